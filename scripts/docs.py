@@ -1,0 +1,64 @@
+"""What `./dev docs` does: check that every link and picture of the Markdown files leads somewhere.
+
+Only links inside the tree are followed; the check needs no network.
+"""
+
+import re
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from urllib.parse import unquote
+
+ROOT = Path(__file__).resolve().parents[1]
+
+FENCE = re.compile(r"^(```|~~~).*?^\1", re.MULTILINE | re.DOTALL)
+LINK = re.compile(r"!?\[[^\]]*\]\(<?([^)\s>]+)>?[^)]*\)")
+HEADING = re.compile(r"^#{1,6}\s+(.+?)\s*#*$", re.MULTILINE)
+SCHEME = re.compile(r"[a-z][a-z0-9+.-]*:", re.IGNORECASE)
+
+
+def main() -> int:
+    """Print a line per broken link; return 1 when there is any."""
+    pages = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md")])
+    faults = [fault for page in pages for fault in faults_of(page)]
+    for fault in faults:
+        print(fault)
+    print(f"{len(pages)} pages, {len(faults)} broken links")
+    return 1 if faults else 0
+
+
+def faults_of(page: Path) -> Iterator[str]:
+    """Yield one line per link of `page` that leads nowhere."""
+    text = page.read_text("utf-8")
+    prose = FENCE.sub(lambda match: "\n" * match[0].count("\n"), text)
+    for match in LINK.finditer(prose):
+        target = match[1]
+        if SCHEME.match(target):
+            continue
+        line = prose.count("\n", 0, match.start()) + 1
+        if fault := fault_of(page, unquote(target)):
+            yield f"{page.relative_to(ROOT)}:{line}: {target}: {fault}"
+
+
+def fault_of(page: Path, target: str) -> str:
+    """Return what is wrong with a link inside the tree, or nothing."""
+    path, _, anchor = target.partition("#")
+    file = (page.parent / path).resolve() if path else page
+    if not file.is_relative_to(ROOT):
+        return "leads out of the tree"
+    if not file.exists():
+        return "no such file"
+    if anchor and file.suffix == ".md" and anchor not in anchors_of(file):
+        return "no such heading"
+    return ""
+
+
+def anchors_of(page: Path) -> set[str]:
+    """Return the anchors that code-hosting sites make of a page's headings."""
+    prose = FENCE.sub("", page.read_text("utf-8"))
+    plain = (re.sub(r"[^\w\- ]", "", heading.lower()) for heading in HEADING.findall(prose))
+    return {heading.strip().replace(" ", "-") for heading in plain}
+
+
+if __name__ == "__main__":
+    sys.exit(main())

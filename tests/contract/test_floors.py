@@ -1,0 +1,107 @@
+"""The floors of the house: a module imports only from floors below its own, siblings never.
+
+An import in a function counts as one at the top, and one for type checkers too: laziness is for
+start-up time, not for going round the house.
+"""
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+
+FLOORS = {
+    "__init__": 7,  # the names for Python users: each is imported on first use, from any floor
+    "cli": 6,
+    "web": 5,
+    "runtime": 4, "simulator": 4, "guard": 4,
+    "config": 3, "protocol": 3, "transports": 3, "packages": 3,
+    "model": 2,
+    "source": 1, "registry": 1, "shipped": 1, "expressions": 1, "patterns": 1,
+    "problems": -1,  # the ground: every error of ours is an UrcError, so all may stand on it
+}  # fmt: skip
+
+# Pure floors do no I/O and have no clock: that is why they can be tested to the last byte.
+PURE = {"model", "protocol"}
+IMPURE = {"asyncio", "socket", "ssl", "threading", "starlette", "uvicorn", "websockets"}
+
+MODULES = [str(path.relative_to(ROOT)) for path in sorted((ROOT / "urc").rglob("*.py"))]
+
+
+def floor_of(part: str) -> int:
+    """Return a part's floor: private modules at the top are the cellar, unknown parts a tower."""
+    return FLOORS.get(part, 0 if part.startswith("_") else 99)
+
+
+def imports_of(path: str, text: str) -> Iterator[tuple[int, str]]:
+    """Yield the line and the absolute dotted name of everything a module imports."""
+    package = Path(path).parts[:-1]
+    for node in ast.walk(ast.parse(text)):
+        if isinstance(node, ast.Import):
+            yield from ((node.lineno, alias.name) for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            above = package[: len(package) - node.level + 1] if node.level else ()
+            base = ".".join((*above, *([node.module] if node.module else [])))
+            yield from ((node.lineno, f"{base}.{alias.name}") for alias in node.names)
+
+
+def faults_of(path: str, text: str) -> Iterator[str]:
+    """Yield one line for each import that the module may not have."""
+    part = Path(path).parts[1].removesuffix(".py")
+    for line, name in imports_of(path, text):
+        top, _, rest = name.partition(".")
+        other = rest.partition(".")[0]
+        if part in PURE and top in IMPURE:
+            yield f"{path}:{line}: {part} is pure and may not import {top}"
+        in_cellar = floor_of(part) == floor_of(other) == 0
+        inside = other in (part, "__version__") or in_cellar
+        # urc/testing is for tests alone: it may import anything, and nothing imports it.
+        if top == "urc" and not inside and part != "testing" and floor_of(other) >= floor_of(part):
+            yield f"{path}:{line}: {part} may not import {other or 'urc'}"
+
+
+@pytest.mark.parametrize("path", MODULES)
+def test_imports_only_from_floors_below(path: str) -> None:
+    """No module reaches up, or across to a sibling."""
+    assert list(faults_of(path, (ROOT / path).read_text("utf-8"))) == []
+
+
+@pytest.mark.parametrize(
+    ("path", "text", "fault"),
+    [
+        (
+            "urc/protocol/a.py",
+            "def f():\n import urc.runtime.hub",
+            "2: protocol may not import runtime",
+        ),
+        ("urc/protocol/a.py", "from urc import config", "1: protocol may not import config"),
+        ("urc/model/a.py", "from ..config import load", "1: model may not import config"),
+        (
+            "urc/model/a.py",
+            "from asyncio import Queue",
+            "1: model is pure and may not import asyncio",
+        ),
+        ("urc/web/a.py", "from urc import connect", "1: web may not import connect"),
+        ("urc/source.py", "import urc.registry", "1: source may not import registry"),
+        ("urc/cli/a.py", "import urc.testing.clock", "1: cli may not import testing"),
+    ],
+)
+def test_a_forbidden_import_is_found(path: str, text: str, fault: str) -> None:
+    """The check sees imports in functions, relative ones and whole packages."""
+    assert list(faults_of(path, text)) == [f"{path}:{fault}"]
+
+
+@pytest.mark.parametrize(
+    ("path", "text"),
+    [
+        ("urc/cli/a.py", "from urc import __version__"),
+        ("urc/protocol/a.py", "from .framing import FRAMINGS\nfrom urc.model.values import Value"),
+        ("urc/patterns.py", "from urc._translator import translate"),
+        ("urc/runtime/a.py", "import asyncio"),
+    ],
+)
+def test_imports_downwards_and_inside_are_allowed(path: str, text: str) -> None:
+    """What the house allows is not reported."""
+    assert list(faults_of(path, text)) == []

@@ -1,0 +1,81 @@
+"""House rules over every file of the tree: no machine's paths, no registries, no giants."""
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+NOT_OURS = {
+    ".git", ".venv", "node_modules", "dist", "build", "__pycache__",
+    ".hypothesis", ".mypy_cache", ".pytest_cache", ".ruff_cache",
+}  # fmt: skip
+MAX_LINES = 400
+MAX_BYTES = 1_000_000
+
+# Written in pieces, so that this file does not find itself.
+FORBIDDEN = re.compile(
+    "|".join(
+        [
+            r"(?<![\w.])/" + r"(?:work|root|home/\w+|Users/\w+|opt)/",
+            r"(?<![\w.])/" + r"tmp/",
+            "registry" + r"\.npmjs\.org",
+            "files" + r"\.pythonhosted\.org",
+            "pypi" + r"\.org/simple",
+            "deb" + r"\.debian\.org",
+        ]
+    )
+)
+
+
+def our_files() -> list[Path]:
+    """Return every file of the tree that people write, in a fixed order."""
+    return [
+        path
+        for path in sorted(ROOT.rglob("*"))
+        if path.is_file() and not NOT_OURS.intersection(path.relative_to(ROOT).parts)
+    ]
+
+
+def texts() -> list[tuple[str, str]]:
+    """Return path and text of every file that is text and not huge (some samples are neither)."""
+    found = []
+    for path in our_files():
+        data = path.read_bytes()
+        if len(data) <= MAX_BYTES and b"\0" not in data:
+            found.append((str(path.relative_to(ROOT)), data.decode("utf-8", "replace")))
+    return found
+
+
+def test_no_file_names_a_machine_or_a_registry() -> None:
+    """A clone works anywhere: no absolute path of a machine, no package registry's address."""
+    found = [
+        f"{path}:{number}: {line.strip()[:100]}"
+        for path, text in texts()
+        for number, line in enumerate(text.splitlines(), 1)
+        if FORBIDDEN.search(line)
+    ]
+    assert found == []
+
+
+def test_python_files_stay_short() -> None:
+    """A module that outgrows 400 lines has two subjects."""
+    lengths = {path: text.count("\n") for path, text in texts() if path.endswith((".py", "dev"))}
+    assert {path: lines for path, lines in lengths.items() if lines > MAX_LINES} == {}
+
+
+@pytest.mark.parametrize("lock", ["package-lock.json", "scripts/chromium/package-lock.json"])
+def test_npm_locks_keep_hashes_and_no_addresses(lock: str) -> None:
+    """Each locked package is pinned by its hash, and comes from whatever registry is configured."""
+    packages = json.loads((ROOT / lock).read_text("utf-8"))["packages"]
+    locked = {name: entry for name, entry in packages.items() if name}
+    assert locked
+    assert [name for name, entry in locked.items() if "resolved" in entry] == []
+    assert [name for name, entry in locked.items() if "integrity" not in entry] == []
+
+
+def test_git_ignores_what_the_tools_make() -> None:
+    """Nothing that a tool makes in the tree can be committed by accident."""
+    ignored = (ROOT / ".gitignore").read_text("utf-8").split()
+    assert [name for name in NOT_OURS - {".git"} if f"{name}/" not in ignored] == []

@@ -1,0 +1,86 @@
+"""A real Chromium for tests: where it is, how it is started, and a page that tells on itself.
+
+Playwright's sync API leaves a running loop in the main thread, which breaks every async test that
+follows in the process. So the tests use its async API, on the one loop of the session.
+"""
+
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
+from typing import Literal
+
+from playwright.async_api import Browser, ConsoleMessage, Error, Page, async_playwright
+
+from scripts.needs import NEEDS
+
+Size = Literal["phone", "tablet", "desktop"]
+Theme = Literal["light", "dark"]
+
+SIZES: dict[Size, tuple[int, int]] = {
+    "phone": (390, 844),
+    "tablet": (820, 1180),
+    "desktop": (1440, 900),
+}
+
+# Containers have neither a sandbox nor a GPU; the rest keeps the browser off the network.
+FLAGS = (
+    "--no-sandbox",
+    "--disable-gpu",
+    "--enable-unsafe-swiftshader",
+    "--disable-dev-shm-usage",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+)
+
+# uPlot asks Intl for the browser's language; without one given it is "en-US@posix", which throws.
+LOCALE = "en-GB"
+
+PAGE_TIMEOUT_MS = 15_000
+
+# Runs before any script of the page: the policy's own report is the only sure sign of a violation.
+WATCH_POLICY = """
+document.addEventListener("securitypolicyviolation", (event) => {
+  console.error(`CSP violation: ${event.violatedDirective} blocked ${event.blockedURI}`);
+});
+"""
+
+
+@asynccontextmanager
+async def running_browser() -> AsyncIterator[Browser]:
+    """Start Chromium headless; it ends with the context."""
+    async with async_playwright() as playwright:
+        browser = await playwright.chromium.launch(
+            executable_path=NEEDS[0].find(), args=FLAGS, timeout=60_000
+        )
+        try:
+            yield browser
+        finally:
+            await browser.close()
+
+
+class PageFaults:
+    """What went wrong in a page that nobody would see: console errors, exceptions, CSP reports."""
+
+    def __init__(self, page: Page) -> None:
+        self.found: list[str] = []
+        self._allowed: list[Callable[[str], bool]] = []
+        page.on("console", self._console)
+        page.on("pageerror", self._page_error)
+
+    def allow(self, is_allowed: Callable[[str], bool]) -> None:
+        """Let the faults pass that a test brings about on purpose, as a server that is killed."""
+        self._allowed.append(is_allowed)
+
+    def unexpected(self) -> list[str]:
+        """Return the faults that no test allowed."""
+        return [text for text in self.found if not any(test(text) for test in self._allowed)]
+
+    def _console(self, message: ConsoleMessage) -> None:
+        if message.type == "error":
+            address = message.location.get("url", "")
+            self.found.append(f"console: {message.text} ({address})")
+
+    def _page_error(self, error: Error) -> None:
+        self.found.append(f"exception: {error.stack or error.message}")

@@ -1,0 +1,84 @@
+"""Fixtures of the tests over real sockets: the browser, its pages, and URC as a process."""
+
+from collections.abc import AsyncIterator, Callable, Iterator
+
+import pytest
+from playwright.async_api import Browser, BrowserContext, Page
+
+from tests.e2e.browser import (
+    LOCALE,
+    PAGE_TIMEOUT_MS,
+    SIZES,
+    WATCH_POLICY,
+    PageFaults,
+    Size,
+    Theme,
+    running_browser,
+)
+from tests.e2e.processes import UrcProcess
+
+
+@pytest.fixture(scope="session")
+async def browser(anyio_backend: str) -> AsyncIterator[Browser]:
+    """One Chromium for the whole session."""
+    async with running_browser() as started:
+        yield started
+
+
+class PageMaker:
+    """Opens pages for one test; call it as ``await new_page(size="phone", theme="dark")``."""
+
+    def __init__(self, browser: Browser) -> None:
+        self._browser = browser
+        self._contexts: list[BrowserContext] = []
+        self._faults: dict[Page, PageFaults] = {}
+
+    async def __call__(self, size: Size = "desktop", theme: Theme = "light") -> Page:
+        """Return an empty page of its own browser context, so that nothing is shared."""
+        width, height = SIZES[size]
+        context = await self._browser.new_context(
+            viewport={"width": width, "height": height},
+            color_scheme=theme,
+            locale=LOCALE,
+            has_touch=size != "desktop",
+        )
+        self._contexts.append(context)
+        await context.add_init_script(WATCH_POLICY)
+        page = await context.new_page()
+        page.set_default_timeout(PAGE_TIMEOUT_MS)
+        self._faults[page] = PageFaults(page)
+        return page
+
+    def allow(self, page: Page, is_allowed: Callable[[str], bool]) -> None:
+        """Let those faults of `page` pass that the test brings about on purpose."""
+        self._faults[page].allow(is_allowed)
+
+    async def close(self) -> list[str]:
+        """Close every page; return the faults that no test allowed."""
+        for context in self._contexts:
+            await context.close()
+        return [fault for faults in self._faults.values() for fault in faults.unexpected()]
+
+
+@pytest.fixture
+async def new_page(browser: Browser) -> AsyncIterator[PageMaker]:
+    """Open pages; the test fails on console errors, page exceptions and CSP violations."""
+    maker = PageMaker(browser)
+    yield maker
+    faults = await maker.close()
+    assert not faults, "the page complained:\n" + "\n".join(faults)
+
+
+@pytest.fixture
+def urc_process() -> Iterator[Callable[..., UrcProcess]]:
+    """Start ``urc …`` as a process of its own; whatever happens, it is gone after the test."""
+    started: list[UrcProcess] = []
+
+    def start(*arguments: str, **environment: str) -> UrcProcess:
+        process = UrcProcess(arguments, environment)
+        started.append(process)
+        return process
+
+    yield start
+    for process in started:
+        process.kill()

@@ -1,0 +1,54 @@
+"""The steps of `./dev test` as processes: how they end, and that nothing outlives them."""
+
+import os
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from scripts.check import Step, run
+
+SLEEP = "import time; time.sleep(60)"
+
+# Takes a lock, hands it to a child that would stay, and goes on as told.
+WITH_CHILD = f"""
+import fcntl, subprocess, sys
+lock = open(sys.argv[1], "w")
+fcntl.flock(lock, fcntl.LOCK_EX)
+subprocess.Popen([sys.executable, "-c", {SLEEP!r}], pass_fds=[lock.fileno()])
+"""
+RELEASE_TIMEOUT_S = 10
+
+
+@pytest.mark.parametrize(
+    ("program", "timeout_s", "fault"),
+    [
+        ("", 30, ""),
+        ("raise SystemExit(3)", 30, "exit code 3"),
+        (SLEEP, 0.2, "not done within 0 s"),
+    ],
+)
+def test_a_step_ends_well_or_says_how(program: str, timeout_s: float, fault: str) -> None:
+    """Exit code 0 is the only success; a hang is a failure too."""
+    step = Step("step", (sys.executable, "-c", program), timeout_s)
+    assert run(step, os.environ).fault == fault
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no process groups to end")
+@pytest.mark.parametrize("ending", ["", SLEEP])
+def test_nothing_outlives_a_step(tmp_path: Path, ending: str) -> None:
+    """A test that is killed leaves no server behind, nor does one that forgets it."""
+    import fcntl  # not on Windows
+
+    step = Step("step", (sys.executable, "-c", WITH_CHILD + ending, str(tmp_path / "lock")), 3)
+    run(step, os.environ)
+    with (tmp_path / "lock").open() as lock:
+        deadline = time.monotonic() + RELEASE_TIMEOUT_S
+        while True:
+            try:
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                return
+            except BlockingIOError:
+                assert time.monotonic() < deadline, "the child of the step still lives"
+                time.sleep(0.05)

@@ -1,0 +1,111 @@
+"""The wheel: what is in it, and that it runs without the checkout."""
+
+import subprocess
+import sys
+import sysconfig
+import venv
+import zipfile
+from pathlib import Path
+
+import pytest
+
+import urc
+
+ROOT = Path(__file__).resolve().parents[2]
+PIP = (sys.executable, "-m", "pip", "--disable-pip-version-check", "--quiet")
+TIMEOUT_S = 80
+
+
+def run(*command: str | Path, cwd: Path) -> str:
+    """Run a program to its end; return what it printed, or fail with all that it said."""
+    done = subprocess.run(
+        [str(part) for part in command],
+        cwd=cwd, capture_output=True, text=True, timeout=TIMEOUT_S, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, f"{command} exited with {done.returncode}:\n{done.stderr}"
+    return done.stdout
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Build the wheel once. npm takes the modules from its cache, so this needs no network."""
+    folder = tmp_path_factory.mktemp("wheel")
+    build = ("wheel", "--no-deps", "--no-build-isolation", "--no-index", "--wheel-dir")
+    run(*PIP, *build, folder, ROOT, cwd=folder)
+    (made,) = folder.glob("*.whl")
+    return made
+
+
+@pytest.fixture(scope="module")
+def installed(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Install the wheel into a new environment that borrows URC's dependencies from this one."""
+    home = tmp_path_factory.mktemp("installed")
+    venv.create(home, with_pip=False, symlinks=True)
+    scripts = sysconfig.get_path("scripts", "venv", vars={"base": str(home)})
+    site = Path(sysconfig.get_path("purelib", "venv", vars={"base": str(home)}))
+    python = Path(scripts) / Path(sys.executable).name
+    run(*PIP, "--python", python, "install", "--no-deps", "--no-index", wheel, cwd=home)
+    # A .pth file is not followed into the .pth files there, so the checkout stays out of sight.
+    (site / "borrowed.pth").write_text(sysconfig.get_path("purelib") + "\n", encoding="utf-8")
+    return Path(scripts)
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "urc/_shipped/schemas/robot.schema.json",
+        "urc/_shipped/robots/puppet.yaml",
+        "urc/_shipped/widgets/battery/widget.yaml",
+        "urc/web/static/tokens.css",
+        "urc/py.typed",
+        "urc_vendor/importmap.json",
+        "urc_vendor/uplot/dist/uPlot.esm.js",
+        "urc_vendor/uplot/LICENSE",
+    ],
+)
+def test_the_wheel_carries(wheel: Path, name: str) -> None:
+    """Everything that a demo without internet and without Node needs is inside."""
+    assert name in zipfile.ZipFile(wheel).namelist()
+
+
+@pytest.mark.parametrize("folder", ["schemas", "robots", "widgets", "templates"])
+def test_the_wheel_carries_every_file_of(wheel: Path, folder: str) -> None:
+    """The data folders are shipped whole."""
+    here = {str(path.relative_to(ROOT)) for path in (ROOT / folder).rglob("*") if path.is_file()}
+    there = {
+        name.removeprefix("urc/_shipped/")
+        for name in zipfile.ZipFile(wheel).namelist()
+        if name.startswith(f"urc/_shipped/{folder}/")
+    }
+    assert here, f"{folder} is empty"
+    assert there == {name.replace("\\", "/") for name in here}
+
+
+def test_the_wheel_carries_nothing_of_the_workshop(wheel: Path) -> None:
+    """Tests, benchmarks and tools stay at home."""
+    tops = {name.split("/")[0] for name in zipfile.ZipFile(wheel).namelist()}
+    assert tops == {"urc", "urc_vendor", f"urc-{urc.__version__}.dist-info"}
+
+
+def test_the_installed_command_runs_elsewhere(installed: Path, tmp_path: Path) -> None:
+    """`urc --version` works in any folder."""
+    assert urc.__version__ in run(installed / "urc", "--version", cwd=tmp_path)
+
+
+def test_the_installed_folders_are_found(installed: Path, tmp_path: Path) -> None:
+    """An installed URC reads its own folders and modules, not those of a checkout."""
+    question = (
+        "from urc.shipped import shipped, vendored\n"
+        "print(shipped('schemas'), vendored(), sep='\\n')"
+    )
+    answer = run(installed / Path(sys.executable).name, "-c", question, cwd=tmp_path)
+    home = installed.parent.resolve()
+    assert [Path(line).resolve().is_relative_to(home) for line in answer.split()] == [True, True]
+    assert all(Path(line).is_dir() for line in answer.split())
+
+
+def test_the_installed_urc_validates_what_it_ships(installed: Path, tmp_path: Path) -> None:
+    """The schemas of the wheel serve `urc validate` outside any checkout."""
+    where = "from urc.shipped import shipped; print(shipped('robots') / 'puppet.yaml')"
+    robot = run(installed / Path(sys.executable).name, "-c", where, cwd=tmp_path).strip()
+    run(installed / "urc", "validate", robot, cwd=tmp_path)

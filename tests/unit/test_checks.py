@@ -1,0 +1,90 @@
+"""`./dev test` and `./dev docs`: what counts as a failure, and how it is told."""
+
+from pathlib import Path
+
+import pytest
+
+from scripts import check, docs
+from scripts.needs import NEEDS, Brought
+
+OK = check.Outcome("lint", "", 0.1)
+BAD = check.Outcome("tests", "exit code 1", 2.0)
+COMPLETE = Brought()
+WITHOUT_NETCAT = Brought(left_out=[need for need in NEEDS if need.name == "netcat"])
+
+
+@pytest.mark.parametrize(
+    ("outcomes", "brought", "not_checked", "ci", "code", "last"),
+    [
+        ([OK], COMPLETE, "", "", 0, "all passed"),
+        ([OK], COMPLETE, "", "true", 0, "all passed"),
+        ([OK, BAD], COMPLETE, "", "", 1, "1 of 2 steps failed: tests"),
+        ([OK], WITHOUT_NETCAT, "", "", 0, "all that ran passed"),
+        ([OK], COMPLETE, "the type check: no Node", "", 0, "all that ran passed"),
+        (
+            [OK],
+            WITHOUT_NETCAT,
+            "",
+            "true",
+            1,
+            "all that ran passed, but with CI=true nothing may be left out",
+        ),
+        (
+            [OK],
+            COMPLETE,
+            "the type check: no Node",
+            "true",
+            1,
+            "all that ran passed, but with CI=true nothing may be left out",
+        ),
+    ],
+)
+def test_the_verdict(
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    outcomes: list[check.Outcome],
+    brought: Brought,
+    not_checked: str,
+    ci: str,
+    code: int,
+    last: str,
+) -> None:
+    """A failed step fails; what was left out fails only with CI=true, and is always told."""
+    monkeypatch.setenv("CI", ci)
+    assert check.summarise(outcomes, brought, not_checked) == code
+    shown = capsys.readouterr().out
+    assert shown.splitlines()[-1] == last
+    assert ("LEFT OUT" in shown) == bool(brought.left_out or not_checked)
+
+
+def test_the_summary_names_the_command_that_brings_what_is_missing(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """One line to paste."""
+    check.summarise([OK], WITHOUT_NETCAT, "")
+    lines = capsys.readouterr().out.splitlines()
+    assert "LEFT OUT  the tests against a client that is not URC: no netcat" in lines
+    assert lines[-2].endswith("apt-get install -y netcat-openbsd")
+
+
+@pytest.mark.parametrize(
+    ("page", "faults"),
+    [
+        ("[a](b.md) and [c](https://example.org/x)", []),
+        ("[a](missing.md)", ["README.md:1: missing.md: no such file"]),
+        ("x\n\n[a](b.md#two-words)", []),
+        ("x\n\n[a](b.md#three)", ["README.md:3: b.md#three: no such heading"]),
+        ("```\n[a](missing.md)\n```\n![p](p.png)", ["README.md:4: p.png: no such file"]),
+        ("[a](../outside.md)", ["README.md:1: ../outside.md: leads out of the tree"]),
+        ("# Here\n[a](#here)", []),
+    ],
+)
+def test_links_lead_somewhere(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, page: str, faults: list[str]
+) -> None:
+    """Links to files and headings of the tree are followed; code blocks are not."""
+    monkeypatch.setattr(docs, "ROOT", tmp_path)
+    (tmp_path / "b.md").write_text("# One\n\n## Two words\n", encoding="utf-8")
+    readme = tmp_path / "README.md"
+    readme.write_text(page, encoding="utf-8")
+    assert list(docs.faults_of(readme)) == faults

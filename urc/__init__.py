@@ -1,0 +1,21 @@
+"""URC: describe a robot in one YAML file and drive it from any browser.
+
+Only names a Python user needs live here, and they are imported on first use: ``urc --version``
+must not pay for a web server.
+"""
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from urc.runtime.scripting import connect, load
+
+__version__ = "0.1.0"
+__all__ = ["__version__", "connect", "load"]
+
+
+def __getattr__(name: str) -> Any:
+    if name in ("connect", "load"):
+        from urc.runtime import scripting
+
+        return getattr(scripting, name)
+    raise AttributeError(f"module 'urc' has no attribute {name!r}")
