@@ -1,0 +1,212 @@
+"""Templates: what they give, what they refuse, and that Jinja agrees where both answer."""
+
+from contextlib import suppress
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from jinja2 import StrictUndefined, TemplateError
+from jinja2.sandbox import SandboxedEnvironment
+
+from urc.expressions import ExpressionError, compile_expression, compile_template
+
+NAMESPACE = {"x": 7, "y": 2.5, "word": "Go", "settings": {"host": "10.0.0.5", "port": 6789}}
+
+SAME_AS_JINJA = [
+    "x + 1",
+    "x - 1",
+    "x * 2 + 1",
+    "x / 2",
+    "x // 2",
+    "x % 4",
+    "2 ** 10",
+    "-x",
+    "+x",
+    "(x | float) / 2",
+    "y | round(1)",
+    "x | abs",
+    "word | upper",
+    "word | lower ~ x",
+    "'  a ' | trim",
+    "word | replace('G', 'N')",
+    "word | length",
+    "x > 3 and y < 3",
+    "x > 3 or nothing",
+    "not x",
+    "3 < x < 9",
+    "'o' in word",
+    "x not in [1, 2]",
+    "'big' if x > 5 else 'small'",
+    "missing is defined",
+    "x is defined",
+    "x is odd",
+    "x is even",
+    "x is none",
+    "missing | default(5)",
+    "settings.port + 1",
+    "settings['host']",
+    "[1, 2, 3][1]",
+    "true",
+    "none is none",
+    "1 if x else 2",
+    "-x | abs",
+    "2 ** -1",
+    "2 ** 3 ** 2",
+    "10 - 4 - 3",
+    "7 % 4 * 2",
+    "1 ~ 2 * 3 ~ 4",
+    "not x > 3",
+    "not not x",
+    "x is not none",
+    "x is not odd",
+    "1 < x",
+    "0x1F + 0b11",
+    "'it\\'s' ~ \"\\n\"",
+    "1.5e3",
+    "1 if false else 2 if false else 3",
+]
+
+
+@pytest.mark.parametrize("source", SAME_AS_JINJA)
+def test_an_expression_gives_what_jinja_gives(source: str) -> None:
+    """The oracle is Jinja's own sandbox."""
+    environment = SandboxedEnvironment(undefined=StrictUndefined)
+    expected = environment.compile_expression(source, undefined_to_none=False)(**NAMESPACE)
+    assert compile_expression(source).evaluate(NAMESPACE) == expected
+
+
+@pytest.mark.parametrize(
+    ("source", "expected"),
+    [
+        ("{{ settings.port }}", 6789),
+        ("{{ x }}", 7),
+        ("{{ x > 3 }}", True),
+        ("v={{ x }}", "v=7"),
+        ("{{ x }}{{ y }}", "72.5"),
+        ("", ""),
+        ("plain", "plain"),
+        ("A\rB\r\nC\n", "A\rB\r\nC\n"),
+        ("{ x } }}", "{ x } }}"),
+        ("{{ '}}' ~ x }}", "}}7"),
+        ("{{ none }}", None),
+        ("a{{ none }}b", "ab"),
+        ("{{ x | hex(4) }}", "0007"),
+        ("{{ y | fixed(3) }}", "2.500"),
+        ("{{ x | pad(3) }}", "007"),
+    ],
+)
+def test_a_template_of_one_expression_keeps_its_type(source: str, expected: object) -> None:
+    """Literal text stays as it is, to the byte: Jinja itself would fold CR and drop the last LF."""
+    value = compile_template(source).evaluate(NAMESPACE)
+    assert value == expected
+    assert type(value) is type(expected)
+
+
+@pytest.mark.parametrize(
+    ("source", "offset", "words"),
+    [
+        ("a {{ b", 2, "never closed"),
+        ("{% for x in y %}", 0, "no statements"),
+        ("{# note #}", 0, "no comments"),
+        ("a {{ b c }}", 7, "'c' is not expected here"),
+        ("{{ x | nope }}", 7, "no filter 'nope'"),
+        ("{{ x | hex(1, 2) }}", 7, "takes 0 to 1 arguments"),
+        ("{{ x() }}", 4, "calls are not part of the language"),
+        ("{{ word[0:1] }}", 9, "':' is not part of an expression"),
+        ("{{ 1 if x }}", 9, "needs an 'else'"),
+        ("{{ x is divisibleby 3 }}", 8, "no test 'divisibleby'"),
+        ("{{ }}", 2, "ends too early"),
+        ("{{ x + }}", 6, "ends too early"),
+        ("{{ (x }}", 5, "')' is expected"),
+        ("{{ [1, 2 }}", 8, "',' is expected"),
+        ("{{ x. }}", 5, "a name is expected after the dot"),
+        ("{{ x and }}", 8, "ends too early"),
+        ("{{ x; y }}", 4, "';' is not part of an expression"),
+        ("{{ 010 }}", 3, "'010' is not a number"),
+        ("{{ 1e999 }}", 3, "too large"),
+        (r"{{ 'a\d' }}", 5, "no escape"),
+        ("{{ 'a }}", 0, "never closed"),
+        ("{{" + "(" * 500 + "1" + ")" * 500 + "}}", 22, "too deeply"),
+        ("{{ " + "-" * 500 + "1 }}", 42, "too deeply"),
+        ("{{ " + "1+" * 500 + "1 }}", 84, "too long"),
+        ("x" * 5000, 0, "at most 4096"),
+    ],
+)
+def test_a_fault_in_a_template_is_found_when_it_is_compiled(
+    source: str, offset: int, words: str
+) -> None:
+    """The offset leads to the character in the document."""
+    with pytest.raises(ExpressionError) as caught:
+        compile_template(source)
+    assert words in str(caught.value)
+    assert caught.value.offset == offset
+
+
+@pytest.mark.parametrize(
+    ("source", "words"),
+    [
+        ("missing", "'missing' has no value here"),
+        ("settings.nope", "'nope' has no value here"),
+        ("'a' * 100000000", "a number is expected"),
+        ("2 ** 99999", "too large"),
+        ("x / 0", "division by zero"),
+        ("'abc' | int", "a whole number is expected"),
+        ("x.__class__", "no part '__class__'"),
+        ("word.upper", "no part 'upper'"),
+        ("word > 3", "not supported"),
+        ("word | replace('', 'x')", "something to look for"),
+    ],
+)
+def test_a_wrong_operand_is_one_clear_line(source: str, words: str) -> None:
+    """Jinja would answer some of these with 0 or a Python attribute."""
+    with pytest.raises(ExpressionError, match=words.replace("'", ".")):
+        compile_expression(source).evaluate(NAMESPACE)
+
+
+def test_the_names_that_a_template_uses_are_known() -> None:
+    """The loader checks them before anything is connected."""
+    template = compile_template("{{ settings.host }}:{{ x + settings['port'] }}")
+    assert template.names == {"settings", "x"}
+    assert template.settings == {"host", "port"}
+    assert not template.is_constant
+    assert compile_template("ping").is_constant
+
+
+@given(st.text(max_size=200))
+def test_any_text_compiles_or_is_refused_in_words(text: str) -> None:
+    """Nothing but ExpressionError leaves, at compile time or later."""
+    for compiler in (compile_template, compile_expression):
+        with suppress(ExpressionError):
+            compiler(text).evaluate(NAMESPACE)
+
+
+ATOMS = st.sampled_from(["1", "2.5", "x", "y", "settings.port", "'a'", "true", "[1, 2]"])
+OPERATORS = ["+", "-", "*", "/", "//", "%", "~", "and", "or", "==", "<", ">=", "in", "not in"]
+
+
+def deeper(inner: st.SearchStrategy[str]) -> st.SearchStrategy[str]:
+    """Expressions made of smaller ones."""
+    return st.one_of(
+        st.tuples(inner, st.sampled_from(OPERATORS), inner).map(" ".join),
+        inner.map("({})".format),
+        inner.map("-{}".format),
+        inner.map("not {}".format),
+        inner.map("{} | abs".format),
+        inner.map("{} is none".format),
+        st.tuples(inner, inner, inner).map(lambda parts: "{} if {} else {}".format(*parts)),
+    )
+
+
+@given(st.recursive(ATOMS, deeper, max_leaves=8))
+def test_whatever_both_can_say_means_the_same_as_in_jinja(source: str) -> None:
+    """Precedence and association are Jinja's; where URC complains, it may be stricter."""
+    try:
+        found = compile_expression(source).evaluate(NAMESPACE)
+    except ExpressionError:
+        return
+    environment = SandboxedEnvironment(undefined=StrictUndefined)
+    try:
+        expected = environment.compile_expression(source, undefined_to_none=False)(**NAMESPACE)
+    except (TemplateError, TypeError, ValueError, ArithmeticError):
+        return  # it folds constants that `or` would not have looked at, and chains no tests
+    assert found == expected

@@ -1,0 +1,213 @@
+"""Operators and filters of expressions: what the compiled Python of a template may call.
+
+Floor 1, private to `urc.expressions`. Every function is total over what documents can hold: it
+returns a value or raises TypeError, ValueError or ArithmeticError with words for a person. None
+turns small operands into a large result.
+"""
+
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
+
+__all__ = ["FILTERS", "SCOPE", "filter_names"]
+
+MAX_TEXT = 65536
+MAX_BITS = 4096
+"""Integers stay below 2**4096."""
+
+
+def _number(value: object) -> Any:
+    if isinstance(value, (int, float)):
+        return value
+    raise TypeError(f"a number is expected, found {_short(value)}")
+
+
+def _short(value: object) -> str:
+    text = repr(value)
+    return text if len(text) <= 40 else text[:37] + "..."
+
+
+def _bounded(value: Any) -> Any:
+    if isinstance(value, int) and value.bit_length() > MAX_BITS:
+        raise ValueError("the number is too large")
+    return value
+
+
+def _add(left: Any, right: Any) -> Any:
+    if isinstance(left, str) and isinstance(right, str):
+        return _joined([left, right])
+    return _bounded(_number(left) + _number(right))
+
+
+def _sub(left: Any, right: Any) -> Any:
+    return _bounded(_number(left) - _number(right))
+
+
+def _mul(left: Any, right: Any) -> Any:
+    return _bounded(_number(left) * _number(right))
+
+
+def _div(left: Any, right: Any) -> Any:
+    return _number(left) / _number(right)
+
+
+def _floordiv(left: Any, right: Any) -> Any:
+    return _number(left) // _number(right)
+
+
+def _mod(left: Any, right: Any) -> Any:
+    return _number(left) % _number(right)
+
+
+def _pow(left: Any, right: Any) -> Any:
+    base, exponent = _number(left), _number(right)
+    if isinstance(base, int) and isinstance(exponent, int):
+        if base.bit_length() * abs(exponent) > MAX_BITS:
+            raise ValueError("the number is too large")
+    elif base < 0:
+        raise ValueError("a negative number has no broken power")
+    return base**exponent
+
+
+def _item(value: Any, key: Any) -> Any:
+    if isinstance(value, Mapping):
+        if key in value:
+            return value[key]
+        raise ValueError(f"{key!r} has no value here")
+    if isinstance(value, (list, tuple)) and isinstance(key, int):
+        if -len(value) <= key < len(value):
+            return value[key]
+        raise ValueError(f"item {key} is asked for, there are {len(value)}")
+    raise TypeError(f"{_short(value)} has no part {key!r}")
+
+
+def _joined(parts: list[str]) -> str:
+    if sum(map(len, parts)) > MAX_TEXT:
+        raise ValueError(f"the text has more than {MAX_TEXT} characters")
+    return "".join(parts)
+
+
+def _join(*parts: Any) -> str:
+    return _joined([part if isinstance(part, str) else _text(part) for part in parts])
+
+
+def _text(value: Any) -> str:
+    return "" if value is None else str(value)
+
+
+def _is_defined(look: Callable[[], Any]) -> bool:
+    try:
+        look()
+    except (KeyError, ValueError, TypeError):
+        return False
+    return True
+
+
+def _default(look: Callable[[], Any], fallback: Any = "") -> Any:
+    try:
+        value = look()
+    except KeyError:
+        return fallback
+    return fallback if value is None else value
+
+
+def _int(value: Any, fallback: Any = None, base: Any = 10) -> Any:
+    try:
+        return int(value, base) if isinstance(value, str) else int(_number(value))
+    except (ValueError, OverflowError):
+        if fallback is None:
+            raise ValueError(f"a whole number is expected, found {_short(value)}") from None
+        return fallback
+
+
+def _float(value: Any, fallback: Any = None) -> Any:
+    try:
+        return float(value) if isinstance(value, str) else float(_number(value))
+    except ValueError:
+        if fallback is None:
+            raise ValueError(f"a number is expected, found {_short(value)}") from None
+        return fallback
+
+
+def _round(value: Any, digits: Any = 0) -> Any:
+    return round(_number(value), int(_number(digits)))
+
+
+def _require_text(value: Any) -> str:
+    if isinstance(value, str):
+        return value
+    raise TypeError(f"text is expected, found {_short(value)}")
+
+
+def _length(value: Any) -> int:
+    if isinstance(value, (str, bytes, list, tuple, Mapping)):
+        return len(value)
+    raise TypeError(f"{_short(value)} has no length")
+
+
+def _replace(value: Any, old: Any, new: Any) -> str:
+    text, found, put = _require_text(value), _require_text(old), _require_text(new)
+    if found == "":
+        raise ValueError("'replace' needs something to look for")
+    if len(text) + text.count(found) * (len(put) - len(found)) > MAX_TEXT:
+        raise ValueError(f"the text has more than {MAX_TEXT} characters")
+    return text.replace(found, put)
+
+
+def _fixed(value: Any, digits: Any) -> str:
+    places = int(_number(digits))
+    if not 0 <= places <= 20:
+        raise ValueError(f"'fixed' takes 0 to 20 digits, found {places}")
+    return f"{_number(value):.{places}f}"
+
+
+def _hex(value: Any, width: Any = 0) -> str:
+    number, places = _number(value), int(_number(width))
+    if not isinstance(number, int) or number < 0:
+        raise ValueError(f"'hex' takes a whole number from 0, found {_short(value)}")
+    if not 0 <= places <= 64:
+        raise ValueError(f"'hex' takes a width from 0 to 64, found {places}")
+    return f"{number:0{places}X}" if places else f"{number:X}"
+
+
+def _pad(value: Any, width: Any, fill: Any = "0") -> str:
+    places, filler = int(_number(width)), _require_text(fill)
+    if not 0 <= places <= 256 or len(filler) != 1:
+        raise ValueError("'pad' takes a width from 0 to 256 and one character")
+    return _text(value).rjust(places, filler)
+
+
+class Filter(NamedTuple):
+    """A filter of the language: its function, and how many arguments follow the subject."""
+
+    function: Callable[..., Any]
+    arity: tuple[int, int]
+
+
+FILTERS: dict[str, Filter] = {
+    "abs": Filter(lambda value: abs(_number(value)), (0, 0)),
+    "default": Filter(_default, (0, 1)),
+    "fixed": Filter(_fixed, (1, 1)),
+    "float": Filter(_float, (0, 1)),
+    "hex": Filter(_hex, (0, 1)),
+    "int": Filter(_int, (0, 2)),
+    "length": Filter(_length, (0, 0)),
+    "lower": Filter(lambda value: _require_text(value).lower(), (0, 0)),
+    "pad": Filter(_pad, (1, 2)),
+    "replace": Filter(_replace, (2, 2)),
+    "round": Filter(_round, (0, 1)),
+    "string": Filter(_text, (0, 0)),
+    "trim": Filter(lambda value: _require_text(value).strip(), (0, 0)),
+    "upper": Filter(lambda value: _require_text(value).upper(), (0, 0)),
+}
+
+_OPERATORS = (_add, _sub, _mul, _div, _floordiv, _mod, _pow, _item, _join, _is_defined)
+
+SCOPE: dict[str, Any] = {"__builtins__": {}}
+"""The only names that compiled Python can reach."""
+SCOPE |= {function.__name__: function for function in _OPERATORS}
+SCOPE |= {f"_filter_{name}": filter_.function for name, filter_ in FILTERS.items()}
+
+
+def filter_names() -> str:
+    """Return the names of all filters, for messages."""
+    return ", ".join(sorted(FILTERS))

@@ -1,0 +1,192 @@
+"""Templates and expressions of documents: Jinja's grammar, compiled to one Python function each.
+
+Floor 1. The forms that have a translation are those in `urc._grammar`, and no others. So there is
+nothing to break out of: no attribute of a Python object is ever read, no loop, no call but the
+filters in `urc._filters`, and no operator that turns a short text into a long one. Literal text is
+kept to the byte, where Jinja would turn CR into LF and drop a final newline. Where Jinja answers
+quietly (``'abc' | int`` is 0), URC raises: a reading must not become a zero by accident.
+
+A template that is exactly one ``{{ expression }}`` keeps the expression's type.
+"""
+
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any, Final
+
+from urc import _filters
+from urc._grammar import Refused, translate
+from urc.problems import UrcError
+
+__all__ = ["ExpressionError", "Template", "compile_expression", "compile_template"]
+
+MAX_SOURCE: Final = 4096
+"""Characters of one template."""
+MAX_OUTPUT: Final = 65536
+"""Characters that one rendering may give."""
+
+
+class ExpressionError(UrcError):
+    """A template that cannot be compiled, or evaluated with the values given.
+
+    `offset` is the 0-based character in the template at which the fault stands.
+    """
+
+    def __init__(self, message: str, offset: int = 0) -> None:
+        super().__init__(message)
+        self.offset = offset
+
+
+class Template:
+    """A compiled template. Equal when its source is; safe to share."""
+
+    __slots__ = ("_function", "is_constant", "names", "python", "settings", "source")
+
+    def __init__(self, source: str, python: str, names: frozenset[str], settings: frozenset[str]):
+        self.source = source
+        """As written in the document."""
+        self.python = python
+        """The Python expression it became, over a mapping `ns`."""
+        self.names = names
+        """Root names it uses: ``settings``, an argument, a signal."""
+        self.settings = settings
+        """Names used as ``settings.NAME``."""
+        self.is_constant = not names
+        self._function: Callable[[Mapping[str, object]], Any] = _function(python)
+
+    def evaluate(self, namespace: Mapping[str, object]) -> Any:
+        """Return the value; raise `ExpressionError` for a missing name or a wrong operand."""
+        try:
+            value = self._function(namespace)
+        except ExpressionError:
+            raise
+        except KeyError as error:
+            raise ExpressionError(f"{error.args[0]!r} has no value here") from None
+        except (ArithmeticError, TypeError, ValueError) as error:
+            raise ExpressionError(f"in {self.source!r}: {error}") from None
+        if isinstance(value, str) and len(value) > MAX_OUTPUT:
+            raise ExpressionError(f"{self.source!r} gives more than {MAX_OUTPUT} characters")
+        return value
+
+    def render(self, namespace: Mapping[str, object]) -> str:
+        """Return the value as text."""
+        return text_of(self.evaluate(namespace))
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Template) and other.python == self.python
+
+    def __hash__(self) -> int:
+        return hash(self.python)
+
+    def __repr__(self) -> str:
+        return f"Template({self.source!r})"
+
+
+def compile_template(text: str) -> Template:
+    """Compile text with ``{{ expression }}`` in it.
+
+    Raises:
+        ExpressionError: with the offset of the fault in `text`.
+    """
+    _check_length(text)
+    parts: list[str] = []
+    names: set[str] = set()
+    settings: set[str] = set()
+    for offset, literal, expression in _split(text):
+        if expression is None:
+            parts.append(repr(literal))
+        else:
+            parts.append(_translate(expression, offset, names, settings))
+    if len(parts) == 1:
+        python = parts[0]
+    elif parts:
+        python = "_join(" + ", ".join(parts) + ")"
+    else:
+        python = "''"
+    return Template(text, python, frozenset(names), frozenset(settings))
+
+
+def compile_expression(text: str) -> Template:
+    """Compile an expression written without braces, as in ``when: battery > 20``."""
+    _check_length(text)
+    if not text.strip():
+        raise ExpressionError("an expression is expected here, found nothing")
+    names: set[str] = set()
+    settings: set[str] = set()
+    python = _translate(text, 0, names, settings)
+    return Template(text, python, frozenset(names), frozenset(settings))
+
+
+def text_of(value: object) -> str:
+    """Return `value` as it goes into text."""
+    return value if isinstance(value, str) else "" if value is None else str(value)
+
+
+def _check_length(text: str) -> None:
+    if len(text) > MAX_SOURCE:
+        raise ExpressionError(f"a template has at most {MAX_SOURCE} characters, found {len(text)}")
+
+
+def _function(python: str) -> Callable[[Mapping[str, object]], Any]:
+    try:
+        code = compile(f"lambda ns: {python}", f"<template {python[:60]}>", "eval")
+    except (SyntaxError, RecursionError, MemoryError):
+        # Brackets of many long sums can add up to more than Python's own parser nests.
+        raise ExpressionError("the expression is nested too deeply") from None
+    # `python` is made of constants and names of SCOPE only: see the warning in `urc._grammar`.
+    function: Callable[[Mapping[str, object]], Any] = eval(code, _filters.SCOPE)  # noqa: S307
+    return function
+
+
+def _split(text: str) -> Iterator[tuple[int, str, str | None]]:
+    """Yield (offset, literal, None) and (offset, "", expression) in order."""
+    position = 0
+    while position < len(text):
+        start = text.find("{", position)
+        while start >= 0 and text[start : start + 2] not in ("{{", "{%", "{#"):
+            start = text.find("{", start + 1)
+        if start < 0:
+            yield position, text[position:], None
+            return
+        if text[start : start + 2] != "{{":
+            word = "statements" if text[start + 1] == "%" else "comments"
+            raise ExpressionError(
+                f"{text[start : start + 2]!r}: templates have no {word}, only {{{{ values }}}}",
+                start,
+            )
+        if start > position:
+            yield position, text[position:start], None
+        end = _closing(text, start)
+        yield start + 2, "", text[start + 2 : end]
+        position = end + 2
+
+
+def _closing(text: str, start: int) -> int:
+    """Return where the ``}}`` stands that closes the ``{{`` at `start`."""
+    quote = ""
+    depth = 0
+    position = start + 2
+    while position < len(text):
+        char = text[position]
+        if quote:
+            if char == "\\":
+                position += 1
+            elif char == quote:
+                quote = ""
+        elif char in "'\"":
+            quote = char
+        elif char == "{":
+            depth += 1
+        elif char == "}":
+            if depth == 0 and text.startswith("}}", position):
+                return position
+            depth -= 1
+        position += 1
+    raise ExpressionError("'{{' is never closed by '}}'", start)
+
+
+def _translate(text: str, offset: int, names: set[str], settings: set[str]) -> str:
+    """Return the Python for one expression; add what it uses to `names` and `settings`."""
+    try:
+        return translate(text, "ns[{!r}]".format, names, settings)
+    except Refused as error:
+        shown = text.strip()
+        raise ExpressionError(f"in {shown!r}: {error}", offset + error.offset) from None

@@ -1,0 +1,111 @@
+"""One finding about a document, and how it is told to a person or a program.
+
+Floor 1. Knows nothing of YAML, robots or the command line. Every pass of the loader, the documents'
+own tests and the widget manifests report through `Problem`; text, JSON and the web editor are
+reporters over the same values.
+"""
+
+from collections.abc import Iterable, Sequence
+from typing import Literal, NamedTuple
+
+__all__ = ["Problem", "ProblemsError", "UrcError", "has_errors", "printable", "to_json", "to_text"]
+
+Severity = Literal["error", "warning"]
+
+_CONTROL = {code: f"\\x{code:02x}" for code in (*range(0x20), *range(0x7F, 0xA0))}
+# Marks that reorder what a terminal shows: a robot's text must not be able to fake a line.
+_CONTROL |= {code: f"\\u{code:04x}" for code in (*range(0x200E, 0x2010), *range(0x2028, 0x202F))}
+_CONTROL |= {code: f"\\u{code:04x}" for code in range(0x2066, 0x206A)}
+
+
+class UrcError(Exception):
+    """A failure that is told to a person in one line. Any other exception is a bug in URC."""
+
+
+class ProblemsError(UrcError):
+    """A document that cannot be used, with every finding of the pass that stopped it."""
+
+    def __init__(self, problems: Sequence["Problem"]) -> None:
+        self.problems = tuple(problems)
+        first = self.problems[0]
+        more = len(self.problems) - 1
+        rest = f" (and {more} more: run 'urc validate')" if more else ""
+        super().__init__(f"{first.headline}{rest}")
+
+
+class Problem(NamedTuple):
+    """One finding: where, what was found, what was expected, what to do."""
+
+    code: str
+    """Names the fault, never the remedy: ``unknown-key``."""
+    message: str
+    """One line: what was found and what was expected."""
+    file: str
+    line: int = 1
+    """1-based."""
+    column: int = 1
+    """1-based, in characters."""
+    end_column: int = 0
+    """1-based, exclusive, on the same line; 0 when only the start is known."""
+    path: str = ""
+    """Where in the document, as ``transports.wire.port``."""
+    hint: str = ""
+    """What to do about it, when something sensible can be said."""
+    source: str = ""
+    """The text of the line, for the caret."""
+    severity: Severity = "error"
+
+    @property
+    def headline(self) -> str:
+        """The one line ``file:line:column: severity CODE path: message``."""
+        where = f" {self.path}" if self.path else ""
+        text = f"{self.file}:{self.line}:{self.column}: {self.severity} {self.code}{where}: "
+        return printable(text + self.message)
+
+
+def printable(text: str) -> str:
+    """Return `text` with control and reordering characters written as escapes."""
+    return text.translate(_CONTROL)
+
+
+def has_errors(problems: Iterable[Problem]) -> bool:
+    """Return whether any finding is more than a warning."""
+    return any(problem.severity == "error" for problem in problems)
+
+
+def to_text(problem: Problem) -> str:
+    """Return the headline, the source line with a caret under the fault, and the hint."""
+    lines = [problem.headline]
+    if problem.source.strip():
+        lines += _excerpt(problem)
+    if problem.hint:
+        lines.append(f"     = {printable(problem.hint)}")
+    return "\n".join(lines)
+
+
+def to_json(problem: Problem) -> dict[str, object]:
+    """Return the finding as a JSON object; the keys are part of the outside contract."""
+    return {
+        "file": problem.file,
+        "line": problem.line,
+        "column": problem.column,
+        "end_column": problem.end_column or problem.column,
+        "severity": problem.severity,
+        "code": problem.code,
+        "path": problem.path,
+        "message": problem.message,
+        "hint": problem.hint,
+    }
+
+
+def _excerpt(problem: Problem, width: int = 96) -> list[str]:
+    """Return the source line, cut to `width` around the fault, and the caret line below it."""
+    start = problem.column - 1
+    end = max(problem.end_column - 1, start + 1)
+    left = max(0, start - width // 2) if len(problem.source) > width else 0
+    shown = problem.source[left : left + width]
+    before, marked = shown[: start - left], shown[start - left : end - left]
+    # Escapes are wider than the character they replace, so the caret is placed after escaping.
+    caret = " " * len(printable(before)) + "^" * max(1, len(printable(marked)))
+    gutter = f"{problem.line:>5} | "
+    return [gutter + printable(shown), " " * (len(gutter) - 2) + "| " + caret]
