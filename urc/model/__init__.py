@@ -1,0 +1,1 @@
+"""What a document means, as frozen values."""

@@ -1,0 +1,40 @@
+"""Widgets: what a folder's manifest says a graphic part takes and gives."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import NamedTuple
+
+from urc.model.values import NOTHING
+
+__all__ = ["Port", "Widget"]
+
+
+class Port(NamedTuple):
+    """An input or output of a widget."""
+
+    name: str
+    types: tuple[str, ...] = ("number",)
+    """Signal types it accepts."""
+    unit: str = ""
+    """Unit it wants; "" takes any."""
+    is_required: bool = True
+    description: str = ""
+
+
+class Widget(NamedTuple):
+    """A widget as its ``widget.yaml`` declares it."""
+
+    name: str
+    """Equal to the folder's name."""
+    title: str
+    folder: Path
+    inputs: Mapping[str, Port] = NOTHING
+    outputs: Mapping[str, Port] = NOTHING
+    options: Mapping[str, object] = NOTHING
+    """JSON Schema ``properties`` of its options."""
+    min_cells: tuple[int, int] = (1, 1)
+    """Columns, rows."""
+    summary: str = ""
+    licence: str = ""
+    """SPDX identifier, as the manifest says."""
+    author: str = ""

@@ -1,0 +1,98 @@
+"""Arguments of a command → checked values → bytes of one frame.
+
+Floor 3, pure. Checks stand here, on the server side of everything: a browser, a script and a test
+go through the same door.
+"""
+
+from collections.abc import Callable, Mapping
+
+from urc.expressions import ExpressionError, Template, text_of
+from urc.model.driver import Argument, Command
+from urc.model.values import Value
+from urc.problems import UrcError, printable
+from urc.protocol.framing import Framing, FramingError
+
+__all__ = ["BadArgument", "Encode", "build_encode", "check_arguments"]
+
+Encode = Callable[[Mapping[str, object]], bytes]
+"""Namespace → bytes on the wire, framing included. Raises `BadArgument`."""
+
+_LARGEST = 1e308
+"""Not-a-number and infinity fail the comparison with it."""
+
+
+class BadArgument(UrcError):
+    """A command that cannot be sent as asked; the message names the argument."""
+
+
+def build_encode(send: Template, framing: Framing, encoding: str) -> Encode:
+    """Return the function that renders `send` and frames it; constants are rendered once."""
+
+    def encode(namespace: Mapping[str, object]) -> bytes:
+        try:
+            return framing.encode(text_of(send.evaluate(namespace)).encode(encoding))
+        except UnicodeEncodeError as error:
+            character = error.object[error.start]
+            raise BadArgument(f"{character!r} cannot be written in {encoding}") from None
+        except (ExpressionError, FramingError) as error:
+            raise BadArgument(str(error)) from None
+
+    if send.is_constant:
+        constant = encode({})
+        return lambda _: constant
+    return encode
+
+
+def check_arguments(command: Command, given: Mapping[str, object]) -> dict[str, Value]:
+    """Return the arguments with defaults filled in, or raise `BadArgument` for the first fault."""
+    for name in given:
+        if name not in command.arguments:
+            known = ", ".join(command.arguments) or "none"
+            raise BadArgument(f"{command.name} has no argument {name!r}; it has: {known}")
+    values: dict[str, Value] = {}
+    for name, argument in command.arguments.items():
+        if name in given:
+            values[name] = _checked(argument, given[name])
+        elif argument.is_required:
+            raise BadArgument(f"{command.name} needs the argument {name!r}")
+        else:
+            values[name] = argument.default
+    return values
+
+
+def _checked(argument: Argument, value: object) -> Value:
+    checked = _typed(argument, value)
+    if argument.choices and checked not in argument.choices:
+        choices = ", ".join(map(repr, argument.choices))
+        raise BadArgument(f"{argument.name}: {_short(value)} is none of {choices}")
+    if isinstance(checked, (int, float)) and not isinstance(checked, bool):
+        if argument.min is not None and checked < argument.min:
+            raise BadArgument(f"{argument.name}: {checked} is below its minimum {argument.min}")
+        if argument.max is not None and checked > argument.max:
+            raise BadArgument(f"{argument.name}: {checked} is above its maximum {argument.max}")
+    return checked
+
+
+def _typed(argument: Argument, value: object) -> Value:
+    match argument.type, value:
+        case "boolean", bool():
+            return value
+        case "integer", int() if not isinstance(value, bool):
+            return value
+        case "integer", float() if value.is_integer():
+            return int(value)
+        case "number", int() | float() if not isinstance(value, bool) and abs(value) <= _LARGEST:
+            return value
+        case "string", str():
+            if not argument.allows_control and value != printable(value):
+                raise BadArgument(
+                    f"{argument.name}: {_short(value)} has control characters, which could end"
+                    " the frame and start another"
+                )
+            return value
+    raise BadArgument(f"{argument.name}: {argument.type} expected, found {_short(value)}")
+
+
+def _short(value: object) -> str:
+    text = repr(value)
+    return text if len(text) <= 40 else text[:37] + "..."

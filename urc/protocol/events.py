@@ -1,0 +1,76 @@
+"""What an engine asks for and tells: the only way anything leaves it."""
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+from urc.model.values import NOTHING, Sample, Value
+
+__all__ = ["Close", "Event", "Failed", "Fault", "Open", "Replied", "Request", "Samples", "Send"]
+
+
+class Request(NamedTuple):
+    """One command to run. One id, one answer: `Replied` or `Failed`."""
+
+    id: int
+    command: str
+    arguments: Mapping[str, Value] = NOTHING
+
+
+class Open(NamedTuple):
+    """Connect this transport: a request waits for it (``connection: per_request``)."""
+
+    transport: str
+
+
+class Send(NamedTuple):
+    """Hand these bytes to the transport, framing included."""
+
+    transport: str
+    data: bytes
+
+
+class Close(NamedTuple):
+    """Close this transport; the engine is done with it or gives it up."""
+
+    transport: str
+    reason: str = ""
+    """"" for the normal end of a per-request connection."""
+
+
+class Samples(NamedTuple):
+    """Readings out of one frame, in the order of the frame."""
+
+    transport: str
+    samples: tuple[Sample, ...]
+
+
+class Replied(NamedTuple):
+    """The request is done. `values` are the reply's groups by name."""
+
+    id: int
+    command: str
+    values: Mapping[str, Value] = NOTHING
+
+
+class Failed(NamedTuple):
+    """The request is over without success."""
+
+    id: int
+    command: str
+    code: str
+    """``timed-out``, ``refused``, ``disconnected``, ``bad-argument``, ``queue-full``,
+    ``unknown-command``."""
+    message: str
+
+
+class Fault(NamedTuple):
+    """Something on the wire was not as declared: counted and shown, never raised."""
+
+    transport: str
+    code: str
+    """``frame-too-long``, ``no-match``, ``bad-value``, ``bad-text``, ``cut-frame``,
+    ``reply-timeout``, ``late-reply``, ``refused``, ``bad-argument``."""
+    message: str
+
+
+Event = Open | Send | Close | Samples | Replied | Failed | Fault
