@@ -1,0 +1,108 @@
+"""Whatever an engine does, the session lives and its timer goes on."""
+
+import asyncio
+from collections.abc import Sequence
+
+import pytest
+
+from urc.protocol.events import Event, Failed, Fault, Replied, Request
+from urc.runtime.dispatcher import MAX_WAITING, Dispatcher
+from urc.runtime.hub import Hub
+from urc.testing.clock import FakeClock
+
+pytestmark = pytest.mark.anyio
+
+
+class BrokenEngine:
+    """Raises in every verb, and always wants to be called at once."""
+
+    def __init__(self) -> None:
+        self.calls = 0
+
+    @property
+    def deadline(self) -> float:
+        return float("-inf")
+
+    def start(self, transport: str, now: float) -> Sequence[Event]:
+        raise ZeroDivisionError
+
+    def closed(self, transport: str, reason: str, now: float) -> Sequence[Event]:
+        raise ZeroDivisionError
+
+    def receive(self, transport: str, data: bytes, now: float) -> Sequence[Event]:
+        raise ZeroDivisionError
+
+    def command(self, request: Request, now: float) -> Sequence[Event]:
+        return []
+
+    def tick(self, now: float) -> Sequence[Event]:
+        self.calls += 1
+        raise ZeroDivisionError
+
+
+class GreedyEngine(BrokenEngine):
+    """Wants to be called at once, again and again, and never has anything to say."""
+
+    def tick(self, now: float) -> Sequence[Event]:
+        self.calls += 1
+        return []
+
+
+class Port:
+    """Records what it is asked for."""
+
+    is_full = False
+
+    def __init__(self) -> None:
+        self.reasons: list[str] = []
+
+    def want_open(self) -> None: ...
+
+    def want_close(self, reason: str) -> None: ...
+
+    def queue(self, data: bytes) -> None: ...
+
+    def heard(self) -> None: ...
+
+    def count(self, fault: Fault) -> None: ...
+
+    def publish(self) -> None: ...
+
+    def hang_up(self, reason: str) -> None:
+        self.reasons.append(reason)
+
+
+async def test_mistake_in_the_engine_is_told_and_the_line_begun_anew() -> None:
+    """Our own bug is one error line, not the end of the session, and the timer goes on slowly."""
+    clock, hub, engine, port = FakeClock(), Hub({}), BrokenEngine(), Port()
+    dispatcher = Dispatcher(engine, hub, clock, {})
+    dispatcher.attach("wire", port)
+    dispatcher.start("wire")
+    expected = "URC made a mistake (ZeroDivisionError): please report it with the log"
+    assert [(note.level, note.text) for note in hub.notes] == [("error", expected)]
+    assert port.reasons == [expected]
+    dispatcher.wind_up()
+    await clock.advance(3)
+    assert 2 <= engine.calls <= 4
+
+
+async def test_engine_that_is_always_due_does_not_hold_the_loop() -> None:
+    """Ticks that leave work overdue come at most a thousand times a second."""
+    clock, engine = FakeClock(), GreedyEngine()
+    dispatcher = Dispatcher(engine, Hub({}), clock, {})
+    dispatcher.wind_up()
+    await clock.advance(0.1)
+    assert 50 < engine.calls <= 102
+
+
+async def test_waiting_commands_are_bounded() -> None:
+    """One more than may wait is refused at once; a stop fails all that wait."""
+    dispatcher = Dispatcher(GreedyEngine(), Hub({}), FakeClock(), {})
+    waiting = [dispatcher.command(Request(n, "ask")) for n in range(MAX_WAITING)]
+    refused = await dispatcher.command(Request(MAX_WAITING, "ask"))
+    assert isinstance(refused, Failed)
+    assert refused.code == "queue-full"
+    dispatcher.stop("over")
+    answers = await asyncio.gather(*waiting)
+    assert {type(answer) for answer in answers} == {Failed}
+    assert not any(isinstance(answer, Replied) for answer in answers)

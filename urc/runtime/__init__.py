@@ -1,0 +1,1 @@
+"""A robot being driven: links, latest values, sessions."""

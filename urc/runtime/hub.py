@@ -1,0 +1,204 @@
+"""The latest value of every signal and the state of every link of one robot.
+
+Floor 4. State is newest-wins: a reader that was away sees the newest reading, never a queue of old
+ones. Notes (faults, state changes) are kept in a bounded list that says how many it dropped. The
+hub is used from one event loop; it has no task and no timer of its own.
+"""
+
+import asyncio
+from collections import deque
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Literal
+
+from urc.model.values import Sample, Signal
+
+__all__ = ["Hub", "LinkState", "LinkStatus", "Note", "Subscription", "Tap", "Traffic"]
+
+LinkState = Literal["idle", "connecting", "live", "silent", "lost"]
+"""idle: nobody asked yet. silent: connected, but an answer is overdue. lost: not connected."""
+
+NOTES_KEPT = 500
+TRAFFIC_KEPT = 1000
+TAP_KEPT = 10_000
+
+
+@dataclass(frozen=True, slots=True)
+class LinkStatus:
+    """What is known of one transport."""
+
+    transport: str
+    state: LinkState
+    address: str
+    since_s: float
+    """Monotonic time at which this state began."""
+    detail: str = ""
+    """Why, in one line, when the state is not good."""
+    attempts: int = 0
+    """Failed attempts since the last good frame."""
+    faults: int = 0
+    """Frames and replies that were not as declared, since the session began."""
+
+
+@dataclass(frozen=True, slots=True)
+class Note:
+    """One line for the log: a fault or a change of state."""
+
+    time_s: float
+    level: Literal["info", "warning", "error"]
+    source: str
+    """Transport or command it is about."""
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Traffic:
+    """Bytes that went over a line; only recorded while somebody watches."""
+
+    time_s: float
+    transport: str
+    direction: Literal["sent", "received"]
+    data: bytes
+
+
+class Subscription:
+    """One reader's place: which revision it has seen, and a wake-up when there is more."""
+
+    def __init__(self, hub: "Hub") -> None:
+        self._hub = hub
+        self._event = asyncio.Event()
+        self.seen = 0
+        """Revision up to which this reader has taken everything."""
+
+    async def changed(self) -> None:
+        """Return when the hub holds something newer than `seen`."""
+        while self._hub.revision <= self.seen:
+            self._event.clear()
+            await self._event.wait()
+
+    def wake(self) -> None:
+        """Let `changed` look again."""
+        self._event.set()
+
+    def take(self) -> list[Sample]:
+        """Return the newest sample of each signal changed since `seen`, and move `seen` up."""
+        samples = self._hub.changed_since(self.seen)
+        self.seen = self._hub.revision
+        return samples
+
+
+class Tap:
+    """Every sample in order, for a reader that must not miss one; bounded, it counts losses."""
+
+    def __init__(self) -> None:
+        self.dropped = 0
+        """Samples lost because the reader was too slow, since the tap was opened."""
+        self._samples: deque[Sample] = deque()
+        self._event = asyncio.Event()
+
+    def put(self, samples: Iterable[Sample]) -> None:
+        """Take samples; the oldest go when there are more than `TAP_KEPT`."""
+        self._samples.extend(samples)
+        while len(self._samples) > TAP_KEPT:
+            self._samples.popleft()
+            self.dropped += 1
+        self._event.set()
+
+    async def take(self) -> list[Sample]:
+        """Wait for samples and return all there are."""
+        while not self._samples:
+            self._event.clear()
+            await self._event.wait()
+        taken = list(self._samples)
+        self._samples.clear()
+        return taken
+
+
+class Hub:
+    """Latest values of one robot, with a revision that grows with every change."""
+
+    def __init__(self, signals: Mapping[str, Signal]) -> None:
+        self.signals = signals
+        self.names = tuple(signals)
+        """Index → signal name; the order of the driver, fixed for the session."""
+        self.index = {name: place for place, name in enumerate(self.names)}
+        self.revision = 0
+        self.links: dict[str, LinkStatus] = {}
+        self.notes: deque[Note] = deque(maxlen=NOTES_KEPT)
+        self.notes_count = 0
+        """Notes ever made; the deque holds the last of them."""
+        self.traffic: deque[Traffic] = deque(maxlen=TRAFFIC_KEPT)
+        self.traffic_count = 0
+        self.traffic_watchers = 0
+        """Traffic is recorded while this is above 0."""
+        self._latest: dict[str, Sample] = {}
+        self._changed: dict[str, int] = {}
+        self._subscriptions: set[Subscription] = set()
+        self._taps: set[Tap] = set()
+
+    def put(self, samples: Iterable[Sample]) -> None:
+        """Take readings; a repeated value counts as a change, because its age is new."""
+        taken = tuple(samples)
+        self.revision += 1
+        for sample in taken:
+            self._latest[sample.signal] = sample
+            self._changed[sample.signal] = self.revision
+        for tap in self._taps:
+            tap.put(taken)
+        self._wake()
+
+    def set_link(self, status: LinkStatus) -> None:
+        """Take the state of one transport."""
+        if self.links.get(status.transport) == status:
+            return
+        self.links[status.transport] = status
+        self.revision += 1
+        self._wake()
+
+    def note(self, note: Note) -> None:
+        """Take one line for the log."""
+        self.notes.append(note)
+        self.notes_count += 1
+        self.revision += 1
+        self._wake()
+
+    def saw(self, traffic: Traffic) -> None:
+        """Take bytes that went over a line."""
+        self.traffic.append(traffic)
+        self.traffic_count += 1
+        self.revision += 1
+        self._wake()
+
+    def latest(self, name: str) -> Sample | None:
+        """Return the newest reading of a signal, or None when there was none."""
+        return self._latest.get(name)
+
+    def changed_since(self, revision: int) -> list[Sample]:
+        """Return the newest reading of every signal that changed after `revision`."""
+        changed = self._changed
+        return [sample for name, sample in self._latest.items() if changed[name] > revision]
+
+    @contextmanager
+    def subscribe(self) -> Iterator[Subscription]:
+        """Give a reader its place for as long as the context lasts."""
+        subscription = Subscription(self)
+        self._subscriptions.add(subscription)
+        try:
+            yield subscription
+        finally:
+            self._subscriptions.discard(subscription)
+
+    @contextmanager
+    def tap(self) -> Iterator[Tap]:
+        """Give a reader every sample from now on, for as long as the context lasts."""
+        tap = Tap()
+        self._taps.add(tap)
+        try:
+            yield tap
+        finally:
+            self._taps.discard(tap)
+
+    def _wake(self) -> None:
+        for subscription in self._subscriptions:
+            subscription.wake()

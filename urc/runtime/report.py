@@ -1,0 +1,125 @@
+"""What people are told of one line: its state, its counts, and a log that cannot be flooded."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+from urc.protocol.events import Fault
+from urc.runtime.clock import Clock
+from urc.runtime.hub import Hub, LinkState, LinkStatus, Note, Traffic
+
+__all__ = ["LinkReport", "NoteLimiter"]
+
+BURST = 4
+"""Notes of one kind that are told at once."""
+REFILL_S = 10.0
+"""After so many seconds one more of that kind is told."""
+KINDS = 64
+"""Kinds told apart; what a foreign engine adds beyond them is counted together."""
+
+
+@dataclass(slots=True)
+class _Kind:
+    tokens: float
+    told_s: float
+    untold: int = 0
+
+
+class NoteLimiter:
+    """A token bucket for each kind of note."""
+
+    def __init__(self, clock: Clock) -> None:
+        self._clock = clock
+        self._kinds: dict[str, _Kind] = {}
+
+    def admit(self, kind: str) -> int | None:
+        """Return how many of this kind were kept back before, or None to keep this one back too."""
+        now = self._clock.now()
+        if kind not in self._kinds:
+            kind = kind if len(self._kinds) < KINDS else ""
+            self._kinds.setdefault(kind, _Kind(BURST, now))
+        known = self._kinds[kind]
+        known.tokens = min(BURST, known.tokens + (now - known.told_s) / REFILL_S)
+        known.told_s = now
+        if known.tokens < 1:
+            known.untold += 1
+            return None
+        known.tokens -= 1
+        untold, known.untold = known.untold, 0
+        return untold
+
+
+class LinkReport:
+    """Keeps what is shown of one transport and puts it into the hub."""
+
+    def __init__(self, transport: str, address: str, hub: Hub, clock: Clock) -> None:
+        self._transport = transport
+        self._address = address
+        self._hub = hub
+        self._clock = clock
+        self._since_s = clock.now()
+        self._detail = ""
+        self._is_changed = True
+        self._limiter = NoteLimiter(clock)
+        self.state: LinkState = "idle"
+        self.attempts = 0
+        """Failed attempts since the last good frame."""
+        self.faults = 0
+        self.publish()
+
+    def show(self, state: LinkState, detail: str = "") -> None:
+        """Take a state; a change of it is noted, a change of its detail is only shown."""
+        if state == self.state and detail == self._detail:
+            return
+        if state != self.state:
+            self.state = state
+            self._since_s = self._clock.now()
+            self._note_state(state, detail)
+        self._detail = detail
+        self._is_changed = True
+
+    def fail(self, state: LinkState, detail: str) -> None:
+        """Take a failed attempt."""
+        self.attempts += 1
+        self._is_changed = True
+        self.show(state, detail)
+
+    def count(self, fault: Fault) -> None:
+        """Count something that was not as declared, and tell of it now and then."""
+        self.faults += 1
+        self._is_changed = True
+        self.note("warning", f"fault {fault.code}", f"{fault.code}: {fault.message}")
+
+    def note(self, level: Literal["info", "warning", "error"], kind: str, text: str) -> None:
+        """Put a line into the log, unless there have been too many of its kind."""
+        untold = self._limiter.admit(kind)
+        if untold is None:
+            return
+        more = f" (and {untold} more like it)" if untold else ""
+        self._hub.note(Note(self._clock.now(), level, self._transport, text + more))
+
+    def saw(self, direction: Literal["sent", "received"], data: bytes) -> None:
+        """Record traffic while somebody watches."""
+        if self._hub.traffic_watchers:
+            self._hub.saw(Traffic(self._clock.now(), self._transport, direction, data))
+
+    def publish(self) -> None:
+        """Put the state into the hub, if anything about it has changed."""
+        if not self._is_changed:
+            return
+        self._is_changed = False
+        self._hub.set_link(
+            LinkStatus(
+                transport=self._transport,
+                state=self.state,
+                address=self._address,
+                since_s=self._since_s,
+                detail=self._detail,
+                attempts=self.attempts,
+                faults=self.faults,
+            )
+        )
+
+    def _note_state(self, state: LinkState, detail: str) -> None:
+        level: Literal["info", "warning"] = "warning" if state in ("silent", "lost") else "info"
+        why = f": {detail}" if detail else ""
+        self.note(level, f"state {state}", f"{self._address} is {state}{why}")

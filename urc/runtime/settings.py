@@ -1,0 +1,190 @@
+"""What the operator fills in, from text to typed values.
+
+Used by every verb that opens a robot; knows no network and no event loop.
+"""
+
+import math
+import re
+from collections.abc import Mapping
+from difflib import get_close_matches
+from ipaddress import ip_address
+from pathlib import Path
+from types import MappingProxyType
+
+from urc.expressions import ExpressionError, Template
+from urc.model.driver import TransportSpec
+from urc.model.profile import Profile, Setting
+from urc.model.values import Value
+from urc.problems import UrcError, printable
+
+__all__ = ["environment_name", "options_of", "parse_setting", "resolve_settings"]
+
+_INTEGER = re.compile(r"[+-]?[0-9]{1,18}")
+_NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]{1,3})?")
+_HOST_LABEL = re.compile(r"(?!-)[A-Za-z0-9_-]{1,63}(?<!-)")
+_TRUE, _FALSE = ("true", "yes", "on", "1"), ("false", "no", "off", "0")
+_LONGEST = 4096
+"""Characters of one setting."""
+_NO_ENVIRONMENT: Mapping[str, str] = MappingProxyType({})
+
+
+def environment_name(name: str) -> str:
+    """Return the environment variable of a setting: ``robot-host`` → ``URC_SET_ROBOT_HOST``."""
+    return "URC_SET_" + name.upper().replace("-", "_")
+
+
+def resolve_settings(
+    profile: Profile,
+    given: Mapping[str, str],
+    environ: Mapping[str, str] = _NO_ENVIRONMENT,
+    *,
+    allows_any_port: bool = False,
+) -> tuple[dict[str, Value], tuple[str, ...]]:
+    """Return the value of every setting that has one, and the names of those that have none.
+
+    Args:
+        profile: whose settings.
+        given: name → text, from ``--set``; wins over everything.
+        environ: the environment; ``URC_SET_NAME`` wins over the default.
+        allows_any_port: port 0 may be given, for a server that lets the system choose.
+
+    Raises:
+        UrcError: a name that is no setting, or a text that is no value of its type.
+    """
+    for name in given:
+        if name not in profile.settings:
+            raise UrcError(_unknown(name, profile))
+    values: dict[str, Value] = {}
+    for name, setting in profile.settings.items():
+        text = given.get(name)
+        source = f"--set {name}"
+        if text is None:
+            source = environment_name(name)
+            text = environ.get(source)
+        if text is None:
+            values[name] = setting.default
+        elif allows_any_port and setting.type == "port" and text.strip() == "0":
+            values[name] = 0
+        else:
+            try:
+                values[name] = parse_setting(setting, text)
+            except UrcError as problem:
+                raise UrcError(f"{source}: {problem}") from problem
+    missing = tuple(name for name, value in values.items() if value is None)
+    return {name: value for name, value in values.items() if value is not None}, missing
+
+
+def parse_setting(setting: Setting, text: str) -> Value:
+    """Return the value that `text` means for `setting`.
+
+    Raises:
+        UrcError: one line: what was found and what was expected. A secret is not repeated.
+    """
+    if len(text) > _LONGEST:
+        raise UrcError(f"is {len(text)} characters long; {_LONGEST} are allowed")
+    found = "that" if setting.is_secret else repr(text)
+    match setting.type:
+        case "string":
+            return text
+        case "host":
+            return _host(text, found)
+        case "port":
+            return _integer(text, found, low=1, high=65535, kind="a port")
+        case "integer":
+            return _integer(text, found, setting.min, setting.max)
+        case "number":
+            return _number(text, found, setting)
+        case "boolean":
+            return _boolean(text, found)
+        case "choice":
+            return _choice(setting, text, found)
+        case "path":
+            if not text.strip() or "\0" in text:
+                raise UrcError(f"{found} is not a path")
+            return str(Path(text).expanduser())
+
+
+def options_of(spec: TransportSpec, settings: Mapping[str, Value]) -> dict[str, Value]:
+    """Return the options of a transport, its templates evaluated with ``settings``.
+
+    Raises:
+        UrcError: a template needs a setting that has no value, or fails on the one it has.
+    """
+    options: dict[str, Value] = {}
+    for name, option in spec.options.items():
+        if not isinstance(option, Template):
+            options[name] = option
+            continue
+        try:
+            options[name] = option.evaluate({"settings": settings})
+        except ExpressionError as problem:
+            raise UrcError(f"transports.{spec.name}.{name}: {problem}") from problem
+    return options
+
+
+def _host(text: str, found: str) -> str:
+    name = text.strip()
+    bare = name[1:-1] if name.startswith("[") and name.endswith("]") else name
+    try:
+        ip_address(bare)
+    except ValueError:
+        labels = name.removesuffix(".").split(".")
+        looks_numeric = all(label.isdigit() for label in labels)
+        if len(name) > 253 or looks_numeric or not all(map(_HOST_LABEL.fullmatch, labels)):
+            raise UrcError(f"{found} is not a host name or an address") from None
+        return name
+    return bare
+
+
+def _integer(
+    text: str, found: str, low: float | None, high: float | None, kind: str = "a whole number"
+) -> int:
+    if not _INTEGER.fullmatch(text.strip()) or not _is_within(int(text), low, high):
+        raise UrcError(f"{found} is not {kind}{_between(low, high)}")
+    return int(text)
+
+
+def _number(text: str, found: str, setting: Setting) -> float:
+    low, high = setting.min, setting.max
+    is_number = _NUMBER.fullmatch(text.strip()) and math.isfinite(float(text))
+    if not is_number or not _is_within(float(text), low, high):
+        raise UrcError(f"{found} is not a number{_between(low, high)}")
+    return float(text)
+
+
+def _boolean(text: str, found: str) -> bool:
+    word = text.strip().lower()
+    if word not in _TRUE + _FALSE:
+        raise UrcError(f"{found} is neither true nor false")
+    return word in _TRUE
+
+
+def _choice(setting: Setting, text: str, found: str) -> str:
+    if text not in setting.choices:
+        raise UrcError(f"{found} is not one of {', '.join(setting.choices)}")
+    return text
+
+
+def _is_within(number: float, low: float | None, high: float | None) -> bool:
+    return (low is None or number >= low) and (high is None or number <= high)
+
+
+def _between(low: float | None, high: float | None) -> str:
+    if low is not None and high is not None:
+        return f" from {low:.15g} to {high:.15g}"
+    if low is not None:
+        return f" of at least {low:.15g}"
+    if high is not None:
+        return f" of at most {high:.15g}"
+    return ""
+
+
+def _unknown(name: str, profile: Profile) -> str:
+    close = get_close_matches(name, profile.settings, n=1)
+    if close:
+        hint = f"; did you mean {close[0]!r}?"
+    elif profile.settings:
+        hint = f"; it has {', '.join(profile.settings)}"
+    else:
+        hint = "; it has none"
+    return f"{profile.name} has no setting {printable(repr(name))}{hint}"

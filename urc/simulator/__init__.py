@@ -1,0 +1,1 @@
+"""Emulated robots, from the same profile that drives the real one."""

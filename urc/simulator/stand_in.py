@@ -1,0 +1,37 @@
+"""A profile whose lines lead to its own emulated robot, on ports that happen to be free.
+
+Floor 4. `urc demo` and `urc serve --simulate` use it; `urc simulate` keeps the real ports instead.
+"""
+
+from collections.abc import AsyncIterator, Mapping
+from contextlib import asynccontextmanager
+
+from urc.model.driver import ScalarOrTemplate
+from urc.model.profile import Profile
+from urc.model.values import Value
+from urc.simulator.server import serve
+
+__all__ = ["stand_in"]
+
+
+@asynccontextmanager
+async def stand_in(profile: Profile, settings: Mapping[str, Value]) -> AsyncIterator[Profile]:
+    """Emulate `profile` for as long as the context lasts; give the profile that leads there.
+
+    Raises:
+        UrcError: a transport that cannot be emulated.
+    """
+    anywhere = _redirected(profile, {name: {"port": 0} for name in profile.driver.transports})
+    async with serve(anywhere, settings) as listening:
+        places: dict[str, dict[str, ScalarOrTemplate]] = {
+            name: {"host": host, "port": port} for name, (host, port) in listening.items()
+        }
+        yield _redirected(profile, places)
+
+
+def _redirected(profile: Profile, options: Mapping[str, Mapping[str, ScalarOrTemplate]]) -> Profile:
+    transports = {
+        name: spec._replace(options={**spec.options, **options[name]})
+        for name, spec in profile.driver.transports.items()
+    }
+    return profile._replace(driver=profile.driver._replace(transports=transports))

@@ -1,0 +1,1 @@
+"""Public fakes for tests of URC and of third-party transports and widgets."""

@@ -1,0 +1,69 @@
+"""A clock that moves only when a test says so."""
+
+import asyncio
+import heapq
+from collections.abc import Callable
+from itertools import count
+
+__all__ = ["FakeClock", "settle"]
+
+_TURNS = 30
+"""Turns of the loop in which everything that is ready has run; no chain in URC is as long."""
+
+
+async def settle() -> None:
+    """Let every task that is ready run until it waits."""
+    for _ in range(_TURNS):
+        await asyncio.sleep(0)
+
+
+class _FakeAlarm:
+    def __init__(self, action: Callable[[], None]) -> None:
+        self.action: Callable[[], None] | None = action
+
+    def cancel(self) -> None:
+        self.action = None
+
+
+class FakeClock:
+    """Stands in for `urc.runtime.clock.LoopClock`; starts at `start_s`."""
+
+    def __init__(self, start_s: float = 1000.0) -> None:
+        self._now = start_s
+        self._due: list[tuple[float, int, _FakeAlarm]] = []
+        self._numbers = count()
+
+    def now(self) -> float:
+        """Return the time that `advance` has reached."""
+        return self._now
+
+    async def sleep(self, seconds: float) -> None:
+        """Return once `advance` has passed `seconds` from now; at once when there are none."""
+        if seconds <= 0:
+            await asyncio.sleep(0)
+            return
+        done = asyncio.Event()
+        alarm = self.call_at(self._now + seconds, done.set)
+        try:
+            await done.wait()
+        finally:
+            alarm.cancel()
+
+    def call_at(self, time_s: float, action: Callable[[], None]) -> _FakeAlarm:
+        """Make `action` run when `advance` reaches `time_s`."""
+        alarm = _FakeAlarm(action)
+        heapq.heappush(self._due, (time_s, next(self._numbers), alarm))
+        return alarm
+
+    async def advance(self, seconds: float) -> None:
+        """Move on, stopping at everything that falls due, in order, and letting it take effect."""
+        end_s = self._now + seconds
+        await settle()
+        while self._due and self._due[0][0] <= end_s:
+            due_s, _, alarm = heapq.heappop(self._due)
+            if alarm.action is not None:
+                self._now = max(self._now, due_s)
+                alarm.action()
+                await settle()
+        self._now = end_s
+        await settle()

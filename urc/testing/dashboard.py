@@ -1,0 +1,112 @@
+"""A robot for the dashboard without a robot: profiles with widgets, and a session that is a hub."""
+
+from collections.abc import AsyncIterator, Callable, Mapping, Sequence
+from contextlib import AbstractAsyncContextManager, asynccontextmanager
+from pathlib import Path
+
+from urc.model.driver import Driver, TransportSpec
+from urc.model.interface import Grid, Interface, Slot, WidgetUse
+from urc.model.profile import Profile, Setting
+from urc.model.values import Alarm, Limits, Sample, Signal, Value
+from urc.model.widget import Port, Widget
+from urc.protocol.events import Replied
+from urc.runtime.clock import Clock, LoopClock
+from urc.runtime.hub import Hub, LinkState, LinkStatus, Note
+from urc.shipped import shipped
+
+__all__ = ["FakeRobot", "dashboard_profile", "plain_widget"]
+
+BATTERY = Signal(
+    "battery",
+    "integer",
+    unit="%",
+    min=0,
+    max=100,
+    limits=Limits(lolo=10, low=20),
+    stale_after_s=3.0,
+)
+
+
+def plain_widget(name: str, inputs: Sequence[str], folder: Path | None = None) -> Widget:
+    """Return a widget of the shipped folder `name`, or of `folder`, that takes anything."""
+    types = ("integer", "number", "boolean", "string")
+    ports = {each: Port(each, types) for each in inputs}
+    return Widget(name, name.title(), folder or shipped("widgets") / name, ports)
+
+
+def dashboard_profile(
+    *,
+    name: str = "puppet",
+    signals: Mapping[str, Signal] | None = None,
+    uses: Sequence[WidgetUse] = (),
+    widgets: Sequence[Widget] = (),
+    settings: Mapping[str, Setting] | None = None,
+) -> Profile:
+    """Return a profile whose slots stand side by side; by default the puppet's one battery."""
+    given = uses or (WidgetUse("battery", "battery", {"level": "battery"}),)
+    known = {each.name: each for each in widgets}
+    for use in given:
+        known.setdefault(use.widget, plain_widget(use.widget, tuple(use.inputs)))
+    slots = tuple(Slot(use.slot, 0, column) for column, use in enumerate(given))
+    grid = Grid(1, len(slots), slots)
+    return Profile(
+        name=name,
+        title=name.title(),
+        file=f"{name}.yaml",
+        summary="A robot that is not there.",
+        settings={"host": Setting("host", "host", default="127.0.0.1")}
+        if settings is None
+        else settings,
+        driver=Driver({"wire": TransportSpec("wire", "tcp")}, signals or {"battery": BATTERY}),
+        slots={use.slot: use for use in given},
+        interfaces={"default": Interface("default", "Default", {"wide": grid})},
+        widgets=known,
+    )
+
+
+class FakeRobot:
+    """Plays a session's part; the test says what the robot says. Counts how often it was opened."""
+
+    def __init__(self, profile: Profile, clock: Clock | None = None) -> None:
+        self.profile = profile
+        self.clock: Clock = clock or LoopClock()
+        self.hub = Hub(profile.driver.signals)
+        self.opened = 0
+        self.is_open = False
+        self.commands: list[tuple[str, dict[str, Value]]] = []
+        self.on_command: Callable[[str, Mapping[str, Value]], Mapping[str, Value]] | None = None
+        """Makes a command's reply, or raises what the session would; None: nothing is returned."""
+
+    def open(self) -> AbstractAsyncContextManager["FakeRobot"]:
+        """Return the context in which the robot is connected."""
+        return self._open()
+
+    @asynccontextmanager
+    async def _open(self) -> AsyncIterator["FakeRobot"]:
+        self.opened += 1
+        self.is_open = True
+        self.hub = Hub(self.profile.driver.signals)
+        self.link("live")
+        try:
+            yield self
+        finally:
+            self.is_open = False
+
+    async def command(self, name: str, arguments: Mapping[str, Value]) -> Replied:
+        """Keep the command, and answer as the test says."""
+        self.commands.append((name, dict(arguments)))
+        values = self.on_command(name, arguments) if self.on_command else {}
+        return Replied(len(self.commands), name, values)
+
+    def say(self, signal: str, value: Value, *, alarm: Alarm = "", age_s: float = 0.0) -> None:
+        """Let a reading arrive that was measured `age_s` ago."""
+        self.hub.put([Sample(signal, value, self.clock.now() - age_s, alarm)])
+
+    def link(self, state: LinkState, detail: str = "") -> None:
+        """Set the state of the one line."""
+        now_s = self.clock.now()
+        self.hub.set_link(LinkStatus("wire", state, "tcp 127.0.0.1:6789", now_s, detail))
+
+    def tell(self, text: str) -> None:
+        """Write a line into the log."""
+        self.hub.note(Note(self.clock.now(), "info", "wire", text))

@@ -1,0 +1,41 @@
+"""One sample of traffic, cut in every way the network may cut it."""
+
+from collections.abc import Callable, Sequence
+from typing import Protocol, TypeVar
+
+__all__ = ["feed_three_ways"]
+
+Frame = TypeVar("Frame", covariant=True)
+
+
+class Feedable(Protocol[Frame]):
+    """Anything that cuts bytes into frames."""
+
+    def feed(self, data: bytes) -> Sequence[Frame]:
+        """Return the frames that `data` completes."""
+
+
+def feed_three_ways(
+    decoder: Callable[[], Feedable[Frame]], data: bytes, trailing: bytes = b"\x00trailing"
+) -> list[Frame]:
+    """Feed `data` whole, byte by byte, and with `trailing` bytes after it; return the frames.
+
+    Args:
+        decoder: makes a fresh decoder for each way.
+        data: ends at the end of a frame.
+        trailing: the begin of a frame that never ends.
+
+    Raises:
+        AssertionError: two ways gave different frames.
+    """
+    whole = list(decoder().feed(data))
+    by_byte: list[Frame] = []
+    dripping = decoder()
+    for place in range(len(data)):
+        by_byte += dripping.feed(data[place : place + 1])
+    if by_byte != whole:
+        raise AssertionError(f"byte by byte gave {by_byte!r}, whole gave {whole!r}")
+    trailed = list(decoder().feed(data + trailing))
+    if trailed != whole:
+        raise AssertionError(f"with trailing bytes gave {trailed!r}, whole gave {whole!r}")
+    return whole

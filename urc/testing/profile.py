@@ -1,0 +1,94 @@
+"""A robot of one line, made without a document."""
+
+from urc.expressions import compile_template
+from urc.model.driver import (
+    Argument,
+    Backoff,
+    Command,
+    Driver,
+    FramingSpec,
+    Message,
+    Poll,
+    Reply,
+    Timeouts,
+    TransportSpec,
+)
+from urc.model.profile import Profile, Setting, SimulatorRule
+from urc.model.values import Signal
+from urc.patterns import compile_pattern
+
+__all__ = ["line_profile"]
+
+QUESTION = "Give me the battery %"
+
+
+def line_profile(
+    *,
+    is_per_request: bool = False,
+    every_s: float | None = 1.0,
+    timeouts: Timeouts | None = None,
+    backoff: Backoff | None = None,
+    transport: str = "tcp",
+    max_bytes: int = 65536,
+) -> Profile:
+    """Return a profile like the puppet's: line feeds, one number signal, one poll, two commands.
+
+    Args:
+        is_per_request: each request has its own connection.
+        every_s: period of the poll; None for a robot that only listens.
+        timeouts: of the one transport, named ``wire``.
+        backoff: of the one transport.
+        transport: row of the transports table.
+        max_bytes: longest frame.
+    """
+    battery = Reply(compile_pattern(r"^(?P<battery>\d+)$"))
+    wire = TransportSpec(
+        name="wire",
+        type=transport,
+        options={
+            "host": compile_template("{{ settings.host }}"),
+            "port": compile_template("{{ settings.port }}"),
+        },
+        connection="per_request" if is_per_request else "persistent",
+        framing=FramingSpec("delimiter", {"tx": b"\n", "rx": b"\n"}, max_bytes),
+        timeouts=timeouts or Timeouts(),
+        backoff=backoff or Backoff(),
+    )
+    commands = {
+        "ask": Command("ask", "wire", compile_template(QUESTION), reply=battery),
+        "say": Command(
+            "say",
+            "wire",
+            compile_template("say {{ word }}"),
+            arguments={"word": Argument("word", "string")},
+        ),
+    }
+    polls = (
+        ()
+        if every_s is None
+        else (Poll("polls.0", "wire", every_s, compile_template(QUESTION), battery),)
+    )
+    driver = Driver(
+        transports={"wire": wire},
+        signals={
+            "battery": Signal("battery", "integer", unit="%", stale_after_s=3.0),
+            "note": Signal("note", "string", stale_after_s=3.0),
+        },
+        commands=commands,
+        messages={"note": Message("note", "wire", compile_pattern(r"^note (?P<note>.*)$"))},
+        polls=polls,
+    )
+    rule = SimulatorRule(
+        "wire", compile_pattern(f"^{QUESTION}$"), compile_template("{{ (now | int) % 100 }}")
+    )
+    return Profile(
+        name="liner",
+        title="Liner",
+        file="liner.yaml",
+        settings={
+            "host": Setting("host", "host", default="127.0.0.1"),
+            "port": Setting("port", "port"),
+        },
+        driver=driver,
+        simulator=(rule,),
+    )

@@ -1,0 +1,1 @@
+"""One module a transport: the only place where sockets live."""
