@@ -1,0 +1,93 @@
+"""Files, read with care: never a directory, a pipe, or more than was asked for.
+
+Floor 0, private to `urc.source`.
+"""
+
+import os
+import stat
+
+from urc.problems import Problem, ProblemsError
+
+__all__ = ["read_bytes", "refused", "similar_file", "too_large"]
+
+
+def read_bytes(path: str, most: int) -> bytes:
+    """Return what an ordinary file holds.
+
+    Raises:
+        ProblemsError: it cannot be read, or holds more than `most` bytes.
+    """
+    try:
+        status = os.stat(path)
+        if stat.S_ISDIR(status.st_mode):
+            raise refused(
+                path,
+                "is-directory",
+                "this is a directory, a document is a file",
+                _documents_in(path),
+            )
+        # Opening a pipe or a device could wait for ever.
+        if not stat.S_ISREG(status.st_mode):
+            raise refused(path, "not-a-file", "this is not an ordinary file")
+        if status.st_size > most:
+            raise refused(path, "too-large", too_large(most))
+        with open(path, "rb") as file:
+            content = file.read(most + 1)
+    except FileNotFoundError:
+        raise refused(path, "no-such-file", "there is no such file", _similar(path)) from None
+    except NotADirectoryError:
+        raise refused(path, "no-such-file", "a part of this path is not a directory") from None
+    except PermissionError:
+        raise refused(
+            path,
+            "not-readable",
+            "permission to read this file is denied",
+            "give it back with 'chmod u+r'",
+        ) from None
+    except OSError as error:
+        reason = (error.strerror or str(error)).lower()
+        raise refused(path, "not-readable", f"this file cannot be read: {reason}") from None
+    except ValueError:
+        raise refused(path, "not-readable", "this is no name of a file") from None
+    if len(content) > most:
+        raise refused(path, "too-large", too_large(most))
+    return content
+
+
+def too_large(most: int) -> str:
+    """Say what the largest size is."""
+    return f"a document has at most {most // 1024} KiB"
+
+
+def refused(file: str, code: str, message: str, hint: str = "") -> ProblemsError:
+    """Return the error for a file that is refused as a whole."""
+    return ProblemsError([Problem(code, message, file, hint=hint)])
+
+
+def _documents_in(folder: str) -> str:
+    try:
+        names = sorted(name for name in os.listdir(folder) if name.endswith((".yaml", ".yml")))
+    except OSError:
+        return ""
+    return f"name one of its documents, such as {os.path.join(folder, names[0])}" if names else ""
+
+
+def similar_file(path: str) -> str:
+    """Return the name in the same folder that is nearly that of `path`, or ""."""
+    from difflib import get_close_matches
+
+    folder, name = os.path.split(path)
+    stem, ending = os.path.splitext(name)
+    try:
+        stems = [
+            one for one, end in map(os.path.splitext, os.listdir(folder or ".")) if end == ending
+        ]
+    except (OSError, ValueError):
+        return ""
+    near = get_close_matches(stem, stems[:1000], 1)
+    return near[0] + ending if near else ""
+
+
+def _similar(path: str) -> str:
+    name = similar_file(path)
+    return f"did you mean '{os.path.join(os.path.dirname(path), name)}'?" if name else ""

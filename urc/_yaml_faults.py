@@ -1,0 +1,312 @@
+"""What a YAML parser says when it gives up → what a person can do about it.
+
+Floor 0, private to `urc.source`. Both of PyYAML's parsers are understood (the C one and the pure
+one): their wording differs, so the fault is told by the text at the place wherever that is enough.
+"""
+
+import re
+from collections.abc import Callable, Sequence
+from typing import Final, NamedTuple
+
+import yaml
+
+__all__ = ["UNQUOTED_TEMPLATE", "Fault", "advice", "explain"]
+
+_QUOTED_VALUE = re.compile(r"""^(?:[^'"]*?[:\-,{\[]\s+|\s*)(?P<value>'[^']*'|"[^"]*")\s*\S""")
+_LAST_ALIAS = re.compile(r"(?:^|[\s:,\[{])(?P<alias>\*[\w-]+)\s*$")
+UNQUOTED_TEMPLATE: Final = "a value that starts with '{{' must be quoted"
+_RESERVED: Final = "%@`"
+_SIGN: Final = "{!r} at the start of a value is a sign of YAML, not text"
+
+
+class Fault(NamedTuple):
+    """One syntax fault; `line` and `column` are 0-based, as the parser counts."""
+
+    line: int
+    column: int
+    code: str
+    message: str
+    hint: str = ""
+
+
+class _Clue(NamedTuple):
+    """What the parser said, and the text it was looking at."""
+
+    said: str
+    context: str
+    line: int
+    column: int
+    opened_line: int
+    opened_column: int
+    lines: Sequence[str]
+
+    @property
+    def text(self) -> str:
+        return self._line(self.line)
+
+    @property
+    def opened_text(self) -> str:
+        return self._line(self.opened_line)
+
+    def _line(self, number: int) -> str:
+        return self.lines[number] if number < len(self.lines) else ""
+
+
+def explain(error: yaml.YAMLError, lines: Sequence[str]) -> Fault:
+    """Return the fault that `error` means, at the place that a person would look at."""
+    mark = getattr(error, "problem_mark", None)
+    opened = getattr(error, "context_mark", None) or mark
+    said = str(getattr(error, "problem", None) or error).splitlines()[0]
+    context = str(getattr(error, "context", None) or "")
+    line, column = (mark.line, mark.column) if mark else (0, 0)
+    from_line, from_column = (opened.line, opened.column) if opened else (line, column)
+    clue = _Clue(said, context, line, column, from_line, from_column, lines)
+    for rule in _RULES:
+        fault = rule(clue)
+        if fault is not None:
+            return fault
+    return Fault(clue.line, clue.column, "not-yaml", f"this is not YAML: {said}")
+
+
+def _tab(at: _Clue) -> Fault | None:
+    indent = at.text[: len(at.text) - len(at.text.lstrip())]
+    if "\t" not in indent or at.column > len(indent) or "quoted" in at.context:
+        return None
+    return Fault(
+        at.line,
+        indent.index("\t"),
+        "tab",
+        "a tab in the indentation",
+        "YAML indents with spaces only: two for each level",
+    )
+
+
+def _directive(at: _Clue) -> Fault | None:
+    first = next((n for n, line in enumerate(at.lines) if line.startswith("%")), None)
+    words = ("directive", "document start", "incompatible YAML", "duplicate %YAML")
+    if first is None or not any(word in at.said or word in at.context for word in words):
+        return None
+    return Fault(
+        first,
+        0,
+        "unquoted",
+        "a line that starts with '%' is a directive of YAML",
+        "quote it, if it is text; documents of URC need no directives",
+    )
+
+
+def _reserved(at: _Clue) -> Fault | None:
+    if "cannot start any token" not in at.said:
+        return None
+    char = at.text[at.column : at.column + 1]
+    if char == "\t":
+        return Fault(at.line, at.column, "tab", "a tab where YAML wants a space", "use spaces")
+    if char not in _RESERVED:
+        return None
+    return Fault(
+        at.line,
+        at.column,
+        "unquoted",
+        f"an unquoted value cannot start with {char!r}",
+        advice(at.text, at.column),
+    )
+
+
+def _escape(at: _Clue) -> Fault | None:
+    words = ("escape", "hexdecimal", "Unicode", "hexadecimal")
+    if "quoted scalar" not in at.context or not any(word in at.said for word in words):
+        return None
+    column = max(at.text.rfind("\\", 0, at.column + 1), 0)  # the pure parser points behind it
+    shown = at.text[column : column + 2]
+    return Fault(
+        at.line,
+        column,
+        "bad-escape",
+        f"'{shown}' means nothing in double quotes",
+        "write the text in single quotes, where a backslash is a backslash",
+    )
+
+
+def _open_quote(at: _Clue) -> Fault | None:
+    if "quoted scalar" not in at.context:
+        return None
+    quote = at.opened_text[at.opened_column : at.opened_column + 1]
+    name = "single" if quote == "'" else "double"
+    hint = f"end the text with {quote}"
+    if quote == "'" and at.opened_text.count("'") > 1:
+        hint += "; a quote inside single quotes is written twice: ''"
+    return Fault(
+        at.opened_line, at.opened_column, "open-quote", f"this {name} quote is never closed", hint
+    )
+
+
+def _indicator(at: _Clue) -> Fault | None:
+    for word, char in (("alias", "*"), ("anchor", "&"), ("tag", "!")):
+        if re.search(rf"an? {word}\b", at.context) or f"{word} handle" in at.said:
+            return Fault(
+                at.opened_line,
+                at.opened_column,
+                "unquoted",
+                _SIGN.format(char),
+                advice(at.opened_text, at.opened_column),
+            )
+    # libyaml ends an alias before '?', so that `*IDN?` is an alias and the start of a key.
+    found = _LAST_ALIAS.search(at.text[: at.column])
+    if found is None:
+        return None
+    start = found.start("alias")
+    return Fault(at.line, start, "unquoted", _SIGN.format("*"), advice(at.text, start))
+
+
+def _after_quote(at: _Clue) -> Fault | None:
+    if not any(word in at.said for word in ("expected key", "block end", "',' or")):
+        return None
+    found = _QUOTED_VALUE.match(at.text[: at.column + 1])
+    if found is None or found.end() != at.column + 1:
+        return None
+    hint = (
+        "a quote inside single quotes is written twice: ''"
+        if found["value"][0] == "'"
+        else 'a quote inside double quotes is written \\"'
+    )
+    return Fault(at.line, at.column, "after-quote", "text after the closing quote", hint)
+
+
+def _flow(at: _Clue) -> Fault | None:
+    if "flow mapping" not in at.context and "flow sequence" not in at.context:
+        return None
+    column = at.opened_column
+    for start in (column - 1, column):
+        if start >= 0 and at.opened_text[start : start + 2] == "{{":
+            return Fault(
+                at.opened_line,
+                start,
+                "unquoted-template",
+                UNQUOTED_TEMPLATE,
+                advice(at.opened_text, start),
+            )
+    bracket, other = ("{", "}") if "mapping" in at.context else ("[", "]")
+    rest = [at.text[at.column :], *at.lines[at.line + 1 :]]
+    is_end = not any(line.strip() for line in rest)  # the two parsers count the end differently
+    place = "the end" if is_end else f"line {at.line + 1}, column {at.column + 1}"
+    return Fault(
+        at.opened_line,
+        column,
+        "open-bracket",
+        f"{bracket!r} is opened here, and ',' or {other!r} is missing before {place}",
+        f"close it with {other!r}; a value with special characters needs quotes",
+    )
+
+
+def _block(at: _Clue) -> Fault | None:
+    said, place = at.said, (at.line, at.column)
+    if "mapping values are not allowed" in said:
+        return _second_colon(at)
+    if "sequence entries are not allowed" in said:
+        return Fault(
+            *place,
+            "not-yaml",
+            "a list cannot start on the line of its key",
+            "write the first '- ' on a line of its own, or use [a, b]",
+        )
+    if "mapping keys are not allowed" in said:
+        return Fault(*place, "unquoted", _SIGN.format("?"), advice(at.text, at.column))
+    if "could not find expected ':'" in said:
+        return Fault(
+            at.opened_line,
+            at.opened_column,
+            "no-colon",
+            "a line without ': ' between key and value",
+            "write 'key: value'",
+        )
+    if "expected key" in said or "block end" in said or "'-' indicator" in said:
+        return Fault(
+            *place,
+            "indentation",
+            "this does not belong to the block that it stands in",
+            "indent it like the other lines of its block; quote values with special characters",
+        )
+    if "<document start>" in said:
+        return Fault(
+            *place,
+            "indentation",
+            "this does not belong to what stands above",
+            "start every top-level key in column 1, as 'key: value'",
+        )
+    return None
+
+
+def _second_colon(at: _Clue) -> Fault:
+    before = re.search(r": +\S", at.text[: at.column])
+    if before is not None:
+        return Fault(
+            at.line,
+            at.column,
+            "unquoted",
+            "a second ': ' in an unquoted value",
+            advice(at.text, before.end() - 1),
+        )
+    above = at.lines[at.line - 1] if at.line else ""
+    is_text = above.strip() and not above.lstrip().startswith("#")
+    if is_text and not re.search(r":(\s|$)", above):
+        return Fault(
+            at.line - 1,
+            len(above) - len(above.lstrip()),
+            "no-colon",
+            "a line without ': ' between key and value",
+            "write 'key: value', with a space after the colon",
+        )
+    return Fault(
+        at.line,
+        len(at.text) - len(at.text.lstrip()),
+        "indentation",
+        "this line is indented more than the one above, which has a value already",
+        "give both lines the same indentation",
+    )
+
+
+def _rest(at: _Clue) -> Fault | None:
+    place = (at.line, at.column)
+    if "node content" in at.said:
+        char = at.text[at.column : at.column + 1]
+        if not char:
+            return Fault(*place, "not-yaml", "a value is expected here", "close what is open")
+        return Fault(
+            *place, "not-yaml", f"{char!r} where a value is expected", "quote it, if it is text"
+        )
+    if "block scalar" in at.context:
+        return Fault(
+            *place,
+            "not-yaml",
+            "only '+', '-' or a digit may follow '|' or '>' on this line",
+            "start the text on the next line",
+        )
+    return None
+
+
+_RULES: tuple[Callable[[_Clue], Fault | None], ...] = (
+    _tab,
+    _directive,
+    _reserved,
+    _escape,
+    _open_quote,
+    _indicator,
+    _after_quote,
+    _flow,
+    _block,
+    _rest,
+)
+
+
+def advice(text: str, column: int, *, has_comment: bool = True) -> str:
+    """Return how to quote the value that starts at `column` (0-based) of the line `text`."""
+    rest = text[column:].split(" #")[0] if has_comment else text[column:]
+    before = text[:column]
+    if before.count("{") > before.count("}") or before.count("[") > before.count("]"):
+        found = re.match(r"\{\{.*?\}\}|[^,}\]]*", rest)
+        rest = found[0] if found else rest
+    rest = rest.rstrip()
+    if not rest or len(rest) > 80 or ("'" in rest and ('"' in rest or "\\" in rest)):
+        return "quote it"
+    mark = '"' if "'" in rest else "'"
+    return f"quote it: {mark}{rest}{mark}"

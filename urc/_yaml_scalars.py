@@ -1,0 +1,53 @@
+"""What an unquoted scalar means: YAML 1.2's core schema.
+
+Floor 0, private to `urc.source`. So ``on``, ``yes`` and ``12:30:00`` are text, 010 is ten, 1e3 is a
+number, and a date is text.
+"""
+
+import re
+from collections.abc import Callable
+from typing import Final
+
+__all__ = ["DIGITS_MAX", "resolve_plain"]
+
+DIGITS_MAX: Final = 40
+"""No number of a robot is longer; Python's own conversion is quadratic and refuses thousands."""
+_SCALAR = re.compile(
+    r"""(?P<null>~|null|Null|NULL|)
+    |(?P<true>true|True|TRUE)|(?P<false>false|False|FALSE)
+    |(?P<oct>0o[0-7]+)|(?P<hex>0x[0-9a-fA-F]+)|(?P<int>[-+]?[0-9]+)
+    |(?P<float>[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?)
+    |(?P<inf>[-+]?\.(?:inf|Inf|INF))|(?P<nan>\.(?:nan|NaN|NAN))""",
+    re.VERBOSE | re.ASCII,
+)
+_SCALAR_STARTS = frozenset("~nNtTfF0123456789+-.")
+
+
+def resolve_plain(text: str) -> object:
+    """Return what an unquoted scalar means by YAML 1.2's core schema.
+
+    Raises:
+        ValueError: it is a number of more digits than any number here has.
+    """
+    if text and text[0] not in _SCALAR_STARTS:
+        return text
+    found = _SCALAR.fullmatch(text)
+    if found is None:
+        return text
+    kind = found.lastgroup
+    if kind in ("oct", "hex", "int", "float") and len(text) > DIGITS_MAX:
+        raise ValueError(f"a number of {len(text)} characters")
+    return _MEANINGS[kind or "null"](text)
+
+
+_MEANINGS: dict[str, Callable[[str], object]] = {
+    "null": lambda _: None,
+    "true": lambda _: True,
+    "false": lambda _: False,
+    "oct": lambda text: int(text[2:], 8),
+    "hex": lambda text: int(text[2:], 16),
+    "int": int,
+    "float": float,
+    "inf": lambda text: float(text.replace(".", "")),
+    "nan": lambda _: float("nan"),
+}

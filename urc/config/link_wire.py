@@ -1,0 +1,204 @@
+"""Names on the wire's side: transports, signals, settings and arguments, wherever they are used."""
+
+import re
+from collections.abc import Iterable, Mapping
+
+from urc.config.gather import Sources
+from urc.config.parse_line import templates_of
+from urc.config.part import Findings, Part
+from urc.config.suggest import did_you_mean
+from urc.expressions import Template
+from urc.model.driver import Driver
+from urc.model.profile import Setting, SimulatorRule
+from urc.patterns import Pattern
+
+__all__ = ["Uses", "link_driver", "link_simulator"]
+
+
+class Uses:
+    """What is used by something, for the rules that ask what is not."""
+
+    def __init__(self) -> None:
+        self.settings: set[str] = set()
+        self.transports: set[str] = set()
+        self.signals: set[str] = set()
+        """Signals that a frame can set."""
+
+
+class _Linker:
+    def __init__(self, driver: Driver, settings: Mapping[str, Setting], findings: Findings) -> None:
+        self.driver = driver
+        self.settings = settings
+        self.findings = findings
+        self.uses = Uses()
+
+    def transport(self, part: Part, key: str, name: str) -> None:
+        """Check the transport that `part` names under `key`, or leaves out."""
+        if name in self.driver.transports:
+            self.uses.transports.add(name)
+            return
+        names = self.driver.transports
+        if key in part.data:
+            self.findings.error(
+                part,
+                "unknown-transport",
+                f"there is no transport {name!r}",
+                at=key,
+                hint=did_you_mean(name, names, "transports"),
+            )
+        else:
+            self.findings.error(
+                part,
+                "missing-key",
+                f"'{key}' is missing, and there are {len(names)} transports",
+                key=True,
+                hint=did_you_mean("", names, "transports"),
+            )
+
+    def groups(self, part: Part, pattern: Pattern) -> None:
+        """Check that each named group is a signal."""
+        for group in pattern.groups:
+            if group in self.driver.signals:
+                self.uses.signals.add(group)
+                continue
+            self.findings.error(
+                part,
+                "unknown-signal",
+                f"group {group!r} is not a signal",
+                offset=pattern.source.find(f"<{group}>") + 1,
+                length=len(group),
+                hint=did_you_mean(group, self.driver.signals, "signals"),
+            )
+
+    def template(self, part: Part, template: Template, known: Iterable[str] = ()) -> None:
+        """Check the names that a template uses."""
+        allowed = {*known, "settings"}
+        for name in sorted(template.names - allowed):
+            hint = did_you_mean(name, allowed, "names")
+            if name in self.settings:
+                hint = f"write settings.{name}"
+            self._unknown(
+                part,
+                template,
+                rf"(?<![\w.]){name}(?!\w)",
+                name,
+                "unknown-name",
+                f"{name!r} means nothing here",
+                hint,
+            )
+        self.uses.settings |= template.settings
+        for name in sorted(template.settings - self.settings.keys()):
+            self._unknown(
+                part,
+                template,
+                rf"settings\W+{name}(?!\w)",
+                name,
+                "unknown-setting",
+                f"there is no setting {name!r}",
+                did_you_mean(name, self.settings, "settings"),
+            )
+        if "settings" in template.names and not template.settings:
+            self._unknown(
+                part,
+                template,
+                r"settings",
+                "settings",
+                "unknown-setting",
+                "'settings' is all of them; name one",
+                did_you_mean("", self.settings, "settings"),
+            )
+
+    def _unknown(
+        self,
+        part: Part,
+        template: Template,
+        pattern: str,
+        name: str,
+        code: str,
+        message: str,
+        hint: str,
+    ) -> None:
+        found = re.search(pattern, template.source)
+        offset = found.end() - len(name) if found else 0
+        self.findings.error(part, code, message, offset=offset, length=len(name), hint=hint)
+
+
+def link_driver(
+    part: Part, driver: Driver, settings: Mapping[str, Setting], findings: Findings
+) -> Uses:
+    """Check every name in the driver at `part`; return what is used."""
+    linker = _Linker(driver, settings, findings)
+    for name, inner in part.named("transports").items():
+        for option, template in templates_of(driver.transports[name]).items():
+            linker.template(inner.must(option), template)
+    for inner, poll in zip(part.listed("polls"), driver.polls, strict=True):
+        linker.transport(inner, "to", poll.transport)
+        linker.template(inner.must("send"), poll.send)
+        if poll.reply is not None:
+            linker.groups(inner.must("reply").must("regex"), poll.reply.pattern)
+    _check_poll_names(part, driver, findings)
+    for name, inner in part.named("commands").items():
+        command = driver.commands[name]
+        linker.transport(inner, "to", command.transport)
+        linker.template(inner.must("send"), command.send, command.arguments)
+        _check_arguments_used(inner, command.send, findings)
+        if command.reply is not None:
+            linker.groups(inner.must("reply").must("regex"), command.reply.pattern)
+    for name, inner in part.named("messages").items():
+        message = driver.messages[name]
+        linker.transport(inner, "from", message.transport)
+        linker.groups(inner.must("regex"), message.pattern)
+    return linker.uses
+
+
+def _check_poll_names(part: Part, driver: Driver, findings: Findings) -> None:
+    """Report names that two polls, or a poll and a command, share: a test could not tell them."""
+    seen: set[str] = set(driver.commands)
+    for inner, poll in zip(part.listed("polls"), driver.polls, strict=True):
+        if poll.name in seen:
+            other = "a command" if poll.name in driver.commands else "another poll"
+            findings.error(
+                inner,
+                "duplicate-name",
+                f"{other} is called {poll.name!r} too",
+                at="name",
+                hint="give each its own name",
+            )
+        seen.add(poll.name)
+
+
+def _check_arguments_used(part: Part, send: Template, findings: Findings) -> None:
+    for name, inner in part.named("args").items():
+        if name not in send.names:
+            findings.warn(
+                inner,
+                "unused-argument",
+                f"nothing sends the argument {name!r}",
+                key=True,
+                hint=f"write {{{{ {name} }}}} in 'send', or take the argument away",
+            )
+
+
+def link_simulator(
+    sources: Sources,
+    driver: Driver,
+    rules: Mapping[str, list[SimulatorRule]],
+    settings: Mapping[str, Setting],
+    findings: Findings,
+) -> None:
+    """Check every name in the rules of the emulated robot."""
+    linker = _Linker(driver, settings, findings)
+    for name, part in sources.simulator.items():
+        if name not in driver.transports:
+            findings.error(
+                part,
+                "unknown-transport",
+                f"there is no transport {name!r}",
+                key=True,
+                hint=did_you_mean(name, driver.transports, "transports"),
+            )
+            continue
+        for inner, rule in zip(part.items(), rules[name], strict=True):
+            if rule.send is not None:
+                groups = rule.pattern.groups if rule.pattern else ()
+                linker.template(inner.must("send"), rule.send, ("now", *groups))

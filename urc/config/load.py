@@ -1,0 +1,167 @@
+"""The only door from YAML to the model: ordered passes, all findings of a pass at once.
+
+read → shape → parse and compile → link names → whole-profile rules. A later pass runs only when the
+earlier ones found no error; warnings are kept and never stop anything.
+"""
+
+from os import PathLike, fspath
+from typing import NamedTuple
+
+from urc.config.gather import Sources, gather
+from urc.config.layout import default_interface, default_slots
+from urc.config.link_look import link_interface, link_slots
+from urc.config.link_tests import link_test
+from urc.config.link_wire import link_driver, link_simulator
+from urc.config.parse_driver import parse_driver, spoken_name
+from urc.config.parse_interface import parse_interface
+from urc.config.parse_profile import parse_rule, parse_setting, parse_test
+from urc.config.parse_widget import Shelf, parse_widget
+from urc.config.part import Findings
+from urc.config.rules import check_profile
+from urc.model.driver import Driver
+from urc.model.interface import Interface
+from urc.model.profile import DocumentTest, Profile, Setting, SimulatorRule
+from urc.problems import Problem, ProblemsError, has_errors
+from urc.registry import Catalog
+from urc.shipped import shipped
+
+__all__ = ["Checked", "Shelf", "check", "load_profile"]
+
+
+class Checked(NamedTuple):
+    """What came of a document."""
+
+    profile: Profile | None
+    """Of a robot or driver without errors; a driver's has the default look."""
+    problems: tuple[Problem, ...]
+    kind: str
+    """``robot``, ``driver``, ``interface``, ``widget``, or "" when a first pass stopped."""
+
+
+def load_profile(
+    path: str | PathLike[str], catalog: Catalog, shelf: Shelf | None = None
+) -> Profile:
+    """Return the profile in a robot's or driver's document.
+
+    Raises:
+        ProblemsError: with every finding of the pass that stopped it.
+    """
+    checked = check(path, catalog, shelf)
+    if checked.profile is not None:
+        return checked.profile
+    if not has_errors(checked.problems):
+        raise ProblemsError(
+            [
+                Problem(
+                    "wrong-kind",
+                    f"a robot's document is expected, this one is of kind '{checked.kind}'",
+                    fspath(path),
+                ),
+            ]
+        )
+    errors = [problem for problem in checked.problems if problem.severity == "error"]
+    raise ProblemsError(errors)
+
+
+def check(path: str | PathLike[str], catalog: Catalog, shelf: Shelf | None = None) -> Checked:
+    """Return every finding about a document of any kind, and about those it refers to.
+
+    Args:
+        path: the document; findings name it as it is written here.
+        catalog: which transports and framings there are.
+        shelf: the widgets there are; those that ship with URC by default. Give the same one to
+            several calls and each manifest is read once.
+    """
+    path = fspath(path)
+    sources, problems = gather(path)
+    if sources is None:
+        return Checked(None, tuple(problems), "")
+    shelf = shelf or Shelf(shipped("widgets"))
+    findings = Findings()
+    profile: Profile | None = None
+    if sources.kind == "widget":
+        parse_widget(sources.root.document, findings)
+    elif sources.kind == "interface":
+        interface = parse_interface(sources.root, sources.root.text("name"), findings)
+        if not has_errors(findings):
+            link_interface(sources.root, interface, {}, None, shelf, findings)
+    else:
+        profile = _profile(sources, catalog, shelf, findings)
+    problems += sorted(findings, key=lambda one: (one.file != path, one.file, one.line, one.column))
+    problems += shelf.problems
+    problems = list(dict.fromkeys(problems))
+    if has_errors(problems):
+        profile = None
+    return Checked(profile, tuple(problems), sources.kind)
+
+
+class _Parsed(NamedTuple):
+    """What the third pass made of the sources."""
+
+    driver: Driver
+    settings: dict[str, Setting]
+    interfaces: dict[str, Interface]
+    tests: list[DocumentTest]
+    rules: dict[str, list[SimulatorRule]]
+
+
+def _profile(
+    sources: Sources, catalog: Catalog, shelf: Shelf, findings: Findings
+) -> Profile | None:
+    parsed = _Parsed(
+        driver=parse_driver(sources.driver, findings, catalog),
+        settings={name: parse_setting(part, findings) for name, part in sources.settings.items()},
+        interfaces={
+            name: parse_interface(part, name, findings) for name, part in sources.interfaces.items()
+        },
+        tests=[parse_test(part) for part in sources.tests],
+        rules={
+            name: [parse_rule(inner, name, findings) for inner in part.items()]
+            for name, part in sources.simulator.items()
+        },
+    )
+    if has_errors(findings):
+        return None
+    return _link(sources, parsed, shelf, findings)
+
+
+def _link(sources: Sources, parsed: _Parsed, shelf: Shelf, findings: Findings) -> Profile | None:
+    driver = parsed.driver
+    uses = link_driver(sources.driver, driver, parsed.settings, findings)
+    link_simulator(sources, driver, parsed.rules, parsed.settings, findings)
+    tests = [
+        link_test(part, test, driver, findings)
+        for part, test in zip(sources.tests, parsed.tests, strict=True)
+    ]
+    slots = link_slots(sources, driver, shelf, findings)
+    interfaces = {
+        name: link_interface(sources.interfaces[name], interface, slots, driver, shelf, findings)
+        for name, interface in parsed.interfaces.items()
+    }
+    if has_errors(findings) or has_errors(shelf.problems):
+        return None
+    check_profile(sources, driver, interfaces, uses, findings)
+    root = sources.root
+    name = root.text("name")
+    title = root.text("title", spoken_name(name))
+    if not interfaces:
+        slots = slots or default_slots(driver, shelf)
+        interfaces = {"default": default_interface(slots, title)}
+    used = {use.widget for use in slots.values()}
+    used |= {use.widget for one in interfaces.values() for use in one.widgets.values()}
+    widgets = {one: shelf.get(one) for one in sorted(used)}
+    return Profile(
+        name=name,
+        title=title,
+        file=root.document.file,
+        summary=root.text("summary"),
+        settings=parsed.settings,
+        driver=driver,
+        slots=slots,
+        interfaces=interfaces,
+        widgets={one: widget for one, widget in widgets.items() if widget is not None},
+        tests=tuple(tests),
+        simulator=tuple(rule for rules in parsed.rules.values() for rule in rules),
+        licence=root.text("licence"),
+        author=root.text("author"),
+    )

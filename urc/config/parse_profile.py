@@ -1,0 +1,144 @@
+"""The rest of a profile: settings, the documents' own tests, the emulated robot."""
+
+from typing import Final
+
+from urc.config.part import Findings, Part
+from urc.config.values import check_range, check_within, fit, fit_hint, shown
+from urc.model.profile import DocumentTest, Setting, SimulatorRule
+from urc.model.values import Value
+
+__all__ = ["parse_rule", "parse_setting", "parse_test"]
+
+_VALUE_TYPES: Final = {
+    "integer": "integer",
+    "number": "number",
+    "boolean": "boolean",
+    "port": "integer",
+}
+"""Type of a setting → type of its value; text when it is not here."""
+
+
+def parse_setting(part: Part, findings: Findings) -> Setting:
+    """Return one setting."""
+    kind = part.text("type")
+    low, high = check_range(
+        part, _VALUE_TYPES.get(kind, "string") if kind != "port" else kind, findings
+    )
+    choices = tuple(str(inner.data) for inner in part.listed("choices"))
+    if kind == "choice" and not choices:
+        findings.error(
+            part, "missing-key", "'choices' is missing from a setting of type choice", key=True
+        )
+    if kind != "choice" and choices:
+        findings.error(
+            part,
+            "misplaced-key",
+            f"'choices' means nothing for {kind}",
+            at="choices",
+            key=True,
+            hint="write 'type: choice'",
+        )
+    is_secret = part.flag("secret", default=False)
+    default_part = part.get("default")
+    if is_secret and default_part is not None:
+        findings.error(
+            default_part,
+            "secret-in-document",
+            "a secret cannot stand in a document",
+            key=True,
+            hint="leave 'default' out: the operator fills it in",
+        )
+    setting = Setting(
+        name=part.name,
+        type=kind,  # type: ignore[arg-type]  # the schema's enum is this Literal
+        title=part.text("title", part.name.replace("_", " ").capitalize()),
+        choices=choices,
+        min=low,
+        max=high,
+        is_secret=is_secret,
+        description=part.text("description"),
+        default=None if default_part is None else _default(default_part, kind, choices, findings),
+    )
+    if default_part is not None:
+        check_within(setting.default, low, high, default_part, findings)
+    return setting
+
+
+def _default(part: Part, kind: str, choices: tuple[str, ...], findings: Findings) -> Value:
+    wanted = _VALUE_TYPES.get(kind, "string")
+    try:
+        value = fit(part.data, wanted)
+    except ValueError as error:
+        findings.error(part, "wrong-type", str(error), hint=fit_hint(part.data, wanted))
+        return None
+    fault = ""
+    if kind == "port" and not 1 <= int(value or 0) <= 65535:
+        fault = f"a port is 1 to 65535, found {value}"
+    elif kind == "host" and not _is_host(str(value)):
+        fault = f"a host is a name or an address, found {shown(value)}"
+    elif kind == "choice" and value not in choices:
+        fault = f"{shown(value)} is not one of the choices"
+    if fault:
+        findings.error(part, "bad-value", fault)
+        return None
+    return value
+
+
+def _is_host(text: str) -> bool:
+    """Return whether a name or address is plausible: no scheme, no port, no blank."""
+    return 0 < len(text) <= 253 and not any(char.isspace() or char in "/@?#'\"" for char in text)
+
+
+def parse_test(part: Part) -> DocumentTest:
+    """Return one test; what it names is looked up when names are linked."""
+    mark = part.document.at(part.path)
+    line, column = (mark.span.line, mark.span.column) if mark else (1, 1)
+    reply_to = part.scalar("reply_to")
+    if isinstance(reply_to, float):
+        reply_to = int(reply_to)
+    return DocumentTest(
+        name=part.text("name"),
+        line=line,
+        feed={name: str(inner.data) for name, inner in part.named("feed").items()},
+        reply_to=reply_to,
+        run=part.text("run") or None,
+        arguments={name: inner.data for name, inner in part.named("args").items()},
+        expect={name: inner.data for name, inner in part.named("expect").items()},
+        sent={name: str(inner.data) for name, inner in part.named("sent").items()},
+        fails=part.text("fails") or None,
+        file=part.document.file,
+        column=column,
+        source=part.document.lines[line - 1],
+    )
+
+
+def parse_rule(part: Part, transport: str, findings: Findings) -> SimulatorRule:
+    """Return one rule of the emulated robot."""
+    match, send = part.get("match"), part.get("send")
+    every = part.get("every")
+    if match is None and every is None:
+        findings.error(
+            part,
+            "missing-key",
+            "'match' or 'every' is missing from this rule",
+            key=True,
+            hint="a rule answers a frame, or speaks every so often",
+        )
+    if match is not None and every is not None:
+        findings.error(
+            every,
+            "misplaced-key",
+            "a rule answers a frame, or speaks every so often",
+            key=True,
+            hint="make two rules of it",
+        )
+    if every is not None and send is None:
+        findings.error(
+            part, "missing-key", "'send' is missing: what is said every so often?", key=True
+        )
+    return SimulatorRule(
+        transport=transport,
+        pattern=None if match is None else findings.pattern(match),
+        send=None if send is None else findings.template(send),
+        every_s=None if every is None else findings.duration(part, "every", 1.0, least=0.005),
+    )

@@ -1,0 +1,135 @@
+"""A widget's manifest → `Widget`, and the shelf that reads manifests by name."""
+
+import re
+from collections.abc import Iterable
+from pathlib import Path as FilePath
+
+from urc.config.part import Findings, Part
+from urc.config.shape import check_options, check_shape, kind_of
+from urc.config.suggest import did_you_mean
+from urc.model.widget import Port, Widget
+from urc.problems import Problem, ProblemsError, has_errors
+from urc.source import Document, read_document
+
+__all__ = ["Shelf", "parse_widget"]
+
+_NAME = re.compile(r"[a-z][a-z0-9-]{0,63}")
+
+
+def parse_widget(document: Document, findings: Findings) -> Widget:
+    """Return the widget that a manifest declares."""
+    part = Part(document, (), document.data)
+    folder = FilePath(document.file).parent
+    name = part.text("name")
+    if folder.absolute().name != name:
+        findings.error(
+            part,
+            "wrong-name",
+            f"the folder is called {folder.absolute().name!r}, the widget {name!r}",
+            at="name",
+            hint="they must be the same",
+        )
+    size = part.get("size")
+    smallest = [int(inner.data) for inner in size.listed("min")] if size else []
+    options = part.get("options")
+    if options is not None:
+        _check_defaults(options, findings)
+    return Widget(
+        name=name,
+        title=part.text("title"),
+        folder=folder,
+        inputs={key: _port(inner) for key, inner in part.named("inputs").items()},
+        outputs={key: _port(inner) for key, inner in part.named("outputs").items()},
+        options={key: inner.data for key, inner in part.named("options").items()},
+        min_cells=(smallest[0], smallest[1]) if smallest else (1, 1),
+        summary=part.text("summary"),
+        licence=part.text("licence"),
+        author=part.text("author"),
+    )
+
+
+def _port(part: Part) -> Port:
+    types = part.get("type")
+    if types is None:
+        names: Iterable[str] = ()
+    else:
+        names = [types.data] if isinstance(types.data, str) else types.data
+    return Port(
+        name=part.name,
+        types=tuple(names),
+        unit=part.text("unit"),
+        is_required=part.flag("required", default=True),
+        description=part.text("description"),
+    )
+
+
+def _check_defaults(options: Part, findings: Findings) -> None:
+    """Report each default that its own schema would refuse."""
+    for name, inner in options.entries().items():
+        default = inner.get("default")
+        if default is None:
+            continue
+        for problem in check_options(
+            options.document, options.path, {name: default.data}, options.data
+        ):
+            findings.error(default, problem.code, problem.message, hint=problem.hint)
+
+
+def _nearby(file: FilePath) -> str:
+    """Return a path as a person in the current folder would write it."""
+    try:
+        return str(file.relative_to(FilePath.cwd()))
+    except (OSError, ValueError):
+        return str(file)
+
+
+class Shelf:
+    """The widgets of one folder; each manifest is read once, when it is first asked for."""
+
+    def __init__(self, folder: FilePath) -> None:
+        self.folder = folder
+        self.problems: list[Problem] = []
+        """What is wrong with the manifests read so far."""
+        self._widgets: dict[str, Widget | None] = {}
+
+    def names(self) -> list[str]:
+        """Return the names of all widgets there are."""
+        try:
+            return sorted(entry.parent.name for entry in self.folder.glob("*/widget.yaml"))
+        except OSError:
+            return []
+
+    def get(self, name: str) -> Widget | None:
+        """Return a widget, or None when there is none or its manifest is broken."""
+        if name not in self._widgets:
+            self._widgets[name] = self._read(name) if self.has(name) else None
+        return self._widgets[name]
+
+    def has(self, name: str) -> bool:
+        """Return whether there is a widget of that name, broken or not."""
+        return bool(_NAME.fullmatch(name)) and (self.folder / name / "widget.yaml").is_file()
+
+    def hint(self, name: str) -> str:
+        """Return what may have been meant by a name that there is not."""
+        return did_you_mean(name, self.names(), "widgets")
+
+    def _read(self, name: str) -> Widget | None:
+        try:
+            document = read_document(_nearby(self.folder / name / "widget.yaml"))
+        except ProblemsError as error:
+            self.problems += error.problems
+            return None
+        problems = check_shape(document)
+        if not problems and kind_of(document) != "widget":
+            problems = [
+                document.problem(
+                    ("kind",),
+                    "wrong-kind",
+                    "a widget's manifest is expected here",
+                    hint="write 'kind: widget'",
+                )
+            ]
+        findings = Findings()
+        widget = None if has_errors(problems) else parse_widget(document, findings)
+        self.problems += [*document.findings, *problems, *findings]
+        return None if has_errors(findings) else widget

@@ -1,0 +1,176 @@
+"""A place in a document whose shape is known, and the findings about it.
+
+The parsers read documents through `Part` only: so each value they take has a place to report at,
+and a test can see which keys are read. Everything here assumes that the shape pass found no fault.
+"""
+
+import math
+import re
+from collections.abc import Iterator
+from typing import Any, Final, NamedTuple
+
+from urc.expressions import ExpressionError, Template, compile_template
+from urc.model.values import Value
+from urc.patterns import Pattern, PatternError, compile_pattern
+from urc.problems import Problem, Severity
+from urc.source import Document, Path
+
+__all__ = ["Findings", "Part", "duration_s"]
+
+_DURATION = re.compile(r"([0-9]+(?:\.[0-9]+)?)(ms|s|m|h)")
+_UNITS_S: Final = {"ms": 0.001, "s": 1.0, "m": 60.0, "h": 3600.0}
+_LONGEST_S: Final = 86400.0
+
+
+def duration_s(text: str) -> float:
+    """Return ``250ms`` in seconds; the text fits the schema's pattern."""
+    found = _DURATION.fullmatch(text)
+    if found is None:
+        raise ValueError(f"{text!r} is not a duration")
+    # Scaled as a whole: 250 * 0.001 is not 0.25 exactly, 250 / 1000 is.
+    number, unit = float(found[1]), found[2]
+    return number / 1000 if unit == "ms" else number * _UNITS_S[unit]
+
+
+class Part(NamedTuple):
+    """One value of a document, and where it stands."""
+
+    document: Document
+    path: Path
+    data: Any
+
+    @property
+    def name(self) -> str:
+        """The key or index that leads to it."""
+        return str(self.path[-1]) if self.path else ""
+
+    def get(self, key: str) -> "Part | None":
+        """Return what stands under `key`, or None when the document leaves it out."""
+        if key not in self.data:
+            return None
+        return Part(self.document, (*self.path, key), self.data[key])
+
+    def must(self, key: str) -> "Part":
+        """Return what stands under `key`, which the schema requires."""
+        return Part(self.document, (*self.path, key), self.data[key])
+
+    def named(self, key: str) -> dict[str, "Part"]:
+        """Return the entries of the mapping under `key`; none when it is left out."""
+        inner = self.get(key)
+        return inner.entries() if inner else {}
+
+    def entries(self) -> dict[str, "Part"]:
+        """Return the entries of a mapping whose keys are names."""
+        return {
+            name: Part(self.document, (*self.path, name), item) for name, item in self.data.items()
+        }
+
+    def listed(self, key: str) -> list["Part"]:
+        """Return the items of the list under `key`; none when it is left out."""
+        inner = self.get(key)
+        return inner.items() if inner else []
+
+    def items(self) -> list["Part"]:
+        """Return the items of a list."""
+        return [
+            Part(self.document, (*self.path, place), item) for place, item in enumerate(self.data)
+        ]
+
+    def text(self, key: str, default: str = "") -> str:
+        """Return the text under `key`."""
+        inner = self.get(key)
+        return default if inner is None else str(inner.data)
+
+    def flag(self, key: str, *, default: bool) -> bool:
+        """Return the truth under `key`."""
+        inner = self.get(key)
+        return default if inner is None else bool(inner.data)
+
+    def number(self, key: str) -> float | None:
+        """Return the number under `key`, or None when it is left out."""
+        inner = self.get(key)
+        return None if inner is None else inner.data
+
+    def integer(self, key: str) -> int | None:
+        """Return the whole number under `key`; 3.0 is one too, as in JSON Schema."""
+        inner = self.get(key)
+        return None if inner is None else int(inner.data)
+
+    def scalar(self, key: str) -> Value:
+        """Return the plain value under `key`, or None when it is left out."""
+        inner = self.get(key)
+        value: Value = None if inner is None else inner.data
+        return value
+
+
+class Findings:
+    """What one pass has found so far."""
+
+    def __init__(self) -> None:
+        self.problems: list[Problem] = []
+
+    def __iter__(self) -> Iterator[Problem]:
+        return iter(self.problems)
+
+    def error(self, part: Part, code: str, message: str, **place: Any) -> None:
+        """Add an error; `place` is what `Document.problem` takes, and ``at``: a key inside."""
+        self._add(part, code, message, "error", **place)
+
+    def warn(self, part: Part, code: str, message: str, **place: Any) -> None:
+        """Add a warning."""
+        self._add(part, code, message, "warning", **place)
+
+    def _add(
+        self, part: Part, code: str, message: str, severity: Severity, *, at: str = "", **place: Any
+    ) -> None:
+        path = (*part.path, at) if at else part.path
+        self.problems.append(part.document.problem(path, code, message, severity=severity, **place))
+
+    def duration(
+        self,
+        part: Part,
+        key: str,
+        default: float,
+        *,
+        least: float = 0.001,
+        most: float = _LONGEST_S,
+    ) -> float:
+        """Return the duration under `key` in seconds, within `least` and `most`."""
+        inner = part.get(key)
+        if inner is None:
+            return default
+        seconds = duration_s(inner.data)
+        if not least <= seconds <= most:
+            self.error(
+                inner,
+                "out-of-range",
+                f"expected {shown_duration(least)} to {shown_duration(most)}, found {inner.data}",
+            )
+            return default
+        return seconds
+
+    def pattern(self, part: Part) -> Pattern | None:
+        """Compile the pattern at `part`, or report why it cannot be."""
+        try:
+            return compile_pattern(part.data)
+        except PatternError as error:
+            self.error(part, "bad-pattern", str(error), offset=error.offset)
+            return None
+
+    def template(self, part: Part) -> Template | None:
+        """Compile the template at `part`, or report why it cannot be."""
+        try:
+            return compile_template(part.data)
+        except ExpressionError as error:
+            self.error(part, "bad-template", str(error), offset=error.offset)
+            return None
+
+
+def shown_duration(seconds: float) -> str:
+    """Return seconds as a document writes them."""
+    if seconds and seconds < 1:
+        return f"{seconds * 1000:g}ms"
+    for unit in ("h", "m"):
+        if seconds >= _UNITS_S[unit] and math.fmod(seconds, _UNITS_S[unit]) == 0:
+            return f"{seconds / _UNITS_S[unit]:g}{unit}"
+    return f"{seconds:g}s"

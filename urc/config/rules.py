@@ -1,0 +1,119 @@
+"""The last pass: rules over a whole profile. None of them is an error; all are worth a look."""
+
+from urc.config.gather import Sources
+from urc.config.link_wire import Uses
+from urc.config.part import Findings, Part, shown_duration
+from urc.config.suggest import did_you_mean
+from urc.model.driver import Driver, Poll
+from urc.model.interface import Interface
+
+__all__ = ["check_profile"]
+
+
+def check_profile(
+    sources: Sources,
+    driver: Driver,
+    interfaces: dict[str, Interface],
+    uses: Uses,
+    findings: Findings,
+) -> None:
+    """Add a warning for each thing that is declared to no purpose, or cannot keep up."""
+    _check_unused(sources, driver, uses, findings)
+    _check_slots(sources, interfaces, findings)
+    for part, poll in zip(sources.driver.listed("polls"), driver.polls, strict=True):
+        _check_pace(part, poll, sources.driver, findings)
+    _check_rate(sources.driver, driver, findings)
+
+
+def _check_unused(sources: Sources, driver: Driver, uses: Uses, findings: Findings) -> None:
+    for name, part in sources.driver.named("signals").items():
+        if name not in uses.signals:
+            findings.warn(
+                part,
+                "never-set",
+                f"nothing ever sets the signal {name!r}",
+                key=True,
+                hint=f"name a group of a reply or message (?P<{name}>…)",
+            )
+    for name, part in sources.driver.named("transports").items():
+        if name not in uses.transports:
+            findings.warn(
+                part, "unused-transport", f"nothing uses the transport {name!r}", key=True
+            )
+    for name, part in sources.settings.items():
+        if name not in uses.settings:
+            findings.warn(
+                part,
+                "unused-setting",
+                f"nothing uses the setting {name!r}",
+                key=True,
+                hint=f"write {{{{ settings.{name} }}}} where it belongs",
+            )
+
+
+def _check_slots(sources: Sources, interfaces: dict[str, Interface], findings: Findings) -> None:
+    """Warn of a slot that this document fills and no interface shows.
+
+    A driver's own document fills slots for every interface, so that only the robot's are looked at.
+    """
+    if not sources.interfaces:
+        return
+    shown = {
+        slot.name
+        for interface in interfaces.values()
+        for grid in interface.grids.values()
+        for slot in grid.slots
+    } | {interface.background for interface in interfaces.values()}
+    for name, parts in sources.slots.items():
+        part = parts[-1]
+        if name not in shown and part.document is sources.root.document:
+            findings.warn(
+                part,
+                "slot-not-shown",
+                f"no interface has a slot {name!r}",
+                key=True,
+                hint=did_you_mean(name, shown - {""}, "slots"),
+            )
+
+
+def _check_pace(part: Part, poll: Poll, driver: Part, findings: Findings) -> None:
+    """Warn of a request that is due again before the wait for its answer is over."""
+    if poll.reply is None:
+        return
+    where: Part | None = part.must("reply").get("timeout")
+    seconds = poll.reply.timeout_s
+    if where is None:
+        timeouts = driver.must("transports").must(poll.transport).get("timeouts")
+        where = timeouts.get("reply") if timeouts else None
+        if where is None:
+            return  # the default is nobody's decision
+        seconds = Findings().duration(timeouts, "reply", 2.0) if timeouts else None
+    if seconds is not None and seconds > poll.every_s:
+        findings.warn(
+            part.must("every"),
+            "impatient-poll",
+            f"the next request is due after {shown_duration(poll.every_s)}, but an answer may take"
+            f" {shown_duration(seconds)}",
+            hint=f"shorten the timeout in line {_line(where)}, or poll more slowly",
+        )
+
+
+def _line(part: Part) -> int:
+    mark = part.document.at(part.path)
+    return mark.span.line if mark else 1
+
+
+def _check_rate(part: Part, driver: Driver, findings: Findings) -> None:
+    """Warn of polls that together want more requests than the line's shortest gap lets through."""
+    for name, transport in driver.transports.items():
+        if not transport.min_gap_s:
+            continue
+        rate = sum(1 / poll.every_s for poll in driver.polls if poll.transport == name)
+        if rate * transport.min_gap_s > 1:
+            findings.warn(
+                part.must("transports").must(name),
+                "too-many-polls",
+                f"the polls want {rate:g} requests a second, but a gap of"
+                f" {shown_duration(transport.min_gap_s)} lets {1 / transport.min_gap_s:g} through",
+                at="min_gap",
+            )

@@ -1,0 +1,88 @@
+"""Typed values in documents: does a default, an expected reading or a choice fit its type?"""
+
+from typing import Final
+
+from urc.config.part import Findings, Part
+from urc.model.values import Value
+
+__all__ = ["check_range", "check_within", "fit", "fit_hint", "shown"]
+
+_TYPE_WORDS: Final = {
+    "integer": "a whole number",
+    "number": "a number",
+    "boolean": "true or false",
+    "string": "text",
+}
+
+
+def shown(value: object) -> str:
+    """Return a value as a document writes it, for messages."""
+    if value is None:
+        return "nothing"
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    return repr(value)
+
+
+def fit(value: Value, kind: str) -> Value:
+    """Return `value` as a value of type `kind`: 3.0 is a whole number.
+
+    Raises:
+        ValueError: it is of another type.
+    """
+    if kind == "string" and isinstance(value, str):
+        return value
+    if kind == "boolean" and isinstance(value, bool):
+        return value
+    if isinstance(value, (int, float)) and not isinstance(value, bool):
+        if kind == "number":
+            return value
+        if kind == "integer" and (isinstance(value, int) or value.is_integer()):
+            return int(value)
+    raise ValueError(f"expected {_TYPE_WORDS[kind]}, found {shown(value)}")
+
+
+def fit_hint(value: Value, kind: str) -> str:
+    """Return what to do about a value that does not fit type `kind`, when quotes are the cause."""
+    if kind in ("integer", "number") and isinstance(value, str):
+        try:
+            float(value)
+        except ValueError:
+            return ""
+        return f"take the quotes away: {value}"
+    if kind == "string" and value is not None:
+        return f'quote it: "{shown(value)}"'
+    if kind == "boolean" and isinstance(value, str):
+        return "yes, no, on and off are text in YAML 1.2; write true or false"
+    return ""
+
+
+def check_range(part: Part, kind: str, findings: Findings) -> tuple[float | None, float | None]:
+    """Return ``min`` and ``max`` of a signal, argument or setting of type `kind`."""
+    low, high = part.number("min"), part.number("max")
+    if kind not in ("integer", "number"):
+        for key in ("min", "max"):
+            if key in part.data:
+                findings.error(
+                    part,
+                    "misplaced-key",
+                    f"'{key}' means nothing for {kind}",
+                    at=key,
+                    key=True,
+                    hint="only integer and number have a range",
+                )
+    elif low is not None and high is not None and low >= high:
+        findings.error(part, "wrong-order", f"min {low:g} is not below max {high:g}", at="min")
+    return low, high
+
+
+def check_within(
+    value: Value, low: float | None, high: float | None, part: Part, findings: Findings
+) -> None:
+    """Report a number at `part` that is outside ``min`` and ``max``."""
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        return
+    if low is not None and value < low:
+        findings.error(part, "out-of-range", f"{value:g} is below min {low:g}")
+    elif high is not None and value > high:
+        findings.error(part, "out-of-range", f"{value:g} is above max {high:g}")

@@ -1,0 +1,327 @@
+"""YAML text → `Document`: plain data, and a side table that knows where everything stands.
+
+Floor 1. Knows YAML and nothing of robots. The only errors are `ProblemsError`, whose problems have
+the place and the remedy; whatever a file holds, reading it is bounded in time and memory.
+"""
+
+import re
+from collections.abc import Sequence
+from typing import Any, Final
+
+import yaml
+
+from urc._files import read_bytes, refused, similar_file, too_large
+from urc._yaml_tree import Limits, Mark, Span, StoppedError, TreeReader, path_text
+from urc.problems import Problem, ProblemsError, Severity, has_errors
+
+__all__ = [
+    "Document",
+    "Limits",
+    "Mark",
+    "Path",
+    "Span",
+    "parse_document",
+    "read_document",
+    "similar_file",
+]
+
+Path = tuple[str | int, ...]
+"""Keys and list indices from the top of a document to a value."""
+
+_LIMITS: Final = Limits()
+# What YAML's reader takes for the end of a line; marks count the same way. The patterns for all of
+# Unicode take milliseconds to compile, so they are made for texts that need them only.
+_LINE_END = re.compile("\r\n|[\r\n]")
+_LINE_END_UNICODE: Final = "\r\n|[\r\n\x85\u2028\u2029]"
+_UNPRINTABLE = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\x7f]")
+_UNPRINTABLE_UNICODE: Final = "[^\t\r\n\x20-\x7e\x85\xa0-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]"
+_ESCAPE = re.compile(r"\\(?:x.{2}|u.{4}|U.{8}|.)", re.DOTALL)
+
+
+class Document:
+    """One file's data with the place of every key and value. Not changed after it was read."""
+
+    __slots__ = ("data", "file", "findings", "lines", "mark", "text")
+
+    def __init__(
+        self,
+        file: str,
+        text: str,
+        lines: Sequence[str],
+        data: object,
+        mark: Mark,
+        findings: tuple[Problem, ...] = (),
+    ) -> None:
+        self.file = file
+        """As the person wrote it: for messages, and to find what it refers to."""
+        self.text = text
+        self.lines = lines
+        self.data = data
+        """Mappings with text keys, lists, text, numbers, booleans and None."""
+        self.mark = mark
+        """Marks of the whole; `at` finds one."""
+        self.findings = findings
+        """Warnings of the reader; an error would have been raised."""
+
+    def at(self, path: Path) -> Mark | None:
+        """Return the marks of the value at `path`, or None when there is no such value."""
+        mark = self.mark
+        for part in path:
+            inner = mark.children.get(part)
+            if inner is None:
+                return None
+            mark = inner
+        return mark
+
+    def problem(
+        self,
+        path: Path,
+        code: str,
+        message: str,
+        *,
+        hint: str = "",
+        key: bool = False,
+        offset: int | None = None,
+        length: int = 1,
+        severity: Severity = "error",
+    ) -> Problem:
+        """Return a finding at the value of `path`, with its source line.
+
+        Args:
+            path: where; when it does not exist, the nearest value around it is shown.
+            code: name of the fault.
+            message: what was found and what was expected.
+            hint: what to do about it.
+            key: point at the key instead of the value.
+            offset: 0-based character inside the text at `path` to point at.
+            length: characters to underline from `offset`.
+            severity: ``error`` or ``warning``.
+        """
+        span = self._span(path, key=key)
+        if offset is not None and not key:
+            span = self._inside(path, offset, length) or span
+        end_column = span.end_column if span.end_line == span.line else 0
+        source = self.lines[span.line - 1] if span.line <= len(self.lines) else ""
+        return Problem(
+            code,
+            message,
+            self.file,
+            span.line,
+            span.column,
+            end_column,
+            path_text(path),
+            hint,
+            source,
+            severity,
+        )
+
+    def _span(self, path: Path, *, key: bool) -> Span:
+        """Return the place of `path`, else of the nearest value around it."""
+        mark, depth = self.mark, 0
+        for part in path:
+            inner = mark.children.get(part)
+            if inner is None:
+                break
+            mark, depth = inner, depth + 1
+        wants_key = key or depth < len(path) or mark.style == "{"
+        if wants_key and mark.key is not None and (key or "{" in mark.style):
+            return mark.key
+        span = mark.span
+        # Of a mapping or list only the start says anything; underline its first character.
+        return span._replace(end_line=0) if mark.style == "{" else span
+
+    def _inside(self, path: Path, offset: int, length: int) -> Span | None:
+        mark = self.at(path)
+        value = self.data
+        for part in path:
+            value = value[part] if isinstance(value, (dict, list)) else None  # type: ignore[index]
+        if mark is None or not isinstance(value, str) or mark.style == "*":
+            return None
+        span = mark.span
+        if mark.style in ("|", ">") or span.line != span.end_line:
+            return _inside_lines(self.lines, span, value, offset, length)
+        raw = self.lines[span.line - 1]
+        start = _raw_column(raw, span.column - 1, mark.style, offset)
+        end = _raw_column(raw, span.column - 1, mark.style, min(offset + length, len(value)))
+        start = min(start, max(span.end_column - 2, 0))
+        return Span(span.line, start + 1, span.line, max(end, start + 1) + 1)
+
+
+def read_document(path: str, limits: Limits = _LIMITS) -> Document:
+    """Read a file.
+
+    Raises:
+        ProblemsError: it cannot be read, or is not a YAML document within `limits`.
+    """
+    return parse_document(read_bytes(path, limits.size_bytes), path, limits)
+
+
+def parse_document(content: bytes | str, file: str, limits: Limits = _LIMITS) -> Document:
+    """Read text; `file` is its name in messages.
+
+    Raises:
+        ProblemsError: it is not a YAML document within `limits`.
+    """
+    text = content if isinstance(content, str) else _decode(content, file)
+    text = text.removeprefix("\ufeff")
+    if len(text) > limits.size_bytes:
+        raise refused(file, "too-large", too_large(limits.size_bytes))
+    lines = _lines(text)
+    _check_characters(text, file, lines)
+    reader, found = None, None
+    problems: list[Problem] = []
+    try:
+        parser = _parser(text)
+        reader = TreeReader(parser, lines, file, limits)
+        found = reader.read()
+    except StoppedError:
+        pass
+    except yaml.YAMLError as error:
+        problems.append(_syntax_problem(error, file, lines))
+    if reader is not None:
+        told = {problem.line for problem in reader.problems}
+        # An unquoted value often upsets the parser further on; one finding per line is enough.
+        problems = [*reader.problems, *(p for p in problems if p.line not in told)]
+    if has_errors(problems):
+        raise ProblemsError(sorted(problems, key=lambda found: (found.line, found.column)))
+    if found is None or found[0] is None:
+        raise refused(
+            file,
+            "empty-document",
+            "the document is empty",
+            "a document starts with 'urc: 1' and 'kind: robot'",
+        )
+    return Document(file, text, lines, *found, tuple(problems))
+
+
+def _parser(text: str) -> Any:
+    try:
+        from yaml.cyaml import CParser  # type: ignore[attr-defined]  # the stubs hide it
+    except ImportError:  # PyYAML without libyaml: seven times slower, same events
+        return _pure_parser(text)
+    return CParser(text)
+
+
+def _pure_parser(text: str) -> Any:
+    class PureParser(yaml.reader.Reader, yaml.scanner.Scanner, yaml.parser.Parser):
+        def __init__(self) -> None:
+            yaml.reader.Reader.__init__(self, text)
+            yaml.scanner.Scanner.__init__(self)
+            yaml.parser.Parser.__init__(self)
+
+    return PureParser()
+
+
+def _decode(content: bytes, file: str) -> str:
+    if content.startswith((b"\xff\xfe", b"\xfe\xff")):
+        raise refused(
+            file, "not-utf-8", "this file is UTF-16, documents are UTF-8", "save it as UTF-8"
+        )
+    try:
+        text = content.decode("utf-8")
+    except UnicodeDecodeError as error:
+        good = _lines(content[: error.start].decode("utf-8"))
+        if b"\0" in content:
+            raise refused(file, "binary-file", "this is a binary file, not a document") from None
+        raise ProblemsError(
+            [
+                Problem(
+                    "not-utf-8",
+                    f"the byte 0x{content[error.start]:02x} here is not UTF-8",
+                    file,
+                    len(good),
+                    len(good[-1]) + 1,
+                    hint="save the file as UTF-8",
+                )
+            ]
+        ) from None
+    if "\0" in text:
+        raise refused(file, "binary-file", "this is a binary file, not a document")
+    return text
+
+
+def _lines(text: str) -> list[str]:
+    return _LINE_END.split(text) if text.isascii() else re.split(_LINE_END_UNICODE, text)
+
+
+def _check_characters(text: str, file: str, lines: Sequence[str]) -> None:
+    found = _UNPRINTABLE.search(text)
+    if found is None and not text.isascii():
+        found = re.search(_UNPRINTABLE_UNICODE, text)
+    if found is None:
+        return
+    before = _lines(text[: found.start()])
+    line, column = len(before), len(before[-1]) + 1
+    raise ProblemsError(
+        [
+            Problem(
+                "control-character",
+                f"the character U+{ord(found[0]):04X} may not stand in YAML",
+                file,
+                line,
+                column,
+                column + 1,
+                source=lines[line - 1],
+                hint='write it as an escape in double quotes, such as "\\x07"',
+            )
+        ]
+    )
+
+
+def _syntax_problem(error: yaml.YAMLError, file: str, lines: Sequence[str]) -> Problem:
+    from urc._yaml_faults import explain
+
+    fault = explain(error, lines)
+    line = min(fault.line, len(lines) - 1)
+    return Problem(
+        fault.code,
+        fault.message,
+        file,
+        line + 1,
+        fault.column + 1,
+        hint=fault.hint,
+        source=lines[line],
+    )
+
+
+def _raw_column(raw: str, start: int, style: str, offset: int) -> int:
+    """Return the 0-based column of character `offset` of a scalar that starts at `start`."""
+    if style not in ("'", '"'):
+        return start + offset
+    column = start + 1
+    for _ in range(offset):
+        if style == "'":
+            column += 2 if raw.startswith("''", column) else 1
+        else:
+            escape = _ESCAPE.match(raw, column)
+            column = escape.end() if escape else column + 1
+    return column
+
+
+def _inside_lines(
+    lines: Sequence[str], span: Span, value: str, offset: int, length: int
+) -> Span | None:
+    """Return the place of a character in a scalar over several lines.
+
+    The lines are looked up in the value one after the other, which holds for literal and folded
+    blocks and for plain and quoted text alike, as long as nothing in it is escaped.
+    """
+    position = 0
+    last = min(span.end_line, len(lines))
+    for number in range(span.line, last + 1):
+        raw = lines[number - 1]
+        first = span.column - 1 if number == span.line else 0
+        if number == span.line and raw[first : first + 1] in ("|", ">"):
+            continue
+        if number == last and number > span.line:
+            raw = raw[: max(span.end_column - 1, 0)] if raw[:1].strip() else raw
+        content = raw[first:].strip().strip("'\"")
+        place = value.find(content, position) if content else -1
+        if place < 0:
+            continue
+        if offset < place + len(content):
+            column = raw.index(content, first) + max(offset - place, 0) + 1
+            end = min(column + length, raw.index(content, first) + len(content) + 1)
+            return Span(number, column, number, max(end, column + 1))
+        position = place + len(content)
+    return None
