@@ -4,6 +4,8 @@ from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 from contextlib import AbstractAsyncContextManager, asynccontextmanager
 from pathlib import Path
 
+import yaml
+
 from urc.model.driver import Driver, TransportSpec
 from urc.model.interface import Grid, Interface, Slot, WidgetUse
 from urc.model.profile import Profile, Setting
@@ -31,7 +33,10 @@ def plain_widget(name: str, inputs: Sequence[str], folder: Path | None = None) -
     """Return a widget of the shipped folder `name`, or of `folder`, that takes anything."""
     types = ("integer", "number", "boolean", "string")
     ports = {each: Port(each, types) for each in inputs}
-    return Widget(name, name.title(), folder or shipped("widgets") / name, ports)
+    place = folder or shipped("widgets") / name
+    manifest = place / "widget.yaml"
+    declared = yaml.safe_load(manifest.read_text("utf-8")) if manifest.is_file() else {}
+    return Widget(name, name.title(), place, ports, options=declared.get("options", {}))
 
 
 def dashboard_profile(

@@ -1,0 +1,111 @@
+"""Every shipped widget folder: complete, named as its folder, its template sound in every state."""
+
+import re
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+from urc.model.values import Limits, Signal
+from urc.model.widget import Port, Widget
+from urc.shipped import shipped
+from urc.web.pages import WidgetContext, render_widget
+
+FOLDERS = sorted(path for path in shipped("widgets").iterdir() if path.is_dir())
+FILES = {"widget.yaml", "template.html.j2", "widget.js", "widget.css", "demo.yaml"}
+TYPES = {"string": str, "integer": int, "number": (int, float), "boolean": bool}
+HOSTILE = "</h3><script>alert(1)</script><img src=x onerror=alert(1)>"
+
+
+class Page(HTMLParser):
+    """Collects the elements of a piece of markup."""
+
+    def __init__(self, html: str) -> None:
+        super().__init__()
+        self.elements: list[tuple[str, dict[str, str | None]]] = []
+        self.feed(html)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        """Keep the element."""
+        self.elements.append((tag, dict(attrs)))
+
+
+def read(folder: Path, name: str) -> Any:
+    """Return a YAML document of the folder."""
+    return yaml.safe_load((folder / name).read_text("utf-8"))
+
+
+def widget_of(folder: Path) -> Widget:
+    """Return the widget as its manifest declares it."""
+    manifest = read(folder, "widget.yaml")
+    ports = {
+        name: Port(name, tuple(port["type"]), port.get("unit", ""))
+        for name, port in manifest["inputs"].items()
+    }
+    return Widget(
+        manifest["name"], manifest["title"], folder, ports, options=manifest.get("options", {})
+    )
+
+
+def signals_of(demo: dict[str, Any]) -> dict[str, Signal]:
+    """Return the signals that a demo binds to the inputs."""
+    return {
+        name: Signal(name, **{**given, "limits": Limits(**given.get("limits", {}))})
+        for name, given in demo["signals"].items()
+    }
+
+
+STATES = [
+    (folder, state)
+    for folder in FOLDERS
+    for state in (read(folder, "demo.yaml")["states"] if (folder / "demo.yaml").is_file() else ())
+]
+
+
+@pytest.mark.parametrize("folder", FOLDERS, ids=lambda folder: folder.name)
+def test_a_widget_folder_is_complete(folder: Path) -> None:
+    """All five files, the name of the folder, and inputs that the demo binds."""
+    assert {path.name for path in folder.iterdir()} == FILES
+    manifest = read(folder, "widget.yaml")
+    assert (manifest["urc"], manifest["kind"], manifest["name"]) == (1, "widget", folder.name)
+    demo = read(folder, "demo.yaml")
+    assert set(demo["signals"]) <= set(manifest["inputs"])
+    for name, port in manifest["inputs"].items():
+        assert name in demo["signals"] or not port.get("required", True)
+    for state in demo["states"].values():
+        for option, value in state.get("options", {}).items():
+            declared = manifest["options"][option]
+            assert isinstance(value, TYPES[declared["type"]])
+            assert value in declared.get("enum", [value])
+    assert {"normal", "stale", "none", "hostile"} <= set(demo["states"])
+
+
+@pytest.mark.parametrize(("folder", "state"), STATES, ids=lambda part: getattr(part, "name", part))
+def test_a_template_renders_in_each_state_without_values(folder: Path, state: str) -> None:
+    """What stands there before the module has loaded makes sense, and texts are texts."""
+    demo = read(folder, "demo.yaml")
+    shown = demo["states"][state]
+    widget = widget_of(folder)
+    options = {**dict.fromkeys(widget.options), **shown.get("options", {})}
+    signals = signals_of(demo)
+    context = WidgetContext(HOSTILE, options, signals, widget.name, "cell-0")
+    html = str(render_widget(widget, context))
+    assert "&lt;img src=x onerror=alert(1)&gt;" in html
+    assert "—" in html
+    assert 'id="cell-0-' in html
+    for tag, attributes in Page(html).elements:
+        assert tag not in ("script", "img", "style", "link", "iframe")
+        assert not [name for name in attributes if name.startswith("on") or name == "style"]
+
+
+@pytest.mark.parametrize("folder", FOLDERS, ids=lambda folder: folder.name)
+def test_a_style_sheet_touches_only_its_own_widget(folder: Path) -> None:
+    """Every selector begins with the widget's name; no ids, no !important, tokens for colours."""
+    css = re.sub(r"/\*.*?\*/", "", (folder / "widget.css").read_text("utf-8"), flags=re.S)
+    assert "!important" not in css
+    assert not re.search(r"#[0-9a-fA-F]{3,8}\b|rgb\(|hsl\(", css)
+    for selector in re.findall(r"(?:^|[};{])\s*([^@{};&]+)\{", css):
+        for part in re.split(r",(?![^(]*\))", selector):
+            assert part.strip().startswith(f".{folder.name}"), part

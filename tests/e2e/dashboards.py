@@ -1,0 +1,70 @@
+"""A dashboard in the test's own loop, so that the test can play the robot's part."""
+
+import asyncio
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
+
+from playwright.async_api import Page
+from websockets.asyncio.client import ClientConnection
+from websockets.exceptions import ConnectionClosed
+
+from urc.testing.dashboard import FakeRobot
+from urc.web.app import Robot, build_app, serve
+
+WAIT_S = 10.0
+
+
+@asynccontextmanager
+async def running_dashboard(*robots: FakeRobot, port: int = 0) -> AsyncIterator[str]:
+    """Serve the robots on this machine; give the address, and end cleanly."""
+    ready: asyncio.Future[str] = asyncio.get_running_loop().create_future()
+    app = build_app(
+        {robot.profile.name: Robot(robot.profile, {}, robot.open) for robot in robots},
+        linger_s=0.2,
+    )
+    task = asyncio.create_task(serve(app, port=port, on_ready=ready.set_result))
+    try:
+        async with asyncio.timeout(WAIT_S):
+            await asyncio.wait((ready, task), return_when=asyncio.FIRST_COMPLETED)
+        if task.done():
+            task.result()
+        yield await ready
+    finally:
+        task.cancel()
+        await asyncio.wait((task,), timeout=WAIT_S)
+
+
+async def until(is_true: Callable[[], bool]) -> None:
+    """Wait for something on the server's side."""
+    loop = asyncio.get_running_loop()
+    end_s = loop.time() + WAIT_S
+    while not is_true():
+        assert loop.time() < end_s, "it did not come true"
+        await asyncio.sleep(0.01)
+
+
+async def until_closed(line: ClientConnection) -> int | None:
+    """Read until the server closes; return the code."""
+    async with asyncio.timeout(WAIT_S):
+        try:
+            while True:
+                await line.recv()
+        except ConnectionClosed:
+            return line.close_code
+
+
+async def until_text(page: Page, selector: str, text: str) -> None:
+    """Wait until an element of the page says exactly `text`."""
+    await page.wait_for_function(
+        "([selector, text]) => document.querySelector(selector)?.textContent.trim() === text",
+        arg=[selector, text],
+    )
+
+
+async def until_attribute(page: Page, selector: str, name: str, value: str) -> None:
+    """Wait until an attribute of an element of the page has `value`."""
+    await page.wait_for_function(
+        "([selector, name, value]) =>"
+        " document.querySelector(selector)?.getAttribute(name) === value",
+        arg=[selector, name, value],
+    )

@@ -1,0 +1,189 @@
+"""The dashboard's server over real sockets, without a browser: limits, slow clients, its end."""
+
+import asyncio
+import contextlib
+import json
+import socket
+from collections.abc import Callable
+from urllib.parse import urlsplit
+
+import pytest
+from websockets.asyncio.client import ClientConnection, connect
+from websockets.exceptions import ConnectionClosed, InvalidStatus
+
+from tests.e2e.dashboards import running_dashboard, until, until_closed
+from tests.e2e.processes import UrcProcess
+from urc.model.interface import WidgetUse
+from urc.model.values import Signal
+from urc.problems import UrcError
+from urc.testing.dashboard import FakeRobot, dashboard_profile
+from urc.web.app import build_app, serve
+
+pytestmark = pytest.mark.anyio
+
+
+def joined(address: str, **options: object) -> connect:
+    """Return a connection to the robot's socket, as its own page makes it."""
+    origin = address.rstrip("/")
+    url = address.replace("http://", "ws://") + "ws?robot=puppet"
+    return connect(url, origin=origin, **{"compression": None, **options})  # type: ignore[arg-type]
+
+
+async def next_value(line: ClientConnection) -> object:
+    """Return the next value that arrives."""
+    async with asyncio.timeout(10):
+        while True:
+            message = json.loads(await line.recv())
+            if message["t"] == "v":
+                return message["v"][0]
+
+
+def text_robot() -> FakeRobot:
+    """Return a robot with one text signal, for large frames."""
+    signals = {"text": Signal("text", "string", stale_after_s=3)}
+    return FakeRobot(
+        dashboard_profile(signals=signals, uses=[WidgetUse("t", "value", {"value": "text"})])
+    )
+
+
+@pytest.mark.parametrize(
+    ("origin", "host", "status"),
+    [
+        ("http://evil.example", None, 403),
+        ("null", None, 403),
+        (None, None, 403),
+        ("http://evil.example", "evil.example", 421),
+    ],
+)
+async def test_a_foreign_page_gets_no_socket(
+    origin: str | None, host: str | None, status: int
+) -> None:
+    """A cross-site page, a sandboxed one, a rebound name: 0 upgrades."""
+    robot = FakeRobot(dashboard_profile())
+    async with running_dashboard(robot) as address:
+        parts = urlsplit(address)
+        url = f"ws://{host or parts.netloc}/ws"
+        with pytest.raises(InvalidStatus) as caught:
+            await connect(url, origin=origin, host=parts.hostname, port=parts.port)  # type: ignore[arg-type]
+        assert caught.value.response.status_code == status
+        assert "content-security-policy" in caught.value.response.headers
+        assert robot.opened == 0
+
+
+async def test_values_are_not_compressed_and_the_socket_names_its_robot() -> None:
+    """Compression costs more than it saves on a LAN; an unknown robot has a code of its own."""
+    robot = FakeRobot(dashboard_profile())
+    async with running_dashboard(robot) as address:
+        async with joined(address, compression="deflate") as line:
+            assert line.protocol.extensions == []
+            assert json.loads(await line.recv())["robot"] == "puppet"
+        url = address.replace("http://", "ws://") + "ws?robot=nobody"
+        async with connect(url, origin=address.rstrip("/")) as line:  # type: ignore[arg-type]
+            assert await until_closed(line) == 4404
+
+
+async def test_a_client_that_does_not_read_is_only_its_own_problem() -> None:
+    """The other gets every value; the slow one skips, and then sees the newest."""
+    robot = text_robot()
+    frames = 200
+    async with running_dashboard(robot) as address, joined(address) as quick:
+        parts = urlsplit(address)
+        raw = socket.create_connection((parts.hostname, parts.port))
+        raw.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+        async with joined(address, sock=raw, max_queue=1) as slow:
+            assert json.loads(await slow.recv())["t"] == "hello"
+            slow.transport.pause_reading()
+            seen = 0
+            for number in range(frames):
+                robot.say("text", f"{number:06d}" + "x" * 4000)
+                value = await next_value(quick)
+                assert str(value).startswith(f"{number:06d}")
+                seen += 1
+            slow.transport.resume_reading()
+            got = []
+            while not got or not got[-1].startswith(f"{frames - 1:06d}"):
+                got.append(str(await next_value(slow)))
+        assert seen == frames
+        assert len(got) < frames / 2
+        assert got == sorted(got)
+
+
+@pytest.mark.parametrize(
+    ("message", "code"), [("x" * 65_537, 1009), (b"\x00" * 65_537, 1009)], ids=["text", "bytes"]
+)
+async def test_a_message_that_is_too_long_closes_the_socket(message: str, code: int) -> None:
+    """One byte more than 64 KiB is refused by the protocol itself."""
+    async with (
+        running_dashboard(FakeRobot(dashboard_profile())) as address,
+        joined(address) as line,
+    ):
+        await line.recv()
+        await line.send(message)
+        assert await until_closed(line) == code
+
+
+async def test_a_flood_closes_the_socket_that_makes_it() -> None:
+    """More than a hundred messages a second end with a code; the server lives."""
+    robot = FakeRobot(dashboard_profile())
+    async with (
+        running_dashboard(robot) as address,
+        joined(address) as line,
+        joined(address) as other,
+    ):
+        with contextlib.suppress(ConnectionClosed):
+            for number in range(10_000):
+                await line.send(json.dumps({"t": "ping", "c": number}))
+        assert await until_closed(line) == 4429
+        robot.say("battery", 5)
+        assert await next_value(other) == 5
+
+
+async def test_the_server_ends_while_pages_are_open() -> None:
+    """Cancelled with open sockets it closes them, says why, and closes the robot's session."""
+    robot = FakeRobot(dashboard_profile())
+    async with running_dashboard(robot) as address:
+        line = await joined(address)
+        await line.recv()
+        assert robot.is_open
+    assert await until_closed(line) == 1012
+    assert not robot.is_open
+
+
+async def test_a_signal_ends_the_process_while_pages_are_open(
+    urc_process: Callable[..., UrcProcess],
+) -> None:
+    """Ctrl-C is a good end, not a crash, and no page can hold it up."""
+    process = urc_process("serve", "robots/puppet.yaml", "--port", "0", "--simulate")
+    address = (await process.wait_for_async(r"(http://\S+)"))[1]
+    async with joined(address) as line:
+        assert isinstance(await next_value(line), int)
+        code = await asyncio.to_thread(process.interrupt, 8.0)
+    assert code == 0
+    assert not [text for text in process.errors if "Traceback" in text]
+
+
+async def test_an_address_that_is_taken_is_told_in_one_line() -> None:
+    """The second server on a port does not start."""
+    robot = FakeRobot(dashboard_profile())
+    async with running_dashboard(robot) as address:
+        port = urlsplit(address).port
+        assert port is not None
+        with pytest.raises(UrcError) as caught:
+            await serve(build_app({}), port=port)
+        assert str(caught.value) == (
+            f"cannot listen on 127.0.0.1 port {port}: Address already in use;"
+            " choose another with --port"
+        )
+
+
+async def test_the_session_closes_when_the_last_page_has_gone() -> None:
+    """Two pages share it; it ends a short while after the second."""
+    robot = FakeRobot(dashboard_profile())
+    async with running_dashboard(robot) as address:
+        async with joined(address) as first:
+            await first.recv()
+            async with joined(address) as second:
+                await second.recv()
+            assert robot.is_open
+        await until(lambda: not robot.is_open)
+        assert robot.opened == 1

@@ -1,0 +1,227 @@
+"""One browser client: limits on what it sends, newest values for what it gets."""
+
+import asyncio
+import json
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from typing import Any
+
+import pytest
+from starlette.types import Message
+
+from urc.model.profile import Setting
+from urc.runtime.session import CommandFailed
+from urc.testing.clock import FakeClock, settle
+from urc.testing.dashboard import FakeRobot, dashboard_profile
+from urc.web.robots import Robot, Station
+from urc.web.socket import BAD_MESSAGES, MESSAGES_PER_S, Allowance, Client
+
+pytestmark = pytest.mark.anyio
+
+
+class FakeLine:
+    """A WebSocket whose other side is the test."""
+
+    def __init__(self) -> None:
+        self.inbox: asyncio.Queue[Message] = asyncio.Queue()
+        self.sent: list[dict[str, Any]] = []
+        self.closed: tuple[int, str | None] | None = None
+        self.free = asyncio.Event()
+        self.free.set()
+        self.was_aborted = False
+
+    async def receive(self) -> Message:
+        return await self.inbox.get()
+
+    async def send_text(self, data: str) -> None:
+        self.sent.append(json.loads(data))
+
+    async def close(self, code: int = 1000, reason: str | None = None) -> None:
+        self.closed = (code, reason)
+        self.leave()
+
+    async def drained(self) -> None:
+        await self.free.wait()
+
+    def abort(self) -> None:
+        self.was_aborted = True
+
+    def say(self, message: object) -> None:
+        text = message if isinstance(message, str) else json.dumps(message)
+        self.inbox.put_nowait({"type": "websocket.receive", "text": text})
+
+    def leave(self) -> None:
+        self.inbox.put_nowait({"type": "websocket.disconnect", "code": 1001})
+
+    def of_type(self, kind: str) -> list[dict[str, Any]]:
+        return [message for message in self.sent if message["t"] == kind]
+
+
+class Scene:
+    """A client that is connected to a fake robot."""
+
+    def __init__(self, station: Station, robot: FakeRobot, clock: FakeClock) -> None:
+        self.robot = robot
+        self.clock = clock
+        self.station = station
+        self.line = FakeLine()
+        self.client = Client(self.line, station, self.line)
+        self.task = asyncio.create_task(self.client.serve())
+
+
+@asynccontextmanager
+async def scene(settings: dict[str, Setting] | None = None) -> AsyncIterator[Scene]:
+    """Serve one client; it and the station are gone after the test."""
+    clock = FakeClock()
+    robot = FakeRobot(dashboard_profile(settings=settings), clock)
+    station = Station(Robot(robot.profile, {}, robot.open), clock=clock)
+    running = asyncio.create_task(station.run())
+    made = Scene(station, robot, clock)
+    await settle()
+    try:
+        yield made
+    finally:
+        made.line.leave()
+        await settle()
+        running.cancel()
+        made.task.cancel()
+        await settle()
+
+
+async def test_a_client_gets_hello_then_links_then_values() -> None:
+    """What an index means comes before any index."""
+    async with scene() as it:
+        it.robot.say("battery", 42)
+        await settle()
+        assert [message["t"] for message in it.line.sent] == ["hello", "links", "v"]
+        assert it.line.of_type("v")[0]["v"] == [42]
+
+
+async def test_a_blocked_line_gets_only_the_newest_value() -> None:
+    """While the kernel takes nothing, nothing is taken from the hub either."""
+    async with scene() as it:
+        it.line.free.clear()
+        it.robot.say("battery", 0)
+        await settle()
+        before = len(it.line.of_type("v"))
+        for level in range(1, 50):
+            it.robot.say("battery", level)
+            await it.clock.advance(0.02)
+        it.line.free.set()
+        await settle()
+        assert [frame["v"] for frame in it.line.of_type("v")[before:]][-1] == [49]
+        assert len(it.line.of_type("v")) - before <= 2
+
+
+async def test_a_ping_is_answered_with_its_own_number() -> None:
+    """The page measures the way there and back."""
+    async with scene() as it:
+        it.line.say({"t": "ping", "c": 12.5})
+        await settle()
+        assert it.line.of_type("pong") == [{"t": "pong", "c": 12.5, "n": 1_000_000}]
+
+
+async def test_a_command_gets_exactly_one_reply() -> None:
+    """Done with its values, or failed with the session's own code."""
+    async with scene() as it:
+        it.robot.on_command = lambda name, arguments: {"battery": 7}
+        it.line.say({"t": "run", "id": 3, "command": "ask", "arguments": {"x": 1}})
+        await settle()
+
+        def refuse(name: str, arguments: object) -> dict[str, int]:
+            raise CommandFailed("refused", "not now")
+
+        it.robot.on_command = refuse  # type: ignore[assignment]
+        it.line.say({"t": "run", "id": 4, "command": "ask"})
+        await settle()
+        assert it.robot.commands == [("ask", {"x": 1}), ("ask", {})]
+        assert it.line.of_type("reply") == [
+            {"t": "reply", "id": 3, "ok": True, "values": {"battery": 7}},
+            {"t": "reply", "id": 4, "ok": False, "code": "refused", "message": "not now"},
+        ]
+
+
+async def test_bad_messages_are_counted_answered_and_then_close_the_line() -> None:
+    """Each is answered; the tenth closes with a code of its own."""
+    async with scene() as it:
+        for _ in range(BAD_MESSAGES - 1):
+            it.line.say("{")
+        await settle()
+        assert len(it.line.of_type("error")) == it.client.bad_messages == BAD_MESSAGES - 1
+        assert it.line.closed is None
+        it.line.say("[]")
+        await settle()
+        assert it.line.closed == (4400, "10 messages could not be used")
+
+
+async def test_too_many_messages_close_the_line() -> None:
+    """A hundred a second pass, one more does not."""
+    async with scene() as it:
+        for number in range(MESSAGES_PER_S):
+            it.line.say({"t": "ping", "c": number})
+        await settle()
+        await it.clock.advance(0.5)
+        assert it.line.closed is None
+        for number in range(MESSAGES_PER_S):
+            it.line.say({"t": "ping", "c": number})
+        await settle()
+        await settle()
+        await settle()
+        await settle()
+        assert it.line.closed == (4429, "more than 100 messages a second")
+
+
+def test_the_allowance_comes_back_with_time() -> None:
+    """A second's worth at once, then the rate."""
+    allowance = Allowance(100, 0.0)
+    assert [allowance.take(0.0) for _ in range(101)] == [True] * 100 + [False]
+    assert [allowance.take(0.011) for _ in range(2)] == [True, False]
+    assert sum(allowance.take(100.0) for _ in range(500)) == 100
+
+
+async def test_a_robot_that_is_not_ready_refuses_with_the_settings_names() -> None:
+    """No session is opened while a setting is undefined."""
+    async with scene(settings={"host": Setting("host", "host")}) as it:
+        assert it.line.closed == (4409, "not set yet: host")
+        assert it.robot.opened == 0
+
+
+async def test_a_page_that_leaves_ends_its_client() -> None:
+    """Its tasks end, and the station counts it no more."""
+    async with scene() as it:
+        it.line.leave()
+        await settle()
+        assert it.task.done()
+        await it.clock.advance(2.1)
+        assert not it.robot.is_open
+
+
+async def test_the_end_of_the_session_is_told_to_the_page() -> None:
+    """The line is closed with a code, so that the page comes back by itself."""
+    async with scene() as it:
+        live = await it.station.live()
+        live.ended.set()
+        live.fanout.flush()
+        await settle()
+        assert it.line.closed == (4500, "the robot's session ended")
+
+
+async def test_commands_at_once_are_bounded() -> None:
+    """One more than may be under way is answered busy, and nothing piles up."""
+    async with scene() as it:
+        gate = asyncio.Event()
+
+        async def slow(name: str, arguments: object) -> object:
+            await gate.wait()
+            raise CommandFailed("refused", "late")
+
+        it.robot.command = slow  # type: ignore[assignment, method-assign]
+        for number in range(17):
+            it.line.say({"t": "run", "id": number, "command": "ask"})
+        await settle()
+        await settle()
+        replies = it.line.of_type("reply")
+        assert [(reply["id"], reply["code"]) for reply in replies] == [(16, "busy")]
+        gate.set()
+        await settle()
+        assert len(it.line.of_type("reply")) == 17

@@ -1,0 +1,189 @@
+"""One flush for all: newest wins, encoded once, nobody waits for anybody."""
+
+import json
+from itertools import pairwise
+
+import pytest
+
+from urc.model.values import Sample, Signal
+from urc.runtime.hub import Hub, Note
+from urc.testing.clock import FakeClock, settle
+from urc.web.fanout import Fanout, Pacer, Place
+
+pytestmark = pytest.mark.anyio
+
+
+class Watcher:
+    """A client that takes what there is when it is told to, or does not."""
+
+    def __init__(self, fanout: Fanout) -> None:
+        self.fanout = fanout
+        self.place = fanout.newcomer()
+        self.woken = 0
+        self.is_stuck = False
+        self.texts: list[str] = []
+        fanout.listeners.add(self)
+
+    def wake(self) -> None:
+        self.woken += 1
+        if not self.is_stuck:
+            self.take()
+
+    def take(self) -> None:
+        self.texts += self.fanout.take(self.place)
+
+    @property
+    def values(self) -> list[dict[str, object]]:
+        """Return name → value of each frame."""
+        frames = [json.loads(text) for text in self.texts if text.startswith('{"t":"v"')]
+        names = self.fanout.hub.names
+        return [
+            {names[place]: value for place, value in zip(frame["i"], frame["v"], strict=True)}
+            for frame in frames
+        ]
+
+
+def robot(clock: FakeClock) -> tuple[Hub, Fanout]:
+    """Return a hub of two signals with its fan-out."""
+    hub = Hub({"a": Signal("a"), "b": Signal("b")})
+    return hub, Fanout(hub, clock=clock)
+
+
+def put(hub: Hub, clock: FakeClock, **values: float) -> None:
+    """Let readings arrive now."""
+    hub.put([Sample(name, value, clock.now()) for name, value in values.items()])
+
+
+def test_a_frame_is_encoded_once_for_all_at_the_same_place() -> None:
+    """Two clients that are up to date are handed the very same text."""
+    clock = FakeClock()
+    hub, fanout = robot(clock)
+    first, second = Watcher(fanout), Watcher(fanout)
+    put(hub, clock, a=1)
+    fanout.flush()
+    assert first.texts[0] is second.texts[0]
+    assert first.values == [{"a": 1}]
+
+
+def test_a_slow_client_gets_the_newest_values_merged() -> None:
+    """It skips the frames in between, sees each signal's last value, and holds up nobody."""
+    clock = FakeClock()
+    hub, fanout = robot(clock)
+    slow, quick = Watcher(fanout), Watcher(fanout)
+    slow.is_stuck = True
+    for step in range(100):
+        put(hub, clock, a=step)
+        fanout.flush()
+    put(hub, clock, b=7)
+    fanout.flush()
+    assert len(quick.values) == 101
+    slow.take()
+    assert slow.values == [{"a": 99, "b": 7}]
+    slow.take()
+    assert len(slow.values) == 1
+
+
+def test_what_comes_after_a_flush_waits_for_the_next() -> None:
+    """A client that is woken for another reason gets no extra frame."""
+    clock = FakeClock()
+    hub, fanout = robot(clock)
+    client = Watcher(fanout)
+    put(hub, clock, a=1)
+    fanout.flush()
+    put(hub, clock, a=2)
+    client.take()
+    assert client.values == [{"a": 1}]
+    fanout.flush()
+    assert client.values == [{"a": 1}, {"a": 2}]
+
+
+def test_a_newcomer_gets_everything_with_its_age_now() -> None:
+    """The frame of somebody who came earlier is not handed out again when its ages are old."""
+    clock = FakeClock()
+    hub, fanout = robot(clock)
+    put(hub, clock, a=1, b=2)
+    fanout.flush()
+    Watcher(fanout).take()
+    clock._now += 5
+    late = Watcher(fanout)
+    late.take()
+    assert late.values == [{"a": 1, "b": 2}]
+    assert json.loads(late.texts[0])["a"] == [5000, 5000]
+
+
+def test_lines_of_the_log_are_never_lost_silently() -> None:
+    """Numbers run on, so a client that missed more than is kept can say how many."""
+    clock = FakeClock()
+    hub, fanout = robot(clock)
+    place = fanout.newcomer()
+    for number in range(700):
+        hub.note(Note(clock.now(), "info", "wire", f"line {number}"))
+    fanout.flush()
+    log = json.loads(fanout.take(place)[0])
+    assert (log["first"], len(log["lines"])) == (200, 500)
+    assert log["lines"][-1]["text"] == "line 699"
+    assert fanout.take(place) == []
+
+
+def test_a_newcomer_gets_the_last_lines_of_the_log() -> None:
+    """It learns what happened before it came, and the numbers are the session's."""
+    clock = FakeClock()
+    hub, fanout = robot(clock)
+    for number in range(80):
+        hub.note(Note(clock.now(), "info", "wire", f"line {number}"))
+    log = json.loads(fanout.take(fanout.newcomer())[0])
+    assert (log["first"], len(log["lines"])) == (30, 50)
+
+
+async def test_the_first_change_is_flushed_at_once_and_the_rest_at_the_rate() -> None:
+    """Leading edge first; then at most the rate, with the last value never lost."""
+    clock = FakeClock()
+    hub, fanout = robot(clock)
+    client = Watcher(fanout)
+    import asyncio
+
+    task = asyncio.create_task(fanout.run())
+    await settle()
+    put(hub, clock, a=0)
+    await settle()
+    assert client.values == [{"a": 0}]
+    for step in range(1, 1001):  # a thousand a second, for one second
+        await clock.advance(0.001)
+        put(hub, clock, a=step)
+        await settle()
+    await clock.advance(0.05)
+    assert 58 <= len(client.values) <= 63
+    assert client.values[-1] == {"a": 1000}
+    task.cancel()
+
+
+@pytest.mark.parametrize("rate_hz", [10.0, 60.0])
+def test_a_source_at_just_the_rate_is_never_held_back(rate_hz: float) -> None:
+    """With jitter and a stall, every message still goes when it comes."""
+    pacer = Pacer(rate_hz)
+    period_s = 1 / rate_hz
+    now_s = 100.0
+    for step in range(500):
+        now_s = 100.0 + step * period_s + (0.4 * period_s if step % 2 else 0.0)
+        assert pacer.delay_s(now_s) <= 1e-9
+        pacer.went(now_s)
+
+
+def test_a_flood_is_let_through_at_the_rate() -> None:
+    """However fast they come, no second has more than one above the rate."""
+    pacer = Pacer(60.0)
+    times = []
+    now_s = 0.0
+    while now_s < 5.0:
+        now_s += pacer.delay_s(now_s)
+        pacer.went(now_s)
+        times.append(now_s)
+        now_s += 0.0005
+    for start in times:
+        assert sum(start <= each < start + 1 for each in times) <= 61
+    assert all(later >= earlier for earlier, later in pairwise(times))
+
+
+def test_a_place_starts_at_nothing() -> None:
+    """A fresh place has seen no revision and no link."""
+    assert Place() == Place(revision=0, links=0, notes=0)

@@ -1,0 +1,125 @@
+"""The life of a robot's session: opened for the first client, closed after the last."""
+
+import asyncio
+from collections.abc import AsyncIterator
+from contextlib import ExitStack, asynccontextmanager
+
+import pytest
+
+from urc.model.profile import Setting
+from urc.problems import UrcError
+from urc.testing.clock import FakeClock, settle
+from urc.testing.dashboard import FakeRobot, dashboard_profile
+from urc.web.robots import Robot, SessionFailed, Station, missing_settings
+
+pytestmark = pytest.mark.anyio
+
+
+@asynccontextmanager
+async def stationed(
+    robot: FakeRobot, clock: FakeClock, opener: object = None
+) -> AsyncIterator[Station]:
+    """Run a station for the fake robot."""
+    open_session = opener or robot.open
+    station = Station(
+        Robot(robot.profile, {"host": "127.0.0.1"}, open_session),  # type: ignore[arg-type]
+        clock=clock,
+    )
+    task = asyncio.create_task(station.run())
+    try:
+        yield station
+    finally:
+        task.cancel()
+        await settle()
+
+
+async def test_the_session_lives_from_the_first_client_to_the_last() -> None:
+    """Two clients share one session; two seconds after they have gone it is closed."""
+    clock = FakeClock()
+    robot = FakeRobot(dashboard_profile(), clock)
+    async with stationed(robot, clock) as station:
+        await settle()
+        assert robot.opened == 0
+        with ExitStack() as both:
+            both.enter_context(station.visit())
+            first = await station.live()
+            both.enter_context(station.visit())
+            assert await station.live() is first
+            assert (robot.opened, robot.is_open) == (1, True)
+        await clock.advance(1.9)
+        assert robot.is_open
+        await clock.advance(0.2)
+        assert not robot.is_open
+        assert first.ended.is_set()
+
+
+async def test_a_reload_keeps_the_session() -> None:
+    """A client that is back within the time finds the same session."""
+    clock = FakeClock()
+    robot = FakeRobot(dashboard_profile(), clock)
+    async with stationed(robot, clock) as station:
+        with station.visit():
+            first = await station.live()
+        await clock.advance(1.0)
+        with station.visit():
+            await clock.advance(10.0)
+            assert await station.live() is first
+            assert robot.is_open
+        assert robot.opened == 1
+
+
+async def test_a_client_that_comes_too_late_gets_a_new_session() -> None:
+    """After the session was closed, the next client opens another."""
+    clock = FakeClock()
+    robot = FakeRobot(dashboard_profile(), clock)
+    async with stationed(robot, clock) as station:
+        with station.visit():
+            first = await station.live()
+        await clock.advance(3.0)
+        with station.visit():
+            assert await station.live() is not first
+        assert robot.opened == 2
+
+
+async def test_a_session_that_cannot_be_opened_is_told_and_tried_again() -> None:
+    """The waiting client learns why in one line; the supervisor goes on."""
+    clock = FakeClock()
+    robot = FakeRobot(dashboard_profile(), clock)
+    faults: list[Exception] = [UrcError("no such host"), ValueError("a bug")]
+
+    @asynccontextmanager
+    async def opener() -> AsyncIterator[FakeRobot]:
+        if faults:
+            raise faults.pop(0)
+        async with robot.open() as session:
+            yield session
+
+    async with stationed(robot, clock, opener) as station:
+        with station.visit():
+            with pytest.raises(SessionFailed) as caught:
+                await station.live()
+            assert str(caught.value) == "no such host"
+            waiting = asyncio.ensure_future(station.live())
+            await settle()
+            await clock.advance(1.1)
+            with pytest.raises(SessionFailed) as caught:
+                await waiting
+            assert "broke" in str(caught.value)
+            assert "a bug" not in str(caught.value)
+            waiting = asyncio.ensure_future(station.live())
+            await settle()
+            await clock.advance(1.1)
+            assert (await waiting).session is robot
+
+
+def test_a_robot_is_not_ready_while_a_setting_is_undefined() -> None:
+    """None and the empty text are both "not set"; False and 0 are values."""
+    settings = {
+        name: Setting(name, "string", default=default)
+        for name, default in {"a": None, "b": "", "c": "x", "d": False, "e": 0}.items()
+    }
+    profile = dashboard_profile(settings=settings)
+    robot = Robot(profile, {"b": ""}, FakeRobot(profile).open)
+    assert [setting.name for setting in missing_settings(robot)] == ["a", "b"]
+    robot = Robot(profile, {"a": "1", "b": "2"}, FakeRobot(profile).open)
+    assert missing_settings(robot) == ()

@@ -1,0 +1,148 @@
+"""Message shapes: what goes to a page, and what is taken from one."""
+
+import json
+import math
+
+import pytest
+
+from urc.expressions import compile_template
+from urc.model.driver import Driver, Message, Poll, Reply
+from urc.model.profile import Profile
+from urc.model.values import Limits, Sample, Signal
+from urc.patterns import compile_pattern
+from urc.runtime.hub import LinkStatus, Note
+from urc.web import wire
+
+
+def test_a_frame_holds_indexes_values_and_ages() -> None:
+    """Names are told once; frames carry indexes only, and alarms only when there are any."""
+    samples = [Sample("b", 7, 9.5), Sample("a", True, 9.999)]
+    text = wire.encode_values(samples, {"a": 0, "b": 1}, 10.0)
+    assert json.loads(text) == {"t": "v", "n": 10000, "i": [1, 0], "v": [7, True], "a": [500, 1]}
+
+
+def test_alarms_stand_beside_their_values() -> None:
+    """One alarm in a frame brings the list for all of its values."""
+    samples = [Sample("a", 1, 1.0, "low"), Sample("b", 2, 1.0)]
+    assert json.loads(wire.encode_values(samples, {"a": 0, "b": 1}, 1.0))["s"] == ["low", ""]
+
+
+@pytest.mark.parametrize(
+    ("value", "shown"),
+    [
+        (None, None),
+        (1.5, 1.5),
+        (math.nan, None),
+        (math.inf, None),
+        (2**53 - 1, 2**53 - 1),
+        (2**53, "9007199254740992"),
+        (-(2**63), "-9223372036854775808"),
+        (True, True),
+        ("", ""),
+        ("</script>", "</script>"),
+        ("x" * 5000, "x" * 4095 + "…"),
+        ("a\ud800b", "a?b"),
+    ],
+)
+def test_values_arrive_as_a_browser_can_hold_them(value: object, shown: object) -> None:
+    """Integers beyond a browser's, huge texts, broken text and NaN never break a frame."""
+    sample = Sample("a", value, 1.0)  # type: ignore[arg-type]
+    assert json.loads(wire.encode_values([sample], {"a": 0}, 1.0))["v"] == [shown]
+
+
+def test_hello_says_what_each_signal_means_and_where_it_comes_from() -> None:
+    """The page can tell which values are cut off when one of several lines is lost."""
+    reply = Reply(compile_pattern(r"^(?P<volts>\d+)$"))
+    driver = Driver(
+        signals={
+            "volts": Signal("volts", "number", unit="V", limits=Limits(low=11), stale_after_s=3),
+            "note": Signal("note", "string", states=(("0", "off"),), stale_after_s=2),
+        },
+        messages={"m": Message("m", "radio", compile_pattern(r"(?P<note>.*)"))},
+        polls=(Poll("polls.0", "wire", 1.0, compile_template("volts?"), reply),),
+    )
+    hello = json.loads(wire.encode_hello(Profile("p", "P", "p.yaml", driver=driver), "s1", 2.0))
+    assert hello == {
+        "t": "hello", "version": 1, "session": "s1", "robot": "p", "title": "P", "now": 2000,
+        "names": ["volts", "note"],
+        "signals": [
+            {"name": "volts", "type": "number", "unit": "V", "limits": {"low": 11.0},
+             "stale_after_s": 3, "sources": ["wire"]},
+            {"name": "note", "type": "string", "states": {"0": "off"},
+             "stale_after_s": 2, "sources": ["radio"]},
+        ],
+    }  # fmt: skip
+
+
+def test_links_log_replies_and_pongs() -> None:
+    """The other messages, each as the page reads it."""
+    link = LinkStatus("wire", "lost", "tcp x:1", 1.0, "refused", 3, 4)
+    assert json.loads(wire.encode_links([link], 3.0)) == {
+        "t": "links",
+        "links": [
+            {"transport": "wire", "state": "lost", "address": "tcp x:1", "since": 2000,
+             "detail": "refused", "attempts": 3, "faults": 4}
+        ],
+    }  # fmt: skip
+    assert json.loads(wire.encode_log([Note(1.0, "error", "wire", "no")], 7, 2.0)) == {
+        "t": "log",
+        "first": 7,
+        "lines": [{"age": 1000, "level": "error", "source": "wire", "text": "no"}],
+    }
+    run = wire.Run(5, "go")
+    assert json.loads(wire.encode_reply(run, values={"x": 1})) == {
+        "t": "reply", "id": 5, "ok": True, "values": {"x": 1},
+    }  # fmt: skip
+    assert json.loads(wire.encode_reply(run, code="timed-out", message="late")) == {
+        "t": "reply", "id": 5, "ok": False, "code": "timed-out", "message": "late",
+    }  # fmt: skip
+    assert json.loads(wire.encode_pong(wire.Ping(1.5), 2.0)) == {"t": "pong", "c": 1.5, "n": 2000}
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ('{"t":"ping","c":12.5}', wire.Ping(12.5)),
+        ('{"t":"run","id":1,"command":"go"}', wire.Run(1, "go")),
+        (
+            '{"t":"run","id":1,"command":"go","arguments":{"v":1.5,"s":"x","__proto__":null}}',
+            wire.Run(1, "go", {"v": 1.5, "s": "x", "__proto__": None}),
+        ),
+    ],
+)
+def test_good_messages(text: str, message: wire.Inbound) -> None:
+    """What a page may say."""
+    assert wire.decode(text) == message
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "x",
+        "null",
+        "[]",
+        "{}",
+        '{"t":"nope"}',
+        '{"t":"ping"}',
+        '{"t":"ping","c":"1"}',
+        '{"t":"ping","c":1,"extra":1}',
+        '{"t":"run","id":"1","command":"go"}',
+        '{"t":"run","id":1,"command":"go","arguments":{"v":[1]}}',
+        '{"t":"run","id":1,"command":"go","arguments":{"v":{"w":1}}}',
+        '{"t":"run","id":1,"command":"go","arguments":[]}',
+        '{"t":"ping","c":1}{"t":"ping","c":1}',
+        '{"t":"ping","c":1',
+        "[" * 60_000,
+        '{"a":' * 10_000,
+        '{"t":"ping","x":' + "[" * 60_000,
+        '{"t":"run","id":1,"command":"' + "x" * wire.INBOUND_BYTES + '"}',
+        "\ud800",
+        b'{"t":"ping","c":\xff}',
+    ],
+)
+def test_bad_messages_are_refused_with_a_reason(text: str | bytes) -> None:
+    """Whatever a page sends ends in one kind of error: wrong type, too deep, too long, no JSON."""
+    with pytest.raises(wire.BadMessage) as caught:
+        wire.decode(text)
+    assert str(caught.value)

@@ -1,0 +1,1 @@
+"""The dashboard: pages, one WebSocket a client, static modules."""

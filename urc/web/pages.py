@@ -1,0 +1,309 @@
+"""Jinja → HTML. Each template has one documented context: the dataclass that it is rendered with.
+
+Floor 5. Templates see the dataclass as ``page`` and nothing else; logic beyond ``for`` and ``if``
+belongs here. Widget templates come from packages, so they run in a sandbox, and one that fails
+costs its own cell.
+"""
+
+import json
+import logging
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import lru_cache
+from urllib.parse import quote
+
+from jinja2 import Environment, FileSystemLoader, StrictUndefined, Template
+from jinja2.sandbox import ImmutableSandboxedEnvironment
+from markupsafe import Markup
+
+from urc import __version__
+from urc.model.interface import Interface, WidgetUse
+from urc.model.profile import Profile, Setting
+from urc.model.values import Signal, Value
+from urc.model.widget import Widget
+from urc.shipped import shipped
+from urc.web.layout import grid_css
+from urc.web.robots import Robot, missing_settings
+
+__all__ = [
+    "Card",
+    "Cell",
+    "ErrorPage",
+    "Head",
+    "MenuPage",
+    "RobotPage",
+    "SettingRow",
+    "WidgetContext",
+    "error_page",
+    "menu_page",
+    "render",
+    "render_widget",
+    "robot_page",
+    "widget_context",
+]
+
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, slots=True)
+class Head:
+    """What every page needs in its head."""
+
+    nonce: str
+    """Of this one response; every script and style element carries it."""
+    title: str
+    import_map: Mapping[str, object] = field(default_factory=lambda: {"imports": {}})
+    widget_styles: tuple[str, ...] = ()
+    """URLs of widget style sheets."""
+    grid_css: str = ""
+    """Rules that place the cells; made of numbers only."""
+    version: str = __version__
+
+
+@dataclass(frozen=True, slots=True)
+class SettingRow:
+    """One line of a robot's settings."""
+
+    title: str
+    name: str
+    value: str
+    """As shown; "" when nothing is set."""
+    description: str
+    is_missing: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Card:
+    """One robot on the menu."""
+
+    title: str
+    summary: str
+    url: str
+    rows: tuple[SettingRow, ...]
+    missing: tuple[str, ...]
+    """Names of the settings that keep Connect disabled."""
+
+
+@dataclass(frozen=True, slots=True)
+class MenuPage:
+    """``menu.html.j2``: the robots that are served, and what is set for each."""
+
+    head: Head
+    cards: tuple[Card, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Cell:
+    """One slot of the grid with its widget's markup."""
+
+    index: int
+    """Place in the page's cells; the grid's rules name it."""
+    config: str
+    """JSON for the host: slot, widget, inputs, outputs, options, title."""
+    html: Markup
+    """The widget's own rendered template; "" when it failed."""
+    error: str
+    """Why the widget's template failed, when it did."""
+    is_background: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Tab:
+    """Another interface of the same robot."""
+
+    title: str
+    url: str
+    is_current: bool
+
+
+@dataclass(frozen=True, slots=True)
+class RobotPage:
+    """``robot.html.j2``: one interface of one robot, live."""
+
+    head: Head
+    title: str
+    socket: str
+    """Path and query of the WebSocket."""
+    tabs: tuple[Tab, ...]
+    """Empty when there is only one interface."""
+    cells: tuple[Cell, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class ErrorPage:
+    """``error.html.j2``: one sentence, and the way back."""
+
+    head: Head
+    status: int
+    message: str
+
+
+@dataclass(frozen=True, slots=True)
+class WidgetContext:
+    """``widgets/*/template.html.j2``, whose fields are its variables.
+
+    The markup is shown before the module has loaded, so it must make sense without any value.
+    """
+
+    title: str
+    """What the author calls this place, else the signal's, else the widget's title."""
+    options: Mapping[str, object]
+    """Checked against the manifest; every declared option has a key, None where nothing is set."""
+    inputs: Mapping[str, Signal]
+    """Input → the signal bound to it; inputs that are not bound are missing."""
+    widget: str
+    """The widget's name."""
+    uid: str
+    """Unique in the page, for ``id`` and ``aria-labelledby``."""
+
+
+def menu_page(head: Head, robots: Mapping[str, Robot]) -> str:
+    """Return the menu."""
+    return render("menu.html.j2", MenuPage(head, tuple(map(_card, robots, robots.values()))))
+
+
+def robot_page(
+    nonce: str,
+    name: str,
+    profile: Profile,
+    interface: Interface,
+    modules: Mapping[str, object],
+) -> str:
+    """Return the page of one interface; `modules` is the import map."""
+    uses = _uses(profile, interface)
+    slots = tuple(uses)
+    widgets = dict.fromkeys(use.widget for use in uses.values())
+    head = Head(
+        nonce=nonce,
+        title=profile.title,
+        import_map=modules,
+        widget_styles=tuple(f"/widgets/{quote(widget)}/widget.css" for widget in widgets),
+        grid_css=grid_css(interface, slots),
+    )
+    url = f"/robots/{quote(name, safe='')}/"
+    tabs = tuple(
+        Tab(each.title or each.name, f"{url}?interface={quote(each.name)}", each is interface)
+        for each in profile.interfaces.values()
+    )
+    page = RobotPage(
+        head=head,
+        title=profile.title,
+        socket=f"/ws?robot={quote(name, safe='')}",
+        tabs=tabs if len(tabs) > 1 else (),
+        cells=tuple(
+            _cell(index, use, profile, is_background=slot == interface.background)
+            for index, (slot, use) in enumerate(uses.items())
+        ),
+    )
+    return render("robot.html.j2", page)
+
+
+def error_page(nonce: str, status: int, message: str) -> str:
+    """Return a page that says what is wrong in one sentence."""
+    return render("error.html.j2", ErrorPage(Head(nonce, f"{status}"), status, message))
+
+
+def render(template: str, page: MenuPage | RobotPage | ErrorPage) -> str:
+    """Return a page's HTML."""
+    return _pages().get_template(template).render(page=page)
+
+
+def render_widget(widget: Widget, context: WidgetContext) -> Markup:
+    """Return the widget's markup. Whatever its template raises comes through."""
+    source = (widget.folder / "template.html.j2").read_text(encoding="utf-8")
+    variables = {name: getattr(context, name) for name in WidgetContext.__slots__}
+    return Markup(_widget_template(source).render(variables))  # noqa: S704  # autoescaped
+
+
+def widget_context(use: WidgetUse, widget: Widget, profile: Profile, uid: str) -> WidgetContext:
+    """Return what the widget's template may know."""
+    signals = profile.driver.signals
+    inputs = {name: signals[signal] for name, signal in use.inputs.items()}
+    declared: dict[str, object] = dict.fromkeys(widget.options)
+    first = next(iter(inputs.values()), None)
+    title = use.title or (first and (first.title or _spoken(first.name))) or widget.title
+    return WidgetContext(title, {**declared, **use.options}, inputs, widget.name, uid)
+
+
+def _cell(index: int, use: WidgetUse, profile: Profile, *, is_background: bool) -> Cell:
+    widget = profile.widgets[use.widget]
+    context = widget_context(use, widget, profile, uid=f"cell-{index}")
+    html, error = Markup(), ""
+    try:
+        html = render_widget(widget, context)
+    except Exception as problem:  # a supervisor: a widget costs its own cell
+        log.warning("widget %s: its template failed: %s", widget.name, problem)
+        error = f"{type(problem).__name__}: {problem}"
+    config = {
+        "slot": use.slot,
+        "widget": use.widget,
+        "title": context.title,
+        "inputs": dict(use.inputs),
+        "outputs": dict(use.outputs),
+        "options": dict(context.options),
+    }
+    return Cell(index, json.dumps(config), html, error, is_background)
+
+
+def _uses(profile: Profile, interface: Interface) -> dict[str, WidgetUse]:
+    """Return slot → widget, in reading order; slots that nobody fills are left out."""
+    names: dict[str, None] = dict.fromkeys((interface.background,) if interface.background else ())
+    for grid in interface.grids.values():
+        ordered = sorted(grid.slots, key=lambda slot: (slot.row, slot.column))
+        names |= dict.fromkeys(slot.name for slot in ordered)
+    found = {name: interface.widgets.get(name) or profile.slots.get(name) for name in names}
+    return {name: use for name, use in found.items() if use is not None}
+
+
+def _card(name: str, robot: Robot) -> Card:
+    profile = robot.profile
+    missing = missing_settings(robot)
+    rows = tuple(
+        _row(setting, robot.settings.get(setting.name, setting.default), setting in missing)
+        for setting in profile.settings.values()
+    )
+    url = f"/robots/{quote(name, safe='')}/"
+    names = tuple(setting.name for setting in missing)
+    return Card(profile.title or name, profile.summary, url, rows, names)
+
+
+def _row(setting: Setting, value: Value, is_missing: bool) -> SettingRow:
+    if is_missing:
+        shown = ""
+    elif setting.is_secret:
+        shown = "••••••"
+    elif isinstance(value, bool):
+        shown = "yes" if value else "no"
+    else:
+        shown = str(value)
+    title = setting.title or _spoken(setting.name)
+    return SettingRow(title, setting.name, shown, setting.description, is_missing)
+
+
+def _spoken(name: str) -> str:
+    """Return an identifier as a person would write it: ``left_motor`` → ``Left motor``."""
+    words = name.replace("_", " ").replace("-", " ").strip()
+    return words[:1].upper() + words[1:]
+
+
+@lru_cache(maxsize=1)
+def _pages() -> Environment:
+    return Environment(
+        loader=FileSystemLoader(shipped("templates")),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+
+
+@lru_cache(maxsize=1)
+def _widgets() -> Environment:
+    return ImmutableSandboxedEnvironment(
+        autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    )
+
+
+@lru_cache(maxsize=256)
+def _widget_template(source: str) -> Template:
+    return _widgets().from_string(source)

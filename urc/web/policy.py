@@ -1,0 +1,223 @@
+"""Who may talk to the dashboard, and what a page may do: checked before any route is looked at.
+
+Floor 5. A pure ASGI layer around the whole application, so that error answers pass through it too.
+Three attacks end here: a foreign name that resolves to this machine (Host), a foreign page that
+opens our WebSocket or posts to us (Origin), and markup that tries to run (page policy, framing).
+It knows no route, no robot and no template.
+"""
+
+import ipaddress
+import re
+import secrets
+from collections.abc import Iterable
+from typing import NamedTuple
+
+from starlette.exceptions import HTTPException
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+__all__ = ["BODY_BYTES", "Authority", "Policy", "is_host_allowed", "is_origin_ours", "parse_host"]
+
+BODY_BYTES = 1 << 20
+"""Largest request body that is read, in bytes."""
+
+_AUTHORITY = r"(?P<host>\[[0-9a-f:.]{2,45}\]|[a-z0-9_.-]{1,253})(?::(?P<port>[0-9]{1,5}))?"
+_HOST = re.compile(_AUTHORITY, re.ASCII | re.IGNORECASE)
+_ORIGIN = re.compile(r"(?P<scheme>https?)://" + _AUTHORITY, re.ASCII | re.IGNORECASE)
+_LABEL = re.compile(r"[a-z0-9_](?:[a-z0-9_-]{0,61}[a-z0-9_])?", re.ASCII)
+_DEFAULT_PORTS = {"http": 80, "https": 443, "ws": 80, "wss": 443}
+_SAFE_METHODS = frozenset({"GET", "HEAD"})
+
+_CONTENT_POLICY = (
+    "default-src 'none'; script-src 'nonce-{nonce}' 'strict-dynamic'; "
+    "style-src 'self' 'nonce-{nonce}'; img-src 'self' data: blob:; connect-src 'self'; "
+    "frame-src 'self'; worker-src 'self'; base-uri 'none'; form-action 'none'; "
+    "object-src 'none'; frame-ancestors 'none'; require-trusted-types-for 'script'; "
+    "trusted-types urc"
+)
+_FIXED_HEADERS = (
+    (b"x-content-type-options", b"nosniff"),
+    (b"x-frame-options", b"DENY"),
+    (b"referrer-policy", b"no-referrer"),
+    (b"cross-origin-opener-policy", b"same-origin"),
+    (b"cross-origin-resource-policy", b"same-origin"),
+    (
+        b"permissions-policy",
+        # What driving needs stays ours; the rest is off, for widgets as well.
+        b"accelerometer=(self), gyroscope=(self), magnetometer=(self), gamepad=(self), "
+        b"fullscreen=(self), screen-wake-lock=(self), camera=(), microphone=(), geolocation=(), "
+        b"display-capture=(), payment=(), usb=(), serial=(), hid=(), midi=()",
+    ),
+)
+
+
+class Authority(NamedTuple):
+    """A host with its port, as in ``Host:`` or behind the scheme of an origin."""
+
+    host: str
+    """Lower case; IPv6 in its brackets."""
+    port: int | None
+    """None when it was left out."""
+
+
+def parse_host(text: str) -> Authority | None:
+    """Return the parts of a ``Host`` header, or None when it isn't exactly one host and port."""
+    match = _HOST.fullmatch(text)
+    return _authority(match) if match else None
+
+
+def is_host_allowed(authority: Authority, names: frozenset[str]) -> bool:
+    """Return whether we answer to that host.
+
+    An address written out cannot be re-bound by a foreign name server, ``localhost`` and names
+    under ``.local`` aren't served by one; every other name must be in `names` (lower case).
+    """
+    host = authority.host
+    if host.startswith("["):
+        return _is_address(ipaddress.IPv6Address, host[1:-1])
+    if _is_address(ipaddress.IPv4Address, host):
+        return True
+    name = host.removesuffix(".")
+    if name == "localhost" or name in names:
+        return True
+    labels = name.split(".")
+    return (
+        len(labels) > 1
+        and labels[-1] == "local"
+        and all(_LABEL.fullmatch(label) for label in labels)
+    )
+
+
+def is_origin_ours(origin: str, scheme: str, authority: Authority) -> bool:
+    """Return whether `origin` is exactly scheme, host and port of this request.
+
+    Args:
+        origin: the header as it came; ``null`` is never ours.
+        scheme: ``http``, ``https``, ``ws`` or ``wss``, as the request arrived.
+        authority: the request's own host.
+    """
+    match = _ORIGIN.fullmatch(origin)
+    theirs = _authority(match) if match else None
+    if match is None or theirs is None:
+        return False
+    default = _DEFAULT_PORTS[scheme]
+    return (
+        match["scheme"].lower() == ("https" if scheme in ("https", "wss") else "http")
+        and theirs.host == authority.host
+        and (theirs.port or default) == (authority.port or default)
+    )
+
+
+class Policy:
+    """The ASGI layer. Puts the page's nonce into ``scope["state"]["nonce"]``."""
+
+    def __init__(self, app: ASGIApp, *, allowed_hosts: Iterable[str] = ()) -> None:
+        self._app = app
+        self._names = frozenset(name.lower().removesuffix(".") for name in allowed_hosts)
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Refuse, or hand on with headers added to every answer."""
+        if scope["type"] == "lifespan":
+            await self._app(scope, receive, send)
+            return
+        nonce = secrets.token_urlsafe(16)
+        scope.setdefault("state", {})["nonce"] = nonce
+        answer = _Answer(scope, send, nonce)
+        refusal = self._refusal(scope)
+        if refusal is None:
+            await self._app(scope, _limited(scope, receive), answer.send)
+        else:
+            await answer.refuse(*refusal)
+
+    def _refusal(self, scope: Scope) -> tuple[int, str] | None:
+        hosts = _values(scope, b"host")
+        authority = parse_host(hosts[0]) if len(hosts) == 1 else None
+        if authority is None or not is_host_allowed(authority, self._names):
+            return 421, "This server does not answer to that host name."
+        is_upgrade = scope["type"] == "websocket"
+        if is_upgrade or scope["method"] not in _SAFE_METHODS:
+            origins = _values(scope, b"origin")
+            if len(origins) != 1 or not is_origin_ours(origins[0], scope["scheme"], authority):
+                return 403, "Only this server's own pages may do that."
+        lengths = _values(scope, b"content-length")
+        if any(not text.isdecimal() or int(text[:20]) > BODY_BYTES for text in lengths):
+            return 413, f"A request may carry at most {BODY_BYTES} bytes."
+        return None
+
+
+class _Answer:
+    """Adds the headers of the page policy to whatever answer goes out first."""
+
+    def __init__(self, scope: Scope, send: Send, nonce: str) -> None:
+        self._send = send
+        self._is_upgrade = scope["type"] == "websocket"
+        self._can_explain = "websocket.http.response" in (scope.get("extensions") or {})
+        self._has_begun = False
+        policy = _CONTENT_POLICY.format(nonce=nonce).encode()
+        self._headers = [(b"content-security-policy", policy), *_FIXED_HEADERS]
+
+    async def send(self, message: Message) -> None:
+        kind = message["type"]
+        if kind in ("http.response.start", "websocket.http.response.start"):
+            self._has_begun = True
+            ours = {name for name, _ in self._headers}
+            theirs = [pair for pair in message.get("headers", ()) if pair[0].lower() not in ours]
+            message = {**message, "headers": [*theirs, *self._headers]}
+        elif kind == "websocket.accept":
+            self._has_begun = True
+        elif kind == "websocket.close" and not self._has_begun:
+            # A route that isn't there: the server's own refusal would carry no headers.
+            await self.refuse(404, "There is no such page.")
+            return
+        await self._send(message)
+
+    async def refuse(self, status: int, text: str) -> None:
+        """Answer with one line of plain text."""
+        if self._is_upgrade and not self._can_explain:
+            self._has_begun = True
+            await self._send({"type": "websocket.close", "code": 1008, "reason": text})
+            return
+        prefix = "websocket.http.response" if self._is_upgrade else "http.response"
+        body = text.encode() + b"\n"
+        headers = [
+            (b"content-type", b"text/plain; charset=utf-8"),
+            (b"content-length", str(len(body)).encode()),
+            (b"cache-control", b"no-store"),
+        ]
+        await self.send({"type": f"{prefix}.start", "status": status, "headers": headers})
+        await self._send({"type": f"{prefix}.body", "body": body})
+
+
+def _limited(scope: Scope, receive: Receive) -> Receive:
+    """Return `receive`, refusing a body that turns out longer than it may be."""
+    if scope["type"] == "websocket":
+        return receive
+    total = 0
+
+    async def counted() -> Message:
+        nonlocal total
+        message = await receive()
+        total += len(message.get("body", b""))
+        if total > BODY_BYTES:
+            raise HTTPException(413, f"A request may carry at most {BODY_BYTES} bytes.")
+        return message
+
+    return counted
+
+
+def _authority(match: re.Match[str]) -> Authority | None:
+    port = int(match["port"]) if match["port"] else None
+    if port is not None and not 0 < port < 65536:
+        return None
+    return Authority(match["host"].lower(), port)
+
+
+def _is_address(kind: type[ipaddress.IPv4Address] | type[ipaddress.IPv6Address], text: str) -> bool:
+    try:
+        kind(text)
+    except ValueError:
+        return False
+    return True
+
+
+def _values(scope: Scope, name: bytes) -> list[str]:
+    return [value.decode("latin-1") for key, value in scope["headers"] if key == name]

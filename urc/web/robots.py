@@ -1,0 +1,177 @@
+"""A robot as the dashboard sees it, and the life of its session.
+
+Floor 5. The session is opened for the first client and closed a short while after the last one has
+gone, so that a reload of the page does not cut the robot off and Back does.
+"""
+
+import asyncio
+import logging
+import secrets
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import AbstractAsyncContextManager, contextmanager
+from dataclasses import dataclass
+from typing import Protocol
+
+from urc.model.profile import Profile, Setting
+from urc.model.values import Value
+from urc.problems import UrcError
+from urc.protocol.events import Replied
+from urc.runtime.clock import Clock, LoopClock
+from urc.runtime.hub import Hub
+from urc.web.fanout import Fanout
+
+__all__ = ["Live", "Robot", "SessionFailed", "SessionLike", "Station", "missing_settings"]
+
+LINGER_S = 2.0
+OPEN_TIMEOUT_S = 10.0
+RETRY_S = 1.0
+CLIENTS = 256
+
+log = logging.getLogger(__name__)
+
+
+class SessionLike(Protocol):
+    """What the dashboard needs of an opened profile."""
+
+    @property
+    def hub(self) -> Hub:
+        """Latest values and link states."""
+
+    async def command(self, name: str, arguments: Mapping[str, Value]) -> Replied:
+        """Run one command and return its reply; raise `CommandFailed` when there is none."""
+
+
+@dataclass(frozen=True, slots=True)
+class Robot:
+    """One robot to serve."""
+
+    profile: Profile
+    settings: Mapping[str, Value]
+    """What is set now, defaults included."""
+    open_session: Callable[[], AbstractAsyncContextManager[SessionLike]]
+    """Connects while the context lasts. Must not wait for the robot to answer."""
+
+
+@dataclass(frozen=True, slots=True)
+class Live:
+    """An open session with its fan-out."""
+
+    session: SessionLike
+    fanout: Fanout
+    number: str
+    """Tells this session from the robot's other ones, also across restarts of the server."""
+    ended: asyncio.Event
+    """Set when the session is over, whatever the reason."""
+
+
+class SessionFailed(UrcError):
+    """The robot's session could not be opened, or ended."""
+
+
+def missing_settings(robot: Robot) -> tuple[Setting, ...]:
+    """Return the settings that must be filled in before the robot can be connected."""
+    return tuple(
+        setting
+        for name, setting in robot.profile.settings.items()
+        if robot.settings.get(name, setting.default) in (None, "")
+    )
+
+
+class Station:
+    """Opens and closes the session of one robot as clients come and go."""
+
+    def __init__(
+        self,
+        robot: Robot,
+        *,
+        linger_s: float = LINGER_S,
+        clock: Clock | None = None,
+    ) -> None:
+        self.robot = robot
+        self.clock: Clock = clock or LoopClock()
+        self._linger_s = linger_s
+        self._visitors = 0
+        self._stirred = asyncio.Event()
+        self._next: asyncio.Future[Live] | None = None
+
+    @property
+    def is_full(self) -> bool:
+        """Whether one more client would be one too many."""
+        return self._visitors >= CLIENTS
+
+    @contextmanager
+    def visit(self) -> Iterator[None]:
+        """Count as a client for as long as the context lasts."""
+        self._visitors += 1
+        self._stirred.set()
+        try:
+            yield
+        finally:
+            self._visitors -= 1
+            self._stirred.set()
+
+    async def live(self) -> Live:
+        """Return the open session; raise `SessionFailed` when there will be none."""
+        try:
+            async with asyncio.timeout(OPEN_TIMEOUT_S):
+                return await asyncio.shield(self._coming())
+        except TimeoutError:
+            raise SessionFailed("the robot's session did not open in time") from None
+
+    async def run(self) -> None:
+        """Supervise for ever; ends by being cancelled."""
+        while True:
+            await self._wait_for(present=True)
+            try:
+                async with self.robot.open_session() as session:
+                    await self._serve(session)
+            except UrcError as error:
+                self._fail(str(error))
+                await self.clock.sleep(RETRY_S)
+            except Exception:  # a supervisor: one robot's bug must not end the others
+                log.exception("the session of %s broke", self.robot.profile.name)
+                self._fail("the robot's session broke; the server's log says why")
+                await self.clock.sleep(RETRY_S)
+
+    async def _serve(self, session: SessionLike) -> None:
+        fanout = Fanout(session.hub, clock=self.clock)
+        live = Live(session, fanout, secrets.token_hex(8), asyncio.Event())
+        self._coming().set_result(live)
+        try:
+            async with asyncio.TaskGroup() as group:
+                flushing = group.create_task(live.fanout.run())
+                await self._until_deserted()
+                self._next = None  # who comes from here on waits for the next session
+                flushing.cancel()
+        finally:
+            self._next = None
+            live.ended.set()
+            live.fanout.flush()
+
+    async def _until_deserted(self) -> None:
+        while True:
+            await self._wait_for(present=False)
+            end_s = self.clock.now() + self._linger_s
+            alarm = self.clock.call_at(end_s, self._stirred.set)
+            while not self._visitors and self.clock.now() < end_s:
+                self._stirred.clear()
+                await self._stirred.wait()
+            alarm.cancel()
+            if not self._visitors:
+                return
+
+    async def _wait_for(self, *, present: bool) -> None:
+        while (self._visitors > 0) is not present:
+            self._stirred.clear()
+            await self._stirred.wait()
+
+    def _coming(self) -> asyncio.Future[Live]:
+        if self._next is None:
+            self._next = asyncio.get_running_loop().create_future()
+        return self._next
+
+    def _fail(self, reason: str) -> None:
+        coming, self._next = self._next, None
+        if coming is not None and not coming.done():
+            coming.set_exception(SessionFailed(reason))
+            coming.exception()  # nobody may be waiting: that is no error

@@ -1,0 +1,211 @@
+"""The HTTP server underneath: uvicorn, run from a coroutine, with low limits on what may wait.
+
+Floor 5. The only module that knows uvicorn. The kernel and the process keep as little unsent data
+per client as possible: whatever waits there grows old and can't be taken back.
+"""
+
+import asyncio
+import contextlib
+import signal
+import socket
+from collections.abc import Callable, Iterator
+from typing import Any, cast
+
+import uvicorn
+from starlette.types import ASGIApp
+from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
+from uvicorn.server import ServerState
+
+from urc.problems import UrcError
+from urc.web.wire import INBOUND_BYTES
+
+__all__ = ["serve"]
+
+SEND_BUFFER_BYTES = 64 * 1024
+UNSENT_BYTES = 16 * 1024
+HEADER_BYTES = 16 * 1024
+CONNECTIONS = 1024
+PING_EVERY_S = 5.0
+PING_TIMEOUT_S = 10.0
+GRACE_S = 2
+BACKLOG = 128
+
+
+async def serve(
+    app: ASGIApp,
+    *,
+    host: str = "127.0.0.1",
+    port: int = 8080,
+    on_ready: Callable[[str], None] | None = None,
+) -> None:
+    """Serve `app` until SIGINT, SIGTERM or cancellation; then close within 3 seconds.
+
+    Args:
+        app: what `build_app` made.
+        host: an address or name of this machine.
+        port: 0 lets the system choose one.
+        on_ready: called once with the real address, as ``http://127.0.0.1:8080/``.
+
+    Raises:
+        UrcError: the address cannot be listened on.
+    """
+    listener = _listen(host, port)
+    config = uvicorn.Config(
+        app,
+        loop="none",
+        http="h11",
+        ws=_DashboardSocket,
+        ws_max_size=INBOUND_BYTES,
+        ws_ping_interval=PING_EVERY_S,
+        ws_ping_timeout=PING_TIMEOUT_S,
+        ws_per_message_deflate=False,
+        lifespan="on",
+        log_config=None,
+        access_log=False,
+        proxy_headers=False,
+        server_header=False,
+        limit_concurrency=CONNECTIONS,
+        timeout_keep_alive=5,
+        timeout_graceful_shutdown=GRACE_S,
+        h11_max_incomplete_event_size=HEADER_BYTES,
+    )
+    server = _Server(config)
+    try:
+        with _ending(server):
+            running = asyncio.ensure_future(server.serve(sockets=[listener]))
+            await _until_ready(server, running)
+            if on_ready and server.started:
+                on_ready(_url(listener))
+            await _follow(server, running)
+    finally:
+        listener.close()
+
+
+class _Server(uvicorn.Server):
+    @contextlib.contextmanager
+    def capture_signals(self) -> Iterator[None]:
+        """Leave the signals to `_ending`: uvicorn's own handling raises them again at the end."""
+        yield
+
+
+class _Flow:
+    """Lets a client wait until the kernel has taken everything, or cut the line."""
+
+    def __init__(self) -> None:
+        self.transport: asyncio.Transport | None = None
+        self.writable = asyncio.Event()
+        self.writable.set()
+
+    async def drained(self) -> None:
+        await self.writable.wait()
+
+    def abort(self) -> None:
+        if self.transport:
+            self.transport.abort()
+
+
+class _DashboardSocket(WebSocketsSansIOProtocol):
+    """uvicorn's WebSocket, with nothing waiting in the process, and a word when the line is free.
+
+    WARNING: only asyncio's own protocol methods and the constructor's arguments are used here, the
+    rest of the base class is uvicorn's business. The application finds the `_Flow` in
+    ``scope["state"]["flow"]`` and must do without it on another server.
+    """
+
+    def __init__(
+        self,
+        config: uvicorn.Config,
+        server_state: ServerState,
+        app_state: dict[str, Any],
+        _loop: asyncio.AbstractEventLoop | None = None,
+    ) -> None:
+        self._urc_flow = _Flow()
+        super().__init__(config, server_state, {**app_state, "flow": self._urc_flow}, _loop)
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        """Take the transport, and let it pause us as soon as the kernel is full."""
+        super().connection_made(transport)
+        self._urc_flow.transport = cast("asyncio.Transport", transport)
+        self._urc_flow.transport.set_write_buffer_limits(high=0)
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        """Let a waiting writer go on, to learn that the line is gone."""
+        super().connection_lost(exc)
+        self._urc_flow.writable.set()
+
+    def pause_writing(self) -> None:
+        """Tell the client that the kernel is full."""
+        super().pause_writing()
+        self._urc_flow.writable.clear()
+
+    def resume_writing(self) -> None:
+        """Tell the client that the kernel has taken everything."""
+        super().resume_writing()
+        self._urc_flow.writable.set()
+
+
+def _listen(host: str, port: int) -> socket.socket:
+    try:
+        family, kind, protocol, _, address = socket.getaddrinfo(
+            host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE
+        )[0]
+        listener = socket.socket(family, kind, protocol)
+    except OSError as error:
+        raise UrcError(f"cannot listen on {host}: {error.strerror or error}") from error
+    try:
+        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        # Accepted sockets inherit these two.
+        listener.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BUFFER_BYTES)
+        if hasattr(socket, "TCP_NOTSENT_LOWAT"):
+            listener.setsockopt(socket.IPPROTO_TCP, socket.TCP_NOTSENT_LOWAT, UNSENT_BYTES)
+        listener.bind(address)
+        listener.listen(BACKLOG)
+    except OSError as error:
+        listener.close()
+        reason = error.strerror or str(error)
+        hint = "; choose another with --port" if port else ""
+        raise UrcError(f"cannot listen on {host} port {port}: {reason}{hint}") from error
+    listener.setblocking(False)
+    return listener
+
+
+def _url(listener: socket.socket) -> str:
+    host, port = listener.getsockname()[:2]
+    return f"http://[{host}]:{port}/" if ":" in host else f"http://{host}:{port}/"
+
+
+async def _until_ready(server: uvicorn.Server, running: "asyncio.Future[None]") -> None:
+    while not server.started and not running.done():
+        await asyncio.wait((running,), timeout=0.01)
+
+
+async def _follow(server: uvicorn.Server, running: "asyncio.Future[None]") -> None:
+    """Wait for the server's end; being cancelled ends it in good order first."""
+    try:
+        await asyncio.shield(running)
+    except asyncio.CancelledError:
+        server.should_exit = True
+        await asyncio.wait((running,), timeout=GRACE_S + 1)
+        running.cancel()
+        raise
+
+
+@contextlib.contextmanager
+def _ending(server: uvicorn.Server) -> Iterator[None]:
+    """Let SIGINT and SIGTERM end the server while the context lasts, where they can be caught."""
+    loop = asyncio.get_running_loop()
+    caught: list[signal.Signals] = []
+
+    def end() -> None:
+        server.should_exit = True
+
+    for number in (signal.SIGINT, signal.SIGTERM):
+        # Not in a thread, and not on Windows: there the caller's own handling stays.
+        with contextlib.suppress(NotImplementedError, RuntimeError, ValueError):
+            loop.add_signal_handler(number, end)
+            caught.append(number)
+    try:
+        yield
+    finally:
+        for number in caught:
+            loop.remove_signal_handler(number)

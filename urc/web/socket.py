@@ -1,0 +1,247 @@
+"""One browser client: what it sends is checked, what it gets is never queued behind another's.
+
+Floor 5. Reads and writes are two tasks of one group. The writer takes the newest state when the
+line is free, so a client that cannot keep up skips frames; one that takes nothing at all for
+`STALL_S` is cut off.
+"""
+
+import asyncio
+import logging
+import math
+from collections import deque
+from typing import Protocol
+
+from starlette.types import Message
+from starlette.websockets import WebSocketDisconnect
+
+from urc.runtime.session import CommandFailed
+from urc.web import wire
+from urc.web.robots import Live, SessionFailed, Station, missing_settings
+
+__all__ = ["Allowance", "Client", "Flow", "Line"]
+
+MESSAGES_PER_S = 100
+BAD_MESSAGES = 10
+COMMANDS_AT_ONCE = 16
+COMMAND_TIMEOUT_S = 30.0
+STALL_S = 15.0
+GOODBYE_S = 2.0
+
+log = logging.getLogger(__name__)
+
+
+class Line(Protocol):
+    """The part of an accepted WebSocket that a client needs."""
+
+    async def receive(self) -> Message:
+        """Return the next ASGI message."""
+
+    async def send_text(self, data: str) -> None:
+        """Send one text message."""
+
+    async def close(self, code: int = 1000, reason: str | None = None) -> None:
+        """Begin the closing handshake."""
+
+
+class Flow(Protocol):
+    """What the server knows of the socket below, where it can be reached."""
+
+    async def drained(self) -> None:
+        """Return when the kernel has taken everything written so far."""
+
+    def abort(self) -> None:
+        """Cut the connection without waiting for anything."""
+
+
+class Allowance:
+    """How many messages may come: a bucket that holds one second's worth."""
+
+    def __init__(self, rate_hz: float, now_s: float) -> None:
+        self._rate_hz = rate_hz
+        self._left = rate_hz
+        self._time_s = now_s
+
+    def take(self, now_s: float) -> bool:
+        """Count one message; False when it is one too many."""
+        earned = (now_s - self._time_s) * self._rate_hz
+        self._left = min(self._rate_hz, self._left + earned)
+        self._time_s = now_s
+        if self._left < 1:
+            return False
+        self._left -= 1
+        return True
+
+
+class Client:
+    """Talks to one page until either side is done."""
+
+    def __init__(self, line: Line, station: Station, flow: Flow | None = None) -> None:
+        self._line = line
+        self._station = station
+        self._flow = flow
+        self._news = asyncio.Event()
+        self._answers: deque[str] = deque()
+        self._pong = ""
+        self._closing: tuple[int, str] | None = None
+        self._commands: set[asyncio.Task[None]] = set()
+        self._allowance = Allowance(MESSAGES_PER_S, station.clock.now())
+        self.bad_messages = 0
+
+    def wake(self) -> None:
+        """Look for news; called by the fan-out."""
+        self._news.set()
+
+    async def serve(self) -> None:
+        """Be this client from the accepted socket to its end."""
+        missing = missing_settings(self._station.robot)
+        if missing:
+            names = ", ".join(setting.name for setting in missing)
+            await self._refuse(wire.CLOSE_NOT_READY, f"not set yet: {names}")
+        elif self._station.is_full:
+            await self._refuse(wire.CLOSE_FULL, "too many clients watch this robot")
+        else:
+            with self._station.visit():
+                await self._visit()
+
+    async def _visit(self) -> None:
+        opening = asyncio.ensure_future(self._station.live())
+        leaving = asyncio.ensure_future(self._line.receive())
+        # A page that leaves while the session is still being opened must not count as a client.
+        try:
+            await asyncio.wait((opening, leaving), return_when=asyncio.FIRST_COMPLETED)
+            if leaving.done() and leaving.result()["type"] == "websocket.disconnect":
+                return
+            live = await opening
+        except SessionFailed as error:
+            await self._refuse(wire.CLOSE_FAILED, str(error))
+            return
+        finally:
+            opening.cancel()
+            if not leaving.done():
+                leaving.cancel()
+        first = leaving.result() if leaving.done() and not leaving.cancelled() else None
+        await self._converse(live, first)
+
+    async def _converse(self, live: Live, first: Message | None) -> None:
+        live.fanout.listeners.add(self)
+        try:
+            async with asyncio.TaskGroup() as group:
+                writing = group.create_task(self._write(live))
+                reading = group.create_task(self._read(live, group, first))
+                await asyncio.wait((writing, reading), return_when=asyncio.FIRST_COMPLETED)
+                if self._closing and not writing.done():
+                    await asyncio.wait((writing,), timeout=GOODBYE_S)
+                for task in (writing, reading, *self._commands):
+                    task.cancel()
+        except* WebSocketDisconnect:
+            pass
+        except* TimeoutError:
+            log.warning("a client took nothing for %g s and was cut off", STALL_S)
+            if self._flow:
+                self._flow.abort()
+        finally:
+            live.fanout.listeners.discard(self)
+
+    async def _refuse(self, code: int, reason: str) -> None:
+        try:
+            await self._line.send_text(wire.encode_error("refused", reason))
+            await self._line.close(code, reason[:100])
+        except WebSocketDisconnect:
+            pass
+
+    # Writing
+
+    async def _write(self, live: Live) -> None:
+        profile = self._station.robot.profile
+        hello = wire.encode_hello(profile, live.number, self._station.clock.now())
+        await self._line.send_text(hello)
+        place = live.fanout.newcomer()
+        while True:
+            # Only what is taken after the line is free is the newest.
+            if self._flow:
+                async with asyncio.timeout(STALL_S):
+                    await self._flow.drained()
+            self._news.clear()
+            for text in (*live.fanout.take(place), *self._take_answers()):
+                async with asyncio.timeout(STALL_S):
+                    await self._line.send_text(text)
+            if live.ended.is_set() and not self._closing:
+                self._closing = (wire.CLOSE_FAILED, "the robot's session ended")
+            if self._closing:
+                await self._line.close(*self._closing)
+                return
+            await self._news.wait()
+
+    def _take_answers(self) -> list[str]:
+        answers = list(self._answers)
+        self._answers.clear()
+        # Last, so that the round trip the page measures has the waiting in it.
+        if self._pong:
+            answers.append(self._pong)
+            self._pong = ""
+        return answers
+
+    # Reading
+
+    async def _read(self, live: Live, group: asyncio.TaskGroup, first: Message | None) -> None:
+        message = first or await self._line.receive()
+        while message["type"] != "websocket.disconnect" and not self._closing:
+            self._take(message, live, group)
+            message = await self._line.receive()
+
+    def _take(self, message: Message, live: Live, group: asyncio.TaskGroup) -> None:
+        now_s = self._station.clock.now()
+        if not self._allowance.take(now_s):
+            self._close(wire.CLOSE_TOO_FAST, f"more than {MESSAGES_PER_S} messages a second")
+            return
+        try:
+            asked = wire.decode(message.get("text") or message.get("bytes") or "")
+        except wire.BadMessage as error:
+            self._count_bad(str(error))
+            return
+        if isinstance(asked, wire.Ping):
+            if math.isfinite(asked.c):
+                self._pong = wire.encode_pong(asked, now_s)
+                self.wake()
+        else:
+            self._start(asked, live, group)
+
+    def _count_bad(self, reason: str) -> None:
+        self.bad_messages += 1
+        if self.bad_messages >= BAD_MESSAGES:
+            self._close(wire.CLOSE_BAD_MESSAGES, f"{BAD_MESSAGES} messages could not be used")
+        else:
+            self._answer(wire.encode_error("bad-message", reason))
+
+    def _close(self, code: int, reason: str) -> None:
+        self._closing = (code, reason)
+        self._answer(wire.encode_error("closing", reason))
+
+    def _answer(self, text: str) -> None:
+        self._answers.append(text)
+        self.wake()
+
+    def _start(self, asked: wire.Run, live: Live, group: asyncio.TaskGroup) -> None:
+        if len(self._commands) + len(self._answers) >= COMMANDS_AT_ONCE:
+            # Refused by closing nothing and queueing nothing: the page sees it as its one answer.
+            text = f"{COMMANDS_AT_ONCE} commands are still under way"
+            if len(self._answers) < 2 * COMMANDS_AT_ONCE:
+                self._answer(wire.encode_reply(asked, code="busy", message=text))
+            else:
+                self._close(wire.CLOSE_TOO_FAST, text)
+            return
+        task = group.create_task(self._run(asked, live))
+        self._commands.add(task)
+        task.add_done_callback(self._commands.discard)
+
+    async def _run(self, asked: wire.Run, live: Live) -> None:
+        try:
+            async with asyncio.timeout(COMMAND_TIMEOUT_S):
+                replied = await live.session.command(asked.command, asked.arguments)
+        except TimeoutError:
+            text = f"no answer within {COMMAND_TIMEOUT_S:g} s"
+            self._answer(wire.encode_reply(asked, code="timed-out", message=text))
+        except CommandFailed as failed:
+            self._answer(wire.encode_reply(asked, code=failed.code, message=failed.message))
+        else:
+            self._answer(wire.encode_reply(asked, values=replied.values))

@@ -1,0 +1,35 @@
+// @ts-check
+/**
+ * Tells a screen reader when a value passes a limit, once; never each new value.
+ *
+ * @typedef {import("./types.js").Alarm} Alarm
+ * @typedef {import("./store.js").Store} Store
+ */
+
+/** @type {Record<Alarm, string>} */
+const WORDS = { "": "", lolo: "very low", low: "low", high: "high", hihi: "very high" };
+
+export class Alarms {
+  /** @param {HTMLElement} el an element with role alert */
+  constructor(el) {
+    this.el = el;
+    /** @type {Map<string, Alarm>} */
+    this.told = new Map();
+  }
+
+  /**
+   * @param {Store} store
+   * @param {number} nowMs
+   */
+  frame(store, nowMs) {
+    for (const [name, sample] of store.samples) {
+      const before = this.told.get(name) ?? "";
+      if (before === sample.alarm) continue;
+      this.told.set(name, sample.alarm);
+      if (!sample.alarm) continue;
+      const { signal, text } = store.reading(name, nowMs);
+      const unit = signal.unit ? ` ${signal.unit}` : "";
+      this.el.textContent = `${signal.title || name} ${WORDS[sample.alarm]}: ${text}${unit}`;
+    }
+  }
+}

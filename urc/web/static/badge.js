@@ -1,0 +1,83 @@
+// @ts-check
+/**
+ * The link badge: one word on whether what is on the screen is live, and the round trip.
+ *
+ * @typedef {import("./types.js").Link} Link
+ * @typedef {import("./store.js").Store} Store
+ * @typedef {import("./socket.js").Socket} Socket
+ * @typedef {"good" | "connecting" | "caution" | "bad"} Sign
+ */
+
+const CAUTION_MS = 100;
+const POOR_MS = 250;
+/** From worst to best: the worst link decides. @type {Link["state"][]} */
+const WORST_FIRST = ["lost", "silent", "connecting", "idle", "live"];
+
+export class Badge {
+  /** @param {HTMLElement} el */
+  constructor(el) {
+    this.el = el;
+    this.text = part(el, "[data-badge-text]");
+    this.trip = part(el, "[data-badge-trip]");
+  }
+
+  /**
+   * @param {Store} store
+   * @param {Socket} socket
+   */
+  frame(store, socket) {
+    const [sign, text] = summary(store, socket.failures > 0);
+    if (this.el.dataset["state"] !== sign) this.el.dataset["state"] = sign;
+    if (this.text.textContent !== text) this.text.textContent = text;
+    const [quality, figure] = tripOf(socket.tripMs);
+    if (this.trip.dataset["trip"] !== quality) this.trip.dataset["trip"] = quality;
+    if (this.trip.textContent !== figure) this.trip.textContent = figure;
+  }
+}
+
+/**
+ * @param {Store} store
+ * @param {boolean} hasFailed whether an attempt has failed since the last connection
+ * @returns {[Sign, string]}
+ */
+function summary(store, hasFailed) {
+  if (!store.isUp) return hasFailed ? ["bad", "No connection to URC"] : ["connecting", "Connecting"];
+  const links = [...store.links.values()];
+  const worst = WORST_FIRST.find((state) => links.some((link) => link.state === state));
+  const name = links.length > 1 ? links.find((link) => link.state === worst)?.transport : "Robot";
+  switch (worst) {
+    case "lost":
+      return ["bad", `${name} lost`];
+    case "silent":
+      return ["caution", `${name} silent`];
+    case "live":
+      return ["good", "Live"];
+    case "idle":
+    case "connecting":
+    case undefined:
+      return ["connecting", "Connecting"];
+  }
+}
+
+/**
+ * @param {number | null} tripMs
+ * @returns {[string, string]} quality and text
+ */
+function tripOf(tripMs) {
+  if (tripMs === null) return ["", ""];
+  const figure = `${Math.max(1, Math.round(tripMs))} ms`;
+  if (tripMs > POOR_MS) return ["bad", `▲ ${figure}`];
+  if (tripMs > CAUTION_MS) return ["caution", `◆ ${figure}`];
+  return ["good", figure];
+}
+
+/**
+ * @param {ParentNode} root
+ * @param {string} selector
+ * @returns {HTMLElement}
+ */
+export function part(root, selector) {
+  const found = root.querySelector(selector);
+  if (!(found instanceof HTMLElement)) throw new Error(`the page has no ${selector}`);
+  return found;
+}

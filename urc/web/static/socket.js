@@ -1,0 +1,138 @@
+// @ts-check
+/**
+ * The page's one WebSocket: reconnects by itself, and measures the way there and back.
+ *
+ * A connection is only believed while its pings are answered: a cable that is pulled says nothing.
+ *
+ * @typedef {object} Listener
+ * @property {(message: any) => void} message A message of the server, in order.
+ * @property {(isUp: boolean) => void} state Called on every change of `isUp`.
+ * @property {() => void} trip A new round trip was measured.
+ */
+
+const FIRST_WAIT_MS = 250;
+const LONGEST_WAIT_MS = 5000;
+const PING_EVERY_MS = 1000;
+const PONG_WITHIN_MS = 3000;
+
+export class Socket {
+  /**
+   * @param {string} url
+   * @param {Listener} listener
+   */
+  constructor(url, listener) {
+    this.url = url;
+    this.listener = listener;
+    /** Round trip in milliseconds; null while unknown. @type {number | null} */
+    this.tripMs = null;
+    /** Connections lost and attempts failed since the last good one. */
+    this.failures = 0;
+    /** Why the server closed, in its words. */
+    this.reason = "";
+    this.isUp = false;
+    /** @type {WebSocket | null} */
+    this.line = null;
+    this.waitMs = FIRST_WAIT_MS;
+    this.isWanted = false;
+    /** When the ping that waits for its answer was sent; 0 when none waits. */
+    this.pingedMs = 0;
+    /** @type {number | undefined} */
+    this.retry = undefined;
+    /** @type {number | undefined} */
+    this.beat = undefined;
+  }
+
+  open() {
+    this.isWanted = true;
+    this.connect();
+  }
+
+  /** Close for good, until `open`. */
+  close() {
+    this.isWanted = false;
+    this.lose("");
+  }
+
+  /** Try now instead of when the back-off says: the network or the page is back. */
+  hurry() {
+    if (this.isWanted && !this.line) this.connect();
+  }
+
+  /**
+   * @param {object} message
+   * @returns {boolean} whether it was handed to the browser
+   */
+  send(message) {
+    if (!this.isUp || !this.line) return false;
+    this.line.send(JSON.stringify(message));
+    return true;
+  }
+
+  connect() {
+    clearTimeout(this.retry);
+    const line = new WebSocket(this.url);
+    this.line = line;
+    this.pingedMs = performance.now(); // an opening that hangs is given up like a missing pong
+    clearInterval(this.beat);
+    this.beat = window.setInterval(() => this.tick(), PING_EVERY_MS);
+    line.addEventListener("message", (event) => {
+      if (line === this.line) this.take(event.data);
+    });
+    line.addEventListener("close", (event) => {
+      if (line === this.line) this.lose(event.reason);
+    });
+  }
+
+  /** @param {unknown} data */
+  take(data) {
+    if (typeof data !== "string") return;
+    const message = JSON.parse(data);
+    if (message.t === "hello") {
+      this.waitMs = FIRST_WAIT_MS;
+      this.reason = "";
+      this.failures = 0;
+      this.pingedMs = 0;
+      this.isUp = true;
+      this.listener.state(true);
+      this.listener.message(message); // the first ping waits for `tick`: a page that starts is slow
+    } else if (message.t === "pong") {
+      this.tripMs = performance.now() - message.c;
+      this.pingedMs = 0;
+      this.listener.message(message);
+      this.listener.trip();
+    } else {
+      this.listener.message(message);
+    }
+  }
+
+  tick() {
+    if (this.pingedMs && performance.now() - this.pingedMs > PONG_WITHIN_MS) {
+      this.lose("no answer");
+    } else if (this.isUp && !this.pingedMs) {
+      this.ping();
+    }
+  }
+
+  ping() {
+    this.pingedMs = performance.now();
+    this.send({ t: "ping", c: this.pingedMs });
+  }
+
+  /** @param {string} reason */
+  lose(reason) {
+    const line = this.line;
+    this.line = null;
+    clearInterval(this.beat);
+    clearTimeout(this.retry);
+    if (line && line.readyState <= WebSocket.OPEN) line.close();
+    this.tripMs = null;
+    this.reason = reason;
+    this.isUp = false;
+    this.failures += 1;
+    this.listener.state(false);
+    if (!this.isWanted) return;
+    // Jitter, so that many pages do not come back in the same instant.
+    this.retry = window.setTimeout(() => this.connect(), this.waitMs * (0.8 + 0.4 * Math.random()));
+    this.waitMs = Math.min(this.waitMs * 2, LONGEST_WAIT_MS);
+  }
+}

@@ -1,0 +1,194 @@
+// @ts-check
+/**
+ * The latest value of every signal, and how old it is. Knows no DOM and no socket.
+ *
+ * Ages are counted on the page's own clock from the moment a value was measured. The server sends
+ * the age at the moment of sending; what the way added on top of its usual time is found by
+ * comparing the two clocks with the fastest message so far, so that a value that lay in a full
+ * buffer is as old as it is.
+ *
+ * @typedef {import("./types.js").Alarm} Alarm
+ * @typedef {import("./types.js").Hello} Hello
+ * @typedef {import("./types.js").Link} Link
+ * @typedef {import("./types.js").Reading} Reading
+ * @typedef {import("./types.js").Signal} Signal
+ * @typedef {import("./types.js").State} State
+ * @typedef {import("./types.js").Value} Value
+ * @typedef {import("./types.js").Values} Values
+ *
+ * @typedef {{value: Value, alarm: Alarm, timeMs: number, serial: number}} Sample
+ */
+
+/** After so many times its greatest age a value is not shown any more. */
+const GONE_AFTER = 10;
+/** How fast two good clocks may run apart. */
+const DRIFT = 1e-4;
+const SHORT_TRIP_MS = 250;
+const LONG_LAG_MS = 1000;
+
+export const DASH = "—";
+
+export class Store {
+  constructor() {
+    /** @type {Map<string, Signal>} */
+    this.signals = new Map();
+    /** @type {string[]} */
+    this.names = [];
+    /** @type {Map<string, Sample>} */
+    this.samples = new Map();
+    /** @type {Map<string, Link>} */
+    this.links = new Map();
+    this.isUp = false;
+    this.serial = 0;
+    this.skewMs = Infinity;
+    this.skewSetMs = 0;
+  }
+
+  /**
+   * Take what the server serves. Values stay: they are the last that were seen, with their age.
+   *
+   * @param {Hello} hello
+   * @param {number} nowMs
+   */
+  hello(hello, nowMs) {
+    this.signals = new Map(hello.signals.map((signal) => [signal.name, signal]));
+    this.names = hello.signals.map((signal) => signal.name);
+    this.links = new Map();
+    this.skewMs = Infinity;
+    this.lagMs(hello.now, nowMs);
+  }
+
+  /** @param {boolean} isUp */
+  setUp(isUp) {
+    this.isUp = isUp;
+    if (!isUp) this.links = new Map();
+  }
+
+  /**
+   * @param {Values} frame
+   * @param {number} nowMs
+   */
+  values(frame, nowMs) {
+    const sentMs = nowMs - this.lagMs(frame.n, nowMs);
+    frame.i.forEach((index, place) => {
+      const name = this.names[index];
+      if (name === undefined) return;
+      this.serial += 1;
+      this.samples.set(name, {
+        value: frame.v[place] ?? null,
+        alarm: frame.s?.[place] ?? "",
+        timeMs: sentMs - (frame.a[place] ?? 0),
+        serial: this.serial,
+      });
+    });
+  }
+
+  /** @param {Link[]} links */
+  setLinks(links) {
+    this.links = new Map(links.map((link) => [link.transport, link]));
+  }
+
+  /**
+   * A quick round trip proves that nothing lies in a buffer: if messages seem late all the same,
+   * one of the clocks has jumped, as after sleep.
+   *
+   * @param {number} serverMs
+   * @param {number} nowMs
+   * @param {number | null} tripMs
+   */
+  pong(serverMs, nowMs, tripMs) {
+    const lagMs = this.lagMs(serverMs, nowMs);
+    if (tripMs !== null && tripMs < SHORT_TRIP_MS && lagMs > LONG_LAG_MS) {
+      this.skewMs = nowMs - serverMs;
+    }
+  }
+
+  /**
+   * @param {string} name
+   * @param {number} nowMs
+   * @returns {Reading}
+   */
+  reading(name, nowMs) {
+    const signal = this.signals.get(name) ?? { name, type: "string" };
+    const sample = this.samples.get(name);
+    const ageMs = sample ? Math.max(0, nowMs - sample.timeMs) : 0;
+    const state = this.stateOf(signal, sample, ageMs);
+    const isShown = sample && (state === "live" || state === "stale");
+    const value = isShown ? sample.value : null;
+    return {
+      value,
+      state,
+      alarm: isShown ? sample.alarm : "",
+      text: textOf(value, signal),
+      age: state === "stale" || state === "gone" ? ageText(ageMs / 1000) : "",
+      time: (sample?.timeMs ?? 0) / 1000,
+      serial: sample?.serial ?? 0,
+      signal,
+    };
+  }
+
+  /**
+   * @param {Signal} signal
+   * @param {Sample | undefined} sample
+   * @param {number} ageMs
+   * @returns {State}
+   */
+  stateOf(signal, sample, ageMs) {
+    if (!sample || sample.value === null) return "none";
+    const limitMs = (signal.stale_after_s ?? 0) * 1000;
+    if (limitMs > 0 && ageMs > GONE_AFTER * limitMs) return "gone";
+    if (limitMs > 0 && ageMs > limitMs) return "stale";
+    return this.isCutOff(signal) ? "stale" : "live";
+  }
+
+  /**
+   * Whether nothing new can come now, because the page or every line that brings it is cut off.
+   *
+   * @param {Signal} signal
+   */
+  isCutOff(signal) {
+    if (!this.isUp) return true;
+    const sources = signal.sources?.length ? signal.sources : [...this.links.keys()];
+    const states = sources.map((source) => this.links.get(source)?.state);
+    return states.length > 0 && !states.some((state) => state === "live" || state === "silent");
+  }
+
+  /**
+   * How much longer than the fastest one this message took, in milliseconds.
+   *
+   * @param {number} serverMs
+   * @param {number} nowMs
+   */
+  lagMs(serverMs, nowMs) {
+    const skewMs = nowMs - serverMs;
+    const known = this.skewMs + (nowMs - this.skewSetMs) * DRIFT;
+    this.skewMs = Number.isFinite(known) ? Math.min(skewMs, known) : skewMs;
+    this.skewSetMs = nowMs;
+    return skewMs - this.skewMs;
+  }
+}
+
+/**
+ * @param {Value} value
+ * @param {Signal} signal
+ */
+function textOf(value, signal) {
+  if (value === null) return DASH;
+  if (typeof value === "number" && signal.precision !== undefined) {
+    return value.toFixed(signal.precision);
+  }
+  const text = String(value);
+  return signal.states && Object.hasOwn(signal.states, text) ? signal.states[text] ?? text : text;
+}
+
+/**
+ * Whole numbers only: a reader wants to know "old", not tenths.
+ *
+ * @param {number} seconds
+ */
+export function ageText(seconds) {
+  if (seconds < 1) return "< 1 s";
+  if (seconds < 60) return `${Math.floor(seconds)} s`;
+  if (seconds < 3600) return `${Math.floor(seconds / 60)} min`;
+  return `${Math.floor(seconds / 3600)} h`;
+}

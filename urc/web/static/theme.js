@@ -1,0 +1,38 @@
+// @ts-check
+// A classic script, run before anything is drawn: a page that changes its colours is a page that
+// blinks. The choice is kept on the device; where nothing can be kept, the device's own wish rules.
+{
+  const KEY = "urc-theme";
+  const THEMES = new Set(["dark", "light", "sunlight", "night"]);
+
+  /** @returns {string} */
+  const kept = () => {
+    try {
+      return localStorage.getItem(KEY) ?? "";
+    } catch {
+      return "";
+    }
+  };
+
+  /** @param {string} name */
+  const show = (name) => {
+    if (THEMES.has(name)) document.documentElement.dataset["theme"] = name;
+    else delete document.documentElement.dataset["theme"];
+  };
+
+  show(kept());
+  document.addEventListener("DOMContentLoaded", () => {
+    for (const choice of document.querySelectorAll("select[data-theme-choice]")) {
+      if (!(choice instanceof HTMLSelectElement)) continue;
+      choice.value = THEMES.has(kept()) ? kept() : "";
+      choice.addEventListener("change", () => {
+        show(choice.value);
+        try {
+          localStorage.setItem(KEY, choice.value);
+        } catch {
+          // Private mode: the choice lasts as long as this page.
+        }
+      });
+    }
+  });
+}

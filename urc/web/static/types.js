@@ -1,0 +1,87 @@
+// @ts-check
+/**
+ * The shapes that the page's modules share. Types only; nothing here runs.
+ *
+ * @typedef {boolean | number | string | null} Value What a signal may hold; null is "not available".
+ * @typedef {"" | "lolo" | "low" | "high" | "hihi"} Alarm The limit that a value has passed.
+ * @typedef {"live" | "stale" | "gone" | "none"} State
+ *   live: new enough. stale: old, or its line is down; shown grey with its age. gone: so old that it
+ *   is no longer shown. none: there was never one, or the robot says it isn't available.
+ *
+ * @typedef {object} Signal What a value means, as the server declares it.
+ * @property {string} name
+ * @property {string} type
+ * @property {string} [title]
+ * @property {string} [unit]
+ * @property {number} [min]
+ * @property {number} [max]
+ * @property {number} [precision]
+ * @property {Record<string, string>} [states]
+ * @property {Partial<Record<"lolo" | "low" | "high" | "hihi", number>>} [limits]
+ * @property {number} [stale_after_s]
+ * @property {string[]} [sources]
+ *
+ * @typedef {object} Reading One input of a widget at this moment.
+ * @property {Value} value null in the states `gone` and `none`.
+ * @property {State} state
+ * @property {Alarm} alarm
+ * @property {string} text The value for people: precision applied, "—" when there is none.
+ * @property {string} age Its age for people, as "4 s"; "" while it is live.
+ * @property {number} time When it was measured, in seconds on the page's own clock.
+ * @property {number} serial Grows with each new reading, also of an equal value.
+ * @property {Signal} signal
+ *
+ * @typedef {object} Link
+ * @property {string} transport
+ * @property {"idle" | "connecting" | "live" | "silent" | "lost"} state
+ * @property {string} address
+ * @property {number} since
+ * @property {string} detail
+ * @property {number} attempts
+ * @property {number} faults
+ *
+ * @typedef {object} Line
+ * @property {number} age
+ * @property {"info" | "warning" | "error"} level
+ * @property {string} source
+ * @property {string} text
+ *
+ * @typedef {object} Hello
+ * @property {string} robot
+ * @property {string} title
+ * @property {number} now
+ * @property {Signal[]} signals
+ *
+ * @typedef {object} Values
+ * @property {number} n
+ * @property {number[]} i
+ * @property {Value[]} v
+ * @property {number[]} a
+ * @property {Alarm[]} [s]
+ *
+ * @typedef {object} Reply
+ * @property {number} id
+ * @property {boolean} ok
+ * @property {Record<string, Value>} [values]
+ * @property {string} [code]
+ * @property {string} [message]
+ *
+ * @typedef {object} Context What a widget is given, and all it may use.
+ * @property {HTMLElement} el Its rendered template's parent: the cell.
+ * @property {Readonly<Record<string, unknown>>} options
+ * @property {(input: string, listener: (reading: Reading) => void) => void} on
+ *   Calls the listener in the animation frame after that input has changed.
+ * @property {(output: string, args?: Record<string, Value>) => Promise<Record<string, Value>>} send
+ *   Runs the command bound to the output; rejects with an Error that says why it was not done.
+ * @property {AbortSignal} signal Aborted when the widget ends; give it to every listener.
+ *
+ * @typedef {object} Instance
+ * @property {(readings: Readonly<Record<string, Reading>>) => void} [update]
+ *   Called in an animation frame when any input has changed, with all bound inputs.
+ * @property {(size: {width: number, height: number}) => void} [resize] The cell's size in CSS pixels.
+ * @property {() => void} [destroy]
+ *
+ * @typedef {object} WidgetModule
+ * @property {{mount: (ctx: Context) => Instance | undefined | Promise<Instance | undefined>}} default
+ */
+export {};

@@ -1,0 +1,328 @@
+"""What goes over a dashboard's WebSocket: message shapes, and nothing else.
+
+Floor 5. JSON text both ways. Times are milliseconds on the server's monotonic clock; ages are
+milliseconds at the moment of encoding. Values travel as index arrays over the names of `Hello`.
+
+Server → page, by ``t``::
+
+    hello   once, first: names, what each signal means, the server's clock
+    v       changed signals: i indexes, v values, a ages, s alarms (left out when all are normal)
+    links   the state of every transport
+    log     lines, oldest first; numbers run on, so that a gap shows what was dropped
+    reply   the one answer to a command
+    pong    the answer to a ping
+    error   a message of the page that could not be used, or why the socket is about to close
+
+Page → server: ``ping`` and ``run``. The types below bound their nesting: anything deeper than an
+argument map of plain values is refused by the decoder without being read further.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+
+import msgspec
+
+from urc.model.driver import Command, Driver, Poll
+from urc.model.profile import Profile
+from urc.model.values import Sample, Signal, Value
+from urc.runtime.hub import LinkStatus, Note
+
+__all__ = [
+    "CLOSE_BAD_MESSAGES",
+    "CLOSE_FAILED",
+    "CLOSE_FULL",
+    "CLOSE_NO_ROBOT",
+    "CLOSE_NOT_READY",
+    "CLOSE_TOO_FAST",
+    "INBOUND_BYTES",
+    "BadMessage",
+    "Inbound",
+    "Ping",
+    "Run",
+    "decode",
+    "encode_error",
+    "encode_hello",
+    "encode_links",
+    "encode_log",
+    "encode_pong",
+    "encode_reply",
+    "encode_values",
+]
+
+VERSION = 1
+INBOUND_BYTES = 64 * 1024
+"""Longest message taken from a page."""
+TEXT_CHARACTERS = 4096
+"""Longest text value sent to a page; a longer one is cut and ends in an ellipsis."""
+_EXACT = 2**53 - 1  # beyond it a browser's numbers skip integers
+
+CLOSE_BAD_MESSAGES = 4400
+CLOSE_NO_ROBOT = 4404
+CLOSE_NOT_READY = 4409
+CLOSE_TOO_FAST = 4429
+CLOSE_FAILED = 4500
+CLOSE_FULL = 4503
+
+
+class BadMessage(Exception):
+    """A page sent something that is no message; the text says what was expected."""
+
+
+class _Outbound(msgspec.Struct, tag_field="t", omit_defaults=True, frozen=True):
+    pass
+
+
+class _Signal(msgspec.Struct, omit_defaults=True, frozen=True):
+    name: str
+    type: str
+    title: str = ""
+    unit: str = ""
+    min: float | None = None
+    max: float | None = None
+    precision: int | None = None
+    states: dict[str, str] | None = None
+    limits: dict[str, float] | None = None
+    stale_after_s: float = 0.0
+    sources: tuple[str, ...] = ()
+    """Transports that bring it: when none of them is live, the value is old at once."""
+
+
+class _Hello(_Outbound, tag="hello", omit_defaults=False, frozen=True):
+    version: int
+    session: str
+    """Changes when the robot was connected anew: the log's numbers begin again."""
+    robot: str
+    title: str
+    now: int
+    names: tuple[str, ...]
+    signals: list[_Signal]
+
+
+class _Values(_Outbound, tag="v", frozen=True):
+    n: int
+    i: list[int]
+    v: list[Value]
+    a: list[int]
+    s: list[str] | None = None
+
+
+class _Link(msgspec.Struct, frozen=True):
+    transport: str
+    state: str
+    address: str
+    since: int
+    detail: str
+    attempts: int
+    faults: int
+
+
+class _Links(_Outbound, tag="links", omit_defaults=False, frozen=True):
+    links: list[_Link]
+
+
+class _Line(msgspec.Struct, frozen=True):
+    age: int
+    level: str
+    source: str
+    text: str
+
+
+class _Log(_Outbound, tag="log", omit_defaults=False, frozen=True):
+    first: int
+    """Number of the first line in this session, from 0."""
+    lines: list[_Line]
+
+
+class _Reply(_Outbound, tag="reply", frozen=True):
+    id: int
+    ok: bool
+    values: Mapping[str, Value] | None = None
+    code: str = ""
+    message: str = ""
+
+
+class _Pong(_Outbound, tag="pong", frozen=True):
+    c: float
+    n: int
+
+
+class _Error(_Outbound, tag="error", frozen=True):
+    code: str
+    message: str
+
+
+class Ping(msgspec.Struct, tag_field="t", tag="ping", forbid_unknown_fields=True, frozen=True):
+    """Asks for a `pong` with the same `c`, the page's own clock in milliseconds."""
+
+    c: float
+
+
+class Run(msgspec.Struct, tag_field="t", tag="run", forbid_unknown_fields=True, frozen=True):
+    """One command. The page chooses `id`; exactly one reply carries it."""
+
+    id: int
+    command: str
+    arguments: dict[str, bool | int | float | str | None] = {}
+
+
+Inbound = Ping | Run
+
+_decoder: msgspec.json.Decoder[Inbound] = msgspec.json.Decoder(Inbound)
+_encoder = msgspec.json.Encoder()
+
+
+def decode(text: str | bytes) -> Inbound:
+    """Return the message, or raise `BadMessage` saying what is wrong with it."""
+    if len(text) > INBOUND_BYTES:
+        raise BadMessage(f"longer than {INBOUND_BYTES} bytes")
+    try:
+        return _decoder.decode(text)
+    except (msgspec.MsgspecError, UnicodeError, RecursionError) as error:
+        raise BadMessage(str(error)) from error
+
+
+def encode_hello(profile: Profile, session: str, now_s: float) -> str:
+    """Return the first message: what every later index means."""
+    sources = _sources(profile.driver)
+    signals = profile.driver.signals
+    return _text(
+        _Hello(
+            version=VERSION,
+            session=session,
+            robot=profile.name,
+            title=profile.title,
+            now=_ms(now_s),
+            names=tuple(signals),
+            signals=[_signal(signal, sources.get(name, ())) for name, signal in signals.items()],
+        )
+    )
+
+
+def encode_values(samples: Sequence[Sample], index: Mapping[str, int], now_s: float) -> str:
+    """Return one frame with the newest reading of each changed signal."""
+    alarms = [sample.alarm for sample in samples]
+    return _text(
+        _Values(
+            n=_ms(now_s),
+            i=[index[sample.signal] for sample in samples],
+            v=[_plain(sample.value) for sample in samples],
+            a=[max(0, _ms(now_s - sample.time_s)) for sample in samples],
+            s=list(alarms) if any(alarms) else None,
+        )
+    )
+
+
+def encode_links(links: Iterable[LinkStatus], now_s: float) -> str:
+    """Return the state of every transport."""
+    return _text(
+        _Links(
+            [
+                _Link(
+                    transport=link.transport,
+                    state=link.state,
+                    address=link.address,
+                    since=max(0, _ms(now_s - link.since_s)),
+                    detail=_cut(link.detail),
+                    attempts=link.attempts,
+                    faults=link.faults,
+                )
+                for link in links
+            ]
+        )
+    )
+
+
+def encode_log(notes: Iterable[Note], first: int, now_s: float) -> str:
+    """Return lines of the log, the first of which has the number `first` in its session."""
+    lines = [
+        _Line(max(0, _ms(now_s - note.time_s)), note.level, note.source, _cut(note.text))
+        for note in notes
+    ]
+    return _text(_Log(first, lines))
+
+
+def encode_reply(
+    run: Run, *, values: Mapping[str, Value] | None = None, code: str = "", message: str = ""
+) -> str:
+    """Return the answer to a command: its values, or `code` and `message` when it failed."""
+    if code:
+        return _text(_Reply(run.id, ok=False, code=code, message=_cut(message)))
+    plain = {name: _plain(value) for name, value in (values or {}).items()}
+    return _text(_Reply(run.id, ok=True, values=plain))
+
+
+def encode_pong(ping: Ping, now_s: float) -> str:
+    """Return the answer to a ping."""
+    return _text(_Pong(ping.c, _ms(now_s)))
+
+
+def encode_error(code: str, message: str) -> str:
+    """Return why a message was not used, or why the socket closes."""
+    return _text(_Error(code, _cut(message)))
+
+
+def _text(message: msgspec.Struct) -> str:
+    try:
+        return _encoder.encode(message).decode()
+    except UnicodeEncodeError:
+        # A lone surrogate in a robot's text; it must not stop everybody's values.
+        return _encoder.encode(_repaired(msgspec.to_builtins(message))).decode()
+
+
+def _repaired(tree: object) -> object:
+    if isinstance(tree, str):
+        return tree.encode("utf-8", "replace").decode()
+    if isinstance(tree, (list, tuple)):
+        return [_repaired(item) for item in tree]
+    if isinstance(tree, dict):
+        return {_repaired(key): _repaired(value) for key, value in tree.items()}
+    return tree
+
+
+def _plain(value: Value) -> Value:
+    """Return the value as a browser can hold it."""
+    if isinstance(value, str):
+        return _cut(value)
+    if type(value) is int and not -_EXACT <= value <= _EXACT:
+        return str(value)
+    return value
+
+
+def _cut(text: str) -> str:
+    return text if len(text) <= TEXT_CHARACTERS else text[: TEXT_CHARACTERS - 1] + "…"
+
+
+def _ms(seconds: float) -> int:
+    return round(seconds * 1000)
+
+
+def _signal(signal: Signal, sources: tuple[str, ...]) -> _Signal:
+    limits = {
+        name: value
+        for name in ("lolo", "low", "high", "hihi")
+        if (value := getattr(signal.limits, name)) is not None
+    }
+    return _Signal(
+        name=signal.name,
+        type=signal.type,
+        title=signal.title,
+        unit=signal.unit,
+        min=signal.min,
+        max=signal.max,
+        precision=signal.precision,
+        states=dict(signal.states) or None,
+        limits=limits or None,
+        stale_after_s=signal.stale_after_s,
+        sources=sources,
+    )
+
+
+def _sources(driver: Driver) -> dict[str, tuple[str, ...]]:
+    """Return which transports bring each signal, by the groups of the patterns."""
+    asked: tuple[Poll | Command, ...] = (*driver.polls, *driver.commands.values())
+    patterns = [(message.transport, message.pattern) for message in driver.messages.values()]
+    patterns += [(each.transport, each.reply.pattern) for each in asked if each.reply]
+    found: dict[str, dict[str, None]] = {}
+    for transport, pattern in patterns:
+        for group in pattern.groups:
+            found.setdefault(group, {})[transport] = None
+    return {name: tuple(transports) for name, transports in found.items()}
