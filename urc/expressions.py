@@ -16,7 +16,14 @@ from urc import _filters
 from urc._grammar import Refused, translate
 from urc.problems import UrcError
 
-__all__ = ["ExpressionError", "Template", "compile_expression", "compile_template"]
+__all__ = [
+    "ExpressionError",
+    "Template",
+    "compile_expression",
+    "compile_template",
+    "split_template",
+    "text_of",
+]
 
 MAX_SOURCE: Final = 4096
 """Characters of one template."""
@@ -90,7 +97,7 @@ def compile_template(text: str) -> Template:
     parts: list[str] = []
     names: set[str] = set()
     settings: set[str] = set()
-    for offset, literal, expression in _split(text):
+    for offset, literal, expression in split_template(text):
         if expression is None:
             parts.append(repr(literal))
         else:
@@ -136,7 +143,7 @@ def _function(python: str) -> Callable[[Mapping[str, object]], Any]:
     return function
 
 
-def _split(text: str) -> Iterator[tuple[int, str, str | None]]:
+def split_template(text: str) -> Iterator[tuple[int, str, str | None]]:
     """Yield (offset, literal, None) and (offset, "", expression) in order."""
     position = 0
     while position < len(text):

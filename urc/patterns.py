@@ -17,7 +17,7 @@ from typing import Any, Final, Protocol
 
 from urc.problems import UrcError
 
-__all__ = ["Pattern", "PatternError", "compile_pattern"]
+__all__ = ["Pattern", "PatternError", "compile_pattern", "example"]
 
 MAX_SOURCE: Final = 1024
 MAX_REPEAT: Final = 1000
@@ -110,6 +110,54 @@ def compile_pattern(text: str) -> Pattern:
         source = text[:-1] + r"\Z" if ends_there else text
         return Pattern(text, groups, re.compile(source, re.ASCII).match, True)
     return Pattern(text, groups, _re2_search(text), False)
+
+
+def example(pattern: Pattern, groups: Mapping[str, str]) -> str:
+    """Return a short text made after `pattern`, with `groups` in the places of its named groups.
+
+    What is optional is left out unless a given group is in it; a class of characters gives its
+    first printable one. Whether the pattern really takes the text is the caller's to check.
+    """
+    tree = _parser.parse(pattern.source, re.ASCII)
+    names = {number: name for name, number in tree.state.groupdict.items()}
+    return _example(tree, names, groups)
+
+
+def _example(tree: Any, names: Mapping[int, str], groups: Mapping[str, str]) -> str:
+    pieces: list[str] = []
+    for operation, argument in tree:
+        if operation is _constants.SUBPATTERN:
+            name = names.get(argument[0], "")
+            inner = _example(argument[3], names, groups)
+            pieces.append(groups.get(name, inner) if name else inner)
+        elif operation is _constants.BRANCH:
+            chosen = [part for part in argument[1] if _mentions(part, names, groups)]
+            pieces.append(_example((chosen or argument[1])[0], names, groups))
+        elif operation in (_constants.MAX_REPEAT, _constants.MIN_REPEAT):
+            low, _, inner = argument
+            times = max(low, int(_mentions(inner, names, groups)))
+            pieces.append(_example(inner, names, groups) * times)
+        elif operation is _constants.LITERAL:
+            pieces.append(chr(argument))
+        elif operation is not _constants.AT:
+            pieces.append(_first_printable(_characters(operation, argument)))
+    return "".join(pieces)
+
+
+def _mentions(tree: Any, names: Mapping[int, str], groups: Mapping[str, str]) -> bool:
+    """Return whether one of `groups` stands in `tree`."""
+    for operation, argument in tree:
+        if operation is _constants.SUBPATTERN and names.get(argument[0], "") in groups:
+            return True
+        if any(_mentions(part, names, groups) for part in _parts(operation, argument)):
+            return True
+    return False
+
+
+def _first_printable(characters: frozenset[int] | None) -> str:
+    wanted = characters or _ALL
+    printable = (code for code in (*range(48, 58), *range(97, 123), *range(32, 127)))
+    return chr(next((code for code in printable if code in wanted), min(wanted, default=63)))
 
 
 def _check_dialect(tree: Any, text: str) -> None:

@@ -3,14 +3,15 @@
 import re
 from collections.abc import Iterable, Mapping
 
+from urc.config.forms import read_form, write_form
 from urc.config.gather import Sources
 from urc.config.parse_line import templates_of
 from urc.config.part import Findings, Part
 from urc.config.suggest import did_you_mean
 from urc.expressions import Template
+from urc.model.codec import ReadSpec, WriteSpec
 from urc.model.driver import Driver
 from urc.model.profile import Setting, SimulatorRule
-from urc.patterns import Pattern
 
 __all__ = ["Uses", "link_driver", "link_simulator"]
 
@@ -55,20 +56,30 @@ class _Linker:
                 hint=did_you_mean("", names, "transports"),
             )
 
-    def groups(self, part: Part, pattern: Pattern) -> None:
-        """Check that each named group is a signal."""
-        for group in pattern.groups:
-            if group in self.driver.signals:
-                self.uses.signals.add(group)
-                continue
-            self.findings.error(
-                part,
-                "unknown-signal",
-                f"group {group!r} is not a signal",
-                offset=pattern.source.find(f"<{group}>") + 1,
-                length=len(group),
-                hint=did_you_mean(group, self.driver.signals, "signals"),
-            )
+    def fields(self, part: Part, read: ReadSpec) -> None:
+        """Check that each field of a reply or message is a signal, or the document's own."""
+        found = read_form(part)
+        if found is None:
+            return
+        inner, form = found
+        for field in read.fields:
+            if field in self.driver.signals:
+                self.uses.signals.add(field)
+            elif not field.startswith("_"):
+                place, where = form.place_of(inner, field)
+                self.findings.error(
+                    place,
+                    "unknown-signal",
+                    f"{field!r} is not a signal",
+                    hint=did_you_mean(field, self.driver.signals, "signals"),
+                    **where,
+                )
+
+    def templates(self, part: Part, spec: WriteSpec, known: Iterable[str] = ()) -> None:
+        """Check the names in every template under ``send:``."""
+        inner, form = write_form(part)
+        for place, template in form.templates(inner, spec):
+            self.template(place, template, known)
 
     def template(self, part: Part, template: Template, known: Iterable[str] = ()) -> None:
         """Check the names that a template uses."""
@@ -133,21 +144,21 @@ def link_driver(
             linker.template(inner.must(option), template)
     for inner, poll in zip(part.listed("polls"), driver.polls, strict=True):
         linker.transport(inner, "to", poll.transport)
-        linker.template(inner.must("send"), poll.send)
+        linker.templates(inner.must("send"), poll.send)
         if poll.reply is not None:
-            linker.groups(inner.must("reply").must("regex"), poll.reply.pattern)
+            linker.fields(inner.must("reply"), poll.reply.read)
     _check_poll_names(part, driver, findings)
     for name, inner in part.named("commands").items():
         command = driver.commands[name]
         linker.transport(inner, "to", command.transport)
-        linker.template(inner.must("send"), command.send, command.arguments)
+        linker.templates(inner.must("send"), command.send, command.arguments)
         _check_arguments_used(inner, command.send, findings)
         if command.reply is not None:
-            linker.groups(inner.must("reply").must("regex"), command.reply.pattern)
+            linker.fields(inner.must("reply"), command.reply.read)
     for name, inner in part.named("messages").items():
         message = driver.messages[name]
         linker.transport(inner, "from", message.transport)
-        linker.groups(inner.must("regex"), message.pattern)
+        linker.fields(inner, message.read)
     return linker.uses
 
 
@@ -167,7 +178,7 @@ def _check_poll_names(part: Part, driver: Driver, findings: Findings) -> None:
         seen.add(poll.name)
 
 
-def _check_arguments_used(part: Part, send: Template, findings: Findings) -> None:
+def _check_arguments_used(part: Part, send: WriteSpec, findings: Findings) -> None:
     for name, inner in part.named("args").items():
         if name not in send.names:
             findings.warn(

@@ -1,20 +1,17 @@
 """A driver: mapping → `Driver`, patterns and templates compiled."""
 
+from collections.abc import Mapping
 from itertools import pairwise
 
+from urc.config.forms import FormContext, parse_read, parse_write
 from urc.config.parse_line import parse_transport
 from urc.config.part import Findings, Part
 from urc.config.values import check_range, check_within, fit, fit_hint
-from urc.expressions import compile_template
 from urc.model.driver import Argument, Command, Driver, Message, Poll, Reply, TransportSpec
 from urc.model.values import Limits, Signal, Value
-from urc.patterns import compile_pattern
 from urc.registry import Catalog
 
 __all__ = ["parse_driver", "spoken_name"]
-
-_NOTHING = compile_template("")
-_ANYTHING = compile_pattern("^")
 
 
 def parse_driver(part: Part, findings: Findings, catalog: Catalog) -> Driver:
@@ -24,25 +21,37 @@ def parse_driver(part: Part, findings: Findings, catalog: Catalog) -> Driver:
         for name, inner in part.named("transports").items()
     }
     # Where a message comes from and a command goes to may be left out when there is one line only.
-    only = next(iter(transports)) if len(transports) == 1 else ""
-    polls = tuple(_poll(inner, only, findings) for inner in part.listed("polls"))
+    lines = _Lines(transports)
+    polls = tuple(_poll(inner, lines, findings) for inner in part.listed("polls"))
     signals = {name: _signal(inner, findings) for name, inner in part.named("signals").items()}
     return Driver(
         transports=transports,
         signals={name: _with_age(one, polls) for name, one in signals.items()},
         commands={
-            name: _command(inner, only, findings) for name, inner in part.named("commands").items()
+            name: _command(inner, lines, findings) for name, inner in part.named("commands").items()
         },
         messages={
-            name: Message(
-                name,
-                inner.text("from", only),
-                findings.pattern(inner.must("regex")) or _ANYTHING,
-            )
-            for name, inner in part.named("messages").items()
+            name: _message(inner, lines, findings) for name, inner in part.named("messages").items()
         },
         polls=polls,
     )
+
+
+class _Lines:
+    """The transports, for those who name one, or may leave it out because there is only one."""
+
+    def __init__(self, transports: Mapping[str, TransportSpec]) -> None:
+        self._transports = transports
+        self._only = next(iter(transports)) if len(transports) == 1 else ""
+
+    def name(self, part: Part, key: str) -> str:
+        """Return the transport that `part` names under `key`."""
+        return part.text(key, self._only)
+
+    def context(self, name: str) -> FormContext:
+        """Return what forms must know of the transport `name`, which may not exist."""
+        spec = self._transports.get(name)
+        return FormContext(spec.encoding) if spec else FormContext()
 
 
 def spoken_name(name: str) -> str:
@@ -129,40 +138,49 @@ def _with_age(signal: Signal, polls: tuple[Poll, ...]) -> Signal:
     if signal.stale_after_s:
         return signal
     periods = [
-        poll.every_s for poll in polls if poll.reply and signal.name in poll.reply.pattern.groups
+        poll.every_s for poll in polls if poll.reply and signal.name in poll.reply.read.fields
     ]
     return signal._replace(stale_after_s=max(1.0, 3 * min(periods)) if periods else 5.0)
 
 
-def _poll(part: Part, only: str, findings: Findings) -> Poll:
+def _message(part: Part, lines: _Lines, findings: Findings) -> Message:
+    transport = lines.name(part, "from")
+    return Message(part.name, transport, parse_read(part, findings, lines.context(transport)))
+
+
+def _poll(part: Part, lines: _Lines, findings: Findings) -> Poll:
+    transport = lines.name(part, "to")
+    context = lines.context(transport)
     return Poll(
         name=part.text("name", f"polls.{part.name}"),
-        transport=part.text("to", only),
+        transport=transport,
         every_s=findings.duration(part, "every", 1.0, least=0.005),
-        send=findings.template(part.must("send")) or _NOTHING,
-        reply=_reply(part.get("reply"), findings),
+        send=parse_write(part.must("send"), findings, context),
+        reply=_reply(part.get("reply"), findings, context),
         phase_s=findings.duration(part, "phase", 0.0, least=0.0, most=3600),
     )
 
 
-def _reply(part: Part | None, findings: Findings) -> Reply | None:
+def _reply(part: Part | None, findings: Findings, context: FormContext) -> Reply | None:
     if part is None:
         return None
     errors = [findings.pattern(inner) for inner in part.listed("errors")]
     return Reply(
-        pattern=findings.pattern(part.must("regex")) or _ANYTHING,
+        read=parse_read(part, findings, context),
         errors=tuple(error for error in errors if error is not None),
         timeout_s=findings.duration(part, "timeout", 0.0, most=3600) or None,
     )
 
 
-def _command(part: Part, only: str, findings: Findings) -> Command:
+def _command(part: Part, lines: _Lines, findings: Findings) -> Command:
+    transport = lines.name(part, "to")
+    context = lines.context(transport)
     return Command(
         name=part.name,
-        transport=part.text("to", only),
-        send=findings.template(part.must("send")) or _NOTHING,
+        transport=transport,
+        send=parse_write(part.must("send"), findings, context),
         arguments={name: _argument(inner, findings) for name, inner in part.named("args").items()},
-        reply=_reply(part.get("reply"), findings),
+        reply=_reply(part.get("reply"), findings, context),
         title=part.text("title", spoken_name(part.name)),
         description=part.text("description"),
     )

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from typing import Literal, NamedTuple
 
 from urc.expressions import Template
+from urc.model.codec import ReadSpec, WriteSpec
 from urc.model.values import NOTHING, Signal, Value
 from urc.patterns import Pattern
 
@@ -71,9 +72,9 @@ class TransportSpec(NamedTuple):
 
 
 class Reply(NamedTuple):
-    """What answers a request: groups of the pattern are signals; `errors` mean failure."""
+    """What answers a request; a frame that matches one of `errors` means that it failed."""
 
-    pattern: Pattern
+    read: ReadSpec
     errors: tuple[Pattern, ...] = ()
     timeout_s: float | None = None
     """None: the transport's ``timeouts.reply``."""
@@ -101,7 +102,7 @@ class Command(NamedTuple):
 
     name: str
     transport: str
-    send: Template
+    send: WriteSpec
     arguments: Mapping[str, Argument] = NOTHING
     reply: Reply | None = None
     title: str = ""
@@ -115,7 +116,7 @@ class Poll(NamedTuple):
     """``polls.0``, or its ``name:``."""
     transport: str
     every_s: float
-    send: Template
+    send: WriteSpec
     reply: Reply | None = None
     phase_s: float = 0.0
     """Delay of the first one after the connection."""
@@ -126,7 +127,7 @@ class Message(NamedTuple):
 
     name: str
     transport: str
-    pattern: Pattern
+    read: ReadSpec
 
 
 class Driver(NamedTuple):

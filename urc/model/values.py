@@ -8,7 +8,17 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any, Final, Literal, NamedTuple
 
-__all__ = ["Alarm", "Limits", "NOTHING", "Sample", "Signal", "SignalType", "Value"]
+__all__ = [
+    "PLAIN",
+    "Alarm",
+    "Conversion",
+    "Limits",
+    "NOTHING",
+    "Sample",
+    "Signal",
+    "SignalType",
+    "Value",
+]
 
 NOTHING: Final[Mapping[str, Any]] = MappingProxyType({})
 """The default of every mapping."""
@@ -32,6 +42,25 @@ class Limits(NamedTuple):
     """How far a value must come back before the alarm ends, in the signal's unit."""
 
 
+class Conversion(NamedTuple):
+    """From a raw field to the value that is meant; applied in the order of the attributes."""
+
+    base: int = 10
+    """Of whole numbers that are written as text: 2 to 36."""
+    not_available: tuple[Value, ...] = ()
+    """Raw values that say "not available"."""
+    polynomial: tuple[float, ...] = ()
+    """Coefficients c0, c1, c2 …: value = c0 + c1·raw + c2·raw² …; () leaves the value alone."""
+    points: tuple[tuple[float, float], ...] = ()
+    """(raw, value) pairs, raw rising; linear between them, clamped outside."""
+    states: tuple[tuple[str, str], ...] = ()
+    """Raw text → word."""
+
+
+PLAIN = Conversion()
+"""Takes the raw value as it is."""
+
+
 class Signal(NamedTuple):
     """A declared value of a robot."""
 
@@ -51,6 +80,8 @@ class Signal(NamedTuple):
     stale_after_s: float = 0.0
     """Age in seconds after which a reading is shown as old. Always > 0 in a loaded driver."""
     description: str = ""
+    conversion: Conversion = PLAIN
+    """From what the robot says to the value in `unit`."""
 
 
 class Sample(NamedTuple):

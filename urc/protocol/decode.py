@@ -12,9 +12,9 @@ from urc.model.values import Alarm, Limits, Sample, Signal, Value
 
 __all__ = ["BadValue", "Decode", "alarm_of", "build_converter", "build_decode"]
 
-Convert = Callable[[str], Value]
-Decode = Callable[[Mapping[str, str | None], float], tuple[list[Sample], list[str]]]
-"""Groups of a match and the time → the samples, and a line for each value that was refused."""
+Convert = Callable[[object], Value]
+Decode = Callable[[Mapping[str, object], float], tuple[list[Sample], list[str]]]
+"""Fields of a frame and the time → the samples, and a line for each value that was refused."""
 
 _TRUE = frozenset(("1", "true", "on", "yes"))
 _FALSE = frozenset(("0", "false", "off", "no"))
@@ -25,33 +25,36 @@ class BadValue(ValueError):
 
 
 def build_converter(signal: Signal) -> Convert:
-    """Return the function from a frame's text to a value of `signal`."""
+    """Return the function from a raw field to a value of `signal`."""
     if signal.states:
         return _states_converter(dict(signal.states))
     if signal.type == "string":
-        return lambda text: text
+        return _to_string
     if signal.type == "boolean":
         return _to_boolean
     return _number_converter(signal)
 
 
-def build_decode(signals: Mapping[str, Signal], groups: tuple[str, ...]) -> Decode:
-    """Return the function that turns the named groups of a match into samples.
+def build_decode(signals: Mapping[str, Signal], fields: tuple[str, ...]) -> Decode:
+    """Return the function that turns the fields of a frame into samples.
 
-    It owns the alarm state of its signals, so hysteresis works from one reading to the next.
+    Fields whose name starts with ``_`` are the document's own and become no samples. The function
+    owns the alarm state of its signals, so hysteresis works from one reading to the next.
     """
-    converters = {name: build_converter(signals[name]) for name in groups}
-    limited = {name: signals[name].limits for name in groups if signals[name].limits != Limits()}
+    set_here = [signals[name] for name in fields if not name.startswith("_")]
+    converters = {signal.name: build_converter(signal) for signal in set_here}
+    limited = {one.name: one.limits for one in set_here if one.limits != Limits()}
     alarms: dict[str, Alarm] = {}
 
-    def decode(found: Mapping[str, str | None], now: float) -> tuple[list[Sample], list[str]]:
+    def decode(found: Mapping[str, object], now: float) -> tuple[list[Sample], list[str]]:
         samples: list[Sample] = []
         refused: list[str] = []
-        for name, text in found.items():
-            if text is None:
+        for name, raw in found.items():
+            convert = converters.get(name)
+            if convert is None:
                 continue
             try:
-                value = converters[name](text)
+                value = convert(raw)
             except BadValue as error:
                 refused.append(f"{name}: {error}")
                 continue
@@ -92,43 +95,93 @@ def _is_deeper(before: Alarm, name: Alarm) -> bool:
 def _states_converter(states: Mapping[str, str]) -> Convert:
     known = ", ".join(sorted(states))
 
-    def convert(text: str) -> Value:
-        word = states.get(text)
+    def convert(raw: object) -> Value:
+        if raw is None:
+            return None
+        word = states.get(_spelt(raw))
         if word is None:
-            raise BadValue(f"{text!r} is none of the states {known}")
+            raise BadValue(f"{_short(raw)} is none of the states {known}")
         return word
 
     return convert
 
 
-def _to_boolean(text: str) -> Value:
-    word = text.strip().lower()
+def _to_string(raw: object) -> Value:
+    if raw is None or isinstance(raw, str):
+        return raw
+    if isinstance(raw, (bool, int, float)):
+        return _spelt(raw)
+    raise BadValue(f"{_short(raw)} is no text")
+
+
+def _to_boolean(raw: object) -> Value:
+    if raw is None or isinstance(raw, bool):
+        return raw
+    word = _spelt(raw).strip().lower()
     if word in _TRUE:
         return True
     if word in _FALSE:
         return False
-    raise BadValue(f"{text!r} is neither true nor false")
+    raise BadValue(f"{_short(raw)} is neither true nor false")
 
 
 def _number_converter(signal: Signal) -> Convert:
     is_integer = signal.type == "integer"
     least = -math.inf if signal.min is None else signal.min
     most = math.inf if signal.max is None else signal.max
-    kind = "a whole number" if is_integer else "a number"
 
-    def convert(text: str) -> Value:
-        try:
-            # Python's int and float take '1_0' and other scripts' digits, which no robot means.
-            if "_" in text or not text.isascii() or len(text) > 400:
-                raise ValueError
-            value = int(text) if is_integer else float(text)
-        except ValueError:
-            raise BadValue(f"{text[:40]!r} is not {kind}") from None
+    def convert(raw: object) -> Value:
+        if raw is None:
+            return None
+        value = _integer_of(raw) if is_integer else _number_of(raw)
         if value != value:
             return None
         if least <= value <= most and value not in (math.inf, -math.inf):
             return value
         low = f" below its minimum {signal.min}" if value < least else ""
-        raise BadValue(f"{text[:40]!r} is{low or f' above its maximum {signal.max}'}")
+        raise BadValue(f"{_short(raw)} is{low or f' above its maximum {signal.max}'}")
 
     return convert
+
+
+def _integer_of(raw: object) -> int:
+    if isinstance(raw, int) and not isinstance(raw, bool):
+        return raw
+    if isinstance(raw, float) and raw.is_integer():
+        return int(raw)
+    if isinstance(raw, str) and _is_plain(raw):
+        try:
+            return int(raw)
+        except ValueError:
+            pass
+    raise BadValue(f"{_short(raw)} is not a whole number")
+
+
+def _number_of(raw: object) -> float:
+    if isinstance(raw, (int, float)) and not isinstance(raw, bool):
+        return raw
+    if isinstance(raw, str) and _is_plain(raw):
+        try:
+            return float(raw)
+        except ValueError:
+            pass
+    raise BadValue(f"{_short(raw)} is not a number")
+
+
+def _is_plain(text: str) -> bool:
+    """Python's int and float take '1_0' and other scripts' digits, which no robot means."""
+    return text.isascii() and "_" not in text and len(text) <= 400
+
+
+def _spelt(raw: object) -> str:
+    """Return a raw value as it is written in documents: ``true``, ``3``, ``2.5``."""
+    if isinstance(raw, bool):
+        return "true" if raw else "false"
+    if isinstance(raw, float) and raw.is_integer():
+        return str(int(raw))
+    return str(raw)
+
+
+def _short(raw: object) -> str:
+    text = repr(raw)
+    return text if len(text) <= 40 else text[:37] + "..."

@@ -6,10 +6,12 @@ go through the same door.
 
 from collections.abc import Callable, Mapping
 
-from urc.expressions import ExpressionError, Template, text_of
+from urc.expressions import ExpressionError
+from urc.model.codec import WriteSpec
 from urc.model.driver import Argument, Command
 from urc.model.values import Value
 from urc.problems import UrcError, printable
+from urc.protocol.forms import CodecContext, NotWritable, build_writer
 from urc.protocol.framing import Framing, FramingError
 
 __all__ = ["BadArgument", "Encode", "build_encode", "check_arguments"]
@@ -25,19 +27,20 @@ class BadArgument(UrcError):
     """A command that cannot be sent as asked; the message names the argument."""
 
 
-def build_encode(send: Template, framing: Framing, encoding: str) -> Encode:
-    """Return the function that renders `send` and frames it; constants are rendered once."""
+def build_encode(send: WriteSpec, framing: Framing, context: CodecContext) -> Encode:
+    """Return the function that writes `send` and frames it; constants are made once."""
+    writer = build_writer(send, context)
 
     def encode(namespace: Mapping[str, object]) -> bytes:
         try:
-            return framing.encode(text_of(send.evaluate(namespace)).encode(encoding))
-        except UnicodeEncodeError as error:
-            character = error.object[error.start]
-            raise BadArgument(f"{character!r} cannot be written in {encoding}") from None
-        except (ExpressionError, FramingError) as error:
+            payload = writer.write(namespace)
+            if not isinstance(payload, bytes):
+                raise BadArgument("a message cannot go over a line of bytes")
+            return framing.encode(payload)
+        except (ExpressionError, FramingError, NotWritable) as error:
             raise BadArgument(str(error)) from None
 
-    if send.is_constant:
+    if not send.names:
         constant = encode({})
         return lambda _: constant
     return encode

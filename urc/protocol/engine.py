@@ -17,12 +17,14 @@ not report it by `closed`.
 from collections.abc import Mapping
 from typing import NamedTuple
 
-from urc.model.driver import Command, Driver, Poll, Reply
+from urc.model.codec import ReadSpec
+from urc.model.driver import Command, Driver, Poll
 from urc.model.values import Signal, Value
 from urc.protocol.decode import build_decode
 from urc.protocol.encode import BadArgument, Encode, build_encode, check_arguments
 from urc.protocol.events import Event, Failed, Fault, Request
 from urc.protocol.exchange import Exchange, Line, Matcher
+from urc.protocol.forms import CodecContext, build_reader
 
 __all__ = ["Engine"]
 
@@ -59,17 +61,18 @@ class Engine:
         self._namespace: dict[str, object] = {"settings": dict(settings)}
         self._lines: dict[str, Line] = {}
         for name, spec in driver.transports.items():
-            messages = [m for m in driver.messages.values() if m.transport == name]
-            matchers = [_matcher(driver.signals, Reply(m.pattern)) for m in messages]
-            self._lines[name] = Line(spec, [m for m in matchers if m is not None])
+            messages = [one for one in driver.messages.values() if one.transport == name]
+            context = CodecContext(spec.encoding)
+            matchers = [_matcher(driver.signals, one.read, context) for one in messages]
+            self._lines[name] = Line(spec, matchers)
         self._commands = {
             command.name: _CompiledCommand(
-                command, self._encoder(command), _matcher(driver.signals, command.reply)
+                command, self._encoder(command), self._answer_to(command, driver.signals)
             )
             for command in driver.commands.values()
         }
         self._polls = [
-            _CompiledPoll(poll, self._encoder(poll), _matcher(driver.signals, poll.reply))
+            _CompiledPoll(poll, self._encoder(poll), self._answer_to(poll, driver.signals))
             for poll in driver.polls
         ]
         self._is_begun = False
@@ -172,10 +175,14 @@ class Engine:
 
     def _encoder(self, asked: Command | Poll) -> Encode:
         line = self._lines[asked.transport]
-        return build_encode(asked.send, line.framing, line.spec.encoding)
+        return build_encode(asked.send, line.framing, CodecContext(line.spec.encoding))
+
+    def _answer_to(self, asked: Command | Poll, signals: Mapping[str, Signal]) -> Matcher | None:
+        if asked.reply is None:
+            return None
+        context = CodecContext(self._lines[asked.transport].spec.encoding)
+        return _matcher(signals, asked.reply.read, context)
 
 
-def _matcher(signals: Mapping[str, Signal], reply: Reply | None) -> Matcher | None:
-    if reply is None:
-        return None
-    return Matcher(reply.pattern, build_decode(signals, reply.pattern.groups))
+def _matcher(signals: Mapping[str, Signal], read: ReadSpec, context: CodecContext) -> Matcher:
+    return Matcher(build_reader(read, context), build_decode(signals, read.fields))

@@ -15,16 +15,17 @@ from collections.abc import Mapping
 from typing import Literal, NamedTuple
 
 from urc.model.driver import TransportSpec
-from urc.model.values import Value
+from urc.model.values import Sample, Value
 from urc.patterns import Pattern
 from urc.protocol.decode import Decode
 from urc.protocol.events import Close, Event, Failed, Fault, Open, Replied, Samples, Send
+from urc.protocol.forms import BadText, Frame, Reader
 from urc.protocol.framing import Decoder, FrameFault, Framing, build_framing
 
 __all__ = ["Exchange", "Line", "Matcher"]
 
-Groups = Mapping[str, str | None]
-"""Named groups of a match."""
+Fields = Mapping[str, object]
+"""What a frame says: name → raw value."""
 
 QUEUE_LIMIT = 64
 """Requests waiting on one line; one more is refused."""
@@ -32,10 +33,17 @@ MISSES_UNTIL_CLOSED = 3
 
 
 class Matcher(NamedTuple):
-    """A pattern and what becomes of its groups."""
+    """A reader and what becomes of its fields."""
 
-    pattern: Pattern
+    reader: Reader
     decode: Decode
+
+    def read(self, frame: Frame) -> Fields | None:
+        """Return the fields, or None when the frame is another one or no text at all."""
+        try:
+            return self.reader.read(frame)
+        except BadText:
+            return None
 
 
 class Exchange:
@@ -217,56 +225,59 @@ class Line:
         self.in_flight = exchange
         return sent
 
-    def _frame(self, frame: bytes, now: float) -> list[Event]:
-        try:
-            text = frame.decode(self.spec.encoding)
-        except UnicodeDecodeError as error:
-            wrong = f"{frame[error.start : error.end]!r} is not {self.spec.encoding} text"
-            return [Fault(self.spec.name, "bad-text", wrong)]
+    def _frame(self, payload: bytes, now: float) -> list[Event]:
+        frame = Frame(payload, self.spec.encoding)
         if self.in_flight is not None and self.in_flight.matcher is not None:
-            events = self._answer(self.in_flight, self.in_flight.matcher, text, now)
+            events = self._answer(self.in_flight, self.in_flight.matcher, frame, now)
             if events is not None:
                 self.in_flight = None
                 self._misses = 0
                 # One connection, one request: the next one waits for a connection of its own.
                 return events + self._hang_up()
         late = self._late
-        if late is not None and late.matcher and late.matcher.pattern.search(text) is not None:
+        if late is not None and late.matcher and late.matcher.read(frame) is not None:
             self._wary_until = self._late = None
             text = f"the answer to {late.label} came too late and was dropped"
             return [Fault(self.spec.name, "late-reply", text)]
         for matcher in self._messages:
-            found = matcher.pattern.search(text)
+            found = matcher.read(frame)
             if found is not None:
-                return self._samples(matcher, found, now)
+                return self._samples(matcher, found, now)[0]
+        return [self._unknown(frame)]
+
+    def _unknown(self, frame: Frame) -> Fault:
+        """Return what to say of a frame that nothing declared matches."""
+        try:
+            text = frame.text
+        except BadText as error:
+            return Fault(self.spec.name, "bad-text", str(error))
         shown = text if len(text) <= 60 else text[:57] + "..."
-        return [Fault(self.spec.name, "no-match", f"nothing declared matches {shown!r}")]
+        return Fault(self.spec.name, "no-match", f"nothing declared matches {shown!r}")
 
     def _answer(
-        self, exchange: Exchange, matcher: Matcher, text: str, now: float
+        self, exchange: Exchange, matcher: Matcher, frame: Frame, now: float
     ) -> list[Event] | None:
         """Return what the frame means for `exchange`, or None when it is no answer to it."""
-        for pattern in exchange.errors:
-            if pattern.search(text) is not None:
-                return self._failed(exchange, "refused", f"the robot answered {text[:80]!r}")
-        found = matcher.pattern.search(text)
+        if any(_matches(pattern, frame) for pattern in exchange.errors):
+            return self._failed(exchange, "refused", f"the robot answered {frame.text[:80]!r}")
+        found = matcher.read(frame)
         if found is None:
             return None
-        events = self._samples(matcher, found, now)
-        values = {
-            sample.signal: sample.value
-            for event in events
-            if isinstance(event, Samples)
-            for sample in event.samples
-        }
+        events, samples = self._samples(matcher, found, now)
+        # What the reply says beside the signals is the command's own result.
+        values = {name[1:]: _plain(raw) for name, raw in found.items() if name.startswith("_")}
+        values |= {sample.signal: sample.value for sample in samples}
         return events + self._done(exchange, values)
 
-    def _samples(self, matcher: Matcher, found: Groups, now: float) -> list[Event]:
+    def _samples(
+        self, matcher: Matcher, found: Fields, now: float
+    ) -> tuple[list[Event], list[Sample]]:
         samples, refused = matcher.decode(found, now)
         # A good frame without values is told of, too: it shows that the line lives.
         is_good = bool(samples) or not refused
         events: list[Event] = [Samples(self.spec.name, tuple(samples))] if is_good else []
-        return events + [Fault(self.spec.name, "bad-value", line) for line in refused]
+        events += [Fault(self.spec.name, "bad-value", line) for line in refused]
+        return events, samples
 
     def _missed(self, exchange: Exchange, now: float) -> list[Event]:
         self.in_flight = None
@@ -300,3 +311,15 @@ class Line:
         if code == "refused":
             return [Fault(self.spec.name, code, f"{exchange.label}: {message}")]
         return []
+
+
+def _matches(pattern: Pattern, frame: Frame) -> bool:
+    try:
+        return pattern.search(frame.text) is not None
+    except BadText:
+        return False
+
+
+def _plain(raw: object) -> Value:
+    """Return a raw value as something that a reply may carry."""
+    return raw if raw is None or isinstance(raw, (bool, int, float, str)) else str(raw)

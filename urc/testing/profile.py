@@ -16,6 +16,7 @@ from urc.model.driver import (
 from urc.model.profile import Profile, Setting, SimulatorRule
 from urc.model.values import Signal
 from urc.patterns import compile_pattern
+from urc.testing.codec import regex, text
 
 __all__ = ["line_profile"]
 
@@ -41,7 +42,7 @@ def line_profile(
         transport: row of the transports table.
         max_bytes: longest frame.
     """
-    battery = Reply(compile_pattern(r"^(?P<battery>\d+)$"))
+    battery = Reply(regex(r"^(?P<battery>\d+)$"))
     wire = TransportSpec(
         name="wire",
         type=transport,
@@ -55,19 +56,15 @@ def line_profile(
         backoff=backoff or Backoff(),
     )
     commands = {
-        "ask": Command("ask", "wire", compile_template(QUESTION), reply=battery),
+        "ask": Command("ask", "wire", text(QUESTION), reply=battery),
         "say": Command(
             "say",
             "wire",
-            compile_template("say {{ word }}"),
+            text("say {{ word }}"),
             arguments={"word": Argument("word", "string")},
         ),
     }
-    polls = (
-        ()
-        if every_s is None
-        else (Poll("polls.0", "wire", every_s, compile_template(QUESTION), battery),)
-    )
+    polls = () if every_s is None else (Poll("polls.0", "wire", every_s, text(QUESTION), battery),)
     driver = Driver(
         transports={"wire": wire},
         signals={
@@ -75,7 +72,7 @@ def line_profile(
             "note": Signal("note", "string", stale_after_s=3.0),
         },
         commands=commands,
-        messages={"note": Message("note", "wire", compile_pattern(r"^note (?P<note>.*)$"))},
+        messages={"note": Message("note", "wire", regex(r"^note (?P<note>.*)$"))},
         polls=polls,
     )
     rule = SimulatorRule(

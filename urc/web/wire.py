@@ -317,12 +317,12 @@ def _signal(signal: Signal, sources: tuple[str, ...]) -> _Signal:
 
 
 def _sources(driver: Driver) -> dict[str, tuple[str, ...]]:
-    """Return which transports bring each signal, by the groups of the patterns."""
+    """Return which transports bring each signal, by the fields of what is read."""
     asked: tuple[Poll | Command, ...] = (*driver.polls, *driver.commands.values())
-    patterns = [(message.transport, message.pattern) for message in driver.messages.values()]
-    patterns += [(each.transport, each.reply.pattern) for each in asked if each.reply]
+    reads = [(message.transport, message.read) for message in driver.messages.values()]
+    reads += [(each.transport, each.reply.read) for each in asked if each.reply]
     found: dict[str, dict[str, None]] = {}
-    for transport, pattern in patterns:
-        for group in pattern.groups:
-            found.setdefault(group, {})[transport] = None
+    for transport, read in reads:
+        for field in read.fields:
+            found.setdefault(field, {})[transport] = None
     return {name: tuple(transports) for name, transports in found.items()}

@@ -14,6 +14,7 @@ from urc.model.profile import DocumentTest, Profile
 from urc.model.values import Limits, Signal
 from urc.problems import ProblemsError
 from urc.runtime.catalog import built_in_catalog
+from urc.testing.codec import text
 
 ROOT = Path(__file__).resolve().parents[3]
 SHELF = ROOT / "tests" / "broken" / "shelf"
@@ -81,9 +82,9 @@ def test_puppet_becomes_the_model_that_it_describes() -> None:
         stale_after_s=3.0,
     )
     assert (poll.name, poll.transport, poll.every_s) == ("polls.0", "wire", 1.0)
-    assert poll.send.render({}) == "Give me the battery %"
+    assert poll.send == text("Give me the battery %")
     assert poll.reply is not None
-    assert poll.reply.pattern.groups == ("battery",)
+    assert poll.reply.read.fields == ("battery",)
     assert profile.slots == {
         "battery": WidgetUse(
             "battery", "battery", {"level": "battery"}, options={"show_number": True}

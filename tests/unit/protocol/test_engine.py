@@ -2,7 +2,6 @@
 
 import pytest
 
-from urc.expressions import compile_template
 from urc.model.driver import (
     Argument,
     Command,
@@ -28,6 +27,7 @@ from urc.protocol.events import (
     Samples,
     Send,
 )
+from urc.testing.codec import regex, text
 
 LINES = FramingSpec("delimiter", {"tx": b"\n", "rx": b"\n"}, 64)
 BATTERY = Signal("battery", "integer", min=0, max=100, limits=Limits(low=20, hysteresis=2))
@@ -36,10 +36,10 @@ TIMEOUTS = Timeouts(connect_s=3.0, reply_s=0.5)
 
 def reply(pattern: str, *errors: str) -> Reply:
     """What answers a request."""
-    return Reply(compile_pattern(pattern), tuple(map(compile_pattern, errors)))
+    return Reply(regex(pattern), tuple(map(compile_pattern, errors)))
 
 
-POLL = Poll("", "wire", 1.0, compile_template("bat?"), reply(r"^(?P<battery>\d+)$"))
+POLL = Poll("", "wire", 1.0, text("bat?"), reply(r"^(?P<battery>\d+)$"))
 
 
 def engine(connection: str = "persistent", *polls: Poll, **wire: object) -> Engine:
@@ -52,12 +52,10 @@ def engine(connection: str = "persistent", *polls: Poll, **wire: object) -> Engi
         transports={"wire": spec},
         signals={"battery": BATTERY, "mode": Signal("mode", "string")},
         commands={
-            "go": Command("go", "wire", compile_template("GO {{ speed }}"), {"speed": go}),
-            "ask": Command(
-                "ask", "wire", compile_template("mode?"), {}, reply("^MODE (?P<mode>.+)$", "^ERR")
-            ),
+            "go": Command("go", "wire", text("GO {{ speed }}"), {"speed": go}),
+            "ask": Command("ask", "wire", text("mode?"), {}, reply("^MODE (?P<mode>.+)$", "^ERR")),
         },
-        messages={"mode": Message("mode", "wire", compile_pattern("^MODE (?P<mode>.+)$"))},
+        messages={"mode": Message("mode", "wire", regex("^MODE (?P<mode>.+)$"))},
         polls=polls,
     )
     return Engine(driver, {})
@@ -152,13 +150,11 @@ def test_a_command_that_cannot_be_sent_fails_at_once(
 def test_text_cannot_smuggle_a_second_command() -> None:
     """Neither a delimiter nor any other control character passes through an argument."""
     spec = TransportSpec("wire", "tcp", framing=LINES)
-    say = Command(
-        "say", "wire", compile_template("SAY {{ text }}"), {"text": Argument("text", "string")}
-    )
+    say = Command("say", "wire", text("SAY {{ text }}"), {"text": Argument("text", "string")})
     made = Engine(Driver(transports={"wire": spec}, commands={"say": say}), {})
     made.start("wire", 0.0)
-    for text in ("hi\nDISARM", "hi\r", "\x00", "\x1b[2J", "\u2028"):
-        assert codes(made.command(Request(1, "say", {"text": text}), 0.0)) == ["bad-argument"]
+    for word in ("hi\nDISARM", "hi\r", "\x00", "\x1b[2J", "\u2028"):
+        assert codes(made.command(Request(1, "say", {"text": word}), 0.0)) == ["bad-argument"]
     assert made.command(Request(1, "say", {"text": "hé"}), 0.0)[0] == Send(
         "wire", b"SAY h\xc3\xa9\n"
     )
@@ -286,5 +282,5 @@ def test_an_alarm_ends_only_past_its_hysteresis() -> None:
 
 def test_a_good_answer_without_values_shows_that_the_line_lives() -> None:
     """A robot may answer a poll with nothing but "pong"."""
-    ping = Poll("", "wire", 1.0, compile_template("ping"), reply("^pong$"))
+    ping = Poll("", "wire", 1.0, text("ping"), reply("^pong$"))
     assert opened(ping).receive("wire", b"pong\n", 0.1) == [Samples("wire", ())]

@@ -1,6 +1,5 @@
 """The emulated robot, without a socket or a clock."""
 
-
 import pytest
 
 from urc.expressions import compile_template

@@ -5,12 +5,11 @@ import math
 
 import pytest
 
-from urc.expressions import compile_template
 from urc.model.driver import Driver, Message, Poll, Reply
 from urc.model.profile import Profile
 from urc.model.values import Limits, Sample, Signal
-from urc.patterns import compile_pattern
 from urc.runtime.hub import LinkStatus, Note
+from urc.testing.codec import regex, text
 from urc.web import wire
 
 
@@ -52,14 +51,14 @@ def test_values_arrive_as_a_browser_can_hold_them(value: object, shown: object) 
 
 def test_hello_says_what_each_signal_means_and_where_it_comes_from() -> None:
     """The page can tell which values are cut off when one of several lines is lost."""
-    reply = Reply(compile_pattern(r"^(?P<volts>\d+)$"))
+    reply = Reply(regex(r"^(?P<volts>\d+)$"))
     driver = Driver(
         signals={
             "volts": Signal("volts", "number", unit="V", limits=Limits(low=11), stale_after_s=3),
             "note": Signal("note", "string", states=(("0", "off"),), stale_after_s=2),
         },
-        messages={"m": Message("m", "radio", compile_pattern(r"(?P<note>.*)"))},
-        polls=(Poll("polls.0", "wire", 1.0, compile_template("volts?"), reply),),
+        messages={"m": Message("m", "radio", regex(r"(?P<note>.*)"))},
+        polls=(Poll("polls.0", "wire", 1.0, text("volts?"), reply),),
     )
     hello = json.loads(wire.encode_hello(Profile("p", "P", "p.yaml", driver=driver), "s1", 2.0))
     assert hello == {

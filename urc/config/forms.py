@@ -1,0 +1,120 @@
+"""Forms of frames: which there are, and which one a document uses at a place.
+
+A form is a module of this package with two functions. For reading:
+
+    parse_read(part, findings, context) -> ReadSpec | None
+    place_of(part, field) -> (part, where), so that a finding about a field can point at it
+
+and for writing:
+
+    parse_write(part, findings, context) -> WriteSpec | None
+    templates(part, spec) -> iterable of (part, template), for the names used in them
+
+`part` is what stands under the form's key; None means that it was reported.
+"""
+
+from collections.abc import Iterable
+from importlib import import_module
+from typing import Any, NamedTuple, Protocol, cast
+
+from urc.config.part import Findings, Part
+from urc.expressions import Template
+from urc.model.codec import ReadSpec, WriteSpec
+
+__all__ = [
+    "READ_FORMS",
+    "WRITE_FORMS",
+    "FormContext",
+    "ReadForm",
+    "WriteForm",
+    "parse_read",
+    "parse_write",
+    "read_form",
+    "write_form",
+]
+
+READ_FORMS = {
+    "regex": "urc.config.form_regex",
+}
+WRITE_FORMS = {
+    "text": "urc.config.form_text",
+}
+_NO_READ = ReadSpec("regex")
+_NO_WRITE = WriteSpec("text")
+
+
+class FormContext(NamedTuple):
+    """What a form may need to know of its surroundings."""
+
+    encoding: str = "utf-8"
+    """Of the line that the frame comes from or goes to."""
+
+
+class ReadForm(Protocol):
+    """A module that parses one way of reading a frame."""
+
+    def parse_read(
+        self, part: Part, findings: Findings, context: FormContext
+    ) -> ReadSpec | None:
+        """Return what `part` declares, or None when a fault was reported."""
+
+    def place_of(self, part: Part, field: str) -> tuple[Part, dict[str, Any]]:
+        """Return where `field` is named, as `Findings.error` takes it."""
+
+
+class WriteForm(Protocol):
+    """A module that parses one way of writing a frame."""
+
+    def parse_write(
+        self, part: Part, findings: Findings, context: FormContext
+    ) -> WriteSpec | None:
+        """Return what `part` declares, or None when a fault was reported."""
+
+    def templates(self, part: Part, spec: WriteSpec) -> Iterable[tuple[Part, Template]]:
+        """Return every template in it, with its place."""
+
+
+def read_form(part: Part) -> tuple[Part, ReadForm] | None:
+    """Return what stands under the form's key of a reply or message, and the form's module."""
+    for key in READ_FORMS:
+        inner = part.get(key)
+        if inner is not None:
+            return inner, cast("ReadForm", import_module(READ_FORMS[key]))
+    return None
+
+
+def write_form(part: Part) -> tuple[Part, WriteForm]:
+    """Return what stands under ``send:``, or under the form's key in it, and the form's module."""
+    if isinstance(part.data, dict):
+        for key in WRITE_FORMS:
+            inner = part.get(key)
+            if inner is not None:
+                return inner, cast("WriteForm", import_module(WRITE_FORMS[key]))
+    return part, cast("WriteForm", import_module(WRITE_FORMS["text"]))
+
+
+def parse_read(part: Part, findings: Findings, context: FormContext) -> ReadSpec:
+    """Return how the frame of a reply or message is read."""
+    given = [key for key in READ_FORMS if key in part.data]
+    if len(given) != 1:
+        found = " and ".join(f"'{key}'" for key in given)
+        findings.error(
+            part,
+            "two-forms" if given else "missing-form",
+            f"{found} both say how the frame is read" if given else "nothing says how it is read",
+            at=given[1] if given else "",
+            key=True,
+            hint=f"use exactly one of: {', '.join(READ_FORMS)}",
+        )
+        return _NO_READ
+    found_form = read_form(part)
+    if found_form is None:
+        return _NO_READ
+    inner, form = found_form
+    return form.parse_read(inner, findings, context) or _NO_READ
+
+
+def parse_write(part: Part, findings: Findings, context: FormContext) -> WriteSpec:
+    """Return how the frame under ``send:`` is written."""
+    inner, form = write_form(part)
+    return form.parse_write(inner, findings, context) or _NO_WRITE
