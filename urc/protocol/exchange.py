@@ -116,6 +116,8 @@ class Line:
     def deadline(self) -> float | None:
         """When `tick` has something to do, or None."""
         times = [exchange.gives_up_at for exchange in self.waiting]
+        if self._decoder.deadline is not None:
+            times.append(self._decoder.deadline)
         if self.in_flight is not None:
             times.append(self.in_flight.answer_due)
         elif self._wary_until is not None:
@@ -167,21 +169,15 @@ class Line:
 
     def receive(self, data: bytes, now: float) -> list[Event]:
         """Take bytes from the transport."""
-        events: list[Event] = []
         if not self.is_open():
-            return events
-        for frame in self._decoder.feed(data):
-            if not self.is_open():
-                break  # what follows the answer on a connection of one request is nobody's
-            if isinstance(frame, FrameFault):
-                events.append(Fault(self.spec.name, frame.code, frame.message))
-            else:
-                events += self._frame(frame, now)
-        return events + self._pump(now)
+            return []
+        return self._frames(self._decoder.feed(data, now), now) + self._pump(now)
 
     def tick(self, now: float) -> list[Event]:
         """Do what is due at `now`."""
         events: list[Event] = []
+        if self.is_open():
+            events += self._frames(self._decoder.tick(now), now)
         for exchange in [late for late in self.waiting if late.gives_up_at <= now]:
             self.waiting.remove(exchange)
             events += self._failed(exchange, "timed-out", "it could not be sent in time")
@@ -224,6 +220,17 @@ class Line:
         exchange.answer_due = now + exchange.reply_s
         self.in_flight = exchange
         return sent
+
+    def _frames(self, frames: list[bytes | FrameFault], now: float) -> list[Event]:
+        events: list[Event] = []
+        for frame in frames:
+            if not self.is_open():
+                break  # what follows the answer on a connection of one request is nobody's
+            if isinstance(frame, FrameFault):
+                events.append(Fault(self.spec.name, frame.code, frame.message))
+            else:
+                events += self._frame(frame, now)
+        return events
 
     def _frame(self, payload: bytes, now: float) -> list[Event]:
         frame = Frame(payload, self.spec.encoding)

@@ -33,8 +33,15 @@ class Decoder(Protocol):
     def pending(self) -> int:
         """Bytes held back because their frame is not complete."""
 
-    def feed(self, data: bytes) -> list[bytes | FrameFault]:
+    @property
+    def deadline(self) -> float | None:
+        """When `tick` may complete a frame by silence alone; None when only bytes can."""
+
+    def feed(self, data: bytes, now: float = 0.0) -> list[bytes | FrameFault]:
         """Take bytes and return the frames that are now complete, in order."""
+
+    def tick(self, now: float) -> list[bytes | FrameFault]:
+        """Return the frames that the silence until `now` has completed."""
 
 
 class Framing(Protocol):
@@ -97,7 +104,14 @@ class _DelimiterDecoder:
     def pending(self) -> int:
         return len(self._buffer)
 
-    def feed(self, data: bytes) -> list[bytes | FrameFault]:
+    @property
+    def deadline(self) -> float | None:
+        return None
+
+    def tick(self, now: float) -> list[bytes | FrameFault]:
+        return []
+
+    def feed(self, data: bytes, now: float = 0.0) -> list[bytes | FrameFault]:
         buffer, delimiter = self._buffer, self._delimiter
         buffer += data
         frames: list[bytes | FrameFault] = []

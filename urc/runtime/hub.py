@@ -14,7 +14,16 @@ from typing import Literal
 
 from urc.model.values import Sample, Signal
 
-__all__ = ["Hub", "LinkState", "LinkStatus", "Note", "Subscription", "Tap", "Traffic"]
+__all__ = [
+    "Hub",
+    "LinkState",
+    "LinkStatus",
+    "Note",
+    "Subscription",
+    "Tap",
+    "Tapped",
+    "Traffic",
+]
 
 LinkState = Literal["idle", "connecting", "live", "silent", "lost"]
 """idle: nobody asked yet. silent: connected, but an answer is overdue. lost: not connected."""
@@ -88,30 +97,38 @@ class Subscription:
         return samples
 
 
+Tapped = Sample | Note | Traffic
+"""What a tap gives."""
+
+
 class Tap:
-    """Every sample in order, for a reader that must not miss one; bounded, it counts losses."""
+    """All that happens, in order, for a reader that must not miss a thing; it counts losses."""
 
     def __init__(self) -> None:
         self.dropped = 0
-        """Samples lost because the reader was too slow, since the tap was opened."""
-        self._samples: deque[Sample] = deque()
+        """Lost because the reader was too slow, since the tap was opened."""
+        self._kept: deque[Tapped] = deque()
         self._event = asyncio.Event()
 
-    def put(self, samples: Iterable[Sample]) -> None:
-        """Take samples; the oldest go when there are more than `TAP_KEPT`."""
-        self._samples.extend(samples)
-        while len(self._samples) > TAP_KEPT:
-            self._samples.popleft()
-            self.dropped += 1
+    def put(self, items: Iterable[Tapped]) -> None:
+        """Take what happened; the oldest go when there is more than `TAP_KEPT`."""
+        for item in items:
+            if len(self._kept) == TAP_KEPT:
+                self._kept.popleft()
+                self.dropped += 1
+            self._kept.append(item)
         self._event.set()
 
-    async def take(self) -> list[Sample]:
-        """Wait for samples and return all there are."""
-        while not self._samples:
+    async def filled(self) -> None:
+        """Return when there is something to take."""
+        while not self._kept:
             self._event.clear()
             await self._event.wait()
-        taken = list(self._samples)
-        self._samples.clear()
+
+    def take(self) -> list[Tapped]:
+        """Return all there is, and keep none of it."""
+        taken = list(self._kept)
+        self._kept.clear()
         return taken
 
 
@@ -136,6 +153,7 @@ class Hub:
         self._changed: dict[str, int] = {}
         self._subscriptions: set[Subscription] = set()
         self._taps: set[Tap] = set()
+        self._traffic_taps: set[Tap] = set()
 
     def put(self, samples: Iterable[Sample]) -> None:
         """Take readings; a repeated value counts as a change, because its age is new."""
@@ -161,6 +179,8 @@ class Hub:
         self.notes.append(note)
         self.notes_count += 1
         self.revision += 1
+        for tap in self._taps:
+            tap.put((note,))
         self._wake()
 
     def saw(self, traffic: Traffic) -> None:
@@ -168,6 +188,8 @@ class Hub:
         self.traffic.append(traffic)
         self.traffic_count += 1
         self.revision += 1
+        for tap in self._traffic_taps:
+            tap.put((traffic,))
         self._wake()
 
     def latest(self, name: str) -> Sample | None:
@@ -190,14 +212,24 @@ class Hub:
             self._subscriptions.discard(subscription)
 
     @contextmanager
-    def tap(self) -> Iterator[Tap]:
-        """Give a reader every sample from now on, for as long as the context lasts."""
+    def tap(self, *, with_traffic: bool = False) -> Iterator[Tap]:
+        """Give a reader every sample and note from now on, for as long as the context lasts.
+
+        Args:
+            with_traffic: the bytes on the lines as well, which are recorded from now on.
+        """
         tap = Tap()
         self._taps.add(tap)
+        if with_traffic:
+            self._traffic_taps.add(tap)
+            self.traffic_watchers += 1
         try:
             yield tap
         finally:
             self._taps.discard(tap)
+            if with_traffic:
+                self._traffic_taps.discard(tap)
+                self.traffic_watchers -= 1
 
     def _wake(self) -> None:
         for subscription in self._subscriptions:

@@ -63,19 +63,22 @@ def resolve_settings(
             text = environ.get(source)
         if text is None:
             values[name] = setting.default
-        elif allows_any_port and setting.type == "port" and text.strip() == "0":
-            values[name] = 0
         else:
             try:
-                values[name] = parse_setting(setting, text)
+                values[name] = parse_setting(setting, text, allows_any_port=allows_any_port)
             except UrcError as problem:
                 raise UrcError(f"{source}: {problem}") from problem
     missing = tuple(name for name, value in values.items() if value is None)
     return {name: value for name, value in values.items() if value is not None}, missing
 
 
-def parse_setting(setting: Setting, text: str) -> Value:
+def parse_setting(setting: Setting, text: str, *, allows_any_port: bool = False) -> Value:
     """Return the value that `text` means for `setting`.
+
+    Args:
+        setting: whose type and range count.
+        text: as typed.
+        allows_any_port: port 0 may be given, for a server that lets the system choose.
 
     Raises:
         UrcError: one line: what was found and what was expected. A secret is not repeated.
@@ -85,11 +88,12 @@ def parse_setting(setting: Setting, text: str) -> Value:
     found = "that" if setting.is_secret else repr(text)
     match setting.type:
         case "string":
-            return text
+            return _text(text, found)
         case "host":
             return _host(text, found)
         case "port":
-            return _integer(text, found, low=1, high=65535, kind="a port")
+            low = 0 if allows_any_port else 1
+            return _integer(text, found, low=low, high=65535, kind="a port")
         case "integer":
             return _integer(text, found, setting.min, setting.max)
         case "number":
@@ -99,9 +103,7 @@ def parse_setting(setting: Setting, text: str) -> Value:
         case "choice":
             return _choice(setting, text, found)
         case "path":
-            if not text.strip() or "\0" in text:
-                raise UrcError(f"{found} is not a path")
-            return str(Path(text).expanduser())
+            return _path(text, found)
 
 
 def options_of(spec: TransportSpec, settings: Mapping[str, Value]) -> dict[str, Value]:
@@ -120,6 +122,22 @@ def options_of(spec: TransportSpec, settings: Mapping[str, Value]) -> dict[str, 
         except ExpressionError as problem:
             raise UrcError(f"transports.{spec.name}.{name}: {problem}") from problem
     return options
+
+
+def _text(text: str, found: str) -> str:
+    # The environment and the command line may hold bytes that are no text; no robot takes them.
+    if any("\ud800" <= character <= "\udfff" for character in text):
+        raise UrcError(f"{found} is not text in UTF-8")
+    return text
+
+
+def _path(text: str, found: str) -> str:
+    if not text.strip() or "\0" in text:
+        raise UrcError(f"{found} is not a path")
+    try:
+        return str(Path(text).expanduser())
+    except RuntimeError as error:  # ~ without a home, or of a user who is not there
+        raise UrcError(f"{found} is not a path: whose home is meant is not known") from error
 
 
 def _host(text: str, found: str) -> str:
