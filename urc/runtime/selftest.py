@@ -3,21 +3,27 @@
 Floor 4, no I/O and no asyncio: `urc validate` runs these without a robot, a network or a secret.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 
-from urc.model.driver import Driver
+from urc.config.values import shown
+from urc.model.driver import Driver, TransportSpec
 from urc.model.profile import DocumentTest, Profile, Setting
 from urc.model.values import Value
 from urc.problems import Problem, UrcError
 from urc.protocol.engine import Engine
 from urc.protocol.events import Event, Failed, Fault, Open, Request, Samples, Send
-from urc.protocol.framing import build_framing
+from urc.protocol.framing import FramingError, build_framing
 
 __all__ = ["run_tests", "sample_settings"]
 
 _SAMPLE: dict[str, Value] = {"host": "127.0.0.1", "port": 1, "integer": 0, "number": 0.0}
 _ROUNDS = 16
 """How many deadlines a test lets pass while it waits for the failure that it declares."""
+_SHOWN = 3
+"""Failures told of one test."""
+_SHOWN_BYTES = 48
+_BEFORE_BYTES = 16
+"""Of a long frame: bytes shown, and how many of them before the first difference."""
 
 
 def run_tests(profile: Profile) -> list[Problem]:
@@ -63,7 +69,7 @@ class _Trial:
 
     def __init__(self, engine: Engine) -> None:
         self.engine = engine
-        self.samples: dict[str, Value] = {}
+        self.samples: dict[str, object] = {}
         self.sent: dict[str, bytes] = {}
         self.failures: list[str] = []
 
@@ -83,12 +89,30 @@ class _Trial:
 
 def _run(driver: Driver, settings: Mapping[str, Value], test: DocumentTest) -> str:
     """Return what is wrong, or "" when the test passes."""
-    if not (test.expect or test.sent or test.fails):
+    if not (test.expect or test.sent or test.fails is not None):
         return "it checks nothing; say what it should 'expect', what is 'sent' or how it 'fails'"
     try:
         trial = _Trial(Engine(_narrowed(driver, test), settings))
+        _converse(trial, driver, test)
     except UrcError as error:
         return str(error)
+    if test.fails is None:
+        complaints = _first(trial.failures)
+    else:
+        complaints = _check_failure(trial, test.fails)
+    complaints += _check_values(trial, test)
+    complaints += _check_bytes(trial, driver, test)
+    return "; ".join(complaints)
+
+
+def _narrowed(driver: Driver, test: DocumentTest) -> Driver:
+    """Return the driver with only the poll that the test is about, due at once."""
+    polls = (driver.polls[test.reply_to],) if isinstance(test.reply_to, int) else ()
+    return driver._replace(polls=tuple(poll._replace(phase_s=0.0) for poll in polls))
+
+
+def _converse(trial: _Trial, driver: Driver, test: DocumentTest) -> None:
+    """Connect, ask, and feed the answer, all in one instant."""
     trial.perform(trial.engine.tick(0.0), 0.0)
     for name, spec in driver.transports.items():
         if spec.connection == "persistent":
@@ -97,63 +121,84 @@ def _run(driver: Driver, settings: Mapping[str, Value], test: DocumentTest) -> s
     if command is not None:
         trial.perform(trial.engine.command(Request(1, command, test.arguments), 0.0), 0.0)
     for name, text in test.feed.items():
-        data = text.encode(driver.transports[name].encoding)
+        data = _encoded(text, driver.transports[name])
         trial.perform(trial.engine.receive(name, data, 0.0), 0.0)
-    if test.fails is not None:
-        return _check_failure(trial, test.fails)
-    return _check(driver, trial, test)
 
 
-def _narrowed(driver: Driver, test: DocumentTest) -> Driver:
-    """Return the driver with only the poll that the test is about, so that no other one speaks."""
-    polls = (driver.polls[test.reply_to],) if isinstance(test.reply_to, int) else ()
-    return driver._replace(polls=polls)
-
-
-def _check_failure(trial: _Trial, expected: str) -> str:
+def _check_failure(trial: _Trial, expected: str) -> list[str]:
+    """Let time pass until the failure that the test declares, and complain if it never comes."""
     for _ in range(_ROUNDS):
         if any(expected in failure for failure in trial.failures):
-            return ""
+            return []
         deadline = trial.engine.deadline
         if deadline is None:
             break
         trial.perform(trial.engine.tick(deadline), deadline)
-    found = "; ".join(trial.failures) or "nothing failed"
-    return f"it should fail with {expected!r}, but {found}"
+    found = "; ".join(_first(trial.failures)) or "nothing failed"
+    return [f"it should fail with {expected!r}, but {found}"]
 
 
-def _check(driver: Driver, trial: _Trial, test: DocumentTest) -> str:
-    complaints = list(trial.failures)
+def _first(failures: list[str]) -> list[str]:
+    more = len(failures) - _SHOWN
+    return [*failures[:_SHOWN], f"and {more} more"] if more > 0 else list(failures)
+
+
+def _check_values(trial: _Trial, test: DocumentTest) -> Iterator[str]:
     for name, expected in test.expect.items():
         if name not in trial.samples:
-            complaints.append(f"{name}: expected {expected!r}, but nothing set it")
+            yield f"{name}: expected {shown(expected)}, but nothing set it"
         elif not _is_same(trial.samples[name], expected):
-            complaints.append(f"{name}: expected {expected!r}, found {trial.samples[name]!r}")
+            yield f"{name}: expected {shown(expected)}, found {shown(trial.samples[name])}"
+
+
+def _check_bytes(trial: _Trial, driver: Driver, test: DocumentTest) -> Iterator[str]:
     for name, text in test.sent.items():
         spec = driver.transports[name]
         try:
-            wanted = build_framing(spec.framing).encode(text.encode(spec.encoding))
-        except (UrcError, UnicodeEncodeError) as error:
-            complaints.append(f"{name}: {error}")
+            wanted = _framed(text, spec)
+        except UrcError as error:
+            yield str(error)
             continue
         found = trial.sent.get(name, b"")
         if found != wanted:
-            complaints.append(_difference(name, wanted, found))
-    return "; ".join(complaints)
+            yield _difference(name, wanted, found)
 
 
-def _is_same(found: Value, expected: Value) -> bool:
+def _framed(text: str, spec: TransportSpec) -> bytes:
+    payload = _encoded(text, spec)
+    try:
+        return build_framing(spec.framing).encode(payload)
+    except FramingError as error:
+        raise UrcError(f"{spec.name}: {error}") from error
+
+
+def _encoded(text: str, spec: TransportSpec) -> bytes:
+    try:
+        return text.encode(spec.encoding)
+    except UnicodeEncodeError as error:
+        wrong = text[error.start : error.end]
+        raise UrcError(f"{spec.name}: {wrong!r} cannot be written in {spec.encoding}") from error
+
+
+def _is_same(found: object, expected: object) -> bool:
     """Compare as a person would: 42 is 42.0, but true is not 1."""
     return found == expected and isinstance(found, bool) == isinstance(expected, bool)
 
 
 def _difference(transport: str, wanted: bytes, found: bytes) -> str:
-    """Return both sides in hex and text, and the first offset at which they differ."""
+    """Return both sides in hex and text around the first byte at which they differ."""
     at = next((i for i, (a, b) in enumerate(zip(wanted, found, strict=False)) if a != b), None)
     offset = min(len(wanted), len(found)) if at is None else at
-    return f"{transport}: at byte {offset}, expected {_shown(wanted)}, found {_shown(found)}"
+    start = max(0, offset - _BEFORE_BYTES) if max(len(wanted), len(found)) > _SHOWN_BYTES else 0
+    sides = f"expected {_bytes_shown(wanted, start)}, found {_bytes_shown(found, start)}"
+    return f"{transport}: at byte {offset}, {sides}"
 
 
-def _shown(data: bytes) -> str:
-    text = data[:48].decode("ascii", "backslashreplace")
-    return f"{text!r} ({data[:48].hex(' ')}{' …' if len(data) > 48 else ''})" if data else "nothing"
+def _bytes_shown(data: bytes, start: int) -> str:
+    """Return what stands from `start`, with dots where something is left out."""
+    if not data:
+        return "nothing"
+    part = data[start : start + _SHOWN_BYTES]
+    before, after = "… " if start else "", " …" if start + len(part) < len(data) else ""
+    text = part.decode("ascii", "backslashreplace")
+    return f"{before}{text!r} ({part.hex(' ')}){after}"

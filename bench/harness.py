@@ -1,0 +1,96 @@
+"""How URC measures: baseline and subject in turn, the median of the ratios pair by pair.
+
+Machines are noisy and drift; a ratio inside one run holds where a time does not.
+"""
+
+import json
+import os
+import statistics
+import subprocess
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+
+__all__ = ["Goal", "Result", "compare", "process_seconds", "report"]
+
+PROCESS_TIMEOUT_S = 60
+
+
+@dataclass(frozen=True, slots=True)
+class Goal:
+    """What a benchmark is held to."""
+
+    name: str
+    """Subject / baseline."""
+    at_most: float
+
+
+@dataclass(frozen=True, slots=True)
+class Result:
+    """One ratio and what it came from."""
+
+    name: str
+    ratio: float
+    """Median of the ratios of the pairs."""
+    goal: float
+    baseline_ms: float
+    subject_ms: float
+    spread: float
+    """Slowest baseline round over its median: above 2 the machine was busy."""
+    rounds: int
+    versions: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def is_met(self) -> bool:
+        """Whether the ratio is within its goal."""
+        return self.ratio <= self.goal
+
+
+def process_seconds(command: Sequence[str]) -> float:
+    """Run a command to its end and return its wall time in seconds.
+
+    Raises:
+        SystemExit: it failed, or took longer than `PROCESS_TIMEOUT_S`: there is nothing to compare.
+    """
+    # Where this is set nothing is ever compiled for good, and what is timed is Python's compiler.
+    environment = {k: v for k, v in os.environ.items() if k != "PYTHONDONTWRITEBYTECODE"}
+    began = time.perf_counter()
+    try:
+        subprocess.run(
+            command, check=True, capture_output=True, env=environment, timeout=PROCESS_TIMEOUT_S
+        )
+    except subprocess.SubprocessError as error:
+        said = (getattr(error, "stderr", None) or b"").decode(errors="replace").strip()
+        raise SystemExit(f"bench: {error}\n{said}") from error
+    return time.perf_counter() - began
+
+
+def compare(
+    goal: Goal,
+    baseline: Callable[[], float],
+    subject: Callable[[], float],
+    *,
+    rounds: int = 11,
+    versions: Mapping[str, str] | None = None,
+) -> Result:
+    """Measure both in turn, after one round that does not count."""
+    baseline(), subject()
+    pairs = [(baseline(), subject()) for _ in range(rounds)]
+    bases, subjects = zip(*pairs, strict=True)
+    return Result(
+        name=goal.name,
+        ratio=round(statistics.median(after / before for before, after in pairs), 3),
+        goal=goal.at_most,
+        baseline_ms=round(statistics.median(bases) * 1000, 2),
+        subject_ms=round(statistics.median(subjects) * 1000, 2),
+        spread=round(max(bases) / statistics.median(bases), 2),
+        rounds=rounds,
+        versions=versions or {},
+    )
+
+
+def report(results: Sequence[Result]) -> int:
+    """Print a line per result as JSON; return 1 when a goal was missed."""
+    for result in results:
+        print(json.dumps({**asdict(result), "met": result.is_met}))
+    return int(not all(result.is_met for result in results))

@@ -1,0 +1,109 @@
+"""Takes the README's picture of the dashboard: `python -m scripts.screenshot`.
+
+The demo runs as a process of its own, and the picture is taken in a real Chromium at the moment
+its battery shows the charge that the README speaks of. With ``--all FOLDER`` it takes every screen
+and theme instead, for people who change how things look.
+"""
+
+import argparse
+import asyncio
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from playwright.async_api import Browser
+
+from tests.e2e.browser import LOCALE, SIZES, running_browser
+from tests.e2e.processes import UrcProcess
+
+PICTURE = Path(__file__).resolve().parents[1] / "docs" / "images" / "dashboard.png"
+CHARGE = "74"
+"""Per cent; the emulated battery comes by once in 100 s."""
+WAIT_MS = 110_000
+MAX_BYTES = 150_000
+THEMES = ("light", "dark", "sunlight", "night")
+ADDRESS = r"dashboard (http://\S+)"
+
+
+@dataclass(frozen=True, slots=True)
+class Shot:
+    """One picture."""
+
+    file: Path
+    page: str = "robots/puppet/"
+    width: int = 1280
+    height: int = 800
+    theme: str = "light"
+    charge: str = ""
+    """Text that the battery must show; "" takes any value."""
+
+
+def main() -> int:
+    """Take the README's picture, or all of them; return the exit code."""
+    parser = argparse.ArgumentParser(prog="screenshot", description="Picture the dashboard.")
+    parser.add_argument("--all", type=Path, metavar="FOLDER", help="every screen and theme")
+    folder = parser.parse_args().all
+    shots = every_shot(folder) if folder else [Shot(PICTURE, charge=CHARGE)]
+    demo = UrcProcess(("demo", "--no-browser", "--port", "0"), {})
+    try:
+        address = demo.wait_for(ADDRESS)[1]
+        asyncio.run(take(address, shots))
+    finally:
+        demo.kill()
+    size = PICTURE.stat().st_size if not folder else 0
+    if size > MAX_BYTES:
+        print(f"{PICTURE.name} has {size} bytes; {MAX_BYTES} are allowed", file=sys.stderr)
+        return 1
+    return 0
+
+
+def every_shot(folder: Path) -> list[Shot]:
+    """Return the menu and the GUI on each screen, in each theme."""
+    pages = {"menu": "", "gui": "robots/puppet/"}
+    return [
+        Shot(folder / f"{name}-{size}-{theme}.png", page, width, height, theme)
+        for name, page in pages.items()
+        for size, (width, height) in SIZES.items()
+        for theme in THEMES
+    ]
+
+
+async def take(address: str, shots: Sequence[Shot]) -> None:
+    """Take the pictures one after the other, each on a page of its own."""
+    async with running_browser() as browser:
+        for shot in shots:
+            await take_one(browser, address, shot)
+            print(shot.file, flush=True)
+
+
+async def take_one(browser: Browser, address: str, shot: Shot) -> None:
+    """Open the page, wait until it shows what it should, and write the picture."""
+    context = await browser.new_context(
+        viewport={"width": shot.width, "height": shot.height},
+        color_scheme="dark" if shot.theme in ("dark", "night") else "light",
+        locale=LOCALE,
+        reduced_motion="reduce",
+    )
+    page = await context.new_page()
+    await page.goto(address)
+    await page.evaluate("theme => localStorage.setItem('urc-theme', theme)", shot.theme)
+    await page.goto(f"{address.rstrip('/')}/{shot.page}")
+    if shot.page:
+        await page.wait_for_function(
+            """(charge) => {
+              const shown = document.querySelector(".battery-digits")?.textContent;
+              const state = document.querySelector(".battery")?.getAttribute("data-state");
+              return state === "live" && (charge ? shown === charge : shown !== "—");
+            }""",
+            arg=shot.charge,
+            timeout=WAIT_MS,
+        )
+        await page.wait_for_selector("[data-badge-trip]:not(:empty)", timeout=WAIT_MS)
+    shot.file.parent.mkdir(parents=True, exist_ok=True)
+    await page.screenshot(path=shot.file)
+    await context.close()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,161 @@
+"""The hub: what a reader gets who comes late, reads slowly, or must not miss a thing."""
+
+import asyncio
+from collections.abc import Callable
+from dataclasses import replace
+
+import pytest
+
+from urc.model.values import Sample, Signal
+from urc.runtime import hub as hub_module
+from urc.runtime.hub import Hub, LinkStatus, Note, Tapped, Traffic
+
+pytestmark = pytest.mark.anyio
+
+SIGNALS = {name: Signal(name) for name in ("a", "b", "c")}
+NOTE = Note(1.0, "warning", "wire", "the robot hung up")
+TRAFFIC = Traffic(1.0, "wire", "received", b"42\n")
+
+
+def sample(name: str, value: float = 1.0) -> Sample:
+    return Sample(name, value, 0.0)
+
+
+@pytest.fixture
+def hub() -> Hub:
+    return Hub(SIGNALS)
+
+
+def test_signals_keep_the_order_of_the_driver(hub: Hub) -> None:
+    """Clients are told indices, so they must never move."""
+    assert hub.names == ("a", "b", "c")
+    assert hub.index == {"a": 0, "b": 1, "c": 2}
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda hub: hub.put([sample("a")]),
+        lambda hub: hub.set_link(LinkStatus("wire", "live", "tcp x:1", 0.0)),
+        lambda hub: hub.note(NOTE),
+        lambda hub: hub.saw(TRAFFIC),
+    ],
+    ids=["sample", "link", "note", "traffic"],
+)
+def test_every_change_is_a_new_revision(hub: Hub, change: Callable[[Hub], None]) -> None:
+    """Whoever has seen an older one knows that there is more."""
+    before = hub.revision
+    change(hub)
+    assert hub.revision == before + 1
+
+
+def test_link_that_did_not_change_is_no_new_revision(hub: Hub) -> None:
+    """Nobody is woken for nothing."""
+    hub.set_link(LinkStatus("wire", "live", "tcp x:1", 0.0))
+    before = hub.revision
+    hub.set_link(LinkStatus("wire", "live", "tcp x:1", 0.0))
+    assert hub.revision == before
+
+
+def test_reader_gets_the_newest_of_each_changed_signal_once(hub: Hub) -> None:
+    """Newest wins: what was overwritten before it looked is not repeated."""
+    with hub.subscribe() as subscription:
+        hub.put([sample("a", 1), sample("b", 1)])
+        hub.put([sample("a", 2)])
+        assert subscription.take() == [sample("a", 2), sample("b", 1)]
+        assert subscription.take() == []
+        hub.put([sample("b", 1)])
+        assert subscription.take() == [sample("b", 1)], "a repeated value has a new age"
+    assert hub.latest("a") == sample("a", 2)
+    assert hub.latest("c") is None
+
+
+async def test_reader_is_woken_by_a_change_and_waits_without_one(hub: Hub) -> None:
+    """`changed` returns at once when there is news, else with the next news."""
+    with hub.subscribe() as subscription:
+        hub.put([sample("a")])
+        await subscription.changed()
+        subscription.take()
+        waiting = asyncio.create_task(subscription.changed())
+        await asyncio.sleep(0)
+        assert not waiting.done()
+        hub.note(NOTE)
+        async with asyncio.timeout(5):
+            await waiting
+
+
+async def test_reader_that_has_left_is_not_kept(hub: Hub) -> None:
+    """Neither subscriptions nor taps outlive their context."""
+    with hub.subscribe() as subscription, hub.tap(with_traffic=True) as tap:
+        pass
+    hub.put([sample("a")])
+    hub.saw(TRAFFIC)
+    assert tap.take() == []
+    waiting = asyncio.create_task(subscription.changed())
+    await asyncio.sleep(0)
+    assert waiting.done(), "what happened can still be asked for"
+    assert hub.traffic_watchers == 0
+
+
+def test_tap_gives_everything_in_order(hub: Hub) -> None:
+    """Samples that repeat a signal, notes, and the traffic around them."""
+    hub.put([sample("c")])
+    with hub.tap(with_traffic=True) as tap:
+        assert hub.traffic_watchers == 1
+        hub.saw(TRAFFIC)
+        hub.put([sample("a", 1), sample("a", 2)])
+        hub.note(NOTE)
+        hub.put([sample("a", 3)])
+        expected: list[Tapped] = [TRAFFIC, sample("a", 1), sample("a", 2), NOTE, sample("a", 3)]
+        assert tap.take() == expected
+        assert tap.take() == []
+        assert tap.dropped == 0
+
+
+def test_tap_without_traffic_asks_for_none(hub: Hub) -> None:
+    """Recording costs, so it is done for those only who look at it."""
+    with hub.tap() as tap, hub.tap(with_traffic=True):
+        hub.saw(TRAFFIC)
+        assert tap.take() == []
+
+
+def test_full_tap_drops_the_oldest_and_counts_them(
+    hub: Hub, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A reader that stands still costs bounded memory, and knows what it missed."""
+    monkeypatch.setattr(hub_module, "TAP_KEPT", 3)
+    with hub.tap() as tap:
+        hub.put([sample("a", number) for number in range(5)])
+        hub.note(NOTE)
+        assert tap.take() == [sample("a", 3), sample("a", 4), NOTE]
+        assert tap.dropped == 3
+        hub.put([sample("b")])
+        assert tap.take() == [sample("b")]
+        assert tap.dropped == 3
+
+
+async def test_tap_waits_for_the_next(hub: Hub) -> None:
+    """`filled` returns at once when something is there, else when something comes."""
+    with hub.tap() as tap:
+        hub.put([sample("a")])
+        await tap.filled()
+        tap.take()
+        waiting = asyncio.create_task(tap.filled())
+        await asyncio.sleep(0)
+        hub.put([])
+        await asyncio.sleep(0)
+        assert not waiting.done(), "an empty batch is nothing to take"
+        hub.put([sample("b")])
+        async with asyncio.timeout(5):
+            await waiting
+        assert tap.take() == [sample("b")]
+
+
+def test_notes_and_traffic_are_bounded_and_counted(hub: Hub) -> None:
+    """The log keeps the last of them; the count says how many there were."""
+    for number in range(hub_module.NOTES_KEPT + 1):
+        hub.note(replace(NOTE, text=str(number)))
+    for _ in range(hub_module.TRAFFIC_KEPT + 1):
+        hub.saw(TRAFFIC)
+    assert (len(hub.notes), hub.notes_count) == (500, 501)
+    assert (len(hub.traffic), hub.traffic_count) == (1000, 1001)

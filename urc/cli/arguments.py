@@ -1,0 +1,160 @@
+"""Command-line words → values, for all verbs alike.
+
+Floor 6. A verb is a module with `EXAMPLE`, `add_arguments(parser)` and `run(arguments) -> int`.
+"""
+
+import argparse
+import os
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NoReturn
+
+from urc.cli.output import complain
+from urc.problems import UrcError
+from urc.shipped import shipped
+
+if TYPE_CHECKING:
+    from urc.model.profile import Profile
+
+__all__ = [
+    "add_host",
+    "add_port",
+    "add_profile",
+    "add_settings",
+    "duration",
+    "load",
+    "parse",
+    "port",
+]
+
+_DURATION = re.compile(r"([0-9]{1,9}(?:\.[0-9]{1,9})?)(ms|s|m|h)?")
+_SECONDS = {"ms": 0.001, "s": 1.0, "m": 60.0, "h": 3600.0, None: 1.0}
+
+
+class _Exit(Exception):
+    """The command line is answered already: help was printed, or a complaint."""
+
+
+class _Parser(argparse.ArgumentParser):
+    """argparse with complaints of one line, as everything in URC complains."""
+
+    def error(self, message: str) -> NoReturn:
+        complain(f"{self.prog}: {message}; try '{self.prog} --help'")
+        raise _Exit(2)
+
+    def print_help(self, file: object = None) -> None:
+        print(self.format_help(), end="")  # argparse's own way hides that it could not be written
+
+    def exit(self, status: int = 0, message: str | None = None) -> NoReturn:
+        raise _Exit(status)
+
+
+def parse(verb: str, summary: str, module: Any, words: list[str]) -> argparse.Namespace | int:
+    """Return the arguments of a verb, or the exit code when there is nothing left to do."""
+    parser = _Parser(
+        prog=f"urc {verb}",
+        description=summary[0].upper() + summary[1:] + ".",
+        epilog=f"example:\n  {module.EXAMPLE}",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        allow_abbrev=False,
+    )
+    module.add_arguments(parser)
+    try:
+        # Intermixed: `urc watch PROFILE --for 5s SIGNAL` means what it says.
+        return parser.parse_intermixed_args(words)
+    except _Exit as ended:
+        return int(ended.args[0])
+
+
+def add_profile(parser: argparse.ArgumentParser) -> None:
+    """Add PROFILE and the ways to fill in its settings."""
+    parser.add_argument("profile", metavar="PROFILE", help="a robot file, or the name of a robot")
+    add_settings(parser)
+
+
+def add_settings(parser: argparse.ArgumentParser) -> None:
+    """Add `--set` and `--settings`."""
+    parser.add_argument(
+        "--set",
+        dest="settings",
+        metavar="NAME=VALUE",
+        action="append",
+        default=[],
+        type=_assignment,
+        help="a setting of the profile; also as URC_SET_NAME in the environment",
+    )
+    parser.add_argument(
+        "--settings", dest="settings_file", metavar="FILE", help="a YAML file of name: value"
+    )
+
+
+def add_host(parser: argparse.ArgumentParser) -> None:
+    """Add `--host`, the address to listen on."""
+    parser.add_argument(
+        "--host",
+        metavar="ADDRESS",
+        type=_address,
+        default="127.0.0.1",
+        help="to listen on (default: this machine only)",
+    )
+
+
+def add_port(parser: argparse.ArgumentParser) -> None:
+    """Add `--port`, the dashboard's."""
+    parser.add_argument(
+        "--port", type=port, default=8080, help="0 takes a free one (default: 8080)"
+    )
+
+
+def load(word: str) -> "Profile":
+    """Return the profile that `word` names; raise `UrcError` with what is wrong with it."""
+    from urc.config.load import load_profile
+    from urc.runtime.catalog import built_in_catalog
+
+    return load_profile(_profile_path(word), built_in_catalog())
+
+
+def _profile_path(word: str) -> str:
+    """Return the file that `word` means: a path, or the name of a robot that ships with URC."""
+    path = Path(word)
+    if path.suffix or len(path.parts) > 1 or os.path.isfile(word):
+        return word
+    named = shipped("robots") / f"{word}.yaml"
+    if os.path.isfile(named):
+        return str(named)
+    if os.path.exists(word):
+        return word  # a folder: reading it says so
+    known = ", ".join(sorted(file.stem for file in shipped("robots").glob("*.yaml")))
+    raise UrcError(f"there is no file and no robot {word!r}; the robots here are: {known}")
+
+
+def duration(text: str) -> float:
+    """Return seconds, more than 0; `text` is a number with ms, s, m or h, or plain seconds."""
+    found = _DURATION.fullmatch(text)
+    seconds = float(found[1]) * _SECONDS[found[2]] if found else 0.0
+    if not seconds:
+        raise argparse.ArgumentTypeError(
+            f"a duration like 500ms, 5s or 2m is expected, not {text!r}"
+        )
+    return seconds
+
+
+def port(text: str) -> int:
+    """Return a port to listen on, 0 to 65535."""
+    if not re.fullmatch(r"[0-9]{1,5}", text) or int(text) > 65535:
+        raise argparse.ArgumentTypeError(f"a port from 0 to 65535 is expected, not {text!r}")
+    return int(text)
+
+
+def _address(text: str) -> str:
+    # An empty one would mean every network that this machine is in.
+    if not text.strip():
+        raise argparse.ArgumentTypeError("an address is expected, like 127.0.0.1 or 0.0.0.0")
+    return text.strip()
+
+
+def _assignment(text: str) -> tuple[str, str]:
+    name, equals, value = text.partition("=")
+    if not equals or not name:
+        raise argparse.ArgumentTypeError(f"NAME=VALUE is expected, found {text!r}")
+    return name, value

@@ -1,0 +1,120 @@
+"""`urc doctor`: what works on this machine, and what is missing."""
+
+import argparse
+import platform
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, version
+from typing import Literal
+
+from urc import __version__
+from urc.cli.arguments import add_port
+from urc.cli.output import complain
+from urc.problems import UrcError, printable
+from urc.shipped import shipped, vendored
+
+EXAMPLE = "urc doctor"
+
+REQUIRED = {
+    "PyYAML": "reads documents",
+    "jsonschema": "explains what is wrong in them",
+    "Jinja2": "templates and pages",
+    "jmespath": "picks values out of JSON",
+    "starlette": "the dashboard's pages",
+    "uvicorn": "the dashboard's server",
+    "websockets": "the dashboard's live values",
+    "msgspec": "the dashboard's messages",
+    "asyncssh": "robots behind SSH",
+    "roslibpy": "robots behind rosbridge",
+}
+OPTIONAL = {
+    "google-re2": "patterns that are not provably fast; without it they are refused",
+    "uvloop": "a faster event loop (pip install 'urc[fast]')",
+}
+FOLDERS: tuple[Literal["schemas", "robots", "widgets", "templates"], ...] = (
+    "schemas",
+    "robots",
+    "widgets",
+    "templates",
+)
+_VENDOR_REMEDY = "install the wheel, or run ./dev once: without it there are no plots"
+
+
+@dataclass(frozen=True, slots=True)
+class _Finding:
+    name: str
+    is_good: bool
+    text: str
+    is_required: bool = True
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the port that is tried."""
+    add_port(parser)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Print a line per check; 1 when something is missing that URC needs."""
+    findings = list(_findings(arguments.port))
+    width = max(len(finding.name) for finding in findings)
+    for finding in findings:
+        mark = "ok     " if finding.is_good else "MISSING" if finding.is_required else "note   "
+        print(printable(f"{mark} {finding.name:<{width}}  {finding.text}"))
+    missing = sum(finding.is_required and not finding.is_good for finding in findings)
+    if missing:
+        complain(f"urc doctor: {missing} of {len(findings)} checks failed")
+    return int(missing > 0)
+
+
+def _findings(port: int) -> Iterator[_Finding]:
+    yield _Finding("urc", True, f"{__version__} on Python {platform.python_version()}")
+    for name, purpose in REQUIRED.items():
+        yield _package(name, purpose, is_required=True)
+    for name, purpose in OPTIONAL.items():
+        yield _package(name, purpose, is_required=False)
+    for folder in FOLDERS:
+        place = shipped(folder)
+        is_there = place.is_dir() and any(place.iterdir())
+        yield _Finding(f"{folder}/", is_there, "ships with URC" if is_there else f"not at {place}")
+    yield _attempt("robots", _load_robots)
+    is_vendored = vendored() is not None
+    text = "third-party modules for the browser" if is_vendored else _VENDOR_REMEDY
+    yield _Finding("urc_vendor", is_vendored, text, is_required=False)
+    yield _attempt("port", lambda: _try_port(port), is_required=False)
+
+
+def _package(name: str, purpose: str, *, is_required: bool) -> _Finding:
+    try:
+        return _Finding(name, True, f"{version(name)}: {purpose}", is_required)
+    except PackageNotFoundError:
+        return _Finding(name, False, f"not installed: {purpose}", is_required)
+
+
+def _attempt(name: str, check: Callable[[], str], *, is_required: bool = True) -> _Finding:
+    try:
+        return _Finding(name, True, check(), is_required)
+    except (UrcError, ImportError) as fault:  # what is not installed cannot be imported either
+        return _Finding(name, False, str(fault), is_required)
+
+
+def _load_robots() -> str:
+    from urc.config.load import load_profile
+    from urc.runtime.catalog import built_in_catalog
+
+    files = sorted(shipped("robots").glob("*.yaml"))
+    for file in files:
+        load_profile(file, built_in_catalog())
+    return f"{len(files)} of {len(files)} load"
+
+
+def _try_port(port: int) -> str:
+    import socket
+
+    with socket.socket() as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind(("127.0.0.1", port))
+        except OSError as error:
+            reason = (error.strerror or str(error)).lower()
+            raise UrcError(f"127.0.0.1:{port}: {reason}; choose another with --port") from error
+        return f"127.0.0.1:{probe.getsockname()[1]} is free for the dashboard"

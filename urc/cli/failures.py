@@ -1,0 +1,38 @@
+"""What is said when a verb ends in an error: one line for each fault, never a traceback."""
+
+from traceback import extract_tb
+
+from urc.cli.output import complain
+from urc.problems import ProblemsError, UrcError, to_text
+
+__all__ = ["Misuse", "explain"]
+
+
+class Misuse(UrcError):
+    """The command line asks for what is not there: wrong use, exit code 2."""
+
+
+def explain(error: Exception, program: str) -> int:
+    """Tell of a failure of `program`, ``urc watch`` for example; return the exit code."""
+    match error:
+        case ProblemsError():
+            for problem in error.problems:
+                for line in to_text(problem).splitlines():
+                    complain(line)
+        case UrcError():
+            complain(f"{program}: {error}")
+        case ModuleNotFoundError() if not str(error.name).startswith("urc."):
+            complain(f"{program}: {error.name} is not installed; 'urc doctor' tells what is")
+        case OSError():
+            where = f"{error.filename}: " if error.filename else ""
+            complain(f"{program}: {where}{error.strerror or error}")
+        case _:
+            complain(f"{program}: {_mistake(error)}")
+    return 2 if isinstance(error, Misuse) else 1
+
+
+def _mistake(bug: Exception) -> str:
+    """Return what a maintainer needs to find a mistake of our own, on one line."""
+    frames = extract_tb(bug.__traceback__)
+    place = f" at {frames[-1].filename}:{frames[-1].lineno}" if frames else ""
+    return f"this is a mistake in URC, please report it: {type(bug).__name__}{place}: {bug}"

@@ -1,0 +1,143 @@
+"""The `urc` command: finds the verb, imports it alone, and turns every failure into one line.
+
+Floor 6. Nothing heavy may be imported here, not even `typing`: `urc --version` and each verb pay
+only for what they use.
+"""
+
+import os
+import sys
+from collections.abc import Sequence
+
+__all__ = ["VERBS", "main"]
+
+VERBS: dict[str, str] = {
+    "demo": "try the gallery's robots, each emulated, in the browser",
+    "serve": "the dashboard on real robots",
+    "validate": "check documents and run their own tests",
+    "simulate": "the emulated robot of a profile, on its real ports",
+    "watch": "print a robot's signals as JSON lines",
+    "send": "run one command and print its reply",
+    "schema": "print the JSON Schema of a kind of document",
+    "doctor": "what works on this machine, and what is missing",
+}
+
+_INTERRUPTED = 130
+"""128 + SIGINT, as a shell reports it."""
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run one command line; return its exit code: 0 fine, 1 findings or failure, 2 wrong use."""
+    _mend_streams()
+    words = list(sys.argv[1:] if argv is None else argv)
+    try:
+        code = _answer(words)
+    except KeyboardInterrupt:
+        _discard_output()  # writing the rest could block, and nobody wants it any more
+        return _INTERRUPTED
+    except BrokenPipeError:
+        code = 0  # the reader has all it wants: `urc watch … | head`
+    except Exception as error:  # supervisor: the last one there is
+        from urc.cli.failures import explain
+
+        code = explain(error, f"urc {words[0]}" if words and words[0] in VERBS else "urc")
+    return _flush(code)
+
+
+def _answer(words: list[str]) -> int:
+    if not words:
+        print(_usage(), file=sys.stderr)
+        return 2
+    verb, *rest = words
+    if verb == "help" and rest:
+        verb, rest = rest[0], ["--help"]
+    if verb in ("-h", "--help", "help"):
+        print(_usage())
+        return 0
+    if verb in ("-V", "--version"):
+        from urc import __version__
+
+        print(f"urc {__version__}")
+        return 0
+    if verb not in VERBS:
+        return _unknown(verb)
+    return _run(verb, rest)
+
+
+def _run(verb: str, rest: list[str]) -> int:
+    from importlib import import_module
+
+    from urc.cli.arguments import parse
+
+    module = import_module(f"urc.cli.{verb}")
+    arguments = parse(verb, VERBS[verb], module, rest)
+    return arguments if isinstance(arguments, int) else int(module.run(arguments))
+
+
+def _usage() -> str:
+    width = max(map(len, VERBS))
+    lines = [f"  {name:<{width}}  {text}" for name, text in VERBS.items()]
+    return "\n".join(
+        (
+            "usage: urc VERB …",
+            "",
+            "Describe a robot in one YAML file, and drive it from any browser.",
+            "",
+            *lines,
+            "",
+            "'urc VERB --help' tells more, with an example. 'urc --version' prints the version.",
+        )
+    )
+
+
+def _unknown(verb: str) -> int:
+    from difflib import get_close_matches
+
+    from urc.cli.output import complain
+
+    close = get_close_matches(verb, VERBS, n=1)
+    hint = f"did you mean '{close[0]}'?" if close else "'urc --help' lists them"
+    complain(f"urc: there is no verb {verb!r}; {hint}")
+    return 2
+
+
+def _mend_streams() -> None:
+    """See to it that there are standard streams, and that they take any text.
+
+    WARNING: a closed one must be filled first of all. The next file or socket would get its number,
+    and what is printed would go to a robot.
+    """
+    for number in range(3):
+        try:
+            os.fstat(number)
+        except OSError:
+            os.open(os.devnull, os.O_RDWR)
+    sys.stdout = sys.stdout or os.fdopen(1, "w", encoding="utf-8", closefd=False)
+    sys.stderr = sys.stderr or os.fdopen(2, "w", encoding="utf-8", closefd=False)
+    # File names and robots may hold what the terminal's encoding does not.
+    reconfigure = getattr(sys.stdout, "reconfigure", None)
+    if reconfigure:
+        reconfigure(errors="backslashreplace")
+
+
+def _flush(code: int) -> int:
+    """Write what is left of the output, so that a failure is told as all others are."""
+    try:
+        sys.stdout.flush()
+    except BrokenPipeError:
+        _discard_output()
+    except OSError as error:
+        from urc.cli.output import complain
+
+        _discard_output()
+        complain(f"urc: the output cannot be written: {error.strerror or error}")
+        return 1
+    return code
+
+
+def _discard_output() -> None:
+    """Send what is still to be written nowhere: Python would try, and complain, at its exit."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,36 @@
+"""What is printed: lines for people on standard error, JSON that any reader takes."""
+
+import os
+import sys
+from collections.abc import Mapping
+
+from urc.problems import printable
+
+__all__ = ["complain", "json_text"]
+
+
+def complain(line: str) -> None:
+    """Print one line for people; when nobody can read it there is nothing left to do."""
+    try:
+        print(printable(line), file=sys.stderr, flush=True)
+    except OSError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stderr.fileno())
+
+
+def json_text(value: Mapping[str, object], indent: int | None = None) -> str:
+    """Return `value` as JSON that standard output's encoding can carry."""
+    import json
+
+    takes_all = sys.stdout.encoding.lower().replace("-", "") == "utf8"
+    return json.dumps(value, indent=indent, ensure_ascii=not takes_all, default=_plain)
+
+
+def _plain(value: object) -> object:
+    """Return what JSON has for a reading that it does not know: bytes are written in base64."""
+    if isinstance(value, bytes):
+        from base64 import b64encode
+
+        return b64encode(value).decode("ascii")
+    if isinstance(value, Mapping):
+        return dict(value)
+    raise TypeError(f"no JSON for {type(value).__name__}")

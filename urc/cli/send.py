@@ -1,0 +1,102 @@
+"""`urc send`: one command, its reply as JSON."""
+
+import argparse
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+from urc.cli.arguments import add_profile, load
+from urc.cli.failures import Misuse
+from urc.cli.output import json_text
+from urc.problems import UrcError
+
+if TYPE_CHECKING:
+    from urc.model.driver import Argument, Command
+    from urc.model.profile import Profile
+    from urc.model.values import Value
+    from urc.runtime.session import CommandFailed, Session
+
+EXAMPLE = "urc send my-robot.yaml set_speed speed=3 --set host=192.168.1.20"
+
+_WRONG_USE = ("bad-argument", "unknown-command")
+"""Codes of a failure that lies in what was typed."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the profile, the command and its arguments."""
+    add_profile(parser)
+    parser.add_argument("command", metavar="COMMAND", help="a command of the robot's driver")
+    parser.add_argument("words", metavar="ARG=VALUE", nargs="*", default=[], help="its arguments")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Run the command and print its reply; 1 when it failed."""
+    from urc.cli.running import run_loop
+    from urc.cli.settings import complete_settings
+
+    profile = load(arguments.profile)
+    command = profile.driver.commands.get(arguments.command)
+    if command is None:
+        known = ", ".join(profile.driver.commands) or "none"
+        raise Misuse(f"{profile.name} has no command {arguments.command!r}; it has: {known}")
+    values = _arguments(command, arguments.words)
+    settings = complete_settings(profile, arguments)
+    return run_loop(_send(profile, settings, command, values))
+
+
+def _arguments(command: "Command", words: list[str]) -> dict[str, "Value"]:
+    values: dict[str, Value] = {}
+    for word in words:
+        name, equals, text = word.partition("=")
+        if not equals:
+            raise Misuse(f"an argument is written ARG=VALUE, found {word!r}")
+        argument = command.arguments.get(name)
+        if argument is None:
+            known = ", ".join(command.arguments) or "none"
+            raise Misuse(f"{command.name} has no argument {name!r}; it has: {known}")
+        if name in values:
+            raise Misuse(f"{name} is given twice")
+        values[name] = _value(argument, text)
+    return values
+
+
+def _value(argument: "Argument", text: str) -> "Value":
+    """Return the typed value; range and choices are the engine's to check."""
+    try:
+        if argument.type == "integer":
+            return int(text, 0)
+        if argument.type == "number":
+            return float(text)
+    except ValueError:
+        raise Misuse(f"{argument.name}: {argument.type} expected, found {text!r}") from None
+    if argument.type == "boolean":
+        if text not in ("true", "false"):
+            raise Misuse(f"{argument.name}: true or false expected, found {text!r}")
+        return text == "true"
+    return text
+
+
+async def _send(
+    profile: "Profile",
+    settings: Mapping[str, "Value"],
+    command: "Command",
+    values: Mapping[str, "Value"],
+) -> int:
+    from urc.runtime.catalog import built_in_catalog
+    from urc.runtime.session import CommandFailed, Session
+
+    async with Session(profile, settings, built_in_catalog().transports) as session:
+        try:
+            replied = await session.command(command.name, values)
+        except CommandFailed as failed:
+            text = f"{command.name} failed ({failed.code}): {_why(session, command, failed)}"
+            raise (Misuse if failed.code in _WRONG_USE else UrcError)(text) from failed
+    print(json_text({"command": command.name, "values": dict(replied.values)}))
+    return 0
+
+
+def _why(session: "Session", command: "Command", failed: "CommandFailed") -> str:
+    """Return the reason, with what the link knows when the robot is not there."""
+    link = session.hub.links[command.transport]
+    if failed.code != "disconnected" or not link.detail or link.detail in failed.message:
+        return failed.message
+    return f"{failed.message}: {link.detail}"

@@ -1,0 +1,171 @@
+"""`urc watch`: connect and print a JSON line per update, for people, pipes and logs."""
+
+import argparse
+import asyncio
+import math
+import sys
+import time
+from collections.abc import Iterable, Mapping
+from contextlib import suppress
+from difflib import get_close_matches
+from typing import TYPE_CHECKING
+
+from urc.cli.arguments import add_profile, duration, load
+from urc.cli.failures import Misuse
+from urc.cli.output import json_text
+from urc.problems import UrcError, printable
+
+if TYPE_CHECKING:
+    from urc.cli.running import LineWriter
+    from urc.model.profile import Profile
+    from urc.model.values import Sample, Value
+    from urc.runtime.hub import Hub, Note, Tap, Tapped, Traffic
+
+EXAMPLE = "urc watch robots/puppet.yaml battery --for 5s"
+
+_LAST_WORDS_S = 5.0
+"""How long the reader may take for the last lines, when the time is over."""
+
+_LOSSES_S = 5.0
+"""Between two lines about losses."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the profile, the signals, how long, and the raw traffic."""
+    add_profile(parser)
+    parser.add_argument("signals", metavar="SIGNAL", nargs="*", default=[], help="only these")
+    parser.add_argument(
+        "--for", dest="seconds", type=duration, metavar="TIME", help="stop after 500ms, 5s, 2m …"
+    )
+    parser.add_argument("--wire", action="store_true", help="the raw traffic, too, in hex and text")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Watch until the time is over or a signal comes; 1 when nothing was received."""
+    from urc.cli.running import run_loop
+    from urc.cli.settings import complete_settings
+
+    profile = load(arguments.profile)
+    _check_signals(profile, arguments.signals)
+    settings = complete_settings(profile, arguments)
+    return run_loop(_watch(profile, settings, arguments))
+
+
+def _check_signals(profile: "Profile", names: list[str]) -> None:
+    for name in names:
+        if name not in profile.driver.signals:
+            close = get_close_matches(name, profile.driver.signals, n=1)
+            known = ", ".join(profile.driver.signals) or "none"
+            hint = f"did you mean {close[0]!r}?" if close else f"it has: {known}"
+            raise Misuse(f"{profile.name} has no signal {name!r}; {hint}")
+
+
+async def _watch(
+    profile: "Profile", settings: Mapping[str, "Value"], arguments: argparse.Namespace
+) -> int:
+    from urc.cli.running import LineWriter
+    from urc.runtime.catalog import built_in_catalog
+    from urc.runtime.session import Session
+
+    async with Session(profile, settings, built_in_catalog().transports) as session:
+        printer = _Printer(LineWriter(), arguments.signals)
+        with session.hub.tap(with_traffic=arguments.wire) as tap:
+            await _follow(tap, printer, arguments.seconds)
+        if not printer.received:
+            raise UrcError(f"nothing was received from {profile.name}{_reasons(session.hub)}")
+    return 0
+
+
+async def _follow(tap: "Tap", printer: "_Printer", seconds: float | None) -> None:
+    """Print what the tap gives until the time is over."""
+    now = asyncio.get_running_loop().time
+    ends = math.inf if seconds is None else now() + seconds
+    is_over = False
+    while not is_over:
+        with suppress(TimeoutError):
+            async with asyncio.timeout_at(ends):
+                await tap.filled()
+        is_over = now() >= ends  # a tap that is never empty is never waited for
+        try:
+            # Not cut off in the middle of a line by the end of the time, yet not without end.
+            async with asyncio.timeout_at(ends + _LAST_WORDS_S):
+                await printer.tell(tap.take())
+                await printer.tell_losses(tap.dropped, is_last=is_over)
+        except TimeoutError:
+            raise UrcError("nobody takes the output; the last lines are lost") from None
+
+
+def _reasons(hub: "Hub") -> str:
+    """Return what the links know about it."""
+    details = dict.fromkeys(link.detail for link in hub.links.values() if link.detail)
+    return f": {'; '.join(details)}" if details else ""
+
+
+class _Printer:
+    """Turns what happens into lines: JSON on standard output, notes on standard error."""
+
+    def __init__(self, writer: "LineWriter", signals: Iterable[str]) -> None:
+        self.received = 0
+        """Lines about what the robot said."""
+        self._writer = writer
+        self._signals = frozenset(signals)
+        self._dropped = 0
+        self._losses_told_s = 0.0
+        # Monotonic times are shown as what the clock on the wall said then.
+        self._offset_s = time.time() - time.monotonic()
+
+    async def tell(self, events: "Iterable[Tapped]") -> None:
+        """Print what happened."""
+        from urc.model.values import Sample
+        from urc.runtime.hub import Note, Traffic
+
+        output: list[str] = []
+        notes: list[str] = []
+        for event in events:
+            match event:
+                case Note():
+                    notes.append(_note_line(event))
+                case Traffic():
+                    self.received += event.direction == "received"
+                    output.append(self._traffic_line(event))
+                case Sample() if not self._signals or event.signal in self._signals:
+                    self.received += 1
+                    output.append(self._sample_line(event))
+        for stream, lines in ((sys.stdout, output), (sys.stderr, notes)):
+            if lines:
+                await self._writer.write(stream, "".join(f"{line}\n" for line in lines))
+
+    async def tell_losses(self, dropped: int, *, is_last: bool) -> None:
+        """Print how many updates were too many, now and then and at the end."""
+        now_s = time.monotonic()
+        if dropped == self._dropped or not (is_last or now_s >= self._losses_told_s + _LOSSES_S):
+            return
+        lost, self._dropped, self._losses_told_s = dropped - self._dropped, dropped, now_s
+        text = f"warning: {lost} updates were lost, the output is not taken fast enough\n"
+        await self._writer.write(sys.stderr, text)
+
+    def _time(self, time_s: float) -> float:
+        return round(time_s + self._offset_s, 3)
+
+    def _sample_line(self, sample: "Sample") -> str:
+        line: dict[str, object] = {
+            "t": self._time(sample.time_s),
+            "signal": sample.signal,
+            "value": sample.value,
+        }
+        return json_text(line | {"alarm": sample.alarm} if sample.alarm else line)
+
+    def _traffic_line(self, traffic: "Traffic") -> str:
+        return json_text(
+            {
+                "t": self._time(traffic.time_s),
+                "transport": traffic.transport,
+                "direction": traffic.direction,
+                "hex": traffic.data.hex(" "),
+                "text": traffic.data.decode("utf-8", "backslashreplace"),
+            }
+        )
+
+
+def _note_line(note: "Note") -> str:
+    return printable(f"{note.level}: {note.source}: {note.text}")
