@@ -1,6 +1,7 @@
 """Fixtures of the tests over real sockets: the browser, its pages, and URC as a process."""
 
 from collections.abc import AsyncIterator, Callable, Iterator
+from pathlib import Path
 
 import pytest
 from playwright.async_api import Browser, BrowserContext, Page
@@ -15,6 +16,7 @@ from tests.e2e.browser import (
     Theme,
     running_browser,
 )
+from tests.e2e.command_line import BOT
 from tests.e2e.processes import UrcProcess
 
 
@@ -82,3 +84,11 @@ def urc_process() -> Iterator[Callable[..., UrcProcess]]:
     yield start
     for process in started:
         process.kill()
+
+
+@pytest.fixture
+def bot(tmp_path: Path) -> str:
+    """Return the file of a robot with a line that stays open, commands, and no defaults."""
+    file = tmp_path / "bot.yaml"
+    file.write_text(BOT, encoding="utf-8")
+    return str(file)

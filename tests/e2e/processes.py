@@ -55,20 +55,24 @@ class UrcProcess:
         """Whether it has not ended yet."""
         return self._process.poll() is None
 
-    def wait_for(self, pattern: str, timeout_s: float = READY_TIMEOUT_S) -> re.Match[str]:
+    def wait_for(
+        self, pattern: str, timeout_s: float = READY_TIMEOUT_S, *, times: int = 1
+    ) -> re.Match[str]:
         """Return the first match in any line of either stream; fail when it ends or time runs out.
 
-        A server is ready when it says so: ``process.wait_for(r"listening .*:(\\d+)")``.
+        A server is ready when it says so: ``process.wait_for(r"listening .*:(\\d+)")``. With
+        `times`, wait until so many lines match, and return the match in the last of them.
         """
         deadline = time.monotonic() + timeout_s
         with self._changed:
             while True:
-                for line in (*self.output, *self.errors):
-                    if found := re.search(pattern, line):
-                        return found
+                lines = (*self.output, *self.errors)
+                found = [match for line in lines if (match := re.search(pattern, line))]
+                if len(found) >= times:
+                    return found[times - 1]
                 left = deadline - time.monotonic()
                 if left <= 0 or self._open_streams == 0:
-                    raise AssertionError(self._story(f"no line with {pattern!r}"))
+                    raise AssertionError(self._story(f"no {times} lines with {pattern!r}"))
                 self._changed.wait(left)
 
     def wait(self, timeout_s: float = EXIT_TIMEOUT_S) -> int:
@@ -93,7 +97,11 @@ class UrcProcess:
 
     def interrupt(self, timeout_s: float = EXIT_TIMEOUT_S) -> int:
         """Press Ctrl-C, as a person does; return the exit code."""
-        self._process.send_signal(signal.SIGINT)
+        return self.end(signal.SIGINT, timeout_s)
+
+    def end(self, number: signal.Signals, timeout_s: float = EXIT_TIMEOUT_S) -> int:
+        """Send a signal that ends it; return the exit code."""
+        self._process.send_signal(number)
         return self.wait(timeout_s)
 
     def kill(self) -> None:

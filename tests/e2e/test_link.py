@@ -3,7 +3,6 @@
 import asyncio
 import contextlib
 import os
-import shutil
 import socket
 import sys
 import tracemalloc
@@ -162,16 +161,14 @@ async def test_emulated_robot_answers_a_session(is_per_request: bool) -> None:
         assert (await session.command("ask")).values == {"battery": 45}
 
 
+@pytest.mark.needs("socat")
 async def test_program_of_others_is_read_though_it_never_closes() -> None:
     """socat takes a connection, reads a line, answers a number, and keeps the line open."""
-    socat = shutil.which("socat")
-    if socat is None:
-        pytest.fail("socat is not installed; apt-get install socat brings it", pytrace=False)
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]
     process = await asyncio.create_subprocess_exec(
-        socat,
+        "socat",
         f"TCP-LISTEN:{port},bind=127.0.0.1,reuseaddr,fork",
         "SYSTEM:read line; echo 42; sleep 60",
         start_new_session=True,

@@ -13,13 +13,16 @@ and for writing:
 `part` is what stands under the form's key; None means that it was reported.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from importlib import import_module
 from typing import Any, NamedTuple, Protocol, cast
 
+from urc.config.beside_form import beside_form
 from urc.config.part import Findings, Part
 from urc.expressions import Template
+from urc.model.binary import Item
 from urc.model.codec import ReadSpec, WriteSpec
+from urc.model.values import NOTHING
 
 __all__ = [
     "READ_FORMS",
@@ -35,9 +38,20 @@ __all__ = [
 
 READ_FORMS = {
     "regex": "urc.config.form_regex",
+    "pattern": "urc.config.form_pattern",
+    "split": "urc.config.form_split",
+    "keyvalue": "urc.config.form_keyvalue",
+    "json": "urc.config.form_json",
+    "xml": "urc.config.form_xml",
+    "equals": "urc.config.form_equals",
+    "struct": "urc.config.form_struct",
 }
 WRITE_FORMS = {
     "text": "urc.config.form_text",
+    "hex": "urc.config.form_hex",
+    "bytes": "urc.config.form_bytes",
+    "json": "urc.config.form_json_text",
+    "struct": "urc.config.form_struct",
 }
 _NO_READ = ReadSpec("regex")
 _NO_WRITE = WriteSpec("text")
@@ -48,14 +62,18 @@ class FormContext(NamedTuple):
 
     encoding: str = "utf-8"
     """Of the line that the frame comes from or goes to."""
+    signals: frozenset[str] = frozenset()
+    """Names of the driver's signals."""
+    types: Mapping[str, tuple[Item, ...]] = NOTHING
+    """The driver's reusable structs."""
+    enums: Mapping[str, tuple[tuple[int, str], ...]] = NOTHING
+    """The driver's lists of words for numbers."""
 
 
 class ReadForm(Protocol):
     """A module that parses one way of reading a frame."""
 
-    def parse_read(
-        self, part: Part, findings: Findings, context: FormContext
-    ) -> ReadSpec | None:
+    def parse_read(self, part: Part, findings: Findings, context: FormContext) -> ReadSpec | None:
         """Return what `part` declares, or None when a fault was reported."""
 
     def place_of(self, part: Part, field: str) -> tuple[Part, dict[str, Any]]:
@@ -65,9 +83,7 @@ class ReadForm(Protocol):
 class WriteForm(Protocol):
     """A module that parses one way of writing a frame."""
 
-    def parse_write(
-        self, part: Part, findings: Findings, context: FormContext
-    ) -> WriteSpec | None:
+    def parse_write(self, part: Part, findings: Findings, context: FormContext) -> WriteSpec | None:
         """Return what `part` declares, or None when a fault was reported."""
 
     def templates(self, part: Part, spec: WriteSpec) -> Iterable[tuple[Part, Template]]:
@@ -111,7 +127,8 @@ def parse_read(part: Part, findings: Findings, context: FormContext) -> ReadSpec
     if found_form is None:
         return _NO_READ
     inner, form = found_form
-    return form.parse_read(inner, findings, context) or _NO_READ
+    spec = form.parse_read(inner, findings, context) or _NO_READ
+    return beside_form(part, spec, findings)
 
 
 def parse_write(part: Part, findings: Findings, context: FormContext) -> WriteSpec:

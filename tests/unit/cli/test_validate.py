@@ -83,7 +83,7 @@ def _documents(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
             [
                 "gone.yaml:1:1: error no-such-file: ",
                 "folder:1:1: error is-directory: ",
-                "broken.yaml:15:12: error ",
+                "broken.yaml:15:14: error wrong-type polls.0.every: ",
             ],
             "3 documents: 3 errors, 0 warnings",
         ),

@@ -67,8 +67,8 @@ async def test_line_per_request_is_opened_and_closed_for_each() -> None:
         assert (line.opens, line.sent, line.is_open) == (3, [ASK] * 3, False)
         assert state_of(session) == ("live", "")
         assert [note.text for note in session.hub.notes] == [
-            "memory is connecting",
-            "memory is live",
+            "connecting to memory",
+            "live",
         ]
 
 

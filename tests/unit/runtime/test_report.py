@@ -42,6 +42,6 @@ async def test_state_keeps_its_time_while_only_its_detail_changes() -> None:
     assert (link.attempts, link.faults, link.address) == (2, 1, "tcp h:1")
     texts = [(note.level, note.text) for note in hub.notes]
     assert texts == [
-        ("warning", "tcp h:1 is lost: refused"),
+        ("warning", "lost: refused"),
         ("warning", "no-match: what?"),
     ]

@@ -41,7 +41,14 @@ BAD = [
     (Setting("s", "number"), "1e999", "'1e999' is not a number"),
     (Setting("s", "boolean"), "maybe", "'maybe' is neither true nor false"),
     (Setting("s", "choice", choices=("a", "b")), "c", "'c' is not one of a, b"),
+    (Setting("s", "string"), "a\udcff", r"'a\udcff' is not text in UTF-8"),
+    (Setting("s", "string", is_secret=True), "a\udcff", "that is not text in UTF-8"),
     (Setting("s", "path"), " ", "' ' is not a path"),
+    (
+        Setting("s", "path"),
+        "~no-such-user/x",
+        "'~no-such-user/x' is not a path: whose home is meant is not known",
+    ),
     (Setting("s", "integer", is_secret=True), "x", "that is not a whole number"),
 ]
 
