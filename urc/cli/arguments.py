@@ -6,6 +6,7 @@ Floor 6. A verb is a module with `EXAMPLE`, `add_arguments(parser)` and `run(arg
 import argparse
 import os
 import re
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
@@ -25,6 +26,7 @@ __all__ = [
     "load",
     "parse",
     "port",
+    "what_it_has",
 ]
 
 _DURATION = re.compile(r"([0-9]{1,9}(?:\.[0-9]{1,9})?)(ms|s|m|h)?")
@@ -124,8 +126,20 @@ def _profile_path(word: str) -> str:
         return str(named)
     if os.path.exists(word):
         return word  # a folder: reading it says so
+    for suffix in (".yaml", ".yml"):
+        if os.path.isfile(word + suffix):
+            raise UrcError(f"there is no file {word!r}; did you mean {word + suffix!r}?")
     known = ", ".join(sorted(file.stem for file in shipped("robots").glob("*.yaml")))
     raise UrcError(f"there is no file and no robot {word!r}; the robots here are: {known}")
+
+
+def what_it_has(word: str, known: Iterable[str]) -> str:
+    """Return the hint for a word that a profile does not know."""
+    from difflib import get_close_matches
+
+    names = list(known)
+    close = get_close_matches(word, names, n=1)
+    return f"did you mean {close[0]!r}?" if close else f"it has: {', '.join(names) or 'none'}"
 
 
 def duration(text: str) -> float:

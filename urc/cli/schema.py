@@ -1,13 +1,19 @@
 """`urc schema`: the grammar of a kind of document, for editors and other programs."""
 
 import argparse
+import json
+import re
 import sys
+from pathlib import Path
+from typing import Any
 
 from urc.cli.failures import Misuse
 from urc.shipped import shipped
 
 EXAMPLE = "urc schema robot > robot.schema.json"
 KINDS = ("robot", "driver", "interface", "widget")
+
+_OTHER = re.compile(r'"\$ref": *"([a-z-]+\.schema\.json)')
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -21,13 +27,43 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Print the schema, byte for byte as it ships."""
+    """Print the schema, whole in itself; or where it stands, beside those that it refers to."""
     folder = shipped("schemas")
     file = folder / f"{arguments.kind}.schema.json"
     if arguments.path:
         print(file if arguments.kind else folder)
     elif arguments.kind:
-        sys.stdout.buffer.write(file.read_bytes())
+        sys.stdout.write(json.dumps(_bundled(folder, file.name), indent=2, ensure_ascii=False))
+        sys.stdout.write("\n")
     else:
         raise Misuse(f"KIND is missing: one of {', '.join(KINDS)}")
     return 0
+
+
+def _bundled(folder: Path, name: str) -> Any:
+    """Return the schema `name` with every other one that it refers to under its ``$defs``."""
+    pending, texts = [name], {name: (folder / name).read_text("utf-8")}
+    while pending:
+        for other in _OTHER.findall(texts[pending.pop()]):
+            if other not in texts:
+                texts[other] = (folder / other).read_text("utf-8")
+                pending.append(other)
+    schemas = {each: json.loads(text) for each, text in texts.items()}
+    bundle = _relinked(schemas.pop(name), name, name)
+    inner = {each: _relinked(schema, each, name) for each, schema in schemas.items()}
+    return bundle | {"$defs": bundle.get("$defs", {}) | inner}
+
+
+def _relinked(node: Any, here: str, root: str) -> Any:
+    """Return a schema whose references lead to where its parts stand in the bundle of `root`."""
+    if isinstance(node, list):
+        return [_relinked(item, here, root) for item in node]
+    if not isinstance(node, dict):
+        return node
+    linked = {key: _relinked(value, here, root) for key, value in node.items()}
+    if isinstance(node.get("$ref"), str):
+        file, _, pointer = node["$ref"].partition("#")
+        file = file or here
+        place = "" if file == root else f"/$defs/{file}"
+        linked["$ref"] = f"#{place}{pointer}"
+    return linked

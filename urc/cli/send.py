@@ -1,10 +1,11 @@
 """`urc send`: one command, its reply as JSON."""
 
 import argparse
+import re
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from urc.cli.arguments import add_profile, load
+from urc.cli.arguments import add_profile, load, what_it_has
 from urc.cli.failures import Misuse
 from urc.cli.output import json_text
 from urc.problems import UrcError
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
 
 EXAMPLE = "urc send my-robot.yaml set_speed speed=3 --set host=192.168.1.20"
 
+_WHOLE = re.compile(r"[+-]?[0-9]{1,300}")
 _WRONG_USE = ("bad-argument", "unknown-command")
 """Codes of a failure that lies in what was typed."""
 
@@ -36,8 +38,8 @@ def run(arguments: argparse.Namespace) -> int:
     profile = load(arguments.profile)
     command = profile.driver.commands.get(arguments.command)
     if command is None:
-        known = ", ".join(profile.driver.commands) or "none"
-        raise Misuse(f"{profile.name} has no command {arguments.command!r}; it has: {known}")
+        hint = what_it_has(arguments.command, profile.driver.commands)
+        raise Misuse(f"{profile.name} has no command {arguments.command!r}; {hint}")
     values = _arguments(command, arguments.words)
     settings = complete_settings(profile, arguments)
     return run_loop(_send(profile, settings, command, values))
@@ -48,11 +50,12 @@ def _arguments(command: "Command", words: list[str]) -> dict[str, "Value"]:
     for word in words:
         name, equals, text = word.partition("=")
         if not equals:
-            raise Misuse(f"an argument is written ARG=VALUE, found {word!r}")
+            example = f"{next(iter(command.arguments), 'ARG')}={word}"
+            raise Misuse(f"an argument is written ARG=VALUE, as {example!r}; found {word!r}")
         argument = command.arguments.get(name)
         if argument is None:
-            known = ", ".join(command.arguments) or "none"
-            raise Misuse(f"{command.name} has no argument {name!r}; it has: {known}")
+            hint = what_it_has(name, command.arguments)
+            raise Misuse(f"{command.name} has no argument {name!r}; {hint}")
         if name in values:
             raise Misuse(f"{name} is given twice")
         values[name] = _value(argument, text)
@@ -65,7 +68,8 @@ def _value(argument: "Argument", text: str) -> "Value":
         if argument.type == "integer":
             return int(text, 0)
         if argument.type == "number":
-            return float(text)
+            # "20" stays a whole number, as it would in a document: templates print it as written.
+            return int(text) if _WHOLE.fullmatch(text) else float(text)
     except ValueError:
         raise Misuse(f"{argument.name}: {argument.type} expected, found {text!r}") from None
     if argument.type == "boolean":

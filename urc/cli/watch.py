@@ -7,10 +7,9 @@ import sys
 import time
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
-from difflib import get_close_matches
 from typing import TYPE_CHECKING
 
-from urc.cli.arguments import add_profile, duration, load
+from urc.cli.arguments import add_profile, duration, load, what_it_has
 from urc.cli.failures import Misuse
 from urc.cli.output import json_text
 from urc.problems import UrcError, printable
@@ -54,9 +53,7 @@ def run(arguments: argparse.Namespace) -> int:
 def _check_signals(profile: "Profile", names: list[str]) -> None:
     for name in names:
         if name not in profile.driver.signals:
-            close = get_close_matches(name, profile.driver.signals, n=1)
-            known = ", ".join(profile.driver.signals) or "none"
-            hint = f"did you mean {close[0]!r}?" if close else f"it has: {known}"
+            hint = what_it_has(name, profile.driver.signals)
             raise Misuse(f"{profile.name} has no signal {name!r}; {hint}")
 
 

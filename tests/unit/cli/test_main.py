@@ -8,7 +8,9 @@ import sys
 from pathlib import Path
 from types import ModuleType
 
+import jsonschema
 import pytest
+import yaml
 
 from urc.cli import main as main_module
 from urc.cli import send as send_module
@@ -107,16 +109,26 @@ def test_mistake_without_a_place_is_told_too(capsys: Output) -> None:
     assert capsys.readouterr().err == expected
 
 
-def test_schema_is_printed_byte_for_byte(capsysbinary: pytest.CaptureFixture[bytes]) -> None:
-    """What ships, what is printed and what `--path` names are one file."""
-    for kind in ("robot", "driver", "interface", "widget"):
-        file = shipped("schemas") / f"{kind}.schema.json"
-        assert main(["schema", kind]) == 0
-        assert capsysbinary.readouterr().out == file.read_bytes()
-        assert main(["schema", kind, "--path"]) == 0
-        assert capsysbinary.readouterr().out == f"{file}\n".encode()
+@pytest.mark.parametrize("kind", ["robot", "driver", "interface", "widget"])
+def test_schema_is_printed_whole_in_itself(kind: str, capsys: Output) -> None:
+    """Saved beside nothing else it judges as the shipped files do together."""
+    assert main(["schema", kind]) == 0
+    schema = json.loads(capsys.readouterr().out)
+    judge = jsonschema.Draft202012Validator(schema)
+    references = set(re.findall(r'"\$ref": "([^#"]*)#', json.dumps(schema)))
+    assert references == {""}
+    assert any(judge.iter_errors({"urc": 1, "kind": kind, "name": "x", "nonsense": 1}))
+    if kind == "robot":
+        puppet = yaml.safe_load((shipped("robots") / "puppet.yaml").read_text("utf-8"))
+        assert list(judge.iter_errors(puppet)) == []
+
+
+def test_schema_says_where_its_file_is(capsys: Output) -> None:
+    """Editors want the file, beside those that it refers to."""
+    assert main(["schema", "robot", "--path"]) == 0
+    assert capsys.readouterr().out == f"{shipped('schemas') / 'robot.schema.json'}\n"
     assert main(["schema", "--path"]) == 0
-    assert capsysbinary.readouterr().out == f"{shipped('schemas')}\n".encode()
+    assert capsys.readouterr().out == f"{shipped('schemas')}\n"
 
 
 def test_schema_of_nothing_is_wrong_use(capsys: Output) -> None:
