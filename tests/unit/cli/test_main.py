@@ -200,7 +200,7 @@ def test_arguments_of_a_command_are_typed() -> None:
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["n"], "an argument is written ARG=VALUE, found 'n'"),
+        (["12"], "an argument is written ARG=VALUE, as 'n=12'; found '12'"),
         (["m=1"], "move has no argument 'm'; it has: n, x, b, s"),
         (["n=1", "n=2"], "n is given twice"),
         (["n=1.5"], "n: integer expected, found '1.5'"),
