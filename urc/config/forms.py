@@ -13,16 +13,13 @@ and for writing:
 `part` is what stands under the form's key; None means that it was reported.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from importlib import import_module
 from typing import Any, NamedTuple, Protocol, cast
 
-from urc.config.beside_form import beside_form
 from urc.config.part import Findings, Part
 from urc.expressions import Template
-from urc.model.binary import Item
 from urc.model.codec import ReadSpec, WriteSpec
-from urc.model.values import NOTHING
 
 __all__ = [
     "READ_FORMS",
@@ -38,20 +35,9 @@ __all__ = [
 
 READ_FORMS = {
     "regex": "urc.config.form_regex",
-    "pattern": "urc.config.form_pattern",
-    "split": "urc.config.form_split",
-    "keyvalue": "urc.config.form_keyvalue",
-    "json": "urc.config.form_json",
-    "xml": "urc.config.form_xml",
-    "equals": "urc.config.form_equals",
-    "struct": "urc.config.form_struct",
 }
 WRITE_FORMS = {
     "text": "urc.config.form_text",
-    "hex": "urc.config.form_hex",
-    "bytes": "urc.config.form_bytes",
-    "json": "urc.config.form_json_text",
-    "struct": "urc.config.form_struct",
 }
 _NO_READ = ReadSpec("regex")
 _NO_WRITE = WriteSpec("text")
@@ -62,12 +48,6 @@ class FormContext(NamedTuple):
 
     encoding: str = "utf-8"
     """Of the line that the frame comes from or goes to."""
-    signals: frozenset[str] = frozenset()
-    """Names of the driver's signals."""
-    types: Mapping[str, tuple[Item, ...]] = NOTHING
-    """The driver's reusable structs."""
-    enums: Mapping[str, tuple[tuple[int, str], ...]] = NOTHING
-    """The driver's lists of words for numbers."""
 
 
 class ReadForm(Protocol):
@@ -127,8 +107,7 @@ def parse_read(part: Part, findings: Findings, context: FormContext) -> ReadSpec
     if found_form is None:
         return _NO_READ
     inner, form = found_form
-    spec = form.parse_read(inner, findings, context) or _NO_READ
-    return beside_form(part, spec, findings)
+    return form.parse_read(inner, findings, context) or _NO_READ
 
 
 def parse_write(part: Part, findings: Findings, context: FormContext) -> WriteSpec:
