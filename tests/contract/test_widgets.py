@@ -11,6 +11,7 @@ import yaml
 from urc.model.values import Limits, Signal
 from urc.model.widget import Port, Widget
 from urc.shipped import shipped
+from urc.testing.dashboard import option_defaults
 from urc.web.pages import WidgetContext, render_widget
 
 FOLDERS = sorted(path for path in shipped("widgets").iterdir() if path.is_dir())
@@ -74,6 +75,10 @@ def test_a_widget_folder_is_complete(folder: Path) -> None:
     assert set(demo["signals"]) <= set(manifest["inputs"])
     for name, port in manifest["inputs"].items():
         assert name in demo["signals"] or not port.get("required", True)
+    outputs = demo.get("outputs", {})
+    assert set(outputs) <= set(manifest["outputs"])
+    for name, port in manifest["outputs"].items():
+        assert name in outputs or not port.get("required", True)
     for state in demo["states"].values():
         for option, value in state.get("options", {}).items():
             declared = manifest["options"][option]
@@ -88,9 +93,15 @@ def test_a_template_renders_in_each_state_without_values(folder: Path, state: st
     demo = read(folder, "demo.yaml")
     shown = demo["states"][state]
     widget = widget_of(folder)
-    options = {**dict.fromkeys(widget.options), **shown.get("options", {})}
-    signals = signals_of(demo)
-    context = WidgetContext(HOSTILE, options, signals, widget.name, "cell-0")
+    options = {
+        **dict.fromkeys(widget.options),
+        **option_defaults(widget),
+        **shown.get("options", {}),
+    }
+    outputs = dict.fromkeys(demo.get("outputs", {}), HOSTILE)
+    # A label of its own would stand in place of the title.
+    options |= {name: HOSTILE for name in ("label",) if options.get(name)}
+    context = WidgetContext(HOSTILE, options, signals_of(demo), widget.name, "cell-0", outputs)
     html = str(render_widget(widget, context))
     assert "&lt;img src=x onerror=alert(1)&gt;" in html
     assert "—" in html
@@ -109,3 +120,13 @@ def test_a_style_sheet_touches_only_its_own_widget(folder: Path) -> None:
     for selector in re.findall(r"(?:^|[};{])\s*([^@{};&]+)\{", css):
         for part in re.split(r",(?![^(]*\))", selector):
             assert part.strip().startswith(f".{folder.name}"), part
+
+
+@pytest.mark.parametrize("folder", FOLDERS, ids=lambda folder: folder.name)
+def test_a_template_without_its_command_has_no_dead_control(folder: Path) -> None:
+    """Bound to signals only, it renders, and leaves out the buttons that would do nothing."""
+    widget = widget_of(folder)
+    options = {**dict.fromkeys(widget.options), **option_defaults(widget)}
+    signals = signals_of(read(folder, "demo.yaml"))
+    html = str(render_widget(widget, WidgetContext("T", options, signals, widget.name, "cell-0")))
+    assert not {"button", "input", "select"} & {tag for tag, _ in Page(html).elements}

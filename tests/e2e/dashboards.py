@@ -10,19 +10,33 @@ from websockets.exceptions import ConnectionClosed
 
 from urc.testing.dashboard import FakeRobot
 from urc.web.app import Robot, build_app, serve
+from urc.web.connection import CONNECTIONS, REQUEST_S
 
 WAIT_S = 10.0
 
 
 @asynccontextmanager
-async def running_dashboard(*robots: FakeRobot, port: int = 0) -> AsyncIterator[str]:
+async def running_dashboard(
+    *robots: FakeRobot,
+    port: int = 0,
+    request_s: float = REQUEST_S,
+    connections: int = CONNECTIONS,
+) -> AsyncIterator[str]:
     """Serve the robots on this machine; give the address, and end cleanly."""
     ready: asyncio.Future[str] = asyncio.get_running_loop().create_future()
     app = build_app(
         {robot.profile.name: Robot(robot.profile, {}, robot.open) for robot in robots},
         linger_s=0.2,
     )
-    task = asyncio.create_task(serve(app, port=port, on_ready=ready.set_result))
+    task = asyncio.create_task(
+        serve(
+            app,
+            port=port,
+            on_ready=ready.set_result,
+            request_s=request_s,
+            connections=connections,
+        )
+    )
     try:
         async with asyncio.timeout(WAIT_S):
             await asyncio.wait((ready, task), return_when=asyncio.FIRST_COMPLETED)

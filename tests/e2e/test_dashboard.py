@@ -10,7 +10,9 @@ from tests.e2e.browser import Size
 from tests.e2e.conftest import PageMaker
 from tests.e2e.dashboards import running_dashboard, until, until_attribute, until_text
 from tests.e2e.processes import UrcProcess
+from urc.model.interface import WidgetUse
 from urc.model.profile import Setting
+from urc.model.values import Signal
 from urc.testing.dashboard import BATTERY, FakeRobot, dashboard_profile
 
 pytestmark = pytest.mark.anyio
@@ -163,9 +165,42 @@ async def test_a_lost_line_greys_at_once_and_a_silent_one_with_time(new_page: Pa
         await until_attribute(page, ".battery", "data-state", "gone")
         await until_text(page, DIGITS, "—")
         assert "last seen 10 min ago" in await page.inner_text(".battery-note")
+        assert await page.get_attribute(".battery", "data-alarm") == ""
         meter = page.locator(".battery-meter")
         assert await meter.get_attribute("aria-valuenow") is None
         assert await meter.get_attribute("aria-valuetext") == "unknown"
+
+
+# Reported when the door moves, so it may be as old as it likes; but not once nobody can tell.
+DOOR = Signal("door", "boolean", states={"true": "open", "false": "shut"}, stale_after_s=3600)
+
+
+async def test_a_value_is_not_shown_a_minute_after_its_line_was_lost(new_page: PageMaker) -> None:
+    """However patient its signal is: grey at once, a dash after 60 s, and live with the line."""
+    use = WidgetUse("door", "value", {"value": "door"})
+    robot = FakeRobot(dashboard_profile(signals={"door": DOOR}, uses=[use]))
+    async with running_dashboard(robot) as address:
+        page = await new_page()
+        await page.goto(f"{address}robots/puppet/")
+        await until(lambda: robot.is_open)
+        robot.say("door", True, age_s=1800)
+        await until_text(page, ".value-text", "open")
+        await until_attribute(page, ".value", "data-state", "live")
+        robot.link("lost", "connection refused", age_s=50)
+        await until_attribute(page, ".value", "data-state", "stale")
+        await until_text(page, ".value-text", "open")
+        robot.link("live")
+        await until_attribute(page, ".value", "data-state", "live")
+        robot.link("lost", "connection refused", age_s=61)
+        await until_attribute(page, ".value", "data-state", "gone")
+        await until_text(page, ".value-text", "—")
+        assert "last seen 30 min ago" in await page.inner_text(".value-note")
+        # Another attempt under way is no line yet.
+        robot.link("connecting")
+        await until_text(page, ".urc-link-state", "◌ connecting")
+        assert await page.text_content(".value-text") == "—"
+        robot.link("live")
+        await until_text(page, ".value-text", "open")
 
 
 async def test_from_menu_to_robot_and_back_by_keyboard(new_page: PageMaker) -> None:
@@ -233,6 +268,47 @@ async def test_the_battery_fits_every_screen(new_page: PageMaker, size: Size) ->
             area = await control.bounding_box()
             if area and not await control.evaluate("el => el.matches('.urc-skip')"):
                 assert min(area["width"], area["height"]) >= 48
+
+
+@pytest.mark.parametrize("size", ["phone", "tablet", "desktop"])
+async def test_nothing_in_the_bar_is_cut_off(new_page: PageMaker, size: Size) -> None:
+    """The short name on a small screen, the whole one else; the arrow has room at its right."""
+    robot = FakeRobot(dashboard_profile())
+    async with running_dashboard(robot) as address:
+        page = await new_page(size=size)
+        await page.goto(address)
+        assert await page.locator(".urc-bar-more").is_visible() is (size != "phone")
+        cut = "el => el.scrollWidth > el.clientWidth"
+        assert not await page.locator(".urc-bar-title").evaluate(cut)
+        for theme in ("light", "dark", "sunlight", "night"):
+            await page.get_by_label("Theme").select_option(theme)
+            room = await page.locator(".urc-theme").evaluate(
+                """el => {
+                  const arrow = getComputedStyle(el, "::after");
+                  const select = getComputedStyle(el.querySelector("select"));
+                  const left = parseFloat(arrow.right) + parseFloat(arrow.width);
+                  return [select.appearance, parseFloat(arrow.right),
+                          parseFloat(select.paddingRight) - left];
+                }"""
+            )
+            assert room[0] == "none"
+            assert room[1] >= 12
+            assert room[2] >= 4
+
+
+async def test_the_round_trip_is_not_part_of_what_is_bad(new_page: PageMaker) -> None:
+    """A lost robot is bold; the figure beside it is another matter."""
+    robot = FakeRobot(dashboard_profile())
+    async with running_dashboard(robot) as address:
+        page = await new_page()
+        await page.goto(f"{address}robots/puppet/")
+        await until(lambda: robot.is_open)
+        weight = "([selector]) => getComputedStyle(document.querySelector(selector)).fontWeight"
+        plain = await page.evaluate(weight, ["[data-badge-trip]"])
+        robot.link("lost", "connection refused")
+        await until_attribute(page, BADGE, "data-state", "bad")
+        assert await page.evaluate(weight, [BADGE_TEXT]) > plain
+        assert await page.evaluate(weight, ["[data-badge-trip]"]) == plain
 
 
 async def test_a_theme_is_kept_on_the_device(new_page: PageMaker) -> None:

@@ -17,7 +17,10 @@ from urc.model.interface import WidgetUse
 from urc.model.values import Signal
 from urc.problems import UrcError
 from urc.testing.dashboard import FakeRobot, dashboard_profile
+from urc.web.addresses import local_addresses
 from urc.web.app import build_app, serve
+from urc.web.policy import REFUSAL_HEADERS
+from urc.web.server import reachable_urls
 
 pytestmark = pytest.mark.anyio
 
@@ -187,3 +190,165 @@ async def test_the_session_closes_when_the_last_page_has_gone() -> None:
             assert robot.is_open
         await until(lambda: not robot.is_open)
         assert robot.opened == 1
+
+
+async def answer_to(reader: asyncio.StreamReader) -> tuple[int, dict[str, str], str]:
+    """Read one answer up to the end of the connection: its status, headers and body."""
+    async with asyncio.timeout(20):
+        text = (await reader.read()).decode()
+    head, _, body = text.partition("\r\n\r\n")
+    first, *lines = head.split("\r\n")
+    headers = dict(line.lower().split(": ", 1) for line in lines)
+    return int(first.split()[1]), headers, body
+
+
+def check_refusal(answer: tuple[int, dict[str, str], str], status: int, text: str) -> None:
+    """Check that it says why, under the headers of the policy, and closes."""
+    found, headers, body = answer
+    assert (found, body.strip()) == (status, text)
+    assert headers["connection"] == "close"
+    for name, value in REFUSAL_HEADERS:
+        assert headers[name.decode()] == value.decode().lower()
+
+
+async def opened(address: str) -> tuple[asyncio.StreamReader, asyncio.StreamWriter]:
+    """Connect to the server, below HTTP."""
+    parts = urlsplit(address)
+    return await asyncio.open_connection(parts.hostname, parts.port)
+
+
+async def test_what_is_no_http_is_refused_under_the_policy() -> None:
+    """uvicorn's own 400 has our headers."""
+    async with running_dashboard(FakeRobot(dashboard_profile())) as address:
+        reader, writer = await opened(address)
+        writer.write(b"\x16\x03\x01 hello\r\n\r\n")
+        check_refusal(await answer_to(reader), 400, "Invalid HTTP request received.")
+        writer.close()
+
+
+@pytest.mark.parametrize(
+    "begin",
+    [
+        b"GET / HTTP/1.1\r\nHost: localhost\r\n",
+        b"POST / HTTP/1.1\r\nHost: evil.example\r\nContent-Length: 1000\r\n",
+        b"GET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\nGET / HTTP/1.1\r\n",
+    ],
+    ids=["first request", "another verb", "second request"],
+)
+async def test_a_request_that_drips_in_is_given_up(begin: bytes) -> None:
+    """Each byte comes soon enough, the whole never: 408, and the connection is free again."""
+    async with running_dashboard(FakeRobot(dashboard_profile()), request_s=0.5) as address:
+        reader, writer = await opened(address)
+        writer.write(begin)
+        answer = asyncio.create_task(answer_to(reader))
+        for _ in range(400):
+            if answer.done() or reader.at_eof():
+                break
+            writer.write(b"x")
+            await asyncio.sleep(0.05)
+        status, headers, body = await answer
+        writer.close()
+        if begin.endswith(b"GET / HTTP/1.1\r\n"):
+            status, headers, body = last_answer(status, headers, body)
+        text = "The request was not here within 0.5 s."
+        check_refusal((status, headers, body), 408, text)
+
+
+def last_answer(status: int, headers: dict[str, str], body: str) -> tuple[int, dict[str, str], str]:
+    """Return the second of two answers on one connection."""
+    assert status == 200
+    _, _, rest = body.partition("HTTP/1.1 ")
+    head, _, text = rest.partition("\r\n\r\n")
+    first, *lines = head.split("\r\n")
+    return int(first.split()[0]), dict(line.lower().split(": ", 1) for line in lines), text
+
+
+async def test_a_body_that_drips_in_is_given_up() -> None:
+    """The headers were whole; the connection is cut all the same."""
+    async with running_dashboard(FakeRobot(dashboard_profile()), request_s=0.5) as address:
+        reader, writer = await opened(address)
+        origin = address.rstrip("/").encode()
+        host = urlsplit(address).netloc.encode()
+        head = b"POST /healthz HTTP/1.1\r\nHost: %s\r\nOrigin: %s\r\n" % (host, origin)
+        writer.write(head + b"Content-Length: 100000\r\n\r\n")
+        with contextlib.suppress(ConnectionError):
+            async with asyncio.timeout(20):
+                while not reader.at_eof():
+                    writer.write(b"x")
+                    await writer.drain()
+                    with contextlib.suppress(TimeoutError):
+                        async with asyncio.timeout(0.05):
+                            await reader.read(4096)
+        writer.close()
+
+
+async def test_a_connection_made_in_advance_is_closed_without_a_word() -> None:
+    """Browsers make some, and take an answer that nobody asked for as a fault."""
+    async with running_dashboard(FakeRobot(dashboard_profile()), request_s=0.2) as address:
+        reader, writer = await opened(address)
+        async with asyncio.timeout(20):
+            assert await reader.read() == b""
+        writer.close()
+
+
+async def test_an_open_socket_outlives_the_limit_of_a_request() -> None:
+    """It was a request once; as a WebSocket it stays."""
+    robot = FakeRobot(dashboard_profile())
+    async with (
+        running_dashboard(robot, request_s=0.2) as address,
+        joined(address) as line,
+    ):
+        await line.recv()
+        await asyncio.sleep(0.6)
+        robot.say("battery", 7)
+        assert await next_value(line) == 7
+
+
+async def test_one_connection_too_many_is_told_so() -> None:
+    """503 under the policy; those that are open go on, and a closed one makes room."""
+    robot = FakeRobot(dashboard_profile())
+    async with running_dashboard(robot, connections=2) as address:
+        async with joined(address) as first, joined(address) as second:
+            await first.recv()
+            await second.recv()
+            reader, writer = await opened(address)
+            writer.write(b"GET / HTTP/1.1\r\nHost: localhost\r\n\r\n")
+            check_refusal(await answer_to(reader), 503, "Too many connections are open.")
+            writer.close()
+            robot.say("battery", 8)
+            assert await next_value(first) == 8
+        async with joined(address) as third:
+            assert json.loads(await third.recv())["t"] == "hello"
+
+
+async def test_every_address_that_is_told_answers() -> None:
+    """What listens everywhere is reached at each address of this machine."""
+    for host in ("0.0.0.0", "::"):
+        told: asyncio.Future[str] = asyncio.get_running_loop().create_future()
+        try:
+            task = asyncio.create_task(
+                serve(build_app({}), host=host, port=0, on_ready=told.set_result)
+            )
+            async with asyncio.timeout(20):
+                await asyncio.wait((told, task), return_when=asyncio.FIRST_COMPLETED)
+            if task.done() and ":" in host:
+                pytest.skip("no IPv6 here")
+            port = urlsplit(await told).port
+            for url in reachable_urls(host, port or 0):
+                reader, writer = await opened(url)
+                name = urlsplit(url).netloc.encode()
+                writer.write(b"GET /healthz HTTP/1.0\r\nHost: " + name + b"\r\n\r\n")
+                status, _, _ = await answer_to(reader)
+                assert status == 200
+                writer.close()
+        finally:
+            task.cancel()
+            await asyncio.wait((task,), timeout=20)
+
+
+def test_an_address_of_this_machine_is_one_that_others_can_use() -> None:
+    """No loopback, no range that a browser cannot open, each once."""
+    found = local_addresses()
+    assert len(set(found)) == len(found)
+    assert [each for each in found if each.is_loopback or each.is_unspecified] == []
+    assert [each for each in found if each.version == 6 and each.is_link_local] == []

@@ -50,9 +50,8 @@ async def test_a_widget_shows_each_state_of_its_demo(new_page: PageMaker, widget
             signals[signal] = Signal(
                 signal, **{**given, "limits": Limits(**given.get("limits", {}))}
             )
-        uses.append(
-            WidgetUse(state, widget, bind, {}, shown.get("options", {}), shown.get("title", ""))
-        )
+        options, title = shown.get("options", {}), shown.get("title", "")
+        uses.append(WidgetUse(state, widget, bind, demo.get("outputs", {}), options, title))
     robot = FakeRobot(dashboard_profile(signals=signals, uses=uses))
     async with running_dashboard(robot) as address:
         page = await new_page(size="tablet")
@@ -223,3 +222,165 @@ async def test_a_widget_sends_the_commands_bound_to_it_and_no_other(
         '["{\\"done\\":true}","the output erase is not bound to a command",'
         '"the output toString is not bound to a command"]'
     )
+
+
+async def test_arguments_go_to_a_command_under_its_own_names(new_page: PageMaker) -> None:
+    """By the same name, by the one that the binding says, and what is fixed stays as it is."""
+    robot = FakeRobot(dashboard_profile())
+    async with running_dashboard(robot) as address:
+        page = await new_page()
+        # A page without our policy, so that the test may import a module into it.
+        await page.route("**/empty", lambda route: route.fulfill(body="", content_type="text/html"))
+        await page.goto(f"{address}empty")
+        got = await page.evaluate(
+            """async ([outputs, given]) => {
+              const { argumentsOf } = await import("/static/output.js");
+              return outputs.map(([names, fixed]) => argumentsOf({ names, fixed }, given));
+            }""",
+            [
+                [
+                    [{}, {}],
+                    [{"speed": "value"}, {}],
+                    [{"left": "value", "right": "value"}, {"gear": 2}],
+                    [{"speed": "absent"}, {"value": 0}],
+                    [{"__proto__": "toString"}, {}],
+                ],
+                {"value": 0.5, "on": True},
+            ],
+        )
+    assert got == [
+        {"value": 0.5, "on": True},
+        {"on": True, "speed": 0.5},
+        {"on": True, "left": 0.5, "right": 0.5, "gear": 2},
+        {"value": 0, "on": True},
+        {"value": 0.5, "on": True},
+    ]
+
+
+LUMINANCE = """
+(colour) => {
+  const canvas = document.createElement("canvas").getContext("2d");
+  canvas.fillStyle = colour;
+  canvas.fillRect(0, 0, 1, 1);
+  const linear = [...canvas.getImageData(0, 0, 1, 1).data.slice(0, 3)]
+    .map((part) => part / 255)
+    .map((part) => (part <= 0.04045 ? part / 12.92 : ((part + 0.055) / 1.055) ** 2.4));
+  return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2];
+}
+"""
+
+MARKS = """
+() => {
+  const look = (selector, name) =>
+    getComputedStyle(document.querySelector(`.battery-lying ${selector}`))[name];
+  const box = (selector) => document.querySelector(`.battery-lying ${selector}`).getBBox();
+  const marks = box(".battery-limits"), shell = box(".battery-shell");
+  return {
+    mark: look(".battery-limits", "fill"),
+    digits: look(".battery-number", "fill"),
+    halo: look(".battery-number", "stroke"),
+    order: look(".battery-number", "paintOrder"),
+    surface: getComputedStyle(document.querySelector(".urc-cell")).backgroundColor,
+    reach: [shell.y - marks.y, marks.y + marks.height - shell.y - shell.height],
+    numbers: document.querySelectorAll(".battery-lying .battery-number").length,
+  };
+}
+"""
+
+
+@pytest.mark.parametrize("theme", ["light", "dark", "sunlight", "night"])
+@pytest.mark.parametrize("level", [3, 100])
+async def test_limits_and_number_of_the_battery_are_seen_whatever_its_level(
+    new_page: PageMaker, theme: str, level: int
+) -> None:
+    """The marks stand outside the shell; the digits have a rim of the other brightness."""
+    robot = FakeRobot(dashboard_profile())
+    async with running_dashboard(robot) as address:
+        page = await new_page()
+        await page.goto(address)
+        await page.get_by_label("Theme").select_option(theme)
+        await page.goto(f"{address}robots/puppet/")
+        await until(lambda: robot.is_open)
+        robot.say("battery", level)
+        await until_text(page, ".battery-digits", str(level))
+        seen = await page.evaluate(MARKS)
+        shades = {
+            name: await page.evaluate(LUMINANCE, seen[name])
+            for name in ("mark", "digits", "halo", "surface")
+        }
+
+    def contrast(one: str, other: str) -> float:
+        bright, dark = sorted((shades[one], shades[other]), reverse=True)
+        return float((bright + 0.05) / (dark + 0.05))
+
+    assert min(seen["reach"]) >= 5
+    assert contrast("mark", "surface") >= 3
+    assert contrast("digits", "halo") >= 4.5
+    assert (seen["order"].split()[0], seen["numbers"]) == ("stroke", 1)
+
+
+VOLTAGE = Signal(
+    "voltage",
+    "number",
+    unit="V",
+    precision=2,
+    limits=Limits(low=11, high=13, hihi=40),
+    stale_after_s=3,
+)
+
+# First and last column of the plot in which anything is drawn, as shares of its width.
+DRAWN = """
+() => {
+  const canvas = document.querySelector(".value-plot canvas");
+  const { width, height } = canvas;
+  const pixels = canvas.getContext("2d").getImageData(0, 0, width, height).data;
+  const columns = new Set();
+  for (let place = 3; place < pixels.length; place += 4) {
+    if (pixels[place]) columns.add(((place - 3) / 4) % width);
+  }
+  return [Math.min(...columns) / width, Math.max(...columns) / width];
+}
+"""
+
+
+async def test_the_line_of_a_value_has_a_scale_a_span_and_its_limits(new_page: PageMaker) -> None:
+    """The window is the option's; a limit far off does not flatten the line; old is grey."""
+    use = WidgetUse("v", "value", {"value": "voltage"}, {}, {"history": "60s"})
+    profile = dashboard_profile(signals={"voltage": VOLTAGE}, uses=[use])
+    robot = FakeRobot(profile)
+    async with running_dashboard(robot) as address:
+        page = await new_page()
+        await page.goto(f"{address}robots/puppet/")
+        await until(lambda: robot.is_open)
+        await page.wait_for_selector(".value-plot canvas")
+        for age_s, volts in ((2.0, 12.0), (1.0, 12.5), (0.1, 12.25)):
+            robot.say("voltage", volts, age_s=age_s)
+            await until_text(page, ".value-text", f"{volts:.2f}")
+        await until_text(page, ".value-most", "13.00")
+        await until_text(page, ".value-least", "11.00")
+        assert await page.inner_text(".value-span") == "last 60 s"
+        assert await page.locator(".value-limit").count() == 2
+        await page.wait_for_function(f"() => ({DRAWN})()[0] > 0.9")
+        first, last = await page.evaluate(DRAWN)
+        assert last > first > 0.9
+        colour = "getComputedStyle(document.querySelector('.value-plot')).color"
+        live = await page.evaluate(colour)
+        robot.say("voltage", 12.25, age_s=40)
+        await until_text(page, ".value-text", "—")
+        assert await page.evaluate(colour) != live
+        assert await page.evaluate(colour) == await page.evaluate(
+            "getComputedStyle(document.querySelector('.value-note')).color"
+        )
+
+
+async def test_a_text_has_no_line(new_page: PageMaker) -> None:
+    """An option that cannot be met leaves no empty frame."""
+    use = WidgetUse("v", "value", {"value": "mode"}, {}, {"history": "60s"})
+    robot = FakeRobot(dashboard_profile(signals={"mode": Signal("mode", "string")}, uses=[use]))
+    async with running_dashboard(robot) as address:
+        page = await new_page()
+        await page.goto(f"{address}robots/puppet/")
+        await until(lambda: robot.is_open)
+        robot.say("mode", "docked")
+        await until_text(page, ".value-text", "docked")
+        assert await page.locator(".value-history").count() == 0

@@ -121,5 +121,8 @@ class LinkReport:
 
     def _note_state(self, state: LinkState, detail: str) -> None:
         level: Literal["info", "warning"] = "warning" if state in ("silent", "lost") else "info"
-        why = f": {detail}" if detail else ""
-        self.note(level, f"state {state}", f"{self._address} is {state}{why}")
+        if state == "connecting":
+            text = f"connecting to {self._address}"  # told once; who reads on knows where
+        else:
+            text = f"{state}: {detail}" if detail else state
+        self.note(level, f"state {state}", text)

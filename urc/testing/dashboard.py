@@ -6,7 +6,7 @@ from pathlib import Path
 
 import yaml
 
-from urc.model.driver import Driver, TransportSpec
+from urc.model.driver import Command, Driver, TransportSpec
 from urc.model.interface import Grid, Interface, Slot, WidgetUse
 from urc.model.profile import Profile, Setting
 from urc.model.values import Alarm, Limits, Sample, Signal, Value
@@ -16,7 +16,7 @@ from urc.runtime.clock import Clock, LoopClock
 from urc.runtime.hub import Hub, LinkState, LinkStatus, Note
 from urc.shipped import shipped
 
-__all__ = ["FakeRobot", "dashboard_profile", "plain_widget"]
+__all__ = ["FakeRobot", "dashboard_profile", "option_defaults", "plain_widget"]
 
 BATTERY = Signal(
     "battery",
@@ -31,12 +31,25 @@ BATTERY = Signal(
 
 def plain_widget(name: str, inputs: Sequence[str], folder: Path | None = None) -> Widget:
     """Return a widget of the shipped folder `name`, or of `folder`, that takes anything."""
-    types = ("integer", "number", "boolean", "string")
-    ports = {each: Port(each, types) for each in inputs}
     place = folder or shipped("widgets") / name
     manifest = place / "widget.yaml"
     declared = yaml.safe_load(manifest.read_text("utf-8")) if manifest.is_file() else {}
+    types = ("integer", "number", "boolean", "string")
+    known = declared.get("inputs", {})
+    ports = {
+        each: Port(each, types, is_required=known.get(each, {}).get("required", True))
+        for each in {**known, **dict.fromkeys(inputs)}
+    }
     return Widget(name, name.title(), place, ports, options=declared.get("options", {}))
+
+
+def option_defaults(widget: Widget) -> dict[str, object]:
+    """Return the defaults of the widget's manifest, which the loader fills in."""
+    return {
+        name: schema["default"]
+        for name, schema in widget.options.items()
+        if isinstance(schema, Mapping) and "default" in schema
+    }
 
 
 def dashboard_profile(
@@ -46,12 +59,20 @@ def dashboard_profile(
     uses: Sequence[WidgetUse] = (),
     widgets: Sequence[Widget] = (),
     settings: Mapping[str, Setting] | None = None,
+    commands: Mapping[str, Command] | None = None,
 ) -> Profile:
-    """Return a profile whose slots stand side by side; by default the puppet's one battery."""
-    given = uses or (WidgetUse("battery", "battery", {"level": "battery"}),)
+    """Return a profile whose slots stand side by side; by default the puppet's one battery.
+
+    Options that a use leaves out take the defaults of the widget's manifest.
+    """
+    wanted = uses or (WidgetUse("battery", "battery", {"level": "battery"}),)
     known = {each.name: each for each in widgets}
-    for use in given:
+    for use in wanted:
         known.setdefault(use.widget, plain_widget(use.widget, tuple(use.inputs)))
+    given = [
+        use._replace(options={**option_defaults(known[use.widget]), **use.options})
+        for use in wanted
+    ]
     slots = tuple(Slot(use.slot, 0, column) for column, use in enumerate(given))
     grid = Grid(1, len(slots), slots)
     return Profile(
@@ -62,7 +83,11 @@ def dashboard_profile(
         settings={"host": Setting("host", "host", default="127.0.0.1")}
         if settings is None
         else settings,
-        driver=Driver({"wire": TransportSpec("wire", "tcp")}, signals or {"battery": BATTERY}),
+        driver=Driver(
+            {"wire": TransportSpec("wire", "tcp")},
+            signals or {"battery": BATTERY},
+            commands=commands or {},
+        ),
         slots={use.slot: use for use in given},
         interfaces={"default": Interface("default", "Default", {"wide": grid})},
         widgets=known,
@@ -107,10 +132,10 @@ class FakeRobot:
         """Let a reading arrive that was measured `age_s` ago."""
         self.hub.put([Sample(signal, value, self.clock.now() - age_s, alarm)])
 
-    def link(self, state: LinkState, detail: str = "") -> None:
-        """Set the state of the one line."""
-        now_s = self.clock.now()
-        self.hub.set_link(LinkStatus("wire", state, "tcp 127.0.0.1:6789", now_s, detail))
+    def link(self, state: LinkState, detail: str = "", *, age_s: float = 0.0) -> None:
+        """Set the state of the one line, as it has been for `age_s`."""
+        since_s = self.clock.now() - age_s
+        self.hub.set_link(LinkStatus("wire", state, "tcp 127.0.0.1:6789", since_s, detail))
 
     def tell(self, text: str) -> None:
         """Write a line into the log."""

@@ -17,13 +17,14 @@ from jinja2.sandbox import ImmutableSandboxedEnvironment
 from markupsafe import Markup
 
 from urc import __version__
+from urc.model.driver import Driver
 from urc.model.interface import Interface, WidgetUse
 from urc.model.profile import Profile, Setting
 from urc.model.values import Signal, Value
 from urc.model.widget import Widget
 from urc.shipped import shipped
 from urc.web.layout import grid_css
-from urc.web.robots import Robot, missing_settings
+from urc.web.robots import HELD, Robot, missing_settings, needs_holding
 
 __all__ = [
     "Card",
@@ -99,7 +100,7 @@ class Cell:
     index: int
     """Place in the page's cells; the grid's rules name it."""
     config: str
-    """JSON for the host: slot, widget, inputs, outputs, options, title."""
+    """JSON for the host: slot, widget, inputs, outputs (see ``output.js``), options, title."""
     html: Markup
     """The widget's own rendered template; "" when it failed."""
     error: str
@@ -146,7 +147,8 @@ class WidgetContext:
     """
 
     title: str
-    """What the author calls this place, else the signal's, else the widget's title."""
+    """What the author calls this place, else the first needed signal's, else the first command's,
+    else the widget's title."""
     options: Mapping[str, object]
     """Checked against the manifest; every declared option has a key, None where nothing is set."""
     inputs: Mapping[str, Signal]
@@ -155,6 +157,9 @@ class WidgetContext:
     """The widget's name."""
     uid: str
     """Unique in the page, for ``id`` and ``aria-labelledby``."""
+    outputs: Mapping[str, str] = field(default_factory=dict)
+    """Output → what the command bound to it is called, for people; outputs that are not bound are
+    missing, so that a widget can leave out what would do nothing."""
 
 
 def menu_page(head: Head, robots: Mapping[str, Robot]) -> str:
@@ -219,10 +224,46 @@ def widget_context(use: WidgetUse, widget: Widget, profile: Profile, uid: str) -
     """Return what the widget's template may know."""
     signals = profile.driver.signals
     inputs = {name: signals[signal] for name, signal in use.inputs.items()}
+    outputs = {name: _called(command, profile.driver) for name, command in use.outputs.items()}
     declared: dict[str, object] = dict.fromkeys(widget.options)
-    first = next(iter(inputs.values()), None)
-    title = use.title or (first and (first.title or _spoken(first.name))) or widget.title
-    return WidgetContext(title, {**declared, **use.options}, inputs, widget.name, uid)
+    title = use.title or _heading(widget, inputs, outputs)
+    return WidgetContext(title, {**declared, **use.options}, inputs, widget.name, uid, outputs)
+
+
+def _heading(widget: Widget, inputs: Mapping[str, Signal], outputs: Mapping[str, str]) -> str:
+    """Return what the widget is about: the first signal it needs, else its command."""
+    needed = [name for name in inputs if widget.inputs[name].is_required]
+    about = [inputs[name].title or _spoken(inputs[name].name) for name in (*needed, *inputs)]
+    if not needed:
+        about = [*outputs.values(), *about]
+    return next(iter(about), widget.title)
+
+
+def _called(command: str, driver: Driver) -> str:
+    known = driver.commands.get(command)
+    return (known and known.title) or _spoken(command)
+
+
+def _output(command: str, driver: Driver) -> dict[str, object]:
+    """Return what ``output.js`` must know of one binding."""
+    known = driver.commands.get(command)
+    line = known.transport if known else ""
+    spec = driver.transports.get(line)
+    # A line that is only made for a command is tried again by the next command, and by nothing
+    # else: one that is lost must not keep anybody from giving it.
+    is_made_for_it = (
+        spec is not None
+        and spec.connection == "per_request"
+        and not any(poll.transport == line for poll in driver.polls)
+    )
+    return {
+        "command": command,
+        "names": {},
+        "fixed": {},
+        "line": "" if is_made_for_it else line,
+        "refusal": HELD if needs_holding(driver, command) else "",
+        "isAnswered": known is not None and (known.reply is not None or bool(known.steps)),
+    }
 
 
 def _cell(index: int, use: WidgetUse, profile: Profile, *, is_background: bool) -> Cell:
@@ -239,7 +280,9 @@ def _cell(index: int, use: WidgetUse, profile: Profile, *, is_background: bool) 
         "widget": use.widget,
         "title": context.title,
         "inputs": dict(use.inputs),
-        "outputs": dict(use.outputs),
+        "outputs": {
+            name: _output(command, profile.driver) for name, command in use.outputs.items()
+        },
         "options": dict(context.options),
     }
     return Cell(index, json.dumps(config), html, error, is_background)

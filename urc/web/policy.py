@@ -15,7 +15,15 @@ from typing import NamedTuple
 from starlette.exceptions import HTTPException
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-__all__ = ["BODY_BYTES", "Authority", "Policy", "is_host_allowed", "is_origin_ours", "parse_host"]
+__all__ = [
+    "BODY_BYTES",
+    "REFUSAL_HEADERS",
+    "Authority",
+    "Policy",
+    "is_host_allowed",
+    "is_origin_ours",
+    "parse_host",
+]
 
 BODY_BYTES = 1 << 20
 """Largest request body that is read, in bytes."""
@@ -48,6 +56,13 @@ _FIXED_HEADERS = (
         b"display-capture=(), payment=(), usb=(), serial=(), hid=(), midi=()",
     ),
 )
+
+
+REFUSAL_HEADERS = (
+    (b"content-security-policy", b"default-src 'none'; frame-ancestors 'none'"),
+    *_FIXED_HEADERS,
+)
+"""For a refusal in plain text that no application has made: nothing may run or load there."""
 
 
 class Authority(NamedTuple):

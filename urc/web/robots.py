@@ -12,6 +12,7 @@ from contextlib import AbstractAsyncContextManager, contextmanager
 from dataclasses import dataclass
 from typing import Protocol
 
+from urc.model.driver import Driver
 from urc.model.profile import Profile, Setting
 from urc.model.values import Value
 from urc.problems import UrcError
@@ -20,12 +21,22 @@ from urc.runtime.clock import Clock, LoopClock
 from urc.runtime.hub import Hub
 from urc.web.fanout import Fanout
 
-__all__ = ["Live", "Robot", "SessionFailed", "SessionLike", "Station", "missing_settings"]
+__all__ = [
+    "HELD",
+    "Live",
+    "Robot",
+    "SessionFailed",
+    "SessionLike",
+    "Station",
+    "missing_settings",
+    "needs_holding",
+]
 
 LINGER_S = 2.0
 OPEN_TIMEOUT_S = 10.0
 RETRY_S = 1.0
 CLIENTS = 256
+HELD = "this command moves the robot for as long as it is held, and nothing here can hold it"
 
 log = logging.getLogger(__name__)
 
@@ -75,6 +86,12 @@ def missing_settings(robot: Robot) -> tuple[Setting, ...]:
         for name, setting in robot.profile.settings.items()
         if robot.settings.get(name, setting.default) in (None, "")
     )
+
+
+def needs_holding(driver: Driver, command: str) -> bool:
+    """Return whether the command is motion: given once, it would never be stopped."""
+    known = driver.commands.get(command)
+    return known is not None and known.hold is not None
 
 
 class Station:

@@ -1,14 +1,16 @@
 """The HTTP server underneath: uvicorn, run from a coroutine, with low limits on what may wait.
 
-Floor 5. The only module that knows uvicorn. The kernel and the process keep as little unsent data
-per client as possible: whatever waits there grows old and can't be taken back.
+Floor 5. Besides `connection` the only module that knows uvicorn. The kernel and the process keep as
+little unsent data per client as possible: whatever waits there grows old and can't be taken back.
 """
 
 import asyncio
 import contextlib
+import ipaddress
 import signal
 import socket
 from collections.abc import Callable, Iterator
+from functools import partial
 from typing import Any, cast
 
 import uvicorn
@@ -17,14 +19,15 @@ from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIO
 from uvicorn.server import ServerState
 
 from urc.problems import UrcError
+from urc.web.addresses import local_addresses
+from urc.web.connection import CONNECTIONS, REQUEST_S, Connection
 from urc.web.wire import INBOUND_BYTES
 
-__all__ = ["serve"]
+__all__ = ["reachable_urls", "serve"]
 
 SEND_BUFFER_BYTES = 64 * 1024
 UNSENT_BYTES = 16 * 1024
 HEADER_BYTES = 16 * 1024
-CONNECTIONS = 1024
 PING_EVERY_S = 5.0
 PING_TIMEOUT_S = 10.0
 GRACE_S = 2
@@ -37,6 +40,8 @@ async def serve(
     host: str = "127.0.0.1",
     port: int = 8080,
     on_ready: Callable[[str], None] | None = None,
+    request_s: float = REQUEST_S,
+    connections: int = CONNECTIONS,
 ) -> None:
     """Serve `app` until SIGINT, SIGTERM or cancellation; then close within 3 seconds.
 
@@ -44,16 +49,20 @@ async def serve(
         app: what `build_app` made.
         host: an address or name of this machine.
         port: 0 lets the system choose one.
-        on_ready: called once with the real address, as ``http://127.0.0.1:8080/``.
+        on_ready: called once with an address to open, as ``http://127.0.0.1:8080/``: the first of
+            `reachable_urls`.
+        request_s: in which a connection must bring a whole request, in seconds.
+        connections: how many may be open at once; the next is answered with 503.
 
     Raises:
         UrcError: the address cannot be listened on.
     """
     listener = _listen(host, port)
+    connection = partial(Connection, request_s=request_s, most=connections)
     config = uvicorn.Config(
         app,
         loop="none",
-        http="h11",
+        http=cast("type[asyncio.Protocol]", connection),
         ws=_DashboardSocket,
         ws_max_size=INBOUND_BYTES,
         ws_ping_interval=PING_EVERY_S,
@@ -64,7 +73,6 @@ async def serve(
         access_log=False,
         proxy_headers=False,
         server_header=False,
-        limit_concurrency=CONNECTIONS,
         timeout_keep_alive=5,
         timeout_graceful_shutdown=GRACE_S,
         h11_max_incomplete_event_size=HEADER_BYTES,
@@ -75,7 +83,7 @@ async def serve(
             running = asyncio.ensure_future(server.serve(sockets=[listener]))
             await _until_ready(server, running)
             if on_ready and server.started:
-                on_ready(_url(listener))
+                on_ready(reachable_urls(*listener.getsockname()[:2])[0])
             await _follow(server, running)
     finally:
         listener.close()
@@ -158,6 +166,10 @@ def _listen(host: str, port: int) -> socket.socket:
         listener.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BUFFER_BYTES)
         if hasattr(socket, "TCP_NOTSENT_LOWAT"):
             listener.setsockopt(socket.IPPROTO_TCP, socket.TCP_NOTSENT_LOWAT, UNSENT_BYTES)
+        if family == socket.AF_INET6:
+            # "::" means every address, of both kinds, whatever the system's own default is.
+            with contextlib.suppress(OSError):  # a system that knows no such thing
+                listener.setsockopt(socket.IPPROTO_IPV6, socket.IPV6_V6ONLY, 0)
         listener.bind(address)
         listener.listen(BACKLOG)
     except OSError as error:
@@ -169,8 +181,28 @@ def _listen(host: str, port: int) -> socket.socket:
     return listener
 
 
-def _url(listener: socket.socket) -> str:
-    host, port = listener.getsockname()[:2]
+def reachable_urls(host: str, port: int) -> tuple[str, ...]:
+    """Return the addresses under which a dashboard that listens on `host` can be opened.
+
+    For ``0.0.0.0`` and ``::`` these are the addresses of this machine's interfaces, those of the
+    network first, or its loopback when it has none; else it is `host`. No packet is sent.
+
+    Args:
+        host: what is listened on: an address, or a name.
+        port: the real one.
+    """
+    try:
+        address = ipaddress.ip_address(host.partition("%")[0])
+    except ValueError:
+        return (_url(host, port),)
+    if not address.is_unspecified:
+        return (_url(host, port),)
+    found = [each for each in local_addresses() if each.version <= address.version]
+    loopback = ipaddress.ip_address("127.0.0.1" if address.version == 4 else "::1")
+    return tuple(_url(str(each), port) for each in found or [loopback])
+
+
+def _url(host: str, port: int) -> str:
     return f"http://[{host}]:{port}/" if ":" in host else f"http://{host}:{port}/"
 
 

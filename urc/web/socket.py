@@ -16,7 +16,14 @@ from starlette.websockets import WebSocketDisconnect
 
 from urc.runtime.session import CommandFailed
 from urc.web import wire
-from urc.web.robots import Live, SessionFailed, Station, missing_settings
+from urc.web.robots import (
+    HELD,
+    Live,
+    SessionFailed,
+    Station,
+    missing_settings,
+    needs_holding,
+)
 
 __all__ = ["Allowance", "Client", "Flow", "Line"]
 
@@ -235,6 +242,9 @@ class Client:
         task.add_done_callback(self._commands.discard)
 
     async def _run(self, asked: wire.Run, live: Live) -> None:
+        if needs_holding(self._station.robot.profile.driver, asked.command):
+            self._answer(wire.encode_reply(asked, code="refused", message=HELD))
+            return
         try:
             async with asyncio.timeout(COMMAND_TIMEOUT_S):
                 replied = await live.session.command(asked.command, asked.arguments)

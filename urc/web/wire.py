@@ -23,7 +23,7 @@ import msgspec
 
 from urc.model.driver import Command, Driver, Poll
 from urc.model.profile import Profile
-from urc.model.values import Sample, Signal, Value
+from urc.model.values import Reading, Sample, Signal
 from urc.runtime.hub import LinkStatus, Note
 
 __all__ = [
@@ -100,7 +100,7 @@ class _Hello(_Outbound, tag="hello", omit_defaults=False, frozen=True):
 class _Values(_Outbound, tag="v", frozen=True):
     n: int
     i: list[int]
-    v: list[Value]
+    v: list[object]
     a: list[int]
     s: list[str] | None = None
 
@@ -135,7 +135,7 @@ class _Log(_Outbound, tag="log", omit_defaults=False, frozen=True):
 class _Reply(_Outbound, tag="reply", frozen=True):
     id: int
     ok: bool
-    values: Mapping[str, Value] | None = None
+    values: Mapping[str, object] | None = None
     code: str = ""
     message: str = ""
 
@@ -241,7 +241,7 @@ def encode_log(notes: Iterable[Note], first: int, now_s: float) -> str:
 
 
 def encode_reply(
-    run: Run, *, values: Mapping[str, Value] | None = None, code: str = "", message: str = ""
+    run: Run, *, values: Mapping[str, Reading] | None = None, code: str = "", message: str = ""
 ) -> str:
     """Return the answer to a command: its values, or `code` and `message` when it failed."""
     if code:
@@ -278,13 +278,21 @@ def _repaired(tree: object) -> object:
     return tree
 
 
-def _plain(value: Value) -> Value:
-    """Return the value as a browser can hold it."""
+def _plain(value: object) -> object:
+    """Return the value as a browser can hold it; of bytes, only how many there are."""
     if isinstance(value, str):
         return _cut(value)
     if type(value) is int and not -_EXACT <= value <= _EXACT:
         return str(value)
-    return value
+    if value is None or isinstance(value, (bool, int, float)):
+        return value
+    if isinstance(value, (bytes, bytearray)):
+        return {"bytes": len(value)}
+    if isinstance(value, Mapping):
+        return {str(name): _plain(item) for name, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(item) for item in value]
+    return _cut(str(value))
 
 
 def _cut(text: str) -> str:

@@ -15,6 +15,11 @@ const INSIDE = {
   standing: { x: 12, y: 28, w: 88, h: 168 },
 };
 
+/** How far from the inside the tip of a limit's mark is, its height, and half its width. */
+const TIP = 12;
+const HIGH = 8;
+const HALF = 5;
+
 /** Of a unit's character against a digit's. */
 const UNIT_WIDTH = 0.86;
 
@@ -41,7 +46,6 @@ export default {
       inside,
       isLying: name === "lying",
       full: find(el, `.battery-${name} .battery-full`),
-      rest: find(el, `.battery-${name} .battery-rest`),
       limits: find(el, `.battery-${name} .battery-limits`),
     }));
     const put = writer();
@@ -68,10 +72,8 @@ export default {
         for (const text of digits) put(text, "", level.text);
         for (const text of units) put(text, "", symbol);
         put(note, "", noteOf(level));
-        for (const { inside, isLying, full, rest, limits } of pictures) {
-          const [first, second] = split(inside, share, isLying);
-          putBox(put, full, isLying ? first : second);
-          putBox(put, rest, isLying ? second : first);
+        for (const { inside, isLying, full, limits } of pictures) {
+          putBox(put, full, filled(inside, share, isLying));
           put(limits, "d", marks.map((place) => mark(inside, place, isLying)).join(""));
         }
 
@@ -85,31 +87,21 @@ export default {
 };
 
 /**
- * Cut the whole drawing in two where the level ends: a lying battery fills from the left, a
- * standing one from below.
+ * The part of the inside that is full: a lying battery fills from the left, a standing one from
+ * below.
  *
  * @param {Box} inside
  * @param {number} share 0..1
  * @param {boolean} isLying
- * @returns {[Box, Box]} left and right, or upper and lower
+ * @returns {Box}
  */
-function split(inside, share, isLying) {
-  if (isLying) {
-    const x = inside.x + share * inside.w;
-    return [
-      { x: 0, y: 0, w: share > 0 ? x : 0, h: 208 },
-      { x: share > 0 ? x : 0, y: 0, w: 208, h: 208 },
-    ];
-  }
-  const y = share > 0 ? inside.y + (1 - share) * inside.h : 208;
-  return [
-    { x: 0, y: 0, w: 208, h: y },
-    { x: 0, y, w: 208, h: 208 - y },
-  ];
+function filled({ x, y, w, h }, share, isLying) {
+  if (isLying) return { x, y, w: share * w, h };
+  return { x, y: y + (1 - share) * h, w, h: share * h };
 }
 
 /**
- * Two short strokes at the edges of the inside, where a limit is.
+ * Two triangles that point at the shell from outside, where a limit is.
  *
  * @param {Box} inside
  * @param {number} place 0..1
@@ -118,10 +110,17 @@ function split(inside, share, isLying) {
 function mark({ x, y, w, h }, place, isLying) {
   if (isLying) {
     const at = (x + place * w).toFixed(1);
-    return `M${at} ${y - 6}v9M${at} ${y + h + 6}v-9`;
+    const [above, below] = [y - TIP, y + h + TIP];
+    return (
+      `M${at} ${above}l-${HALF}-${HIGH}h${2 * HALF}z` +
+      `M${at} ${below}l-${HALF} ${HIGH}h${2 * HALF}z`
+    );
   }
   const at = (y + (1 - place) * h).toFixed(1);
-  return `M${x - 6} ${at}h9M${x + w + 6} ${at}h-9`;
+  const [left, right] = [x - TIP, x + w + TIP];
+  return (
+    `M${left} ${at}l-${HIGH}-${HALF}v${2 * HALF}z` + `M${right} ${at}l${HIGH}-${HALF}v${2 * HALF}z`
+  );
 }
 
 /** @param {Reading} level */

@@ -12,6 +12,11 @@ const ALARMS = {
 };
 const POINTS = 600;
 const DRAW_EVERY_MS = 100;
+const MOVE_EVERY_MS = 1000;
+/** A limit further away than so many times the height of the line is not drawn. */
+const NEAR = 3;
+/** Room above and below, as a share of the height. */
+const RIM = 0.04;
 
 export default {
   /**
@@ -26,7 +31,7 @@ export default {
     const note = find(el, ".value-note");
     const place = el.querySelector(".value-history");
     const windowS = seconds(options["history"]);
-    const history = place instanceof HTMLElement && windowS ? new History(place, windowS) : null;
+    const history = place && windowS ? new History(place, windowS) : null;
     signal.addEventListener("abort", () => history?.destroy());
 
     return {
@@ -42,9 +47,6 @@ export default {
         write(note, noteOf(reading));
         history?.add(reading);
       },
-      resize() {
-        history?.fit();
-      },
     };
   },
 };
@@ -52,21 +54,33 @@ export default {
 /** The last minutes as a line, drawn by uPlot where the build has brought it. */
 class History {
   /**
-   * @param {HTMLElement} place
+   * @param {Element} root holds the three parts
    * @param {number} windowS
    */
-  constructor(place, windowS) {
-    this.place = place;
+  constructor(root, windowS) {
+    this.root = root;
     this.windowS = windowS;
+    this.place = find(root, ".value-plot");
+    this.most = find(root, ".value-most");
+    this.least = find(root, ".value-least");
     /** @type {number[]} */
     this.times = [];
-    /** @type {(number | null)[]} */
+    /** A gap is a null: what was not measured is not drawn. @type {(number | null)[]} */
     this.values = [];
+    /** Lowest and highest that is drawn. @type {[number, number]} */
+    this.scale = [0, 1];
+    /** @type {Reading["signal"]} */
+    this.signal = { name: "", type: "number" };
     this.serial = -1;
     this.drawnMs = 0;
+    this.limitsShown = "";
     /** uPlot's instance: its types are not part of this page. @type {any} */
     this.plot = null;
     this.isOver = false;
+    // The line moves on with the time, also when nothing comes.
+    this.timer = setInterval(() => this.draw(), MOVE_EVERY_MS);
+    // Not the cell's size: the figures beside the line take of its width.
+    this.sizes = new ResizeObserver(() => this.plot?.setSize(sizeOf(this.place)));
     void this.load();
   }
 
@@ -75,65 +89,132 @@ class History {
       const name = "uplot";
       const { default: Plot } = await import(name);
       if (this.isOver) return;
-      this.plot = new Plot(plotOptions(this.place), [this.times, this.values], this.place);
+      const end = () => performance.now() / 1000;
+      const options = {
+        ...sizeOf(this.place),
+        padding: [0, 0, 0, 0],
+        cursor: { show: false },
+        legend: { show: false },
+        axes: [{ show: false }, { show: false }],
+        scales: {
+          x: { time: false, range: () => [end() - this.windowS, end()] },
+          y: { range: () => this.scale },
+        },
+        // Asked anew for each drawing, so that the line follows the theme.
+        series: [{}, { stroke: () => getComputedStyle(this.place).color, width: 2, points: { show: false } }],
+      };
+      this.plot = new Plot(options, [this.times, this.values], this.place);
+      this.sizes.observe(this.place);
     } catch (error) {
       // The number is the widget; the line is an extra that some installations don't have.
       console.info("value: no history is drawn:", error);
-      this.place.hidden = true;
+      if (this.root instanceof HTMLElement) this.root.hidden = true;
     }
   }
 
   /** @param {Reading} reading */
-  add(reading) {
-    const { value } = reading;
-    const isLive = reading.state === "live" && typeof value === "number";
-    if (reading.serial === this.serial || !isLive) return;
-    this.serial = reading.serial;
+  add({ value, state, signal, serial, time }) {
+    this.signal = signal;
     const last = this.times.at(-1) ?? -Infinity;
-    // At most POINTS in the window: newer readings replace the last point in between.
-    const isClose = reading.time - last < this.windowS / POINTS && this.times.length > 1;
-    if (isClose || reading.time <= last) {
-      this.values[this.values.length - 1] = value;
-    } else {
-      this.times.push(reading.time);
-      this.values.push(value);
-    }
-    while ((this.times[0] ?? Infinity) < reading.time - this.windowS) {
-      this.times.shift();
-      this.values.shift();
-    }
-    const nowMs = performance.now();
-    if (this.plot && nowMs - this.drawnMs > DRAW_EVERY_MS) {
-      this.drawnMs = nowMs;
-      this.plot.setData([this.times, this.values]);
+    if (state !== "live" || typeof value !== "number") {
+      if ((this.values.at(-1) ?? null) !== null) this.push(last + 1e-3, null);
+      this.draw();
+    } else if (serial !== this.serial) {
+      this.serial = serial;
+      // At most POINTS in the window: newer readings replace the last point in between.
+      const isClose = time - last < this.windowS / POINTS && typeof this.values.at(-1) === "number";
+      if (isClose || time <= last) this.values[this.values.length - 1] = value;
+      else this.push(time, value);
+      if (performance.now() - this.drawnMs > DRAW_EVERY_MS) this.draw();
     }
   }
 
-  fit() {
-    this.plot?.setSize(sizeOf(this.place));
+  /**
+   * @param {number} time in seconds
+   * @param {number | null} value
+   */
+  push(time, value) {
+    this.times.push(time);
+    this.values.push(value);
+    if (this.times.length > 2 * POINTS) this.drop();
+  }
+
+  drop() {
+    this.times.shift();
+    this.values.shift();
+  }
+
+  draw() {
+    this.drawnMs = performance.now();
+    const startS = this.drawnMs / 1000 - this.windowS;
+    // The last point before the window stays: from there the line comes in. A gap needs no start.
+    while ((this.times[1] ?? Infinity) < startS) this.drop();
+    if (this.times.length === 1 && (this.times[0] ?? 0) < startS) this.drop();
+    const known = this.values.filter((value) => value !== null);
+    const limits = Object.entries(this.signal.limits ?? {});
+    const ends = scaleOf(known, limits.map(([, limit]) => limit));
+    const rim = (ends[1] - ends[0]) * RIM;
+    this.scale = [ends[0] - rim, ends[1] + rim];
+    write(this.least, known.length > 0 ? this.figure(ends[0]) : "");
+    write(this.most, known.length > 0 ? this.figure(ends[1]) : "");
+    this.drawLimits(known.length > 0 ? limits : []);
+    this.plot?.setData([this.times, this.values]);
+  }
+
+  /** @param {number} value */
+  figure(value) {
+    const { precision } = this.signal;
+    return precision === undefined ? String(Number(value.toPrecision(4))) : value.toFixed(precision);
+  }
+
+  /** @param {[string, number][]} limits */
+  drawLimits(limits) {
+    const [least, most] = this.scale;
+    const seen = limits.filter(([, limit]) => limit > least && limit < most);
+    const places = seen.map(([name, limit]) => [name, `${(100 * (most - limit)) / (most - least)}%`]);
+    if (JSON.stringify(places) === this.limitsShown) return;
+    this.limitsShown = JSON.stringify(places);
+    for (const old of this.place.querySelectorAll(".value-limit")) old.remove();
+    for (const [name, top] of places) {
+      const line = document.createElement("div");
+      line.className = "value-limit";
+      line.dataset["limit"] = name ?? "";
+      line.style.top = top ?? "";
+      this.place.append(line);
+    }
   }
 
   destroy() {
     this.isOver = true;
+    clearInterval(this.timer);
+    this.sizes.disconnect();
     this.plot?.destroy();
   }
 }
 
-/** @param {HTMLElement} place */
-function plotOptions(place) {
-  // Asked anew for each drawing, so that the line follows the theme.
-  const stroke = () => getComputedStyle(place).color;
-  return {
-    ...sizeOf(place),
-    padding: [4, 4, 4, 4],
-    cursor: { show: false },
-    legend: { show: false },
-    axes: [{ show: false }, { show: false }],
-    series: [{}, { stroke, width: 2, points: { show: false } }],
-  };
+/**
+ * What is drawn from bottom to top: all values, and the next limits where they are not so far off
+ * that the line would become flat.
+ *
+ * @param {number[]} values
+ * @param {number[]} limits
+ * @returns {[number, number]}
+ */
+function scaleOf(values, limits) {
+  if (values.length === 0) return [0, 1];
+  let least = Math.min(...values);
+  let most = Math.max(...values);
+  if (least === most) {
+    const room = Math.abs(most) / 10 || 1;
+    [least, most] = [least - room, most + room];
+  }
+  const near = NEAR * (most - least);
+  const above = Math.min(...limits.filter((limit) => limit > most && limit <= most + near));
+  const below = Math.max(...limits.filter((limit) => limit < least && limit >= least - near));
+  return [Number.isFinite(below) ? below : least, Number.isFinite(above) ? above : most];
 }
 
-/** @param {HTMLElement} place */
+/** @param {Element} place */
 function sizeOf(place) {
   return { width: Math.max(1, place.clientWidth), height: Math.max(1, place.clientHeight) };
 }

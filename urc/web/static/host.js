@@ -8,9 +8,11 @@
  *
  * @typedef {import("./types.js").Context} Context
  * @typedef {import("./types.js").Instance} Instance
+ * @typedef {import("./types.js").Outlet} Outlet
  * @typedef {import("./types.js").Reading} Reading
  * @typedef {import("./types.js").Value} Value
  * @typedef {import("./types.js").WidgetModule} WidgetModule
+ * @typedef {import("./output.js").Output} Output
  * @typedef {import("./store.js").Store} Store
  *
  * @typedef {object} Config
@@ -18,11 +20,12 @@
  * @property {string} widget
  * @property {string} title
  * @property {Record<string, string>} inputs
- * @property {Record<string, string>} outputs
+ * @property {Record<string, Output>} outputs
  * @property {Record<string, unknown>} options
  *
  * @typedef {(command: string, args: Record<string, Value>) => Promise<Record<string, Value>>} Run
  */
+import { argumentsOf } from "./output.js";
 
 class Cell {
   /**
@@ -37,6 +40,7 @@ class Cell {
     /** @type {Config} */
     this.config = JSON.parse(el.dataset["config"] ?? "{}");
     this.inputs = Object.entries(this.config.inputs);
+    this.outputs = Object.entries(this.config.outputs);
     this.end = new AbortController();
     /** @type {Instance} */
     this.instance = {};
@@ -44,7 +48,7 @@ class Cell {
     this.isVisible = true;
     /** @type {Map<string, ((reading: Reading) => void)[]>} */
     this.listeners = new Map();
-    /** What each input looked like when the widget last saw it. @type {Map<string, string>} */
+    /** What each input and output was like when the widget last saw it. @type {Map<string, string>} */
     this.seen = new Map();
     /** @type {{width: number, height: number} | null} */
     this.size = null;
@@ -80,13 +84,13 @@ class Cell {
         this.listeners.set(input, [...(this.listeners.get(input) ?? []), listener]);
       },
       send: (/** @type {string} */ output, /** @type {Record<string, Value>} */ args = {}) => {
-        const command = Object.hasOwn(this.config.outputs, output)
+        const bound = Object.hasOwn(this.config.outputs, output)
           ? this.config.outputs[output]
           : undefined;
-        if (command === undefined) {
+        if (bound === undefined) {
           return Promise.reject(new Error(`the output ${output} is not bound to a command`));
         }
-        return this.run(command, args);
+        return this.run(bound.command, argumentsOf(bound, args));
       },
     });
   }
@@ -103,9 +107,13 @@ class Cell {
     const readings = Object.create(null);
     /** @type {string[]} */
     const changed = [];
+    const outlets = this.outlets(store);
+    const outlook = JSON.stringify(outlets);
+    const isOutputNews = this.seen.get("") !== outlook; // no input has this name
+    this.seen.set("", outlook);
     for (const [input, signal] of this.inputs) {
       const reading = store.reading(signal, nowMs);
-      const look = `${reading.serial} ${reading.state} ${reading.age} ${reading.signal.title ?? ""}`;
+      const look = `${reading.serial} ${reading.state} ${reading.age} ${store.edition}`;
       readings[input] = reading;
       if (this.seen.get(input) !== look) {
         this.seen.set(input, look);
@@ -117,15 +125,29 @@ class Cell {
         this.instance.resize?.(this.size);
         this.size = null;
       }
-      if (changed.length === 0) return;
+      if (changed.length === 0 && !isOutputNews) return;
       for (const input of changed) {
         const reading = readings[input];
         if (reading) this.listeners.get(input)?.forEach((listener) => listener(reading));
       }
-      this.instance.update?.(readings);
+      this.instance.update?.(readings, outlets);
     } catch (error) {
       this.fail(error);
     }
+  }
+
+  /**
+   * @param {Store} store
+   * @returns {Record<string, Outlet>}
+   */
+  outlets(store) {
+    /** @type {Record<string, Outlet>} */
+    const found = Object.create(null);
+    for (const [name, { line, refusal, isAnswered }] of this.outputs) {
+      const reason = refusal || store.hindrance(line);
+      found[name] = { isReady: reason === "", reason, isAnswered };
+    }
+    return found;
   }
 
   /**

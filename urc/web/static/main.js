@@ -33,7 +33,7 @@ const socket = new Socket(address.href, {
   message: take,
   trip: wake,
   state(isUp) {
-    store.setUp(isUp);
+    store.setUp(isUp, performance.now());
     if (!isUp) giveUpCommands();
     wake();
   },
@@ -68,7 +68,7 @@ function take(message) {
       session = message.session;
       break;
     case "links":
-      store.setLinks(message.links);
+      store.setLinks(message.links, nowMs);
       break;
     case "log":
       panel.addLines(message.lines, message.first, session);

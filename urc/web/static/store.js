@@ -21,6 +21,11 @@
 
 /** After so many times its greatest age a value is not shown any more. */
 const GONE_AFTER = 10;
+/**
+ * Nor after its line has been down for so long: nobody knows then what has become of it, however
+ * patient its signal is.
+ */
+const CUT_OFF_MS = 60_000;
 /** How fast two good clocks may run apart. */
 const DRIFT = 1e-4;
 const SHORT_TRIP_MS = 250;
@@ -38,8 +43,14 @@ export class Store {
     this.samples = new Map();
     /** @type {Map<string, Link>} */
     this.links = new Map();
+    /** Since when each line that is down has been so. @type {Map<string, number>} */
+    this.downMs = new Map();
     this.isUp = false;
+    /** When the connection to URC was lost. */
+    this.lostMs = 0;
     this.serial = 0;
+    /** Grows when the server says anew what the signals mean. */
+    this.edition = 0;
     this.skewMs = Infinity;
     this.skewSetMs = 0;
   }
@@ -53,13 +64,19 @@ export class Store {
   hello(hello, nowMs) {
     this.signals = new Map(hello.signals.map((signal) => [signal.name, signal]));
     this.names = hello.signals.map((signal) => signal.name);
+    this.edition += 1;
     this.links = new Map();
+    this.downMs = new Map();
     this.skewMs = Infinity;
     this.lagMs(hello.now, nowMs);
   }
 
-  /** @param {boolean} isUp */
-  setUp(isUp) {
+  /**
+   * @param {boolean} isUp
+   * @param {number} nowMs
+   */
+  setUp(isUp, nowMs) {
+    if (this.isUp && !isUp) this.lostMs = nowMs;
     this.isUp = isUp;
     if (!isUp) this.links = new Map();
   }
@@ -83,9 +100,17 @@ export class Store {
     });
   }
 
-  /** @param {Link[]} links */
-  setLinks(links) {
+  /**
+   * @param {Link[]} links
+   * @param {number} nowMs
+   */
+  setLinks(links, nowMs) {
     this.links = new Map(links.map((link) => [link.transport, link]));
+    for (const { transport, state, since } of links) {
+      if (isConnected(state)) this.downMs.delete(transport);
+      // Lost, connecting, lost again: it has been down since the first of them.
+      else if (!this.downMs.has(transport)) this.downMs.set(transport, nowMs - since);
+    }
   }
 
   /**
@@ -112,7 +137,7 @@ export class Store {
     const signal = this.signals.get(name) ?? { name, type: "string" };
     const sample = this.samples.get(name);
     const ageMs = sample ? Math.max(0, nowMs - sample.timeMs) : 0;
-    const state = this.stateOf(signal, sample, ageMs);
+    const state = this.stateOf(signal, sample, ageMs, nowMs);
     const isShown = sample && (state === "live" || state === "stale");
     const value = isShown ? sample.value : null;
     return {
@@ -131,26 +156,46 @@ export class Store {
    * @param {Signal} signal
    * @param {Sample | undefined} sample
    * @param {number} ageMs
+   * @param {number} nowMs
    * @returns {State}
    */
-  stateOf(signal, sample, ageMs) {
+  stateOf(signal, sample, ageMs, nowMs) {
     if (!sample || sample.value === null) return "none";
     const limitMs = (signal.stale_after_s ?? 0) * 1000;
+    const cutOffMs = this.cutOffMs(signal, nowMs);
     if (limitMs > 0 && ageMs > GONE_AFTER * limitMs) return "gone";
+    if (cutOffMs > CUT_OFF_MS) return "gone";
     if (limitMs > 0 && ageMs > limitMs) return "stale";
-    return this.isCutOff(signal) ? "stale" : "live";
+    return cutOffMs >= 0 ? "stale" : "live";
   }
 
   /**
-   * Whether nothing new can come now, because the page or every line that brings it is cut off.
+   * For how long nothing new could come, because the page or every line that brings it is cut off;
+   * -1 while something can.
    *
    * @param {Signal} signal
+   * @param {number} nowMs
    */
-  isCutOff(signal) {
-    if (!this.isUp) return true;
+  cutOffMs(signal, nowMs) {
     const sources = signal.sources?.length ? signal.sources : [...this.links.keys()];
     const states = sources.map((source) => this.links.get(source)?.state);
-    return states.length > 0 && !states.some((state) => state === "live" || state === "silent");
+    if (this.isUp && (states.length === 0 || states.some(isConnected))) return -1;
+    // The last of its lines that went down; without URC nothing is known of them any more.
+    const downMs = sources.map((source) => this.downMs.get(source) ?? Infinity);
+    const sinceMs = Math.max(-Infinity, ...downMs);
+    const isKnown = Number.isFinite(sinceMs);
+    if (!this.isUp) return nowMs - (isKnown ? Math.min(sinceMs, this.lostMs) : this.lostMs);
+    return isKnown ? Math.max(0, nowMs - sinceMs) : 0;
+  }
+
+  /**
+   * Why a command cannot be given now; "" when it can be tried.
+   *
+   * @param {string} transport the line that must not be lost; "" when one is made for each command
+   */
+  hindrance(transport) {
+    if (!this.isUp) return "no connection to URC";
+    return this.links.get(transport)?.state === "lost" ? "the robot is not connected" : "";
   }
 
   /**
@@ -166,6 +211,11 @@ export class Store {
     this.skewSetMs = nowMs;
     return skewMs - this.skewMs;
   }
+}
+
+/** @param {Link["state"] | undefined} state */
+function isConnected(state) {
+  return state === "live" || state === "silent";
 }
 
 /**

@@ -31,6 +31,12 @@
  * @property {number} serial Grows with each new reading, also of an equal value.
  * @property {Signal} signal
  *
+ * @typedef {object} Outlet One bound output of a widget at this moment.
+ * @property {boolean} isReady Whether its command can be given now.
+ * @property {string} reason Why not, for people; "" when it can.
+ * @property {boolean} isAnswered Whether the robot says that the command was done; else it is done
+ *   when it is sent.
+ *
  * @typedef {object} Link
  * @property {string} transport
  * @property {"idle" | "connecting" | "live" | "silent" | "lost"} state
@@ -72,12 +78,13 @@
  * @property {(input: string, listener: (reading: Reading) => void) => void} on
  *   Calls the listener in the animation frame after that input has changed.
  * @property {(output: string, args?: Record<string, Value>) => Promise<Record<string, Value>>} send
- *   Runs the command bound to the output; rejects with an Error that says why it was not done.
+ *   Runs the command bound to the output, with arguments by the names of the widget's manifest;
+ *   rejects with an Error that says why it was not done.
  * @property {AbortSignal} signal Aborted when the widget ends; give it to every listener.
  *
  * @typedef {object} Instance
- * @property {(readings: Readonly<Record<string, Reading>>) => void} [update]
- *   Called in an animation frame when any input has changed, with all bound inputs.
+ * @property {(readings: Readonly<Record<string, Reading>>, outputs: Readonly<Record<string, Outlet>>) => void} [update]
+ *   Called in an animation frame when any input or output has changed, with all that are bound.
  * @property {(size: {width: number, height: number}) => void} [resize] The cell's size in CSS pixels.
  * @property {() => void} [destroy]
  *
