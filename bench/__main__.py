@@ -6,7 +6,7 @@ from importlib import import_module
 
 from bench.harness import report
 
-NAMES = ("startup",)
+NAMES = ("startup", "engine_binary", "engine_text")
 
 
 def main() -> int:

@@ -8,10 +8,11 @@ import os
 import shutil
 import subprocess
 import sys
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from scripts.chromium.bring import BringError, bring_chromium
-from scripts.node import playwright_environment
+from scripts.node import node_executable, playwright_environment
 
 __all__ = ["NEEDS", "Brought", "Need", "bring"]
 
@@ -29,13 +30,16 @@ class Need:
     purpose: str
     variable: str = ""
     """The environment variable that names another executable, if there is one."""
+    other: Callable[[], str | None] | None = None
+    """Finds it where it is on no path."""
 
     def find(self) -> str | None:
         """Return what the variable names, else the first executable that is there."""
         named = os.environ.get(self.variable) if self.variable else None
-        return named or next(
+        found = named or next(
             (path for name in self.executables if (path := shutil.which(name))), None
         )
+        return found or (self.other() if self.other else None)
 
 
 # Later tests extend this table; nothing else has to know.
@@ -58,6 +62,13 @@ NEEDS = (
         executables=("socat",),
         package="socat",
         purpose="the tests against a server that is not URC",
+    ),
+    Need(
+        name="node",
+        executables=("node",),
+        package="nodejs",
+        purpose="the tests of the schemas in an editor's language server",
+        other=node_executable,
     ),
 )
 

@@ -8,6 +8,8 @@ turns small operands into a large result.
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
+from urc import _bytes, _rotation
+
 __all__ = ["FILTERS", "SCOPE", "filter_names"]
 
 MAX_TEXT = 65536
@@ -91,6 +93,8 @@ def _join(*parts: Any) -> str:
 
 
 def _text(value: Any) -> str:
+    if isinstance(value, bytes):
+        raise TypeError("bytes are no text; 'hex:' and 'bytes:' take them")
     return "" if value is None else str(value)
 
 
@@ -181,6 +185,8 @@ class Filter(NamedTuple):
 
     function: Callable[..., Any]
     arity: tuple[int, int]
+    gives_bytes: bool = False
+    """Only what is sent by ``hex:`` and ``bytes:`` may end in it."""
 
 
 FILTERS: dict[str, Filter] = {
@@ -193,12 +199,20 @@ FILTERS: dict[str, Filter] = {
     "length": Filter(_length, (0, 0)),
     "lower": Filter(lambda value: _require_text(value).lower(), (0, 0)),
     "pad": Filter(_pad, (1, 2)),
+    "pitch": Filter(_rotation.pitch, (0, 0)),
     "replace": Filter(_replace, (2, 2)),
+    "roll": Filter(_rotation.roll, (0, 0)),
     "round": Filter(_round, (0, 1)),
     "string": Filter(_text, (0, 0)),
     "trim": Filter(lambda value: _require_text(value).strip(), (0, 0)),
     "upper": Filter(lambda value: _require_text(value).upper(), (0, 0)),
+    "yaw": Filter(_rotation.yaw, (0, 0)),
 }
+
+FILTERS |= {
+    name: Filter(one, (0, 0), gives_bytes=True) for name, one in _bytes.BYTE_FILTERS.items()
+}
+FILTERS |= {name: Filter(one, (more, more)) for name, (one, more) in _bytes.TEXT_FILTERS.items()}
 
 _OPERATORS = (_add, _sub, _mul, _div, _floordiv, _mod, _pow, _item, _join, _is_defined)
 
@@ -209,5 +223,5 @@ SCOPE |= {f"_filter_{name}": filter_.function for name, filter_ in FILTERS.items
 
 
 def filter_names() -> str:
-    """Return the names of all filters, for messages."""
-    return ", ".join(sorted(FILTERS))
+    """Return the names of all filters, for messages; those that give bytes are too many."""
+    return ", ".join(sorted(name for name, one in FILTERS.items() if not one.gives_bytes))

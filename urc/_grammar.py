@@ -11,26 +11,16 @@ that `resolve` returns, or a name out of `urc._filters.SCOPE`; keep it so.
 
 import re
 from collections.abc import Callable
-from typing import Final, NamedTuple
+from typing import Final
 
 from urc import _filters
+from urc._tokens import Refused, Token, float_of, integer_of, string_of, tokens_of
 
-__all__ = ["MAX_DEPTH", "Refused", "translate"]
+__all__ = ["COUNTERS", "MAX_DEPTH", "Refused", "translate"]
 
 MAX_DEPTH: Final = 40
 """Levels of brackets, and operators of one kind in a row."""
 
-_TOKEN = re.compile(
-    r"""(?P<space>\s+)
-    |(?P<float>\d[\d_]*(?:\.\d[\d_]*(?:[eE][+-]?\d+)?|[eE][+-]?\d+))
-    |(?P<integer>0[xX][0-9a-fA-F_]+|0[bB][01_]+|0[oO][0-7_]+|\d[\d_]*)
-    |(?P<name>[A-Za-z_][A-Za-z0-9_]*)
-    |(?P<string>'(?:[^'\\]|\\.)*'|"(?:[^"\\]|\\.)*")
-    |(?P<operator>\*\*|//|==|!=|<=|>=|[-+*/%~<>|.,()\[\]])""",
-    re.VERBOSE | re.DOTALL | re.ASCII,
-)
-_ESCAPE = re.compile(r"\\(?:x([0-9a-fA-F]{2})|u([0-9a-fA-F]{4})|(.))", re.DOTALL)
-_ESCAPES = {"n": "\n", "r": "\r", "t": "\t", "0": "\0", "\\": "\\", "'": "'", '"': '"'}
 _CONSTANTS = {
     "true": "True",
     "True": "True",
@@ -44,24 +34,19 @@ _COMPARE = frozenset(("==", "!=", "<", "<=", ">", ">="))
 _SUM = {"+": "_add", "-": "_sub"}
 _PRODUCT = {"*": "_mul", "/": "_div", "//": "_floordiv", "%": "_mod"}
 _TESTS = ("defined", "undefined", "none", "odd", "even")
-_MAX_DIGITS = 400
+COUNTERS: Final = "seq()"
+"""The root name under which a namespace keeps its counters; no name of a document can be so."""
+_COUNTER = re.compile(r"[a-z][a-z0-9_]{0,63}")
 
 
-class Refused(Exception):
-    """Why this text is no expression of the language, and the 0-based character of the fault."""
-
-    def __init__(self, message: str, offset: int) -> None:
-        super().__init__(message)
-        self.offset = offset
-
-
-class _Token(NamedTuple):
-    kind: str
-    text: str
-    offset: int
-
-
-def translate(text: str, resolve: Callable[[str], str], names: set[str], settings: set[str]) -> str:
+def translate(
+    text: str,
+    resolve: Callable[[str], str],
+    names: set[str],
+    settings: set[str],
+    *,
+    allows_bytes: bool = False,
+) -> str:
     """Return Python for the expression `text`.
 
     Args:
@@ -69,35 +54,16 @@ def translate(text: str, resolve: Callable[[str], str], names: set[str], setting
         resolve: root name → the Python that reads it.
         names: takes the root names used.
         settings: takes every NAME of ``settings.NAME``.
+        allows_bytes: whether the value may be bytes.
 
     Raises:
         Refused: it is no expression of the language.
     """
-    parser = _Parser(_tokens(text), resolve, names, settings)
+    parser = _Parser(tokens_of(text), resolve, names, settings)
+    parser.allows_bytes = allows_bytes
     python = parser.expression()
     parser.expect_end()
     return python
-
-
-def _tokens(text: str) -> list[_Token]:
-    tokens: list[_Token] = []
-    position = 0
-    while position < len(text):
-        found = _TOKEN.match(text, position)
-        if found is None or found.lastgroup is None:
-            raise Refused(_unreadable(text[position]), position)
-        if found.lastgroup != "space":
-            tokens.append(_Token(found.lastgroup, found[0], position))
-        position = found.end()
-    return [*tokens, _Token("end", "", len(text.rstrip()))]
-
-
-def _unreadable(character: str) -> str:
-    if character in "'\"":
-        return f"the quote {character} is never closed"
-    if character in "{}":
-        return "braces are not part of an expression"
-    return f"{character!r} is not part of an expression"
 
 
 class _Parser:
@@ -105,7 +71,7 @@ class _Parser:
 
     def __init__(
         self,
-        tokens: list[_Token],
+        tokens: list[Token],
         resolve: Callable[[str], str],
         names: set[str],
         settings: set[str],
@@ -116,6 +82,8 @@ class _Parser:
         self._resolve = resolve
         self._names = names
         self._settings = settings
+        self.allows_bytes = False
+        """Whether a filter that gives bytes may come last."""
 
     def expression(self) -> str:
         """``a if test else b``, and everything tighter."""
@@ -137,10 +105,10 @@ class _Parser:
             raise self._surprise()
 
     @property
-    def _next(self) -> _Token:
+    def _next(self) -> Token:
         return self._tokens[self._place]
 
-    def _advance(self) -> _Token:
+    def _advance(self) -> Token:
         token = self._tokens[self._place]
         self._place += 1
         return token
@@ -238,7 +206,7 @@ class _Parser:
         return value
 
     def _postfix(self) -> str:
-        is_settings = self._next == _Token("name", "settings", self._next.offset)
+        is_settings = self._next == Token("name", "settings", self._next.offset)
         value = self._primary()
         while True:
             if self._take("."):
@@ -246,7 +214,8 @@ class _Parser:
             elif self._take("["):
                 value = f"_item({value}, {self._subscript(is_settings)})"
             elif self._next.text == "(" and self._next.kind == "operator":
-                raise Refused("calls are not part of the language, only filters", self._next.offset)
+                text = "calls are not part of the language, only filters and seq()"
+                raise Refused(text, self._next.offset)
             else:
                 return value
             is_settings = False
@@ -254,7 +223,7 @@ class _Parser:
     def _key(self, is_settings: bool) -> str:
         token = self._advance()
         if token.kind == "integer":
-            return _integer(token)
+            return integer_of(token)
         if token.kind != "name":
             raise Refused("a name is expected after the dot", token.offset)
         if is_settings:
@@ -265,21 +234,23 @@ class _Parser:
         token = self._next
         key = self.expression()
         if is_settings and token.kind == "string" and self._next.text == "]":
-            self._settings.add(_string(token))
+            self._settings.add(string_of(token))
         self._expect("]")
         return key
 
     def _primary(self) -> str:
         token = self._advance()
         if token.kind == "integer":
-            return _integer(token)
+            return integer_of(token)
         if token.kind == "float":
-            return _float(token)
+            return float_of(token)
         if token.kind == "string":
-            return repr(_string(token))
+            return repr(string_of(token))
         if token.kind == "name" and token.text not in _KEYWORDS:
             if token.text in _CONSTANTS:
                 return _CONSTANTS[token.text]
+            if token.text == "seq" and self._take("("):
+                return self._counter(token)
             self._names.add(token.text)
             return self._resolve(token.text)
         if token.text == "(" and token.kind == "operator":
@@ -290,6 +261,30 @@ class _Parser:
             return f"[{', '.join(self._items(']'))}]"
         self._place -= 1
         raise self._surprise()
+
+    def _counter(self, token: Token) -> str:
+        """``seq('name', low, high)``, the only call: the next number of a counter."""
+        name, low, high = self._next, None, None
+        self._place += 1
+        if name.kind != "string" or not _COUNTER.fullmatch(string_of(name)):
+            raise Refused("'seq' takes a name in quotes first, such as 'id'", name.offset)
+        if self._take(","):
+            low = self._whole()
+        if low is not None and self._take(","):
+            high = self._whole()
+        if low is None or high is None or not self._take(")"):
+            raise Refused("write seq('name', lowest, highest) with whole numbers", token.offset)
+        if not 0 <= low < high < 1 << 64:
+            raise Refused(f"a counter cannot run from {low} to {high}", token.offset)
+        self._names.add(COUNTERS)
+        return f"{self._resolve(COUNTERS)}({string_of(name)!r}, {low}, {high})"
+
+    def _whole(self) -> int | None:
+        token = self._next
+        if token.kind != "integer":
+            return None
+        self._place += 1
+        return int(integer_of(token))
 
     def _items(self, closing: str) -> list[str]:
         items: list[str] = []
@@ -321,6 +316,10 @@ class _Parser:
             expected = str(least) if least == most else f"{least} to {most}"
             text = f"filter {token.text!r} takes {expected} arguments, found {len(arguments)}"
             raise Refused(text, token.offset)
+        is_last = self._next.text != "|"
+        if _filters.FILTERS[token.text].gives_bytes and is_last and not self.allows_bytes:
+            text = f"{token.text!r} gives bytes, which only 'hex:' and 'bytes:' can send"
+            raise Refused(text, token.offset)
         if token.text == "default":
             # The only filter that may meet a missing name, so its subject is evaluated inside it.
             subject = f"lambda: {subject}"
@@ -340,37 +339,3 @@ class _Parser:
         else:
             python = f"(_mod({subject}, 2) == {int(token.text == 'odd')})"
         return f"(not {python})" if is_negated else python
-
-
-def _integer(token: _Token) -> str:
-    text = token.text
-    if len(text) > _MAX_DIGITS:
-        raise Refused("the number is too large", token.offset)
-    try:
-        # "010" is ten in some languages and eight in others; in this one it is a mistake.
-        return repr(int(text, 0))
-    except ValueError:
-        raise Refused(f"{text!r} is not a number", token.offset) from None
-
-
-def _float(token: _Token) -> str:
-    try:
-        value = float(token.text)
-    except ValueError:
-        raise Refused(f"{token.text!r} is not a number", token.offset) from None
-    if value == float("inf"):
-        raise Refused("the number is too large", token.offset)
-    return repr(value)
-
-
-def _string(token: _Token) -> str:
-    def character(found: re.Match[str]) -> str:
-        code = found[1] or found[2]
-        if code:
-            return chr(int(code, 16))
-        if found[3] not in _ESCAPES:
-            text = f"'\\{found[3]}' is no escape in an expression"
-            raise Refused(text, token.offset + 1 + found.start())
-        return _ESCAPES[found[3]]
-
-    return _ESCAPE.sub(character, token.text[1:-1])

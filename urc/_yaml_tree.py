@@ -11,40 +11,17 @@ from typing import Any, Final, NamedTuple
 
 import yaml
 
+from urc._marks import Mark, Span
 from urc._yaml_scalars import DIGITS_MAX, resolve_plain
 from urc.problems import Problem, Severity
 
-__all__ = ["Limits", "Mark", "Span", "StoppedError", "TreeReader"]
+__all__ = ["Limits", "StoppedError", "TreeReader"]
 
 _TAGS: Final = "tag:yaml.org,2002:"
 _PATH_SHOWN: Final = 12
 _PROBLEMS_MOST: Final = 100
 """Findings after which a text is given up: each costs a look at its line, however long that is."""
 _CUT_COMMENT = re.compile(r" #[^\s#!]")
-
-
-class Span(NamedTuple):
-    """A place in the text: lines and columns are 1-based, the end is exclusive."""
-
-    line: int
-    column: int
-    end_line: int
-    end_column: int
-
-
-class Mark:
-    """Where one value stands, where its key stands, and the marks of what is inside it."""
-
-    __slots__ = ("children", "key", "span", "style")
-
-    def __init__(
-        self, span: Span, style: str, children: "dict[str | int, Mark] | None" = None
-    ) -> None:
-        self.span = span
-        self.style = style
-        """"" plain, "'", '"', "|", ">", "{" a mapping or list, "*" an alias."""
-        self.key: Span | None = None
-        self.children = {} if children is None else children
 
 
 class Limits(NamedTuple):

@@ -13,14 +13,17 @@ from collections.abc import Callable, Iterator, Mapping
 from typing import Any, Final
 
 from urc import _filters
-from urc._grammar import Refused, translate
+from urc._grammar import COUNTERS, Refused, translate
 from urc.problems import UrcError
 
 __all__ = [
+    "COUNTERS",
     "ExpressionError",
     "Template",
     "compile_expression",
     "compile_template",
+    "is_byte_filter",
+    "last_filter",
     "split_template",
     "text_of",
 ]
@@ -111,19 +114,26 @@ def compile_template(text: str) -> Template:
     return Template(text, python, frozenset(names), frozenset(settings))
 
 
-def compile_expression(text: str) -> Template:
-    """Compile an expression written without braces, as in ``when: battery > 20``."""
+def compile_expression(text: str, *, allows_bytes: bool = False) -> Template:
+    """Compile an expression written without braces, as in ``when: battery > 20``.
+
+    Args:
+        text: the expression.
+        allows_bytes: whether its value may be bytes: where bytes are written, not text.
+    """
     _check_length(text)
     if not text.strip():
         raise ExpressionError("an expression is expected here, found nothing")
     names: set[str] = set()
     settings: set[str] = set()
-    python = _translate(text, 0, names, settings)
+    python = _translate(text, 0, names, settings, allows_bytes=allows_bytes)
     return Template(text, python, frozenset(names), frozenset(settings))
 
 
 def text_of(value: object) -> str:
     """Return `value` as it goes into text."""
+    if isinstance(value, bytes):
+        raise ExpressionError("bytes are no text; 'hex:' and 'bytes:' take them")
     return value if isinstance(value, str) else "" if value is None else str(value)
 
 
@@ -190,10 +200,23 @@ def _closing(text: str, start: int) -> int:
     raise ExpressionError("'{{' is never closed by '}}'", start)
 
 
-def _translate(text: str, offset: int, names: set[str], settings: set[str]) -> str:
+def _translate(
+    text: str, offset: int, names: set[str], settings: set[str], *, allows_bytes: bool = False
+) -> str:
     """Return the Python for one expression; add what it uses to `names` and `settings`."""
     try:
-        return translate(text, "ns[{!r}]".format, names, settings)
+        return translate(text, "ns[{!r}]".format, names, settings, allows_bytes=allows_bytes)
     except Refused as error:
         shown = text.strip()
         raise ExpressionError(f"in {shown!r}: {error}", offset + error.offset) from None
+
+
+def last_filter(template: Template) -> str:
+    """Return the filter that makes the value of an expression, or ""."""
+    name = template.python.partition("(")[0]
+    return name.removeprefix("_filter_") if name.startswith("_filter_") else ""
+
+
+def is_byte_filter(name: str) -> bool:
+    """Return whether a filter gives bytes."""
+    return name in _filters.FILTERS and _filters.FILTERS[name].gives_bytes

@@ -11,13 +11,21 @@ first character, and the pattern must be anchored at the start.
 """
 
 import re
-from collections.abc import Mapping
+import warnings
+from collections.abc import Callable, Mapping
 from re import _constants, _parser  # type: ignore[attr-defined]  # no public door to the syntax tree
 from typing import Any, Final, Protocol
 
 from urc.problems import UrcError
 
-__all__ = ["Pattern", "PatternError", "compile_pattern", "example"]
+__all__ = [
+    "Pattern",
+    "PatternError",
+    "compile_pattern",
+    "example",
+    "is_plain_group",
+    "literal_prefix",
+]
 
 MAX_SOURCE: Final = 1024
 MAX_REPEAT: Final = 1000
@@ -73,6 +81,17 @@ class Pattern:
         """Whether it runs on `re`; RE2 otherwise."""
         self._search = search
 
+    @property
+    def places(self) -> Mapping[str, int]:
+        """Name of a group → its number."""
+        tree = _parser.parse(self.source, re.ASCII)
+        return dict(tree.state.groupdict)
+
+    @property
+    def match(self) -> Callable[[str], "re.Match[str] | None"] | None:
+        """The compiled matcher of a pattern that is proven; None for one that runs on RE2."""
+        return self._search if self.is_proven else None
+
     def search(self, text: str) -> Mapping[str, str | None] | None:
         """Return the named groups of the first match in `text`, or None."""
         found: _Match | None = self._search(text)
@@ -97,7 +116,13 @@ def compile_pattern(text: str) -> Pattern:
     if len(text) > MAX_SOURCE:
         raise PatternError(f"a pattern has at most {MAX_SOURCE} characters, found {len(text)}")
     try:
-        tree = _parser.parse(text, re.ASCII)
+        with warnings.catch_warnings():
+            # Python means to read "[[", "--", "&&" in a class in another way one day.
+            warnings.simplefilter("error", FutureWarning)
+            tree = _parser.parse(text, re.ASCII)
+    except FutureWarning as error:
+        words = str(error).lower()
+        raise PatternError(f"{words}: write a backslash before it: {text!r}") from None
     except re.error as error:
         raise PatternError(f"not a pattern: {error.msg}", error.pos or 0) from None
     except (RecursionError, OverflowError):
@@ -121,6 +146,48 @@ def example(pattern: Pattern, groups: Mapping[str, str]) -> str:
     tree = _parser.parse(pattern.source, re.ASCII)
     names = {number: name for name, number in tree.state.groupdict.items()}
     return _example(tree, names, groups)
+
+
+def literal_prefix(pattern: Pattern) -> str:
+    """Return the text with which everything begins that a proven pattern takes."""
+    if not pattern.is_proven:
+        return ""
+    prefix = ""
+    for operation, argument in list(_parser.parse(pattern.source, re.ASCII))[1:]:
+        if operation is not _constants.LITERAL:
+            break
+        prefix += chr(argument)
+    return prefix
+
+
+def is_plain_group(pattern: Pattern, name: str) -> bool:
+    """Return whether a group can hold neither ``_`` nor anything outside ASCII."""
+    tree = _parser.parse(pattern.source, re.ASCII)
+    found = _alphabet(tree, tree.state.groupdict[name])
+    return found is not None and not found & {_OTHER, ord("_")}
+
+
+def _alphabet(tree: Any, number: int) -> frozenset[int] | None:
+    """Return every character that the group can hold, or None when it is not in `tree`."""
+    for operation, argument in tree:
+        if operation is _constants.SUBPATTERN and argument[0] == number:
+            return _letters(argument[3])
+        for part in _parts(operation, argument):
+            found = _alphabet(part, number)
+            if found is not None:
+                return found
+    return None
+
+
+def _letters(tree: Any) -> frozenset[int]:
+    letters: frozenset[int] = frozenset()
+    for operation, argument in tree:
+        parts = _parts(operation, argument)
+        if parts:
+            letters = letters.union(*map(_letters, parts))
+        elif operation is not _constants.AT:
+            letters |= _characters(operation, argument) or _ALL
+    return letters
 
 
 def _example(tree: Any, names: Mapping[int, str], groups: Mapping[str, str]) -> str:

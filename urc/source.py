@@ -11,7 +11,8 @@ from typing import Any, Final
 import yaml
 
 from urc._files import read_bytes, refused, similar_file, too_large
-from urc._yaml_tree import Limits, Mark, Span, StoppedError, TreeReader, path_text
+from urc._marks import Mark, Span, Written
+from urc._yaml_tree import Limits, StoppedError, TreeReader, path_text
 from urc.problems import Problem, ProblemsError, Severity, has_errors
 
 __all__ = [
@@ -20,6 +21,7 @@ __all__ = [
     "Mark",
     "Path",
     "Span",
+    "Written",
     "parse_document",
     "read_document",
     "similar_file",
@@ -39,7 +41,10 @@ _ESCAPE = re.compile(r"\\(?:x.{2}|u.{4}|U.{8}|.)", re.DOTALL)
 
 
 class Document:
-    """One file's data with the place of every key and value. Not changed after it was read."""
+    """One file's data with the place of every key and value. Not changed after it was read.
+
+    Parts of the data may have come from other documents; their marks say from which (`source_of`).
+    """
 
     __slots__ = ("data", "file", "findings", "lines", "mark", "text")
 
@@ -73,6 +78,10 @@ class Document:
             mark = inner
         return mark
 
+    def source_of(self, path: Path) -> "Document":
+        """Return the document in whose text the value at `path` stands, or what is around it."""
+        return self._nearest(path)[0]
+
     def problem(
         self,
         path: Path,
@@ -97,15 +106,16 @@ class Document:
             length: characters to underline from `offset`.
             severity: ``error`` or ``warning``.
         """
-        span = self._span(path, key=key)
-        if offset is not None and not key:
-            span = self._inside(path, offset, length) or span
+        home, mark, depth = self._nearest(path)
+        span = _span(mark, key=key, is_inside=depth < len(path))
+        if offset is not None and not key and depth == len(path):
+            span = home.inside(mark, self._text_at(path), offset, length) or span
         end_column = span.end_column if span.end_line == span.line else 0
-        source = self.lines[span.line - 1] if span.line <= len(self.lines) else ""
+        source = home.lines[span.line - 1] if span.line <= len(home.lines) else ""
         return Problem(
             code,
             message,
-            self.file,
+            home.file,
             span.line,
             span.column,
             end_column,
@@ -115,36 +125,50 @@ class Document:
             severity,
         )
 
-    def _span(self, path: Path, *, key: bool) -> Span:
-        """Return the place of `path`, else of the nearest value around it."""
+    def _nearest(self, path: Path) -> tuple["Document", Mark, int]:
+        """Return the marks of `path`, else of the nearest value around it, and how deep it is."""
+        home: Document = self.mark.origin or self
         mark, depth = self.mark, 0
         for part in path:
             inner = mark.children.get(part)
             if inner is None:
                 break
             mark, depth = inner, depth + 1
-        wants_key = key or depth < len(path) or mark.style == "{"
-        if wants_key and mark.key is not None and (key or "{" in mark.style):
-            return mark.key
-        span = mark.span
-        # Of a mapping or list only the start says anything; underline its first character.
-        return span._replace(end_line=0) if mark.style == "{" else span
+            home = mark.origin or home
+        return home, mark, depth
 
-    def _inside(self, path: Path, offset: int, length: int) -> Span | None:
-        mark = self.at(path)
+    def _text_at(self, path: Path) -> str | None:
         value = self.data
         for part in path:
             value = value[part] if isinstance(value, (dict, list)) else None  # type: ignore[index]
-        if mark is None or not isinstance(value, str) or mark.style == "*":
+        return value if isinstance(value, str) else None
+
+    def inside(self, mark: Mark, text: str | None, offset: int, length: int) -> Span | None:
+        """Return the place of some characters of a text of this document, if it can be told."""
+        written = mark.written
+        if written is not None:
+            end = written.offset(offset + length)
+            offset, text = written.offset(offset), written.text
+            length = max(end - offset, 1)
+        if text is None or mark.style == "*":
             return None
         span = mark.span
         if mark.style in ("|", ">") or span.line != span.end_line:
-            return _inside_lines(self.lines, span, value, offset, length)
+            return _inside_lines(self.lines, span, text, offset, length)
         raw = self.lines[span.line - 1]
         start = _raw_column(raw, span.column - 1, mark.style, offset)
-        end = _raw_column(raw, span.column - 1, mark.style, min(offset + length, len(value)))
+        end = _raw_column(raw, span.column - 1, mark.style, min(offset + length, len(text)))
         start = min(start, max(span.end_column - 2, 0))
         return Span(span.line, start + 1, span.line, max(end, start + 1) + 1)
+
+
+def _span(mark: Mark, *, key: bool, is_inside: bool) -> Span:
+    """Return what to underline of a value: its key, itself, or the first character of it."""
+    wants_key = key or is_inside or mark.style == "{"
+    if wants_key and mark.key is not None and (key or "{" in mark.style):
+        return mark.key
+    # Of a mapping or list only the start says anything; underline its first character.
+    return mark.span._replace(end_line=0) if mark.style == "{" else mark.span
 
 
 def read_document(path: str, limits: Limits = _LIMITS) -> Document:

@@ -109,3 +109,15 @@ def test_the_installed_urc_validates_what_it_ships(installed: Path, tmp_path: Pa
     where = "from urc.shipped import shipped; print(shipped('robots') / 'puppet.yaml')"
     robot = run(installed / Path(sys.executable).name, "-c", where, cwd=tmp_path).strip()
     run(installed / "urc", "validate", robot, cwd=tmp_path)
+
+
+def test_the_installed_urc_explains_its_findings(installed: Path, tmp_path: Path) -> None:
+    """The pages of the codes are inside; reading them imports nothing but the standard library."""
+    assert run(installed / "urc", "explain", "tab", cwd=tmp_path).startswith("tab\n\nWhat: ")
+    question = (
+        "import sys; before = set(sys.modules); import urc.config.codes; urc.config.codes.pages()\n"
+        "print({name.partition('.')[0] for name in set(sys.modules) - before}"
+        " - sys.stdlib_module_names)"
+    )
+    answer = run(installed / Path(sys.executable).name, "-c", question, cwd=tmp_path)
+    assert answer.strip() == "{'urc'}"

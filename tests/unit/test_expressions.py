@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from jinja2 import StrictUndefined, TemplateError
 from jinja2.sandbox import SandboxedEnvironment
 
-from urc.expressions import ExpressionError, compile_expression, compile_template
+from urc.expressions import COUNTERS, ExpressionError, compile_expression, compile_template
 
 NAMESPACE = {"x": 7, "y": 2.5, "word": "Go", "settings": {"host": "10.0.0.5", "port": 6789}}
 
@@ -210,3 +210,38 @@ def test_whatever_both_can_say_means_the_same_as_in_jinja(source: str) -> None:
     except (TemplateError, TypeError, ValueError, ArithmeticError):
         return  # it folds constants that `or` would not have looked at, and chains no tests
     assert found == expected
+
+
+def test_a_counter_is_the_only_call() -> None:
+    """Its numbers come from the namespace; what it may be is known when it is compiled."""
+    asked = []
+
+    def draw(name: str, low: int, high: int) -> int:
+        asked.append((name, low, high))
+        return 7
+
+    template = compile_template("{{ seq('id', 0, 0xFF) | pad(3) }}/{{ seq }}")
+    assert template.names == {COUNTERS, "seq"}
+    assert template.evaluate({COUNTERS: draw, "seq": 1}) == "007/1"
+    assert asked == [("id", 0, 255)]
+
+
+@pytest.mark.parametrize(
+    ("text", "offset"),
+    [
+        ("seq()", 4),
+        ("seq(id, 0, 9)", 4),
+        ("seq('Id', 0, 9)", 4),
+        ("seq('id')", 0),
+        ("seq('id', 0)", 0),
+        ("seq('id', 0, x)", 0),
+        ("seq('id', 9, 9)", 0),
+        ("seq('id', 0, 9, 1)", 0),
+        ("seq('id', -1, 9)", 0),
+    ],
+)
+def test_a_counter_that_cannot_count_is_refused(text: str, offset: int) -> None:
+    """At the place of the fault."""
+    with pytest.raises(ExpressionError) as caught:
+        compile_expression(text)
+    assert caught.value.offset == offset

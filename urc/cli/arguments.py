@@ -26,6 +26,7 @@ __all__ = [
     "load",
     "parse",
     "port",
+    "profile_path",
     "what_it_has",
 ]
 
@@ -113,10 +114,10 @@ def load(word: str) -> "Profile":
     from urc.config.load import load_profile
     from urc.runtime.catalog import built_in_catalog
 
-    return load_profile(_profile_path(word), built_in_catalog())
+    return load_profile(profile_path(word), built_in_catalog())
 
 
-def _profile_path(word: str) -> str:
+def profile_path(word: str) -> str:
     """Return the file that `word` means: a path, or the name of a robot that ships with URC."""
     path = Path(word)
     if path.suffix or len(path.parts) > 1 or os.path.isfile(word):

@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from urc.cli.arguments import add_host, add_profile, load
-from urc.cli.output import complain
 
 if TYPE_CHECKING:
     from urc.model.profile import Profile
@@ -32,8 +31,6 @@ def run(arguments: argparse.Namespace) -> int:
     # What only a real robot needs to be told, nobody must fill in for its twin.
     settings = sample_settings(profile.settings) | values
     settings |= {name: 0 for name in missing if profile.settings[name].type == "port"}
-    if not profile.simulator:
-        complain(f"urc simulate: {profile.name} has no 'simulator': it will listen and say nothing")
     return run_loop(_simulate(profile, settings, arguments.host), code_when_ended=0)
 
 

@@ -5,11 +5,17 @@ Imports as little as it can: people run it on every save.
 
 import argparse
 from contextlib import suppress
+from typing import TYPE_CHECKING
 
 from urc.cli.output import complain, json_text
 from urc.problems import Problem, has_errors, to_json, to_text
 
+if TYPE_CHECKING:
+    from urc.runtime.coverage import Coverage
+
 EXAMPLE = "urc validate robots/*.yaml"
+
+FORMATS = ("text", "json", "sarif", "github")
 
 
 class _Report:
@@ -22,6 +28,10 @@ class _Report:
         """Tests that failed."""
         self.problems: list[Problem] = []
         """In the order of the command line; each once, though several documents may share it."""
+        self.coverage: list[Coverage] = []
+        """Of each profile whose tests were run."""
+        self.looked_at: dict[str, None] = {}
+        """Every file that the findings depend on, whether there is one or not."""
 
     def add(self, problems: list[Problem]) -> None:
         self.problems = list(dict.fromkeys([*self.problems, *problems]))
@@ -31,32 +41,64 @@ class _Report:
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the documents and the format."""
+    """Add the documents, the format and what is checked."""
     parser.add_argument("paths", metavar="PATH", nargs="+", help="documents of any kind")
     parser.add_argument(
-        "--format", choices=("text", "json"), default="text", help="of the report (default: text)"
+        "--format", choices=FORMATS, default="text", help="of the report (default: text)"
     )
     parser.add_argument("--strict", action="store_true", help="warnings fail, too")
     parser.add_argument(
         "--no-tests", action="store_true", help="leave out the documents' own tests"
     )
+    parser.add_argument(
+        "--coverage", action="store_true", help="list what the documents' own tests leave out"
+    )
+    parser.add_argument(
+        "--watch", action="store_true", help="check again whenever a document changes, until Ctrl-C"
+    )
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Check all documents, print the report; 1 when there is an error in any of them."""
-    report = _examine(list(dict.fromkeys(arguments.paths)), with_tests=not arguments.no_tests)
+    paths = list(dict.fromkeys(arguments.paths))
+    if arguments.watch:
+        return _watch(paths, arguments)
+    report = _examine(paths, with_tests=not arguments.no_tests)
     with suppress(BrokenPipeError):  # `urc validate … | head` has findings all the same
-        if arguments.format == "json":
-            print(json_text(_as_json(report), indent=2))
-        else:
-            _print_text(report)
+        _print(report, arguments, indent=2)
+    return _exit_code(report, arguments)
+
+
+def _exit_code(report: _Report, arguments: argparse.Namespace) -> int:
     return int(has_errors(report.problems) or (arguments.strict and bool(report.problems)))
+
+
+def _watch(paths: list[str], arguments: argparse.Namespace) -> int:
+    """Check now and after every change; Ctrl-C ends it with the code of the last check."""
+    from urc.runtime.changes import Watched, wait_for_change
+
+    code = 0
+    try:
+        while True:
+            watched = Watched(paths)  # before they are read: no change may fall in between
+            report = _examine(paths, with_tests=not arguments.no_tests)
+            watched.add(report.looked_at)
+            code = _exit_code(report, arguments)
+            _print(report, arguments)
+            if arguments.format == "text":
+                complain("watching; Ctrl-C ends it")
+            changed = wait_for_change(watched)
+            if arguments.format == "text":
+                complain(f"changed: {', '.join(changed)}")
+    except KeyboardInterrupt:
+        return code
 
 
 def _examine(paths: list[str], *, with_tests: bool) -> _Report:
     from urc.config.load import Shelf, check
     from urc.runtime.catalog import built_in_catalog
-    from urc.runtime.selftest import run_tests
+    from urc.runtime.coverage import measure
+    from urc.runtime.selftest import exercise
     from urc.shipped import shipped
 
     report, catalog, shelf = _Report(), built_in_catalog(), Shelf(shipped("widgets"))
@@ -64,22 +106,56 @@ def _examine(paths: list[str], *, with_tests: bool) -> _Report:
         report.files += 1
         checked = check(path, catalog, shelf)
         report.add(list(checked.problems))
+        report.looked_at |= dict.fromkeys(checked.files)
         if checked.profile is not None and with_tests:
-            failures = run_tests(checked.profile)
+            outcome = exercise(checked.profile)
             report.tests += len(checked.profile.tests)
-            report.failed += len(failures)
-            report.add(failures)
+            report.failed += len(outcome.problems)
+            report.add(outcome.problems)
+            report.coverage.append(measure(path, checked.profile.driver, outcome.exercised))
     return report
 
 
-def _print_text(report: _Report) -> None:
-    for problem in report.problems:
-        print(to_text(problem))
+def _print(report: _Report, arguments: argparse.Namespace, indent: int | None = None) -> None:
+    """Print a report; without `indent`, a report for programs is one line."""
+    if arguments.format == "json":
+        print(json_text(_as_json(report), indent), flush=True)
+    elif arguments.format == "sarif":
+        from urc import __version__
+        from urc.config.codes import summaries
+        from urc.config.formats import to_sarif
+
+        log = to_sarif(report.problems, __version__, summaries())
+        print(json_text(log, indent), flush=True)
+    else:
+        if arguments.format == "github":
+            from urc.config.formats import to_github as tell
+        else:
+            tell = to_text
+        for problem in report.problems:
+            print(tell(problem), flush=True)
+        if arguments.coverage:
+            _print_coverage(report)
+        complain(_summary(report))
+
+
+def _print_coverage(report: _Report) -> None:
+    for coverage in report.coverage:
+        tested = coverage.total - len(coverage.untested)
+        print(f"{coverage.file}: {tested} of {coverage.total} commands, polls and messages tested")
+        for kind, name in coverage.untested:
+            print(f"  no test of {kind} {name}")
+
+
+def _summary(report: _Report) -> str:
+    from urc.runtime.coverage import summary
+
     words = [_count(report.count(severity), severity) for severity in ("error", "warning")]
     if report.tests:
         passed = report.tests - report.failed
         words.append(f"{passed} of {_count(report.tests, 'test')} passed")
-    complain(f"{_count(report.files, 'document')}: {', '.join(words)}")
+    words += filter(None, [summary(report.coverage)])
+    return f"{_count(report.files, 'document')}: {', '.join(words)}"
 
 
 def _count(number: int, noun: str) -> str:
@@ -92,5 +168,13 @@ def _as_json(report: _Report) -> dict[str, object]:
         "errors": report.count("error"),
         "warnings": report.count("warning"),
         "tests": {"run": report.tests, "failed": report.failed},
+        "coverage": [
+            {
+                "file": coverage.file,
+                "total": coverage.total,
+                "untested": [{"kind": kind, "name": name} for kind, name in coverage.untested],
+            }
+            for coverage in report.coverage
+        ],
         "problems": [to_json(problem) for problem in report.problems],
     }

@@ -13,13 +13,18 @@ and for writing:
 `part` is what stands under the form's key; None means that it was reported.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from importlib import import_module
 from typing import Any, NamedTuple, Protocol, cast
 
+from urc.config.beside_form import beside_form
 from urc.config.part import Findings, Part
 from urc.expressions import Template
+from urc.model.binary import Item
 from urc.model.codec import ReadSpec, WriteSpec
+from urc.model.driver import FramingSpec
+from urc.model.values import NOTHING
+from urc.registry import Catalog
 
 __all__ = [
     "READ_FORMS",
@@ -35,9 +40,20 @@ __all__ = [
 
 READ_FORMS = {
     "regex": "urc.config.form_regex",
+    "pattern": "urc.config.form_pattern",
+    "split": "urc.config.form_split",
+    "keyvalue": "urc.config.form_keyvalue",
+    "json": "urc.config.form_json",
+    "xml": "urc.config.form_xml",
+    "equals": "urc.config.form_equals",
+    "struct": "urc.config.form_struct",
 }
 WRITE_FORMS = {
     "text": "urc.config.form_text",
+    "hex": "urc.config.form_hex",
+    "bytes": "urc.config.form_bytes",
+    "json": "urc.config.form_json_text",
+    "struct": "urc.config.form_struct",
 }
 _NO_READ = ReadSpec("regex")
 _NO_WRITE = WriteSpec("text")
@@ -48,6 +64,16 @@ class FormContext(NamedTuple):
 
     encoding: str = "utf-8"
     """Of the line that the frame comes from or goes to."""
+    signals: frozenset[str] = frozenset()
+    """Names of the driver's signals."""
+    types: Mapping[str, tuple[Item, ...]] = NOTHING
+    """The driver's reusable structs."""
+    enums: Mapping[str, tuple[tuple[int, str], ...]] = NOTHING
+    """The driver's lists of words for numbers."""
+    catalog: Catalog | None = None
+    """Which framings there are, for a frame that brings its own."""
+    framing: FramingSpec | None = None
+    """Of that line; None where the frame brings its own."""
 
 
 class ReadForm(Protocol):
@@ -82,10 +108,9 @@ def read_form(part: Part) -> tuple[Part, ReadForm] | None:
 def write_form(part: Part) -> tuple[Part, WriteForm]:
     """Return what stands under ``send:``, or under the form's key in it, and the form's module."""
     if isinstance(part.data, dict):
-        for key in WRITE_FORMS:
-            inner = part.get(key)
-            if inner is not None:
-                return inner, cast("WriteForm", import_module(WRITE_FORMS[key]))
+        for key in part.data:
+            if key in WRITE_FORMS:
+                return part.must(key), cast("WriteForm", import_module(WRITE_FORMS[key]))
     return part, cast("WriteForm", import_module(WRITE_FORMS["text"]))
 
 
@@ -107,7 +132,8 @@ def parse_read(part: Part, findings: Findings, context: FormContext) -> ReadSpec
     if found_form is None:
         return _NO_READ
     inner, form = found_form
-    return form.parse_read(inner, findings, context) or _NO_READ
+    spec = form.parse_read(inner, findings, context) or _NO_READ
+    return beside_form(part, spec, findings)
 
 
 def parse_write(part: Part, findings: Findings, context: FormContext) -> WriteSpec:

@@ -1,24 +1,21 @@
 """The first passes: read a document and check its shape, then those that it refers to.
 
 The result says, for each part of a profile, in which document it stands: a robot may keep its
-driver and its interfaces in files of their own.
+driver and its interfaces in files of their own, and each of them may build on others.
 """
 
-import os
-from typing import Final
+from typing import NamedTuple
 
+from urc.config.each import expand
+from urc.config.library import Library
+from urc.config.merge import Tree, merge
+from urc.config.params import fill_params
 from urc.config.part import Findings, Part
-from urc.config.shape import check_shape, kind_of
+from urc.config.shape import check_shape, kind_of, read_schema
 from urc.problems import Problem, ProblemsError, has_errors
-from urc.source import read_document, similar_file
+from urc.source import Document
 
-__all__ = ["Sources", "gather"]
-
-_DRIVER_KEYS: Final = ("transports", "signals", "messages", "commands", "polls")
-_FILE_CODES: Final = (
-    "no-such-file", "is-directory", "not-a-file", "not-readable", "too-large",
-)  # fmt: skip
-_ARTICLES: Final = {"interface": "an interface"}
+__all__ = ["Gathered", "Sources", "gather"]
 
 
 class Sources:
@@ -45,47 +42,98 @@ class Sources:
         self.simulator |= part.named("simulator")
 
 
-def gather(path: str) -> tuple[Sources | None, list[Problem]]:
-    """Return where everything is, or None with the errors that stop here."""
+class Gathered(NamedTuple):
+    """What the first passes give."""
+
+    sources: Sources | None
+    """None when an error stops here, or the document is only a part of others."""
+    problems: list[Problem]
+    kind: str
+    files: tuple[str, ...]
+    """Every file that was looked at, whether there is one or not."""
+
+
+def gather(path: str) -> Gathered:
+    """Return where everything is, or the errors that stop here."""
+    library = Library()
     try:
-        document = read_document(path)
+        document = library.read(path)
     except ProblemsError as error:
-        return None, list(error.problems)
-    problems = [*document.findings, *check_shape(document)]
-    if has_errors(problems):
-        return None, problems
-    root = Part(document, (), document.data)
+        return Gathered(None, list(error.problems), "", tuple(library.files))
     kind = kind_of(document)
-    sources = Sources(root, kind)
-    findings = Findings()
-    if kind == "robot":
-        _gather_robot(sources, findings)
-    elif kind == "driver":
-        sources.add(root)
-    problems += findings
-    return (None if has_errors(problems) else sources), problems
+    findings = library.findings
+    findings.problems += document.findings
+    root = _shaped(document, library)
+    sources = None
+    if root is not None and not _is_part(root):
+        sources = Sources(Part(root, (), root.data), kind)
+        if kind == "robot":
+            _gather_robot(sources, library)
+        elif kind == "driver":
+            sources.add(sources.root)
+    if has_errors(findings):
+        sources = None
+    problems = list(dict.fromkeys(findings))
+    return Gathered(sources, problems, "" if has_errors(problems) else kind, tuple(library.files))
 
 
-def _gather_robot(sources: Sources, findings: Findings) -> None:
-    root = sources.root
+def _is_part(document: Document) -> bool:
+    return isinstance(document.data, dict) and document.data.get("partial") is True
+
+
+def _shaped(
+    document: Document, library: Library, given: Part | None = None, use: Part | None = None
+) -> Document | None:
+    """Return a document put together, written out and of the right shape, or None.
+
+    Args:
+        document: as it stands in its file.
+        library: reads what it builds on, and takes the findings.
+        given: what a robot says about the driver: its `params` and `overrides`.
+        use: where the robot names it.
+    """
+    findings = library.findings
+    whole = library.whole(document)
+    if whole is None:
+        return None
+    told = len(findings.problems)
+    if kind_of(whole) == "driver":
+        overrides = given.get("overrides") if given is not None else None
+        whole = whole if overrides is None else _overridden(whole, overrides)
+        whole = fill_params(
+            whole, given.get("params") if given is not None else None, use, findings
+        )
+    whole = expand(whole, findings)
+    known = {_place(problem) for problem in findings}
+    shape = [problem for problem in check_shape(whole) if _place(problem) not in known]
+    findings.problems += shape
+    return None if has_errors(findings.problems[told:]) else whole
+
+
+def _place(problem: Problem) -> tuple[str, str, int, int]:
+    """Return what tells findings apart that came from one text over different ways."""
+    return problem.code, problem.file, problem.line, problem.column
+
+
+def _overridden(document: Document, overrides: Part) -> Document:
+    """Return a driver with what a robot changes in it."""
+    mark = overrides.document.at(overrides.path)
+    if mark is None:
+        return document  # a part that is there has a mark
+    over = Tree(overrides.data, mark, overrides.document.source_of(overrides.path))
+    merged = merge(Tree(document.data, document.mark, document), over)
+    mark = document.mark.copy(dict(merged.mark.children))
+    return Document(
+        document.file, document.text, document.lines, merged.value, mark, document.findings
+    )
+
+
+def _gather_robot(sources: Sources, library: Library) -> None:
+    root, findings = sources.root, library.findings
     driver = root.get("driver")
-    here = [key for key in _DRIVER_KEYS if key in root.data]
     if driver is not None:
-        for key in here:
-            findings.error(
-                root,
-                "misplaced-key",
-                f"'{key}' belongs to the driver",
-                at=key,
-                key=True,
-                hint="move it to where 'driver:' points, or write the whole driver here",
-            )
-        followed = driver
-        if isinstance(driver.data, str):
-            followed = _follow(driver, "driver", findings) or driver
-            if followed is not driver:
-                sources.add(followed)
-        sources.driver = followed
+        _check_placement(root, findings)
+        sources.driver = _driver(driver, sources, library)
     elif "transports" not in root.data:
         findings.error(
             root,
@@ -97,45 +145,55 @@ def _gather_robot(sources: Sources, findings: Findings) -> None:
     sources.add(root)
     for name, inner in root.named("interfaces").items():
         if isinstance(inner.data, str):
-            target = _follow(inner, "interface", findings)
+            target = _follow(inner, "interface", library)
             if target is not None:
                 sources.interfaces[name] = target
         else:
             sources.interfaces[name] = inner
 
 
-def _follow(reference: Part, kind: str, findings: Findings) -> Part | None:
-    """Return the document that a path names, relative to the document that names it."""
-    here = reference.document.file
-    target = os.path.normpath(os.path.join(os.path.dirname(here), reference.data))
-    if os.path.realpath(target) == os.path.realpath(here):
-        findings.error(reference, "refers-to-itself", "this document refers to itself")
-        return None
-    try:
-        document = read_document(target)
-    except ProblemsError as error:
-        first = error.problems[0]
-        if first.code in _FILE_CODES:
-            near = similar_file(target) if first.code == "no-such-file" else ""
-            hint = os.path.join(os.path.dirname(reference.data), near) if near else ""
+def _check_placement(root: Part, findings: Findings) -> None:
+    """Report what belongs to the driver and stands beside it."""
+    for key in read_schema("robot.schema.json")["$defs"]["inlineDriver"]["properties"]:
+        if key in root.data:
             findings.error(
-                reference,
-                first.code,
-                f"{target}: {first.message}",
-                hint=f"did you mean '{hint}'?" if hint else "",
+                root,
+                "misplaced-key",
+                f"'{key}' belongs to the driver",
+                at=key,
+                key=True,
+                hint="move it to where 'driver:' points, or write the whole driver here",
             )
-        else:
-            findings.problems += error.problems
+
+
+def _driver(part: Part, sources: Sources, library: Library) -> Part:
+    """Return the driver that stands at `part`, or that it names."""
+    reference, given = part, None
+    if isinstance(part.data, dict):
+        if "use" not in part.data:
+            return part  # it stands right here
+        reference, given = part.must("use"), part
+    followed = _follow(reference, "driver", library, given)
+    if followed is None:
+        return part
+    sources.add(followed)
+    return followed
+
+
+def _follow(reference: Part, kind: str, library: Library, given: Part | None = None) -> Part | None:
+    """Return the document that a path names, relative to the document that names it."""
+    document = library.follow(reference, (kind,))
+    if document is None:
         return None
-    found = kind_of(document)
-    if found and found != kind:
-        findings.error(
+    shaped = _shaped(document, library, given, reference)
+    if shaped is None:
+        return None
+    if _is_part(shaped):
+        library.findings.error(
             reference,
-            "wrong-kind",
-            f"{target} is {_ARTICLES.get(found, f'a {found}')},"
-            f" {_ARTICLES.get(kind, f'a {kind}')} is expected here",
+            "partial-document",
+            f"{shaped.file} is only a part of {'an' if kind == 'interface' else 'a'} {kind}",
+            hint="name a document that includes or extends it",
         )
         return None
-    problems = [*document.findings, *check_shape(document)]
-    findings.problems += problems
-    return None if has_errors(problems) else Part(document, (), document.data)
+    return Part(shaped, (), shaped.data)

@@ -1,18 +1,27 @@
 """Names in the tests that documents carry about themselves."""
 
+from collections.abc import Mapping
+
+from urc.config.parse_profile import setting_value
 from urc.config.part import Findings, Part
 from urc.config.suggest import did_you_mean
 from urc.config.values import check_within, fit, fit_hint
 from urc.model.driver import Command, Driver
-from urc.model.profile import DocumentTest
-from urc.model.values import Value
+from urc.model.profile import DocumentTest, Setting
+from urc.model.values import Signal, Value
 
 __all__ = ["link_test"]
 
 
-def link_test(part: Part, test: DocumentTest, driver: Driver, findings: Findings) -> DocumentTest:
+def link_test(
+    part: Part,
+    test: DocumentTest,
+    driver: Driver,
+    settings: Mapping[str, Setting],
+    findings: Findings,
+) -> DocumentTest:
     """Return the test with values of the signals' types and the poll it names by its index."""
-    if not test.feed and test.run is None:
+    if not test.feed and test.run is None and test.reply_to is None:
         findings.error(
             part, "missing-key", "'feed' or 'run' is missing: this test does nothing", key=True
         )
@@ -37,10 +46,35 @@ def link_test(part: Part, test: DocumentTest, driver: Driver, findings: Findings
     for name, inner in part.named("expect").items():
         expect[name] = _expected(name, inner, driver, findings)
     _check_run(part, test, driver, findings)
-    return test._replace(expect=expect, reply_to=_reply_to(part, test, driver, findings))
+    return test._replace(
+        expect=expect,
+        reply_to=_reply_to(part, test, driver, findings),
+        settings={
+            name: _setting(inner, settings, findings)
+            for name, inner in part.named("settings").items()
+        },
+    )
 
 
-def _expected(name: str, part: Part, driver: Driver, findings: Findings) -> Value:
+def _setting(part: Part, settings: Mapping[str, Setting], findings: Findings) -> Value:
+    setting = settings.get(part.name)
+    if setting is None:
+        findings.error(
+            part,
+            "unknown-setting",
+            f"there is no setting {part.name!r}",
+            key=True,
+            hint=did_you_mean(part.name, settings, "settings"),
+        )
+        return None
+    value = setting_value(part, setting.type, setting.choices, findings)
+    check_within(value, setting.min, setting.max, part, findings)
+    return value
+
+
+def _expected(
+    name: str, part: Part, driver: Driver, findings: Findings
+) -> Value | tuple[Value, ...]:
     signal = driver.signals.get(name)
     if signal is None:
         findings.error(
@@ -53,15 +87,29 @@ def _expected(name: str, part: Part, driver: Driver, findings: Findings) -> Valu
         return None
     if part.data is None:
         return None
-    words = dict(signal.states)
-    if isinstance(part.data, str) and part.data in words.values():
-        return part.data
+    if (signal.type == "array") != isinstance(part.data, list):
+        wanted = f"a list of {signal.of}s" if signal.type == "array" else "no list"
+        text = f"signal {name!r} is of type {signal.type}: {wanted} is expected"
+        findings.error(part, "wrong-type", text)
+        return None
+    if signal.type == "array":
+        return tuple(_fitting(inner, signal, signal.of, findings) for inner in part.items())
+    return _fitting(part, signal, signal.type, findings)
+
+
+def _fitting(part: Part, signal: Signal, kind: str, findings: Findings) -> Value:
+    value: Value = part.data
+    if value is None or (isinstance(value, str) and value in dict(signal.states).values()):
+        return value
+    if kind in ("object", "image", "blob"):
+        text = f"signal {signal.name!r}: what is in {kind}s cannot be compared"
+        findings.error(part, "wrong-type", text, hint="compare a signal that is computed from it")
+        return None
     try:
-        return fit(part.data, signal.type)
+        return fit(value, kind)
     except ValueError as error:
-        findings.error(
-            part, "wrong-type", f"signal {name!r}: {error}", hint=fit_hint(part.data, signal.type)
-        )
+        text = f"signal {signal.name!r}: {error}"
+        findings.error(part, "wrong-type", text, hint=fit_hint(value, kind))
         return None
 
 
@@ -75,7 +123,7 @@ def _reply_to(
     if isinstance(waiting, str):
         names = {poll.name: place for place, poll in enumerate(driver.polls)}
         if waiting in driver.commands:
-            if driver.commands[waiting].reply is None:
+            if test.feed and driver.commands[waiting].reply is None:
                 findings.error(inner, "no-reply", f"the command {waiting!r} waits for no reply")
             return waiting
         if waiting not in names:
@@ -98,7 +146,7 @@ def _reply_to(
         )
         return None
     poll = driver.polls[waiting]
-    if poll.reply is None:
+    if test.feed and poll.reply is None:
         findings.error(inner, "no-reply", f"poll {waiting} waits for no reply")
     if test.feed and poll.transport not in test.feed:
         findings.error(

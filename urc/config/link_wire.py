@@ -5,10 +5,14 @@ from collections.abc import Iterable, Mapping
 
 from urc.config.forms import read_form, write_form
 from urc.config.gather import Sources
+from urc.config.link_flow import link_command, link_keepalives, link_poll
+from urc.config.link_frames import check_frames
+from urc.config.link_signals import link_signals
+from urc.config.link_steps import link_sequences
 from urc.config.parse_line import templates_of
 from urc.config.part import Findings, Part
 from urc.config.suggest import did_you_mean
-from urc.expressions import Template
+from urc.expressions import COUNTERS, Template
 from urc.model.codec import ReadSpec, WriteSpec
 from urc.model.driver import Driver
 from urc.model.profile import Setting, SimulatorRule
@@ -63,17 +67,42 @@ class _Linker:
             return
         inner, form = found
         for field in read.fields:
-            if field in self.driver.signals:
-                self.uses.signals.add(field)
-            elif not field.startswith("_"):
+            if field in read.sets:
+                self.field(part.must("set").must(field), field, {"key": True})
+            elif field in self.driver.signals or not field.startswith("_"):
                 place, where = form.place_of(inner, field)
+                self.field(place, field, where)
+        self._beside(part, read)
+
+    def field(self, part: Part, name: str, place: Mapping[str, int | bool]) -> None:
+        """Check one name of a signal that is set at `part`."""
+        if name in self.driver.signals:
+            self.uses.signals.add(name)
+        elif not name.startswith("_"):
+            self.findings.error(
+                part,
+                "unknown-signal",
+                f"{name!r} is not a signal",
+                hint=did_you_mean(name, self.driver.signals, "signals"),
+                **place,
+            )
+
+    def _beside(self, part: Part, read: ReadSpec) -> None:
+        """Check the names in what stands beside a form."""
+        known = [name for name in read.fields if name not in read.sets]
+        for name, inner in part.named("fields").items():
+            if name not in known:
                 self.findings.error(
-                    place,
-                    "unknown-signal",
-                    f"{field!r} is not a signal",
-                    hint=did_you_mean(field, self.driver.signals, "signals"),
-                    **where,
+                    inner,
+                    "unknown-field",
+                    f"{name!r} is not a field of this frame",
+                    key=True,
+                    hint=did_you_mean(name, known, "fields"),
                 )
+        for name, template in read.sets.items():
+            self.template(part.must("set").must(name), template, known)
+        if read.when is not None:
+            self.template(part.must("when"), read.when, known)
 
     def templates(self, part: Part, spec: WriteSpec, known: Iterable[str] = ()) -> None:
         """Check the names in every template under ``send:``."""
@@ -84,10 +113,8 @@ class _Linker:
     def template(self, part: Part, template: Template, known: Iterable[str] = ()) -> None:
         """Check the names that a template uses."""
         allowed = {*known, "settings"}
-        for name in sorted(template.names - allowed):
-            hint = did_you_mean(name, allowed, "names")
-            if name in self.settings:
-                hint = f"write settings.{name}"
+        for used in sorted(template.names - allowed):
+            name, hint = self._meant(used, allowed - {COUNTERS})
             self._unknown(
                 part,
                 template,
@@ -119,6 +146,16 @@ class _Linker:
                 did_you_mean("", self.settings, "settings"),
             )
 
+    def _meant(self, name: str, allowed: Iterable[str]) -> tuple[str, str]:
+        """Return an unknown name as it is written, and what to do about it."""
+        if name == COUNTERS:
+            return "seq", "a counter counts what is sent: it belongs into 'send'"
+        if name in self.settings:
+            return name, f"write settings.{name}"
+        if name == "params":
+            return name, "params are filled in earlier: write {params.NAME}, in single braces"
+        return name, did_you_mean(name, allowed, "names")
+
     def _unknown(
         self,
         part: Part,
@@ -143,18 +180,18 @@ def link_driver(
         for option, template in templates_of(driver.transports[name]).items():
             linker.template(inner.must(option), template)
     for inner, poll in zip(part.listed("polls"), driver.polls, strict=True):
-        linker.transport(inner, "to", poll.transport)
-        linker.templates(inner.must("send"), poll.send)
-        if poll.reply is not None:
-            linker.fields(inner.must("reply"), poll.reply.read)
+        link_poll(linker, inner, poll)
     _check_poll_names(part, driver, findings)
+    link_signals(part, driver, linker.template, findings)
     for name, inner in part.named("commands").items():
         command = driver.commands[name]
         linker.transport(inner, "to", command.transport)
-        linker.templates(inner.must("send"), command.send, command.arguments)
+        linker.templates(inner.must("send"), command.send, (*command.arguments, COUNTERS))
         _check_arguments_used(inner, command.send, findings)
-        if command.reply is not None:
-            linker.fields(inner.must("reply"), command.reply.read)
+        link_command(linker, inner, command)
+    link_keepalives(linker, part)
+    link_sequences(linker, part)
+    check_frames(part, driver, findings)
     for name, inner in part.named("messages").items():
         message = driver.messages[name]
         linker.transport(inner, "from", message.transport)

@@ -4,6 +4,7 @@ read → shape → parse and compile → link names → whole-profile rules. A l
 earlier ones found no error; warnings are kept and never stop anything.
 """
 
+from collections.abc import Iterable
 from os import PathLike, fspath
 from typing import NamedTuple
 
@@ -14,7 +15,8 @@ from urc.config.link_tests import link_test
 from urc.config.link_wire import link_driver, link_simulator
 from urc.config.parse_driver import parse_driver, spoken_name
 from urc.config.parse_interface import parse_interface
-from urc.config.parse_profile import parse_rule, parse_setting, parse_test
+from urc.config.parse_profile import parse_rule, parse_setting
+from urc.config.parse_test import parse_test
 from urc.config.parse_widget import Shelf, parse_widget
 from urc.config.part import Findings
 from urc.config.rules import check_profile
@@ -36,6 +38,8 @@ class Checked(NamedTuple):
     problems: tuple[Problem, ...]
     kind: str
     """``robot``, ``driver``, ``interface``, ``widget``, or "" when a first pass stopped."""
+    files: tuple[str, ...] = ()
+    """Every document that was looked at, whether there is one or not; this one is the first."""
 
 
 def load_profile(
@@ -50,6 +54,9 @@ def load_profile(
     if checked.profile is not None:
         return checked.profile
     if not has_errors(checked.problems):
+        if checked.kind in ("robot", "driver"):
+            text = f"this is only a part of a {checked.kind}: others include or extend it"
+            raise ProblemsError([Problem("partial-document", text, fspath(path))])
         raise ProblemsError(
             [
                 Problem(
@@ -73,9 +80,9 @@ def check(path: str | PathLike[str], catalog: Catalog, shelf: Shelf | None = Non
             several calls and each manifest is read once.
     """
     path = fspath(path)
-    sources, problems = gather(path)
+    sources, problems, kind, files = gather(path)
     if sources is None:
-        return Checked(None, tuple(problems), "")
+        return Checked(None, tuple(_told_once(problems)), kind, files)
     shelf = shelf or Shelf(shipped("widgets"))
     findings = Findings()
     profile: Profile | None = None
@@ -89,10 +96,23 @@ def check(path: str | PathLike[str], catalog: Catalog, shelf: Shelf | None = Non
         profile = _profile(sources, catalog, shelf, findings)
     problems += sorted(findings, key=lambda one: (one.file != path, one.file, one.line, one.column))
     problems += shelf.problems
-    problems = list(dict.fromkeys(problems))
+    problems = _told_once(problems)
     if has_errors(problems):
         profile = None
-    return Checked(profile, tuple(problems), sources.kind)
+    return Checked(profile, tuple(problems), sources.kind, (*files, *shelf.files))
+
+
+def _told_once(problems: Iterable[Problem]) -> list[Problem]:
+    """Return the findings without those of texts that `each` repeats: the first says it all."""
+    paths: dict[tuple[str, str, int, int], str] = {}
+    return [
+        problem
+        for problem in dict.fromkeys(problems)
+        if paths.setdefault(
+            (problem.code, problem.file, problem.line, problem.column), problem.path
+        )
+        == problem.path
+    ]
 
 
 class _Parsed(NamedTuple):
@@ -114,7 +134,7 @@ def _profile(
         interfaces={
             name: parse_interface(part, name, findings) for name, part in sources.interfaces.items()
         },
-        tests=[parse_test(part) for part in sources.tests],
+        tests=[parse_test(part, findings) for part in sources.tests],
         rules={
             name: [parse_rule(inner, name, findings) for inner in part.items()]
             for name, part in sources.simulator.items()
@@ -130,7 +150,7 @@ def _link(sources: Sources, parsed: _Parsed, shelf: Shelf, findings: Findings) -
     uses = link_driver(sources.driver, driver, parsed.settings, findings)
     link_simulator(sources, driver, parsed.rules, parsed.settings, findings)
     tests = [
-        link_test(part, test, driver, findings)
+        link_test(part, test, driver, parsed.settings, findings)
         for part, test in zip(sources.tests, parsed.tests, strict=True)
     ]
     slots = link_slots(sources, driver, shelf, findings)

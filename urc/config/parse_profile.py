@@ -4,10 +4,10 @@ from typing import Final
 
 from urc.config.part import Findings, Part
 from urc.config.values import check_range, check_within, fit, fit_hint, shown
-from urc.model.profile import DocumentTest, Setting, SimulatorRule
+from urc.model.profile import Setting, SimulatorRule
 from urc.model.values import Value
 
-__all__ = ["parse_rule", "parse_setting", "parse_test"]
+__all__ = ["parse_rule", "parse_setting", "setting_value"]
 
 _VALUE_TYPES: Final = {
     "integer": "integer",
@@ -57,14 +57,17 @@ def parse_setting(part: Part, findings: Findings) -> Setting:
         max=high,
         is_secret=is_secret,
         description=part.text("description"),
-        default=None if default_part is None else _default(default_part, kind, choices, findings),
+        default=(
+            None if default_part is None else setting_value(default_part, kind, choices, findings)
+        ),
     )
     if default_part is not None:
         check_within(setting.default, low, high, default_part, findings)
     return setting
 
 
-def _default(part: Part, kind: str, choices: tuple[str, ...], findings: Findings) -> Value:
+def setting_value(part: Part, kind: str, choices: tuple[str, ...], findings: Findings) -> Value:
+    """Return the value of a setting that a document gives, or None when it was reported."""
     wanted = _VALUE_TYPES.get(kind, "string")
     try:
         value = fit(part.data, wanted)
@@ -87,29 +90,6 @@ def _default(part: Part, kind: str, choices: tuple[str, ...], findings: Findings
 def _is_host(text: str) -> bool:
     """Return whether a name or address is plausible: no scheme, no port, no blank."""
     return 0 < len(text) <= 253 and not any(char.isspace() or char in "/@?#'\"" for char in text)
-
-
-def parse_test(part: Part) -> DocumentTest:
-    """Return one test; what it names is looked up when names are linked."""
-    mark = part.document.at(part.path)
-    line, column = (mark.span.line, mark.span.column) if mark else (1, 1)
-    reply_to = part.scalar("reply_to")
-    if isinstance(reply_to, float):
-        reply_to = int(reply_to)
-    return DocumentTest(
-        name=part.text("name"),
-        line=line,
-        feed={name: str(inner.data) for name, inner in part.named("feed").items()},
-        reply_to=reply_to,
-        run=part.text("run") or None,
-        arguments={name: inner.data for name, inner in part.named("args").items()},
-        expect={name: inner.data for name, inner in part.named("expect").items()},
-        sent={name: str(inner.data) for name, inner in part.named("sent").items()},
-        fails=part.text("fails") or None,
-        file=part.document.file,
-        column=column,
-        source=part.document.lines[line - 1],
-    )
 
 
 def parse_rule(part: Part, transport: str, findings: Findings) -> SimulatorRule:

@@ -92,6 +92,11 @@ class Shelf:
         """What is wrong with the manifests read so far."""
         self._widgets: dict[str, Widget | None] = {}
 
+    @property
+    def files(self) -> tuple[str, ...]:
+        """Every manifest that was asked for, whether there is one or not."""
+        return tuple(str(self.folder / name / "widget.yaml") for name in self._widgets)
+
     def names(self) -> list[str]:
         """Return the names of all widgets there are."""
         try:

@@ -9,7 +9,7 @@ import re
 from collections.abc import Iterator
 from typing import Any, Final, NamedTuple
 
-from urc.expressions import ExpressionError, Template, compile_template
+from urc.expressions import ExpressionError, Template, compile_expression, compile_template
 from urc.model.values import Value
 from urc.patterns import Pattern, PatternError, compile_pattern
 from urc.problems import Problem, Severity
@@ -163,6 +163,16 @@ class Findings:
             return compile_template(part.data)
         except ExpressionError as error:
             self.error(part, "bad-template", str(error), offset=error.offset)
+            return None
+
+    def expression(self, part: Part) -> Template | None:
+        """Compile the expression at `part`, or report why it cannot be."""
+        try:
+            return compile_expression(part.data)
+        except ExpressionError as error:
+            braces = "{{" in part.data
+            hint = "an expression is written without braces" if braces else ""
+            self.error(part, "bad-expression", str(error), offset=error.offset, hint=hint)
             return None
 
 

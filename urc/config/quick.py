@@ -37,6 +37,13 @@ class QuickCheck:
         except _UncertainError:
             return False
 
+    def is_valid_at(self, reference: str, data: object) -> bool:
+        """Return whether `data` certainly fits the schema at ``file#/pointer``."""
+        try:
+            return self.reference("", reference)(data)
+        except _UncertainError:
+            return False
+
     def is_valid_inline(self, schema: Mapping[str, Any], data: object) -> bool:
         """Return whether `data` certainly fits `schema`, which refers to no file."""
         try:

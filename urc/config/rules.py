@@ -3,6 +3,7 @@
 from urc.config.gather import Sources
 from urc.config.link_wire import Uses
 from urc.config.part import Findings, Part, shown_duration
+from urc.config.rules_flow import check_flow
 from urc.config.suggest import did_you_mean
 from urc.model.driver import Driver, Poll
 from urc.model.interface import Interface
@@ -23,11 +24,13 @@ def check_profile(
     for part, poll in zip(sources.driver.listed("polls"), driver.polls, strict=True):
         _check_pace(part, poll, sources.driver, findings)
     _check_rate(sources.driver, driver, findings)
+    secrets = {name for name, one in sources.settings.items() if one.flag("secret", default=False)}
+    check_flow(sources.driver, driver, frozenset(secrets), findings)
 
 
 def _check_unused(sources: Sources, driver: Driver, uses: Uses, findings: Findings) -> None:
     for name, part in sources.driver.named("signals").items():
-        if name not in uses.signals:
+        if name not in uses.signals and driver.signals[name].formula is None:
             findings.warn(
                 part,
                 "never-set",
@@ -80,7 +83,8 @@ def _check_pace(part: Part, poll: Poll, driver: Part, findings: Findings) -> Non
     """Warn of a request that is due again before the wait for its answer is over."""
     if poll.reply is None:
         return
-    where: Part | None = part.must("reply").get("timeout")
+    asked = driver.must("commands").must(poll.run) if poll.run else part
+    where: Part | None = asked.must("reply").get("timeout")
     seconds = poll.reply.timeout_s
     if where is None:
         timeouts = driver.must("transports").must(poll.transport).get("timeouts")
@@ -94,13 +98,16 @@ def _check_pace(part: Part, poll: Poll, driver: Part, findings: Findings) -> Non
             "impatient-poll",
             f"the next request is due after {shown_duration(poll.every_s)}, but an answer may take"
             f" {shown_duration(seconds)}",
-            hint=f"shorten the timeout in line {_line(where)}, or poll more slowly",
+            hint=f"shorten the timeout in {_place(where, part)}, or poll more slowly",
         )
 
 
-def _line(part: Part) -> int:
+def _place(part: Part, near: Part) -> str:
+    """Return where `part` stands, seen from `near`."""
     mark = part.document.at(part.path)
-    return mark.span.line if mark else 1
+    file = part.document.source_of(part.path).file
+    line = f"line {mark.span.line if mark else 1}"
+    return line if file == near.document.source_of(near.path).file else f"{line} of {file}"
 
 
 def _check_rate(part: Part, driver: Driver, findings: Findings) -> None:

@@ -16,7 +16,15 @@ from urc.problems import Problem
 from urc.shipped import shipped
 from urc.source import Document, Path
 
-__all__ = ["KINDS", "check_options", "check_shape", "kind_of", "read_schema"]
+__all__ = [
+    "KINDS",
+    "check_options",
+    "check_shape",
+    "check_source",
+    "fits",
+    "kind_of",
+    "read_schema",
+]
 
 KINDS: Final = ("robot", "driver", "interface", "widget")
 
@@ -60,6 +68,70 @@ def check_shape(document: Document) -> list[Problem]:
 
         problems += report(document, read_schema(file), read_schema)
     return problems
+
+
+def fits(reference: str, value: object) -> bool:
+    """Return whether a value certainly fits the schema at ``file#/pointer``."""
+    return _quick().is_valid_at(reference, value)
+
+
+def check_source(document: Document) -> list[Problem]:
+    """Return what is wrong with one of several documents that are merged, whatever the others say.
+
+    That is: keys that the language does not have, and how it refers to the others. What is missing
+    here may stand there, so all else is looked at when they are one.
+    """
+    data = _without_nothing(document.data)
+    if isinstance(document.data, dict) and isinstance(data, dict):
+        data |= {key: None for key in _OWN_KEYS if document.data.get(key, "") is None}
+    file = f"{kind_of(document)}.schema.json"
+    if _quick_source().is_valid(file, data):
+        return []
+    from urc.config.shape_report import report
+
+    pruned = Document(document.file, document.text, document.lines, data, document.mark)
+    return [
+        problem
+        for problem in report(pruned, _source_schema(file), _source_schema)
+        if problem.code == "unknown-key" or problem.path.partition(".")[0] in _OWN_KEYS
+    ]
+
+
+_OWN_KEYS: Final = ("urc", "extends", "include", "partial")
+"""What is never taken from another document."""
+
+
+@cache
+def _quick_source() -> QuickCheck:
+    return QuickCheck(_source_schema)
+
+
+@cache
+def _source_schema(name: str) -> Mapping[str, Any]:
+    schema: Mapping[str, Any] = _optional(read_schema(name))
+    return schema
+
+
+def _optional(schema: Any) -> Any:
+    """Return a schema that requires nothing; what chooses between kinds is left as it is."""
+    if isinstance(schema, list):
+        return [_optional(item) for item in schema]
+    if not isinstance(schema, dict):
+        return schema
+    return {
+        key: item if key == "if" else _optional(item)
+        for key, item in schema.items()
+        if key not in ("required", "minProperties") or isinstance(item, dict)
+    }
+
+
+def _without_nothing(value: object) -> object:
+    """Return data without the keys whose value is null: they take something away."""
+    if isinstance(value, dict):
+        return {key: _without_nothing(item) for key, item in value.items() if item is not None}
+    if isinstance(value, list):
+        return [_without_nothing(item) for item in value]
+    return value
 
 
 def check_options(

@@ -84,12 +84,14 @@ def report(
     for found in validator.iter_errors(data):
         where = (*path, *found.absolute_path)
         error = _error(found)
+        if not found.absolute_path and "properties" not in error.schema:
+            error = error._replace(schema=schema)  # a branch of the whole document's schema
         tell = _REPORTS.get(error.keyword, _other)
         for problem in tell(document, where, error):
             problems.setdefault(problem, len(where))
         if len(problems) >= _PROBLEMS_MOST:
             break
-    return sorted(problems, key=lambda one: (-problems[one], one.line, one.column))
+    return sorted(problems, key=lambda one: (-problems[one], one.line, one.column, one.path))
 
 
 def _error(found: ValidationError) -> _Error:
@@ -200,6 +202,8 @@ def _type_hint(
     if "string" in types and isinstance(value, (bool, int, float)):
         return f'quote it: "{_written(document, path) or value}"'
     if isinstance(value, str):
+        if _is_filled_in(document, path):
+            return 'a text with names in braces becomes a value only when it is one name: "{i}"'
         if {"integer", "number"} & set(types) and _looks_like_number(value):
             return f"take the quotes away: {value}"
         if "boolean" in types:
@@ -216,7 +220,13 @@ def _written(document: Document, path: Path) -> str:
     mark = document.at(path)
     if mark is None or mark.span.line != mark.span.end_line:
         return ""
-    return document.lines[mark.span.line - 1][mark.span.column - 1 : mark.span.end_column - 1]
+    lines = document.source_of(path).lines
+    return lines[mark.span.line - 1][mark.span.column - 1 : mark.span.end_column - 1]
+
+
+def _is_filled_in(document: Document, path: Path) -> bool:
+    mark = document.at(path)
+    return mark is not None and mark.written is not None
 
 
 def _looks_like_number(text: str) -> bool:

@@ -19,6 +19,8 @@ def shown(value: object) -> str:
     """Return a value as a document writes it, for messages."""
     if value is None:
         return "nothing"
+    if isinstance(value, tuple):
+        return f"[{', '.join(map(shown, value))}]"
     if isinstance(value, bool):
         return "true" if value else "false"
     return repr(value)

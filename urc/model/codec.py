@@ -11,7 +11,9 @@ whose name starts with ``_`` stays inside the document (conditions, correlation,
 from collections.abc import Mapping
 from typing import NamedTuple
 
+from urc.expressions import Template
 from urc.model.values import NOTHING, Conversion
+from urc.patterns import Pattern
 
 __all__ = ["Envelope", "Payload", "ReadSpec", "WriteSpec"]
 
@@ -38,9 +40,15 @@ class ReadSpec(NamedTuple):
     """Row of the readers' table: ``regex`` …"""
     options: Mapping[str, object] = NOTHING
     fields: tuple[str, ...] = ()
-    """Every field that it can give, in the order of the frame."""
+    """Every field that it can give, in the order of the frame; then the names of `sets`."""
     conversions: Mapping[str, Conversion] = NOTHING
     """Field → conversion of this frame alone; the signal's own comes after it."""
+    sets: Mapping[str, Template] = NOTHING
+    """Signal → expression over the converted fields."""
+    when: Template | None = None
+    """Expression over the converted fields; the frame is another one where it is not true."""
+    lines: int | Pattern | None = None
+    """The reply is that many frames, or all up to one that the pattern finds; joined by LF."""
 
 
 class WriteSpec(NamedTuple):

@@ -5,6 +5,19 @@ from typing import Literal, NamedTuple
 
 from urc.expressions import Template
 from urc.model.codec import ReadSpec, WriteSpec
+from urc.model.flow import (
+    Confirm,
+    ErrorReply,
+    Hold,
+    Keepalive,
+    Offline,
+    Priority,
+    Queue,
+    Requirement,
+    Stage,
+    Step,
+    Verify,
+)
 from urc.model.values import NOTHING, Signal, Value
 from urc.patterns import Pattern
 
@@ -34,6 +47,8 @@ class FramingSpec(NamedTuple):
     """As parsed by the loader: for ``delimiter``, ``tx`` and ``rx`` as bytes."""
     max_bytes: int = 65536
     """Longest frame accepted; a longer one is dropped and counted."""
+    sent: "FramingSpec | None" = None
+    """Of what URC sends, where that is framed otherwise than what comes; None: the same."""
 
 
 class Timeouts(NamedTuple):
@@ -69,6 +84,14 @@ class TransportSpec(NamedTuple):
     backoff: Backoff = Backoff()
     min_gap_s: float = 0.0
     """Shortest time between two requests on this line."""
+    queue: Queue = Queue()
+    keepalive: Keepalive | None = None
+    on_connect: tuple[Step, ...] = ()
+    """What makes a fresh connection usable; until then nothing else is sent on it."""
+    on_close: tuple[Step, ...] = ()
+    """What is said before the line is closed in good order."""
+    stale_after_s: float | None = None
+    """Silence after which the line is told to be silent; None = never."""
 
 
 class Reply(NamedTuple):
@@ -78,6 +101,15 @@ class Reply(NamedTuple):
     errors: tuple[Pattern, ...] = ()
     timeout_s: float | None = None
     """None: the transport's ``timeouts.reply``."""
+    match: Template | None = None
+    """Whose answer it is: over the fields, the command's arguments, and ``seq.NAME``, the counters
+    in the request. None: answers come in the order of the requests."""
+    stages: tuple[Stage, ...] = ()
+    """What must come after it until the request is done."""
+    faults: tuple[ErrorReply, ...] = ()
+    """Answers that mean failure, beside `errors`."""
+    framing: FramingSpec | None = None
+    """How the answer is cut; None: as everything else on the line."""
 
 
 class Argument(NamedTuple):
@@ -107,6 +139,22 @@ class Command(NamedTuple):
     reply: Reply | None = None
     title: str = ""
     description: str = ""
+    priority: Priority = "normal"
+    is_latest_only: bool = False
+    """A newer one takes the place of one that still waits to be sent."""
+    rate_per_s: float | None = None
+    """How often it is sent on average; two may follow each other at once. None: no limit."""
+    is_idempotent: bool = False
+    """Doing it twice is the same as once."""
+    retries: int = 0
+    """How often it is sent again when no answer comes; 0 unless it is idempotent."""
+    hold: Hold | None = None
+    confirm: Confirm | None = None
+    requires: tuple[Requirement, ...] = ()
+    verify: Verify | None = None
+    steps: tuple[Step, ...] = ()
+    """Of a sequence: what it does instead of sending. `transport` is then the first that it uses,
+    and `send` is empty."""
 
 
 class Poll(NamedTuple):
@@ -120,6 +168,14 @@ class Poll(NamedTuple):
     reply: Reply | None = None
     phase_s: float = 0.0
     """Delay of the first one after the connection."""
+    run: str = ""
+    """Command whose `send` and `reply` these are; "" when they are the poll's own."""
+    arguments: Mapping[str, Value] = NOTHING
+    """Of the command in `run`, defaults included."""
+    when: Template | None = None
+    """Asked only while it holds, over fresh signals and settings."""
+    priority: Priority = "low"
+    offline: Offline | None = None
 
 
 class Message(NamedTuple):

@@ -10,7 +10,7 @@ from urc.model.values import NOTHING, Value
 from urc.model.widget import Widget
 from urc.patterns import Pattern
 
-__all__ = ["DocumentTest", "Profile", "Setting", "SimulatorRule"]
+__all__ = ["DocumentTest", "Fed", "Profile", "Setting", "SimulatorRule", "pieces_of"]
 
 
 class Setting(NamedTuple):
@@ -28,23 +28,32 @@ class Setting(NamedTuple):
     description: str = ""
 
 
+Fed = str | bytes
+"""Text in the line's encoding, or bytes."""
+
+
+def pieces_of(fed: Fed | tuple[Fed, ...]) -> tuple[Fed, ...]:
+    """Return what is fed, piece by piece: each comes by itself."""
+    return fed if isinstance(fed, tuple) else (fed,)
+
+
 class DocumentTest(NamedTuple):
     """A test that a document carries about itself."""
 
     name: str
     line: int
     """1-based, where it stands in the document."""
-    feed: Mapping[str, str] = NOTHING
-    """Transport → text fed to it, as if the robot had sent it."""
+    feed: Mapping[str, "Fed | tuple[Fed, ...]"] = NOTHING
+    """Transport → what the robot says at once, or one after the other; see `pieces_of`."""
     reply_to: int | str | None = None
     """Index of the poll, or name of the command, that is waiting when the text arrives."""
     run: str | None = None
     """Command to run."""
     arguments: Mapping[str, Value] = NOTHING
-    expect: Mapping[str, Value] = NOTHING
-    """Signal → value after it."""
-    sent: Mapping[str, str] = NOTHING
-    """Transport → exact text sent, with the framing's terminator removed."""
+    expect: Mapping[str, Value | tuple[Value, ...]] = NOTHING
+    """Signal → value after it; of an array, all its elements."""
+    sent: Mapping[str, Fed] = NOTHING
+    """Transport → exact text sent, without what the framing adds; or every byte on the wire."""
     fails: str | None = None
     """What the failure must say, when the test is about a failure."""
     file: str = ""
@@ -53,6 +62,8 @@ class DocumentTest(NamedTuple):
     """1-based."""
     source: str = ""
     """The text of its line, for the caret."""
+    settings: Mapping[str, Value] = NOTHING
+    """Settings that differ from their defaults."""
 
 
 class SimulatorRule(NamedTuple):

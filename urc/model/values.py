@@ -8,12 +8,17 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any, Final, Literal, NamedTuple
 
+from urc.expressions import Template
+
 __all__ = [
     "PLAIN",
     "Alarm",
+    "Axes",
     "Conversion",
+    "ElementType",
     "Limits",
     "NOTHING",
+    "Reading",
     "Sample",
     "Signal",
     "SignalType",
@@ -23,10 +28,16 @@ __all__ = [
 NOTHING: Final[Mapping[str, Any]] = MappingProxyType({})
 """The default of every mapping."""
 
-SignalType = Literal["integer", "number", "boolean", "string"]
+ElementType = Literal["integer", "number", "boolean", "string"]
 """The words are JSON Schema's."""
+SignalType = Literal["integer", "number", "boolean", "string", "array", "object", "image", "blob"]
+"""What a signal may be: one value, several of one kind, a mapping, or bytes."""
 Value = bool | int | float | str | None
-"""What a signal may hold; None means the robot said "not available"."""
+"""One plain value; None means the robot said "not available"."""
+Reading = Value | bytes | tuple[Any, ...] | Mapping[str, Any]
+"""What a signal may hold: bytes for ``image`` and ``blob``, a tuple for ``array``."""
+Axes = Literal["", "FLU", "FRD", "ENU", "NED", "bearing"]
+"""Which way the axes point; "" says nothing of it."""
 Alarm = Literal["", "lolo", "low", "high", "hihi"]
 """Which limit a value has passed; "" is normal."""
 
@@ -40,13 +51,15 @@ class Limits(NamedTuple):
     hihi: float | None = None
     hysteresis: float = 0.0
     """How far a value must come back before the alarm ends, in the signal's unit."""
+    for_s: float = 0.0
+    """How long a value must stay past a limit before the alarm begins, in seconds."""
 
 
 class Conversion(NamedTuple):
     """From a raw field to the value that is meant; applied in the order of the attributes."""
 
-    base: int = 10
-    """Of whole numbers that are written as text: 2 to 36."""
+    base: int = 0
+    """Of whole numbers that are written as text: 2 to 36. 0: text stays what it is."""
     not_available: tuple[Value, ...] = ()
     """Raw values that say "not available"."""
     polynomial: tuple[float, ...] = ()
@@ -81,14 +94,22 @@ class Signal(NamedTuple):
     """Age in seconds after which a reading is shown as old. Always > 0 in a loaded driver."""
     description: str = ""
     conversion: Conversion = PLAIN
-    """From what the robot says to the value in `unit`."""
+    """From what the robot says to the value in `unit`; of an array, each element's."""
+    of: ElementType = "number"
+    """Kind of the elements of an array."""
+    size: int | None = None
+    """Elements of an array; most bytes of an image or blob."""
+    axes: Axes = ""
+    """Which way its axes point."""
+    formula: Template | None = None
+    """What it is computed from, over other signals; None: frames set it."""
 
 
 class Sample(NamedTuple):
     """One reading: the value, when its first byte arrived, and the limit it has passed."""
 
     signal: str
-    value: Value
+    value: Reading
     time_s: float
     """Monotonic seconds, on the clock that was passed into the engine."""
     alarm: Alarm = ""

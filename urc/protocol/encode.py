@@ -5,16 +5,18 @@ go through the same door.
 """
 
 from collections.abc import Callable, Mapping
+from functools import partial
 
-from urc.expressions import ExpressionError
+from urc.expressions import ExpressionError, Template
 from urc.model.codec import WriteSpec
 from urc.model.driver import Argument, Command
-from urc.model.values import Value
+from urc.model.values import NOTHING, Value
 from urc.problems import UrcError, printable
 from urc.protocol.forms import CodecContext, NotWritable, build_writer
 from urc.protocol.framing import Framing, FramingError
+from urc.protocol.generate import after_a_while
 
-__all__ = ["BadArgument", "Encode", "build_encode", "check_arguments"]
+__all__ = ["BadArgument", "Encode", "build_check", "build_encode", "check_arguments"]
 
 Encode = Callable[[Mapping[str, object]], bytes]
 """Namespace → bytes on the wire, framing included. Raises `BadArgument`."""
@@ -27,7 +29,12 @@ class BadArgument(UrcError):
     """A command that cannot be sent as asked; the message names the argument."""
 
 
-def build_encode(send: WriteSpec, framing: Framing, context: CodecContext) -> Encode:
+def build_encode(
+    send: WriteSpec,
+    framing: Framing,
+    context: CodecContext,
+    arguments: Mapping[str, Argument] = NOTHING,
+) -> Encode:
     """Return the function that writes `send` and frames it; constants are made once."""
     writer = build_writer(send, context)
 
@@ -43,7 +50,28 @@ def build_encode(send: WriteSpec, framing: Framing, context: CodecContext) -> En
     if not send.names:
         constant = encode({})
         return lambda _: constant
+    template = send.options.get("template")
+    if send.form == "text" and isinstance(template, Template):
+
+        def make() -> Encode | None:
+            from urc.protocol.fast_encode import build_fast_encode
+
+            return build_fast_encode(template, arguments, framing, context.encoding, encode)
+
+        return after_a_while(encode, make)
     return encode
+
+
+def build_check(command: Command) -> Callable[[Mapping[str, object]], dict[str, Value]]:
+    """Return `check_arguments` for one command."""
+    slow = partial(check_arguments, command)
+
+    def make() -> Callable[[Mapping[str, object]], dict[str, Value]]:
+        from urc.protocol.fast_encode import build_fast_check
+
+        return build_fast_check(command.arguments, slow)
+
+    return after_a_while(slow, make)
 
 
 def check_arguments(command: Command, given: Mapping[str, object]) -> dict[str, Value]:

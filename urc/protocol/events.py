@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import NamedTuple
 
-from urc.model.values import NOTHING, Sample, Value
+from urc.model.values import NOTHING, Reading, Sample, Value
 
 __all__ = ["Close", "Event", "Failed", "Fault", "Open", "Replied", "Request", "Samples", "Send"]
 
@@ -27,6 +27,8 @@ class Send(NamedTuple):
 
     transport: str
     data: bytes
+    is_secret: bool = False
+    """Its text must not be shown or logged."""
 
 
 class Close(NamedTuple):
@@ -38,9 +40,10 @@ class Close(NamedTuple):
 
 
 class Samples(NamedTuple):
-    """Readings out of one frame, in the order of the frame."""
+    """Readings out of one frame, in the order of the frame, then what is computed from them."""
 
     transport: str
+    """"" when no frame brought them: time alone began an alarm."""
     samples: tuple[Sample, ...]
 
 
@@ -49,7 +52,7 @@ class Replied(NamedTuple):
 
     id: int
     command: str
-    values: Mapping[str, Value] = NOTHING
+    values: Mapping[str, Reading] = NOTHING
 
 
 class Failed(NamedTuple):
@@ -59,7 +62,7 @@ class Failed(NamedTuple):
     command: str
     code: str
     """``timed-out``, ``refused``, ``disconnected``, ``bad-argument``, ``queue-full``,
-    ``unknown-command``."""
+    ``unknown-command``, ``superseded``, ``not-allowed``, ``not-verified``, ``busy``, ``failed``."""
     message: str
 
 
@@ -69,7 +72,7 @@ class Fault(NamedTuple):
     transport: str
     code: str
     """``frame-too-long``, ``no-match``, ``bad-value``, ``bad-text``, ``cut-frame``,
-    ``reply-timeout``, ``late-reply``, ``refused``, ``bad-argument``."""
+    ``reply-timeout``, ``late-reply``, ``refused``, ``bad-argument``, ``silent``, ``failed``."""
     message: str
 
 

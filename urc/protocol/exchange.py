@@ -1,35 +1,52 @@
-"""One line of a driver: what waits to be sent, what waits for its answer, what came in.
+"""One request and its answers.
 
-Floor 3, pure. An `Exchange` is one request and its answer; a `Line` runs them one at a time over
-one transport and cuts what comes back into frames.
-
-Theory of operation. A line is closed, opening or open. A persistent line is opened from outside; a
-per-request one asks for it (`Open`) when something waits, and asks for the end (`Close`) when
-nothing does. After an answer is overdue the line is *wary* for one more reply time: the next frame
-is then the late answer, not the answer of the next request, so it is dropped. A line that misses
-`MISSES_UNTIL_CLOSED` answers in a row is given up and opened afresh.
+Floor 3, pure. An `Ask` is what can be asked, compiled once; an `Exchange` is one such request, from
+the queue to its end; a `Flight` is one time that it was sent. An `Ear` collects the frames of one
+answer: the transport's conversation (`urc.protocol.line`) offers it each frame that comes in.
 """
 
-from collections import deque
-from collections.abc import Mapping
-from typing import Literal, NamedTuple
+from collections.abc import Callable, Mapping
+from typing import Final, NamedTuple, Protocol
 
+from urc.expressions import ExpressionError, Template, text_of
 from urc.model.driver import TransportSpec
-from urc.model.values import Sample, Value
+from urc.model.values import NOTHING, Reading, Sample
 from urc.patterns import Pattern
-from urc.protocol.decode import Decode
-from urc.protocol.events import Close, Event, Failed, Fault, Open, Replied, Samples, Send
-from urc.protocol.forms import BadText, Frame, Reader
-from urc.protocol.framing import Decoder, FrameFault, Framing, build_framing
+from urc.protocol.bounds import queue_limit_s
+from urc.protocol.encode import Encode
+from urc.protocol.events import Event
+from urc.protocol.fast_read import FastRead, Taken
+from urc.protocol.forms import BadItem, BadText, Frame, Reader
+from urc.protocol.framing import Framing
+from urc.protocol.gate import REALTIME, Bucket
+from urc.protocol.readings import Decode
+from urc.protocol.word import Word
 
-__all__ = ["Exchange", "Line", "Matcher"]
+__all__ = [
+    "DONE",
+    "Answer",
+    "Ask",
+    "Ear",
+    "Ended",
+    "Exchange",
+    "Fields",
+    "Flight",
+    "Heard",
+    "Leaving",
+    "LineEvent",
+    "Matcher",
+    "Offer",
+    "Outcome",
+    "Listening",
+    "Owner",
+    "expires_at",
+]
 
 Fields = Mapping[str, object]
 """What a frame says: name → raw value."""
 
-QUEUE_LIMIT = 64
-"""Requests waiting on one line; one more is refused."""
-MISSES_UNTIL_CLOSED = 3
+_MOST_COLLECTED: Final = 1 << 20
+"""Bytes that a reply of several frames may have."""
 
 
 class Matcher(NamedTuple):
@@ -37,296 +54,336 @@ class Matcher(NamedTuple):
 
     reader: Reader
     decode: Decode
+    make_fast: Callable[[], FastRead | None] | None = None
+    """Makes a function that does both in one, for text."""
+    prefix: str = ""
+    """What the text of its frames begins with, blanks aside; "" when that is not known."""
+
+    def take(self, frame: Frame, now: float) -> Taken | None:
+        """Return samples and refused values, or None when the frame is another one."""
+        found = self.read(frame)
+        return None if found is None else self.decode(found, now)
 
     def read(self, frame: Frame) -> Fields | None:
         """Return the fields, or None when the frame is another one or no text at all."""
         try:
             return self.reader.read(frame)
+        except BadItem as error:
+            frame.fault = str(error)
+            return None
         except BadText:
             return None
 
 
+class Outcome(NamedTuple):
+    """How a request ended."""
+
+    code: str = ""
+    """"" when it is done; else as in `urc.protocol.events.Failed`."""
+    message: str = ""
+    values: Mapping[str, Reading] = NOTHING
+
+
+DONE: Final = Outcome()
+
+
+class Answer(NamedTuple):
+    """What one answer looks like, compiled."""
+
+    matcher: Matcher
+    timeout_s: float
+    errors: tuple[Pattern, ...] = ()
+    faults: tuple[tuple[Matcher, Template | None], ...] = ()
+    lines: int | Pattern | None = None
+
+
+class Ask(NamedTuple):
+    """What can be asked, compiled once."""
+
+    label: str
+    """For messages: ``polls.0`` or the command's name."""
+    encode: Encode
+    answers: tuple[Answer, ...] = ()
+    """One for each stage; () when nothing answers."""
+    match: Template | None = None
+    framing: Framing | None = None
+    """Of its answers; None: the line's own."""
+    rank: int = 2
+    is_latest_only: bool = False
+    bucket: Bucket | None = None
+    retries: int = 0
+    has_counters: bool = False
+    is_motion: bool = False
+    """It moves the robot: it must not wait until the line is usable and take effect then."""
+    is_miss_harmless: bool = False
+    """Its missing answers say nothing about the line: somebody else counts them."""
+
+
+class Owner(Protocol):
+    """Who asked."""
+
+    def ended(self, exchange: "Exchange", outcome: Outcome, now: float) -> "list[LineEvent]":
+        """Take note of the outcome; return what to tell."""
+
+
 class Exchange:
-    """A request and how it is answered."""
+    """One request, from the queue to its outcome."""
 
     __slots__ = (
-        "answer_due",
+        "ask",
+        "condition",
         "data",
-        "errors",
         "gives_up_at",
-        "label",
-        "matcher",
-        "reply_s",
-        "request_id",
+        "is_privileged",
+        "is_secret",
+        "namespace",
+        "numbers",
+        "owner",
+        "sent_at",
+        "tries_left",
     )
 
     def __init__(
         self,
-        label: str,
-        data: bytes,
-        matcher: Matcher | None,
-        errors: tuple[Pattern, ...],
+        ask: Ask,
+        owner: Owner,
+        namespace: Mapping[str, object],
+        data: bytes | None,
         *,
-        reply_s: float,
         gives_up_at: float,
-        request_id: int | None = None,
+        is_privileged: bool = False,
+        is_secret: bool = False,
+        condition: Callable[[float], str] | None = None,
     ) -> None:
-        self.label = label
-        """For messages: ``polls.0`` or the command's name."""
+        self.ask = ask
+        self.owner = owner
+        self.namespace = namespace
+        """What its templates know; without counters."""
         self.data = data
-        self.matcher = matcher
-        """What its answer looks like; None when none comes."""
-        self.errors = errors
-        """Answers that mean failure."""
-        self.reply_s = reply_s
-        """How long the answer may take, in seconds."""
+        """None: there are counters in it, so it is made when it is sent."""
+        self.numbers: Mapping[str, int] = NOTHING
+        """Of the counters in it."""
         self.gives_up_at = gives_up_at
         """When it fails for having waited too long to be sent."""
-        self.request_id = request_id
-        """None for polls."""
-        self.answer_due = 0.0
-
-
-class Line:
-    """The conversation on one transport. Time is passed in; nothing is called back."""
-
-    def __init__(self, spec: TransportSpec, messages: list[Matcher]) -> None:
-        self.spec = spec
-        self.framing: Framing = build_framing(spec.framing)
-        self.state: Literal["closed", "opening", "open"] = "closed"
-        self.waiting: deque[Exchange] = deque()
-        self.in_flight: Exchange | None = None
-        self._messages = messages
-        self._decoder: Decoder = self.framing.decoder()
-        self._next_send = float("-inf")
-        self._wary_until: float | None = None
-        self._late: Exchange | None = None
-        self._misses = 0
+        self.is_privileged = is_privileged
+        """It belongs to what makes the line usable, or says good-bye."""
+        self.is_secret = is_secret
+        """Its text must not appear in any message."""
+        self.condition = condition
+        """Asked again before it is sent: returns why not, or ""."""
+        self.tries_left = ask.retries
+        self.sent_at = gives_up_at
+        """When it was last sent."""
 
     @property
-    def is_per_request(self) -> bool:
-        """Whether each request brings its own connection."""
-        return self.spec.connection == "per_request"
-
-    def is_open(self) -> bool:
-        """Return whether the transport is connected."""
-        return self.state == "open"
+    def rank(self) -> int:
+        """The lower, the sooner it is sent."""
+        return self.ask.rank
 
     @property
-    def deadline(self) -> float | None:
-        """When `tick` has something to do, or None."""
-        times = [exchange.gives_up_at for exchange in self.waiting]
-        if self._decoder.deadline is not None:
-            times.append(self._decoder.deadline)
-        if self.in_flight is not None:
-            times.append(self.in_flight.answer_due)
-        elif self._wary_until is not None:
-            times.append(self._wary_until)
-        elif self.waiting and self.state == "open":
-            times.append(self._next_send)
-        return min(times, default=None)
+    def latest_key(self) -> str:
+        """Its name, when a newer one takes its place."""
+        return self.ask.label if self.ask.is_latest_only else ""
 
-    def has(self, label: str) -> bool:
-        """Return whether a request of that label waits or is in flight."""
-        if self.in_flight is not None and self.in_flight.label == label:
-            return True
-        return any(exchange.label == label for exchange in self.waiting)
+    @property
+    def is_realtime(self) -> bool:
+        """Whether it waits for nothing."""
+        return self.ask.rank == REALTIME
 
-    def opened(self, now: float) -> list[Event]:
-        """Take note that the transport is connected, with nothing received on it yet."""
-        self._reset("open")
-        return self._pump(now)
 
-    def closed(self, reason: str, now: float) -> list[Event]:
-        """Take note that the transport is not connected (any more)."""
-        if self.state == "closed":
-            return []
-        events: list[Event] = []
-        was_open, pending = self.state == "open", self._decoder.pending
-        if was_open and pending:
-            text = f"the connection ended in the middle of a frame ({pending} bytes)"
-            events.append(Fault(self.spec.name, "cut-frame", text))
-        lost = [self.in_flight] if self.in_flight is not None else []
-        if not self.is_per_request:
-            lost += self.waiting
-            self.waiting.clear()
-        elif self.waiting and not was_open:
-            lost.append(self.waiting.popleft())  # it could not be connected for this one
-        for exchange in lost:
-            events += self._failed(exchange, "disconnected", reason or "the robot hung up")
-        self._reset("closed")
-        return events + self._pump(now)
+class Ended(NamedTuple):
+    """Inside the engine: a request is over."""
 
-    def submit(self, exchange: Exchange, now: float) -> list[Event]:
-        """Queue a request, and send it at once when the line is free."""
-        if self.state == "closed" and not self.is_per_request:
-            return self._failed(exchange, "disconnected", "the robot is not connected")
-        if len(self.waiting) >= QUEUE_LIMIT:
-            text = f"{QUEUE_LIMIT} requests are waiting on {self.spec.name} already"
-            return self._failed(exchange, "queue-full", text)
-        self.waiting.append(exchange)
-        return self._pump(now)
+    exchange: Exchange
+    outcome: Outcome
 
-    def receive(self, data: bytes, now: float) -> list[Event]:
-        """Take bytes from the transport."""
-        if not self.is_open():
-            return []
-        return self._frames(self._decoder.feed(data, now), now) + self._pump(now)
 
-    def tick(self, now: float) -> list[Event]:
-        """Do what is due at `now`."""
-        events: list[Event] = []
-        if self.is_open():
-            events += self._frames(self._decoder.tick(now), now)
-        for exchange in [late for late in self.waiting if late.gives_up_at <= now]:
-            self.waiting.remove(exchange)
-            events += self._failed(exchange, "timed-out", "it could not be sent in time")
-        if self.in_flight is not None and self.in_flight.answer_due <= now:
-            events += self._missed(self.in_flight, now)
-        if self._wary_until is not None and self._wary_until <= now:
-            self._wary_until = self._late = None
-        return events + self._pump(now)
+class Heard(NamedTuple):
+    """Inside the engine: what somebody listened for has come."""
 
-    def _reset(self, state: Literal["closed", "open"]) -> None:
-        self.state = state
-        self.in_flight = self._late = self._wary_until = None
-        self._misses = 0
-        self._decoder = self.framing.decoder()
+    ear: "Ear"
+    offer: "Offer"
 
-    def _pump(self, now: float) -> list[Event]:
-        """Send what may be sent; open and close a per-request line as needed."""
-        events: list[Event] = []
-        while self.in_flight is None and self._wary_until is None:
-            if not self.waiting:
-                if self.is_per_request and self.state == "open":
-                    self.state = "closed"
-                    events.append(Close(self.spec.name))
-                break
-            if self.state != "open":
-                if self.is_per_request and self.state == "closed":
-                    self.state = "opening"
-                    events.append(Open(self.spec.name))
-                break
-            if now < self._next_send:
-                break
-            events += self._send(self.waiting.popleft(), now)
-        return events
 
-    def _send(self, exchange: Exchange, now: float) -> list[Event]:
-        self._next_send = now + self.spec.min_gap_s
-        sent: list[Event] = [Send(self.spec.name, exchange.data)]
-        if exchange.matcher is None:
-            return sent + self._done(exchange, {})
-        exchange.answer_due = now + exchange.reply_s
-        self.in_flight = exchange
-        return sent
+class Leaving(NamedTuple):
+    """Inside the engine: the line is done with its connection, and wants to say good-bye."""
 
-    def _frames(self, frames: list[bytes | FrameFault], now: float) -> list[Event]:
-        events: list[Event] = []
-        for frame in frames:
-            if not self.is_open():
-                break  # what follows the answer on a connection of one request is nobody's
-            if isinstance(frame, FrameFault):
-                events.append(Fault(self.spec.name, frame.code, frame.message))
-            else:
-                events += self._frame(frame, now)
-        return events
+    transport: str
 
-    def _frame(self, payload: bytes, now: float) -> list[Event]:
-        frame = Frame(payload, self.spec.encoding)
-        if self.in_flight is not None and self.in_flight.matcher is not None:
-            events = self._answer(self.in_flight, self.in_flight.matcher, frame, now)
-            if events is not None:
-                self.in_flight = None
-                self._misses = 0
-                # One connection, one request: the next one waits for a connection of its own.
-                return events + self._hang_up()
-        late = self._late
-        if late is not None and late.matcher and late.matcher.read(frame) is not None:
-            self._wary_until = self._late = None
-            text = f"the answer to {late.label} came too late and was dropped"
-            return [Fault(self.spec.name, "late-reply", text)]
-        for matcher in self._messages:
-            found = matcher.read(frame)
-            if found is not None:
-                return self._samples(matcher, found, now)[0]
-        return [self._unknown(frame)]
 
-    def _unknown(self, frame: Frame) -> Fault:
-        """Return what to say of a frame that nothing declared matches."""
-        try:
-            text = frame.text
-        except BadText as error:
-            return Fault(self.spec.name, "bad-text", str(error))
-        shown = text if len(text) <= 60 else text[:57] + "..."
-        return Fault(self.spec.name, "no-match", f"nothing declared matches {shown!r}")
+LineEvent = Event | Ended | Heard | Leaving
 
-    def _answer(
-        self, exchange: Exchange, matcher: Matcher, frame: Frame, now: float
-    ) -> list[Event] | None:
-        """Return what the frame means for `exchange`, or None when it is no answer to it."""
-        if any(_matches(pattern, frame) for pattern in exchange.errors):
-            return self._failed(exchange, "refused", f"the robot answered {frame.text[:80]!r}")
-        found = matcher.read(frame)
-        if found is None:
+
+class Offer(NamedTuple):
+    """What an ear made of a frame."""
+
+    fields: Fields | None = None
+    """Of a whole answer; None: more is to come, or it is a refusal."""
+    refusal: str = ""
+    """Why the robot refused, for people."""
+    dropped: str = ""
+    """What was collected before and belongs to no answer, for people."""
+
+
+_MORE: Final = Offer()
+
+
+class Ear:
+    """Collects the frames of one answer."""
+
+    __slots__ = ("_lines", "_size", "answer", "owner")
+
+    def __init__(self, answer: Answer, owner: "Listening | None" = None) -> None:
+        self.answer = answer
+        self.owner = owner
+        self._lines: list[bytes] = []
+        self._size = 0
+
+    def offer(self, frame: Frame, is_mine: Callable[[Fields], bool] | None = None) -> Offer | None:
+        """Return what the frame means here, or None when it is no part of the answer.
+
+        Args:
+            frame: as it came in.
+            is_mine: tells by its fields whether an answer is the one waited for.
+        """
+        refused = self._refusal(frame, is_mine)
+        if refused is not None:
+            return refused
+        if self.answer.lines is not None:
+            return self._collect(frame, self.answer.lines)
+        found = self.answer.matcher.read(frame)
+        if found is None or (is_mine is not None and not is_mine(found)):
             return None
-        events, samples = self._samples(matcher, found, now)
-        # What the reply says beside the signals is the command's own result.
-        values = {name[1:]: _plain(raw) for name, raw in found.items() if name.startswith("_")}
-        values |= {sample.signal: sample.value for sample in samples}
-        return events + self._done(exchange, values)
+        return Offer(found)
 
-    def _samples(
-        self, matcher: Matcher, found: Fields, now: float
-    ) -> tuple[list[Event], list[Sample]]:
-        samples, refused = matcher.decode(found, now)
-        # A good frame without values is told of, too: it shows that the line lives.
-        is_good = bool(samples) or not refused
-        events: list[Event] = [Samples(self.spec.name, tuple(samples))] if is_good else []
-        events += [Fault(self.spec.name, "bad-value", line) for line in refused]
-        return events, samples
+    def _refusal(self, frame: Frame, is_mine: Callable[[Fields], bool] | None) -> Offer | None:
+        """Return why the robot refused; what names nobody is for whoever waits longest."""
+        for matcher, text in self.answer.faults:  # first: they say more
+            fields = matcher.read(frame)
+            if fields is not None and (is_mine is None or not fields or is_mine(fields)):
+                return Offer(refusal=_told(text, fields, frame))
+        for pattern in self.answer.errors:
+            groups = _search(pattern, frame)
+            if groups is not None and (is_mine is None or not groups or is_mine(groups)):
+                return Offer(refusal=f"the robot answered {_shown(frame)}")
+        return None
 
-    def _missed(self, exchange: Exchange, now: float) -> list[Event]:
-        self.in_flight = None
-        self._misses += 1
-        text = f"no answer to {exchange.label} within {exchange.reply_s:g} s"
-        events: list[Event] = [Fault(self.spec.name, "reply-timeout", text)]
-        if exchange.request_id is not None:
-            events += self._failed(exchange, "timed-out", text)
-        if self.is_per_request or self._misses >= MISSES_UNTIL_CLOSED:
-            return events + self._hang_up(text)
-        self._late = exchange
-        self._wary_until = now + exchange.reply_s
-        return events
+    def _collect(self, frame: Frame, lines: int | Pattern) -> Offer | None:
+        payload = frame.payload
+        if not isinstance(payload, bytes):
+            return None
+        self._lines.append(payload)
+        self._size += len(payload) + 1
+        if self._size > _MOST_COLLECTED:
+            return self._drop(len(self._lines), "it has too many lines")
+        if isinstance(lines, int):
+            if len(self._lines) < lines:
+                return _MORE
+        elif _search(lines, frame) is None:
+            return _MORE
+        found = self.answer.matcher.read(Frame(b"\n".join(self._lines), frame.encoding))
+        if found is not None:
+            self._lines, self._size = [], 0
+            return Offer(found)
+        # A stray line in front of a counted reply must not shift it for ever.
+        return self._drop(1 if isinstance(lines, int) else len(self._lines), "nothing matches it")
 
-    def _hang_up(self, reason: str = "") -> list[Event]:
-        """End the connection when it belonged to one request, or when it is given up."""
-        if not self.is_per_request and not reason:
-            return []
-        self._reset("closed")
-        return [Close(self.spec.name, reason)]
-
-    def _done(self, exchange: Exchange, values: Mapping[str, Value]) -> list[Event]:
-        if exchange.request_id is None:
-            return []
-        return [Replied(exchange.request_id, exchange.label, values)]
-
-    def _failed(self, exchange: Exchange, code: str, message: str) -> list[Event]:
-        if exchange.request_id is not None:
-            return [Failed(exchange.request_id, exchange.label, code, message)]
-        # A poll comes again by itself, so only a robot that refuses it is worth a line.
-        if code == "refused":
-            return [Fault(self.spec.name, code, f"{exchange.label}: {message}")]
-        return []
+    def _drop(self, count: int, why: str) -> Offer:
+        gone, self._lines = self._lines[:count], self._lines[count:]
+        self._size = sum(len(line) + 1 for line in self._lines)
+        return Offer(dropped=f"{len(gone)} lines of a reply were dropped: {why}")
 
 
-def _matches(pattern: Pattern, frame: Frame) -> bool:
+class Listening(Protocol):
+    """Who put out an ear."""
+
+    def heard(self, ear: Ear, offer: Offer, now: float) -> None:
+        """Take what came."""
+
+
+class Flight:
+    """One time that a request was sent, until its last answer has come or is given up."""
+
+    __slots__ = ("due", "ear", "exchange", "is_late", "stage", "values")
+
+    def __init__(self, exchange: Exchange, now: float) -> None:
+        self.exchange = exchange
+        self.stage = 0
+        self.ear = Ear(exchange.ask.answers[0])
+        self.due = now + self.ear.answer.timeout_s
+        """When its answer is overdue; of one that is late: when it is not expected any more."""
+        self.is_late = False
+        """It has failed, but its answer may still come and must not be taken for another's."""
+        self.values: dict[str, Reading] = {}
+
+    def offer(self, frame: Frame) -> Offer | None:
+        """Return what the frame means for this request, or None when it answers another one."""
+        return self.ear.offer(frame, None if self.exchange.ask.match is None else self._is_mine)
+
+    def next_stage(self, now: float) -> bool:
+        """Wait for the next answer; return whether there is one to come."""
+        answers = self.exchange.ask.answers
+        self.stage += 1
+        if self.stage == len(answers):
+            return False
+        self.ear = Ear(answers[self.stage])
+        self.due = now + self.ear.answer.timeout_s
+        return True
+
+    def take(self, fields: Fields, samples: list[Sample]) -> None:
+        """Keep what an answer says: its readings, and what is the document's own."""
+        for name, raw in fields.items():
+            if name.startswith("_"):
+                self.values[name[1:]] = _plain(raw)
+        for sample in samples:
+            self.values[sample.signal] = sample.value
+
+    def _is_mine(self, fields: Fields) -> bool:
+        match = self.exchange.ask.match
+        if match is None:
+            return True
+        names: dict[str, object] = {"seq": self.exchange.numbers, **self.exchange.namespace}
+        for name, raw in fields.items():
+            names[name] = Word(raw) if isinstance(raw, str) else raw
+        try:
+            return bool(match.evaluate(names))
+        except ExpressionError:
+            return False
+
+
+def expires_at(spec: TransportSpec, ask: Ask, now: float) -> float:
+    """Return when a request that is asked now has waited too long to be sent."""
+    return now + queue_limit_s(spec, ask.answers[0].timeout_s if ask.answers else None)
+
+
+def _search(pattern: Pattern, frame: Frame) -> Mapping[str, str | None] | None:
     try:
-        return pattern.search(frame.text) is not None
+        return pattern.search(frame.text)
     except BadText:
-        return False
+        return None
 
 
-def _plain(raw: object) -> Value:
+def _told(text: Template | None, fields: Fields, frame: Frame) -> str:
+    if text is not None:
+        try:
+            return text_of(text.evaluate(fields))
+        except ExpressionError as error:
+            return f"the robot refused; {error}"
+    return f"the robot answered {_shown(frame)}"
+
+
+def _shown(frame: Frame) -> str:
+    try:
+        return repr(frame.text[:80])
+    except BadText:
+        payload = frame.payload
+        return payload[:40].hex(" ") if isinstance(payload, bytes) else "with an error"
+
+
+def _plain(raw: object) -> Reading:
     """Return a raw value as something that a reply may carry."""
-    return raw if raw is None or isinstance(raw, (bool, int, float, str)) else str(raw)
+    if isinstance(raw, (list, tuple)):
+        return tuple(map(_plain, raw))
+    if raw is None or isinstance(raw, (bool, int, float, str, bytes, Mapping)):
+        return raw
+    return str(raw)

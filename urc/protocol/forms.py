@@ -9,12 +9,14 @@ from collections.abc import Mapping
 from typing import NamedTuple, Protocol
 
 from urc.model.codec import Payload, ReadSpec, WriteSpec
+from urc.model.values import NOTHING
 from urc.problems import UrcError
 from urc.registry import Table
 
 __all__ = [
     "READERS",
     "WRITERS",
+    "BadItem",
     "BadText",
     "CodecContext",
     "Frame",
@@ -30,6 +32,10 @@ class BadText(ValueError):
     """A frame that is not text in the line's encoding; the message says where."""
 
 
+class BadItem(BadText):
+    """A frame that is meant here, with a value that it cannot have; the message names the item."""
+
+
 class NotWritable(UrcError):
     """Values that cannot be put into this frame; the message names the one at fault."""
 
@@ -37,31 +43,44 @@ class NotWritable(UrcError):
 class Frame:
     """One frame as it came in; its text is decoded once, and only when somebody wants it."""
 
-    __slots__ = ("_text", "encoding", "payload")
+    __slots__ = ("_text", "encoding", "fault", "payload", "was_text_wanted")
+
+    fault: str
+    """Why a reader that knew it could not take it; unset when there was none."""
+    was_text_wanted: bool
+    """A reader wanted text where there is none; unset when nobody did."""
 
     def __init__(self, payload: Payload, encoding: str) -> None:
         self.payload = payload
         self.encoding = encoding
         self._text: str | None = None
+        # The fault is set when there is one: a line makes thousands of frames a second.
 
     @property
     def text(self) -> str:
         """The frame as text; raise `BadText` when it is none."""
-        if self._text is None:
-            if not isinstance(self.payload, bytes):
-                raise BadText("a message is no text")
-            try:
-                self._text = self.payload.decode(self.encoding)
-            except UnicodeDecodeError as error:
-                wrong = self.payload[error.start : error.end]
-                raise BadText(f"{wrong!r} is not {self.encoding} text") from None
-        return self._text
+        text = self._text
+        if text is None:
+            text = self._text = self._decoded()
+        return text
+
+    def _decoded(self) -> str:
+        if not isinstance(self.payload, bytes):
+            raise BadText("a message is no text")
+        try:
+            return self.payload.decode(self.encoding)
+        except UnicodeDecodeError as error:
+            wrong = self.payload[error.start : error.end]
+            self.was_text_wanted = True
+            raise BadText(f"{wrong!r} is not {self.encoding} text") from None
 
 
 class CodecContext(NamedTuple):
     """What a reader or writer must know of its line."""
 
     encoding: str = "utf-8"
+    settings: Mapping[str, object] = NOTHING
+    """Values of the profile's settings, for ``when`` and ``set``."""
 
 
 class Reader(Protocol):
@@ -87,7 +106,11 @@ class Writer(Protocol):
 def build_reader(spec: ReadSpec, context: CodecContext) -> Reader:
     """Return the reader that `spec` declares."""
     reader: Reader = READERS[spec.form].load()(spec, context)
-    return reader
+    if not (spec.conversions or spec.sets or spec.when):
+        return reader
+    from urc.protocol.shaped import ShapedReader
+
+    return ShapedReader(reader, spec, context)
 
 
 def build_writer(spec: WriteSpec, context: CodecContext) -> Writer:
@@ -100,11 +123,22 @@ READERS = Table(
     "urc.readers",
     {
         "regex": "urc.protocol.regex_form:RegexReader",
+        "pattern": "urc.protocol.pattern_form:PatternReader",
+        "split": "urc.protocol.split_form:SplitReader",
+        "keyvalue": "urc.protocol.split_form:KeyvalueReader",
+        "json": "urc.protocol.json_paths:JsonReader",
+        "xml": "urc.protocol.xml_form:XmlReader",
+        "equals": "urc.protocol.equals_form:EqualsReader",
+        "struct": "urc.protocol.struct_form:StructReader",
     },
 )
 WRITERS = Table(
     "urc.writers",
     {
         "text": "urc.protocol.text_form:TextWriter",
+        "hex": "urc.protocol.hex_form:BytesWriter",
+        "bytes": "urc.protocol.hex_form:BytesWriter",
+        "json": "urc.protocol.json_text_form:JsonWriter",
+        "struct": "urc.protocol.struct_form:StructWriter",
     },
 )

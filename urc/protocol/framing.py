@@ -1,17 +1,39 @@
 """Framings: how a byte stream is cut into frames, and frames are made into bytes.
 
 Floor 3, pure. Each framing owns both directions, so that the emulated robot is the same
-declaration turned round (`reversed`). A decoder is bounded: a frame longer than the limit is
-dropped as a whole, reported once, and the stream goes on at the next delimiter.
+declaration turned round (`reversed`). This module has what all framings share, and the simplest
+one; the others are in `urc.protocol.framings`.
+
+Theory of operation. A decoder takes frames off the front of a `Stream`, one a call, and leaves the
+rest there: so another decoder may go on with it when a reply brings its own framing. It is bounded:
+what is held back never outgrows the longest frame. It is linear: what it has looked at, it does not
+look at again, or only as often as `Credit` allows. After bytes that are no frame it says so once,
+and goes on where the next frame may begin.
 """
 
-from typing import NamedTuple, Protocol, cast
+from collections.abc import Callable
+from typing import Final, NamedTuple, Protocol, cast
 
 from urc.model.driver import FramingSpec
+from urc.model.framing import FrameLayout
 from urc.problems import UrcError
+from urc.protocol.frame import BadFrame, Seal
 from urc.registry import Table
 
-__all__ = ["FRAMINGS", "Decoder", "FrameFault", "Framing", "FramingError", "build_framing"]
+__all__ = [
+    "FRAMINGS",
+    "Credit",
+    "Decoder",
+    "DelimiterDecoder",
+    "FrameFault",
+    "Framing",
+    "FramingError",
+    "Stream",
+    "StreamDecoder",
+    "build_framing",
+    "sealed",
+    "seal_of",
+]
 
 
 class FramingError(UrcError):
@@ -22,8 +44,31 @@ class FrameFault(NamedTuple):
     """Bytes that were no frame."""
 
     code: str
-    """``frame-too-long``"""
+    """``frame-too-long``, ``bad-checksum``, ``no-frame`` …"""
     message: str
+    closes: bool = False
+    """Whether the connection is to be given up."""
+
+
+class Stream:
+    """The bytes of one connection that no frame has taken yet."""
+
+    __slots__ = ("at", "data")
+
+    def __init__(self, data: bytearray | None = None) -> None:
+        self.data = bytearray() if data is None else data
+        self.at = 0
+        """Where the bytes begin that are not taken yet."""
+
+    def __len__(self) -> int:
+        return len(self.data) - self.at
+
+    def push(self, data: bytes) -> None:
+        """Add bytes at the end, and let go of those that are taken."""
+        if self.at:
+            del self.data[: self.at]
+            self.at = 0
+        self.data += data
 
 
 class Decoder(Protocol):
@@ -40,6 +85,12 @@ class Decoder(Protocol):
     def feed(self, data: bytes, now: float = 0.0) -> list[bytes | FrameFault]:
         """Take bytes and return the frames that are now complete, in order."""
 
+    def push(self, data: bytes, now: float = 0.0) -> None:
+        """Take bytes, to be cut by `next`."""
+
+    def next(self, now: float = 0.0) -> bytes | FrameFault | None:
+        """Return one frame or fault and take it off the stream; None when none is complete."""
+
     def tick(self, now: float) -> list[bytes | FrameFault]:
         """Return the frames that the silence until `now` has completed."""
 
@@ -50,8 +101,8 @@ class Framing(Protocol):
     def encode(self, payload: bytes) -> bytes:
         """Return the bytes of one frame; raise `FramingError` when it cannot be told apart."""
 
-    def decoder(self) -> Decoder:
-        """Return a fresh decoder."""
+    def decoder(self, stream: Stream | None = None) -> Decoder:
+        """Return a fresh decoder, of what is in `stream` already and what will be fed."""
 
     def reversed(self) -> "Framing":
         """Return the same framing seen from the other end of the line."""
@@ -60,7 +111,130 @@ class Framing(Protocol):
 def build_framing(spec: FramingSpec) -> Framing:
     """Return the framing that `spec` declares."""
     framing: Framing = FRAMINGS[spec.type].load()(spec)
-    return framing
+    return framing if spec.sent is None else TwoFramings(build_framing(spec.sent), framing)
+
+
+class TwoFramings(NamedTuple):
+    """What is sent is framed otherwise than what comes."""
+
+    sent: Framing
+    received: Framing
+
+    def encode(self, payload: bytes) -> bytes:
+        """Return the bytes of one frame, or raise `FramingError`."""
+        return self.sent.encode(payload)
+
+    def decoder(self, stream: Stream | None = None) -> Decoder:
+        """Return a fresh decoder."""
+        return self.received.decoder(stream)
+
+    def reversed(self) -> "TwoFramings":
+        """Return the same framings seen from the other end of the line."""
+        return TwoFramings(self.received.reversed(), self.sent.reversed())
+
+
+class Credit:
+    """How many bytes may be looked at a second time: a few for each that the stream moves on.
+
+    So all work together is at most `RATE` + 1 times the bytes of the stream, and `MOST` once.
+    """
+
+    RATE: Final = 8
+    MOST: Final = 1 << 16
+
+    def __init__(self) -> None:
+        self._left = self.MOST
+
+    def earn(self, count: int) -> None:
+        """Take note that the stream has moved on by `count` bytes."""
+        self._left = min(self.MOST, self._left + self.RATE * count)
+
+    def spend(self, count: int) -> bool:
+        """Return whether `count` bytes may be looked at again, and take them off."""
+        if self._left < count:
+            return False
+        self._left -= count
+        return True
+
+
+class StreamDecoder:
+    """What the decoders share. One of them adds `next`."""
+
+    def __init__(self, stream: Stream | None, max_bytes: int) -> None:
+        self._stream = Stream() if stream is None else stream
+        self._max_bytes = max_bytes
+        self._is_lost = False
+        """Whether the bytes since the last frame were none: that is told once."""
+
+    @property
+    def pending(self) -> int:
+        """Bytes held back."""
+        return len(self._stream)
+
+    @property
+    def deadline(self) -> float | None:
+        """None: only bytes complete a frame."""
+        return None
+
+    def push(self, data: bytes, now: float = 0.0) -> None:
+        """Take bytes, to be cut by `next`."""
+        self._stream.push(data)
+
+    def next(self, now: float = 0.0) -> bytes | FrameFault | None:
+        """Return one frame or fault, or None when there is none yet."""
+        raise NotImplementedError
+
+    def feed(self, data: bytes, now: float = 0.0) -> list[bytes | FrameFault]:
+        """Take bytes and return the frames that are now complete, in order."""
+        self.push(data, now)
+        frames: list[bytes | FrameFault] = []
+        while (frame := self.next(now)) is not None:
+            frames.append(frame)
+        return frames
+
+    def tick(self, now: float) -> list[bytes | FrameFault]:
+        """Return the frames that silence has completed: none."""
+        return []
+
+    def restart(self) -> None:
+        """Forget what was seen of the stream: one case of a `switch` has a frame begin here."""
+        self._is_lost = False
+
+    def _skip(self, count: int) -> FrameFault | None:
+        """Let go of bytes that begin no frame; return a fault for the first of their run."""
+        stream = self._stream
+        first = stream.data[stream.at : stream.at + 1]
+        stream.at += count
+        return self._lost(
+            "no-frame", f"bytes from {first.hex()} on begin no frame; skipped up to the next one"
+        )
+
+    def _lost(self, code: str, message: str, *, closes: bool = False) -> FrameFault | None:
+        """Return a fault, or None when the run of bytes that are no frame is told already."""
+        if self._is_lost:
+            return None
+        self._is_lost = True
+        return FrameFault(code, message, closes)
+
+
+Open = Callable[[bytes], bytes]
+
+
+def seal_of(spec: FramingSpec) -> Seal | None:
+    """Return what wraps the payloads of `spec`, or None when they are the frames themselves."""
+    layout = cast("FrameLayout | None", spec.options.get("layout"))
+    return None if layout is None or layout == FrameLayout() else Seal(layout)
+
+
+def sealed(seal: Seal | None, payload: bytes, max_bytes: int) -> bytes:
+    """Return the frame around `payload`; raise `FramingError` when it cannot be one."""
+    try:
+        frame = payload if seal is None else seal.close(payload)
+    except BadFrame as error:
+        raise FramingError(str(error)) from None
+    if len(frame) > max_bytes:
+        raise FramingError(f"a frame of {len(frame)} bytes is longer than {max_bytes}")
+    return frame
 
 
 class DelimiterFraming(NamedTuple):
@@ -69,70 +243,109 @@ class DelimiterFraming(NamedTuple):
     tx: bytes
     rx: bytes
     max_bytes: int
+    seal: Seal | None = None
 
     @classmethod
     def from_spec(cls, spec: FramingSpec) -> "DelimiterFraming":
         """Return the framing for options ``tx`` and ``rx``, both bytes."""
         tx, rx = cast("bytes", spec.options["tx"]), cast("bytes", spec.options["rx"])
-        return cls(tx, rx, spec.max_bytes)
+        return cls(tx, rx, spec.max_bytes, seal_of(spec))
 
     def encode(self, payload: bytes) -> bytes:
-        if self.tx and self.tx in payload:
+        frame = payload if self.seal is None else sealed(self.seal, payload, self.max_bytes)
+        if self.tx and self.tx in frame:
             raise FramingError(
                 f"{payload!r} contains the delimiter {self.tx!r}: it would be two frames"
             )
-        return payload + self.tx
+        return frame + self.tx
 
-    def decoder(self) -> Decoder:
-        return _DelimiterDecoder(self.rx, self.max_bytes)
+    def decoder(self, stream: Stream | None = None) -> Decoder:
+        return DelimiterDecoder(
+            stream, self.rx, self.max_bytes, None if self.seal is None else self.seal.open
+        )
 
     def reversed(self) -> "DelimiterFraming":
         return self._replace(tx=self.rx, rx=self.tx)
 
 
-class _DelimiterDecoder:
-    """Remembers how far it has searched, so a frame that drips in costs linear time."""
+class DelimiterDecoder(StreamDecoder):
+    """Remembers how far it has searched, so a frame that drips in costs linear time.
 
-    def __init__(self, delimiter: bytes, max_bytes: int) -> None:
+    A frame that is too long is dropped as a whole, reported once, and the stream goes on behind the
+    next delimiter.
+    """
+
+    def __init__(
+        self,
+        stream: Stream | None,
+        delimiter: bytes,
+        max_bytes: int,
+        opened: Open | None = None,
+        *,
+        skips_empty: bool = False,
+    ) -> None:
+        super().__init__(stream, max_bytes)
         self._delimiter = delimiter
-        self._max_bytes = max_bytes
-        self._buffer = bytearray()
+        self._open = opened
+        self._skips_empty = skips_empty
         self._searched = 0
+        """How many bytes of the stream are known to have no delimiter."""
         self._is_skipping = False
+        self._credit: Credit | None = None
+        """Of a case of a `switch`: there a frame that is too long costs its first byte only."""
 
-    @property
-    def pending(self) -> int:
-        return len(self._buffer)
+    def restart(self) -> None:
+        """Let a frame of a `switch` begin here."""
+        super().restart()
+        self._searched = 0
+        self._credit = self._credit or Credit()
 
-    @property
-    def deadline(self) -> float | None:
-        return None
-
-    def tick(self, now: float) -> list[bytes | FrameFault]:
-        return []
-
-    def feed(self, data: bytes, now: float = 0.0) -> list[bytes | FrameFault]:
-        buffer, delimiter = self._buffer, self._delimiter
-        buffer += data
-        frames: list[bytes | FrameFault] = []
-        start = 0
-        while (end := buffer.find(delimiter, max(start, self._searched))) >= 0:
+    def next(self, now: float = 0.0) -> bytes | FrameFault | None:
+        """Return one frame or fault, or None when there is none yet."""
+        stream, delimiter = self._stream, self._delimiter
+        while True:
+            start = stream.at
+            most = len(stream.data)
+            if self._credit is not None:
+                most = min(most, start + self._max_bytes + len(delimiter))
+            end = stream.data.find(delimiter, start + self._searched, most)
+            if end < 0:
+                return self._wait(self._credit)
+            stream.at = end + len(delimiter)
+            self._searched = 0
+            if self._credit is not None:
+                self._credit.earn(stream.at - start)
             if self._is_skipping:
                 self._is_skipping = False
             elif end - start > self._max_bytes:
-                frames.append(self._too_long())
-            else:
-                frames.append(bytes(buffer[start:end]))
-            start = end + len(delimiter)
-        del buffer[:start]
-        if len(buffer) > self._max_bytes + len(delimiter) and not self._is_skipping:
+                return self._too_long()
+            elif end > start or not self._skips_empty:
+                return self._opened(bytes(stream.data[start:end]))
+
+    def _opened(self, frame: bytes) -> bytes | FrameFault:
+        if self._open is None:
+            return frame
+        try:
+            return self._open(frame)
+        except BadFrame as error:
+            return FrameFault(error.code, str(error), error.closes)
+
+    def _wait(self, credit: Credit | None) -> FrameFault | None:
+        """Keep what may yet become a frame."""
+        stream, keep = self._stream, len(self._delimiter) - 1
+        fault = None
+        if credit is not None and len(stream) >= self._max_bytes + len(self._delimiter):
+            stream.at += 1 if credit.spend(self._max_bytes) else self._max_bytes
+            self._searched = 0
+            return self._too_long()
+        if len(stream) > self._max_bytes + len(self._delimiter) and not self._is_skipping:
             self._is_skipping = True
-            frames.append(self._too_long())
+            fault = self._too_long()
         if self._is_skipping:
             # Only what may be the beginning of a delimiter is still of interest.
-            del buffer[: max(0, len(buffer) - len(delimiter) + 1)]
-        self._searched = max(0, len(buffer) - len(delimiter) + 1)
-        return frames
+            stream.at = max(stream.at, len(stream.data) - keep)
+        self._searched = max(0, len(stream) - keep)
+        return fault
 
     def _too_long(self) -> FrameFault:
         return FrameFault(
@@ -143,5 +356,17 @@ class _DelimiterDecoder:
 
 FRAMINGS = Table(
     "urc.framings",
-    {"delimiter": "urc.protocol.framing:DelimiterFraming.from_spec"},
+    {
+        "delimiter": "urc.protocol.framing:DelimiterFraming.from_spec",
+        "fixed": "urc.protocol.framings.measured:MeasuredFraming.from_spec",
+        "length": "urc.protocol.framings.measured:MeasuredFraming.from_spec",
+        "slip": "urc.protocol.framings.stuffed:SlipFraming.from_spec",
+        "cobs": "urc.protocol.framings.stuffed:CobsFraming.from_spec",
+        "idle": "urc.protocol.framings.silent:IdleFraming.from_spec",
+        "datagram": "urc.protocol.framings.silent:DatagramFraming.from_spec",
+        "regex": "urc.protocol.framings.searched:RegexFraming.from_spec",
+        "brackets": "urc.protocol.framings.searched:BracketsFraming.from_spec",
+        "json": "urc.protocol.framings.json_values:JsonFraming.from_spec",
+        "switch": "urc.protocol.framings.switched:SwitchFraming.from_spec",
+    },
 )

@@ -6,6 +6,7 @@ from typing import cast
 from urc.model.codec import Payload, ReadSpec
 from urc.patterns import Pattern, example
 from urc.protocol.forms import CodecContext, Frame, NotWritable
+from urc.protocol.texts import encoded, field_text
 
 __all__ = ["RegexReader"]
 
@@ -26,20 +27,9 @@ class RegexReader:
 
     def write(self, fields: Mapping[str, object]) -> Payload:
         """Return text with `fields` in the places of the groups."""
-        texts = {name: _text(value) for name, value in fields.items()}
+        texts = {name: field_text(value) for name, value in fields.items()}
         text = example(self._pattern, texts)
         found = self._pattern.search(text)
         if found is None or any(found[name] != texts[name] for name in texts if name in found):
             raise NotWritable(f"no text with {texts!r} fits {self._pattern.source!r}")
-        try:
-            return text.encode(self._encoding)
-        except UnicodeEncodeError as error:
-            raise NotWritable(f"{error.object!r} does not exist in {self._encoding}") from None
-
-
-def _text(value: object) -> str:
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, float) and value.is_integer():
-        return str(int(value))
-    return str(value)
+        return encoded(text, self._encoding)

@@ -3,16 +3,20 @@
 import re
 from collections.abc import Mapping
 from functools import cached_property
-from typing import cast
+from typing import NamedTuple, cast
 
 from urc.expressions import Template, split_template, text_of
 from urc.model.codec import Payload, WriteSpec
-from urc.patterns import Pattern, compile_pattern
 from urc.protocol.forms import BadText, CodecContext, Frame, NotWritable
+from urc.protocol.texts import counter_in
 
 __all__ = ["TextWriter"]
 
-_NAME = re.compile(r"\s*([A-Za-z_][A-Za-z0-9_]*)\s*")
+_NAME = re.compile(
+    r"\s*([A-Za-z_][A-Za-z0-9_]*)\s*"
+    r"(?:\|\s*(?:fixed|round|int|float|string|pad|trim)\s*(?:\([^()]*\))?\s*)*"
+)
+"""What a name may go through and still be read back: nothing but its way of being written."""
 
 
 class TextWriter:
@@ -32,24 +36,56 @@ class TextWriter:
             raise NotWritable(f"{wrong!r} cannot be written in {self._encoding}") from None
 
     def read(self, frame: Frame) -> Mapping[str, object] | None:
-        """Return what stands in the places of the plain names, as text."""
+        """Return what stands in the places of the plain names, as text.
+
+        A counter's number is there as ``seq.NAME``. Where a hole could end in several places, it
+        ends at the first.
+        """
         try:
-            return self._reverse.search(frame.text)
+            text = frame.text
         except BadText:
             return None
+        first, *pieces = self._pieces
+        if not text.startswith(first.literal) or (not pieces and text != first.literal):
+            return None
+        found: dict[str, object] = {}
+        position = len(first.literal)
+        for piece in pieces:
+            if piece is pieces[-1]:
+                end = len(text) - len(piece.literal)
+                end = end if text.endswith(piece.literal) and end >= position else -1
+            else:
+                end = text.find(piece.literal, position)
+            if end < 0:
+                return None
+            if piece.name:
+                found.setdefault(piece.name, text[position:end])
+            position = end + len(piece.literal)
+        return found
 
     @cached_property
-    def _reverse(self) -> Pattern:
-        pieces = ["(?s)^"]
-        seen: set[str] = set()
+    def _pieces(self) -> tuple["_Piece", ...]:
+        pieces = [_Piece("", "")]
         for _, literal, expression in split_template(self._template.source):
             if expression is None:
-                pieces.append(re.escape(literal))
-                continue
-            name = _NAME.fullmatch(expression)
-            if name is not None and name[1] not in seen:
-                seen.add(name[1])
-                pieces.append(f"(?P<{name[1]}>.*?)")
+                last = pieces.pop()
+                pieces.append(_Piece(last.name, last.literal + literal))
             else:
-                pieces.append(".*?")
-        return compile_pattern("".join(pieces) + "$")
+                pieces.append(_Piece(_name_in(expression), ""))
+        return tuple(pieces)
+
+
+class _Piece(NamedTuple):
+    """A hole and the literal text after it; the first piece has no hole."""
+
+    name: str
+    """What stands in the hole; "" when that cannot be told."""
+    literal: str
+
+
+def _name_in(expression: str) -> str:
+    name = _NAME.fullmatch(expression)
+    if name is not None:
+        return name[1]
+    counter = counter_in(expression)
+    return f"seq.{counter}" if counter else ""

@@ -186,7 +186,8 @@ class Dispatcher:
             match event:
                 case Samples():
                     samples += event.samples
-                    self._ports[event.transport].heard()
+                    if event.transport:
+                        self._ports[event.transport].heard()
                 case Fault():
                     self._ports[event.transport].count(event)
                 case Send():

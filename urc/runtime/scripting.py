@@ -17,7 +17,7 @@ from os import PathLike
 from pathlib import Path
 
 from urc.model.profile import Profile
-from urc.model.values import Sample, Value
+from urc.model.values import Reading, Sample, Value
 from urc.problems import UrcError
 from urc.runtime.catalog import built_in_catalog
 from urc.runtime.session import CommandFailed, Session, resolve_settings
@@ -66,7 +66,7 @@ class ConnectedRobot:
         """Made by `connect`."""
         self.session = session
 
-    async def command(self, name: str, /, **arguments: Value) -> dict[str, Value]:
+    async def command(self, name: str, /, **arguments: Value) -> dict[str, Reading]:
         """Run a command and return the values of its reply; the wait is bounded.
 
         Raises:

@@ -3,22 +3,28 @@
 Floor 4, no I/O and no asyncio: `urc validate` runs these without a robot, a network or a secret.
 """
 
+import math
 from collections.abc import Iterator, Mapping
+from typing import NamedTuple
 
 from urc.config.values import shown
 from urc.model.driver import Driver, TransportSpec
-from urc.model.profile import DocumentTest, Profile, Setting
+from urc.model.profile import DocumentTest, Fed, Profile, Setting, pieces_of
 from urc.model.values import Value
 from urc.problems import Problem, UrcError
+from urc.protocol.alone import alone
 from urc.protocol.engine import Engine
-from urc.protocol.events import Event, Failed, Fault, Open, Request, Samples, Send
+from urc.protocol.events import Close, Event, Failed, Fault, Open, Request, Samples, Send
 from urc.protocol.framing import FramingError, build_framing
+from urc.runtime.coverage import Exercised, Listener
 
-__all__ = ["run_tests", "sample_settings"]
+__all__ = ["Outcome", "exercise", "run_tests", "sample_settings"]
 
 _SAMPLE: dict[str, Value] = {"host": "127.0.0.1", "port": 1, "integer": 0, "number": 0.0}
 _ROUNDS = 16
 """How many deadlines a test lets pass while it waits for the failure that it declares."""
+_SINGLE = 1e-7
+"""Numbers of four bytes are exact to this share of themselves."""
 _SHOWN = 3
 """Failures told of one test."""
 _SHOWN_BYTES = 48
@@ -26,15 +32,32 @@ _BEFORE_BYTES = 16
 """Of a long frame: bytes shown, and how many of them before the first difference."""
 
 
+class Outcome(NamedTuple):
+    """What came of a document's own tests."""
+
+    problems: list[Problem]
+    """A finding for each one that failed."""
+    exercised: frozenset[Exercised]
+    """The commands, polls and messages that were used, whether the test passed or not."""
+
+
 def run_tests(profile: Profile) -> list[Problem]:
     """Run every test of `profile`; return a finding for each one that fails."""
+    return exercise(profile).problems
+
+
+def exercise(profile: Profile) -> Outcome:
+    """Run every test of `profile`; return what failed, and what was used."""
     settings = sample_settings(profile.settings)
     problems = []
+    used: set[Exercised] = set()
+    listener = Listener(profile.driver, settings)
     for test in profile.tests:
-        complaint = _run(profile.driver, settings, test)
+        used |= listener.exercised(test)
+        complaint = _run(profile.driver, {**settings, **test.settings}, test)
         if complaint:
             problems.append(_problem(profile, test, complaint))
-    return problems
+    return Outcome(problems, frozenset(used))
 
 
 def sample_settings(settings: Mapping[str, Setting]) -> dict[str, Value]:
@@ -85,6 +108,8 @@ class _Trial:
                     self.samples.update((sample.signal, sample.value) for sample in samples)
                 case Fault(_, code, message) | Failed(_, _, code, message):
                     self.failures.append(f"{code}: {message}")
+                case Close(_, reason) if reason:
+                    self.failures.append(f"closed: {reason}")
 
 
 def _run(driver: Driver, settings: Mapping[str, Value], test: DocumentTest) -> str:
@@ -106,9 +131,15 @@ def _run(driver: Driver, settings: Mapping[str, Value], test: DocumentTest) -> s
 
 
 def _narrowed(driver: Driver, test: DocumentTest) -> Driver:
-    """Return the driver with only the poll that the test is about, due at once."""
+    """Return the driver with only the poll that the test is about, due at once.
+
+    A test that asks nothing is about what the robot says, and about the steps of its connections.
+    """
     polls = (driver.polls[test.reply_to],) if isinstance(test.reply_to, int) else ()
-    return driver._replace(polls=tuple(poll._replace(phase_s=0.0) for poll in polls))
+    narrowed = driver._replace(polls=polls)
+    if test.run is None and test.reply_to is None:
+        return narrowed
+    return alone(narrowed, keeps_conditions=test.fails is not None)
 
 
 def _converse(trial: _Trial, driver: Driver, test: DocumentTest) -> None:
@@ -120,9 +151,10 @@ def _converse(trial: _Trial, driver: Driver, test: DocumentTest) -> None:
     command = test.run or (test.reply_to if isinstance(test.reply_to, str) else None)
     if command is not None:
         trial.perform(trial.engine.command(Request(1, command, test.arguments), 0.0), 0.0)
-    for name, text in test.feed.items():
-        data = _encoded(text, driver.transports[name])
-        trial.perform(trial.engine.receive(name, data, 0.0), 0.0)
+    for name, fed in test.feed.items():
+        for piece in pieces_of(fed):
+            data = _encoded(piece, driver.transports[name])
+            trial.perform(trial.engine.receive(name, data, 0.0), 0.0)
 
 
 def _check_failure(trial: _Trial, expected: str) -> list[str]:
@@ -164,7 +196,10 @@ def _check_bytes(trial: _Trial, driver: Driver, test: DocumentTest) -> Iterator[
             yield _difference(name, wanted, found)
 
 
-def _framed(text: str, spec: TransportSpec) -> bytes:
+def _framed(text: Fed, spec: TransportSpec) -> bytes:
+    """Return every byte on the wire: bytes are that already, text is a frame's payload."""
+    if isinstance(text, bytes):
+        return text
     payload = _encoded(text, spec)
     try:
         return build_framing(spec.framing).encode(payload)
@@ -172,7 +207,9 @@ def _framed(text: str, spec: TransportSpec) -> bytes:
         raise UrcError(f"{spec.name}: {error}") from error
 
 
-def _encoded(text: str, spec: TransportSpec) -> bytes:
+def _encoded(text: Fed, spec: TransportSpec) -> bytes:
+    if isinstance(text, bytes):
+        return text
     try:
         return text.encode(spec.encoding)
     except UnicodeEncodeError as error:
@@ -181,8 +218,14 @@ def _encoded(text: str, spec: TransportSpec) -> bytes:
 
 
 def _is_same(found: object, expected: object) -> bool:
-    """Compare as a person would: 42 is 42.0, but true is not 1."""
-    return found == expected and isinstance(found, bool) == isinstance(expected, bool)
+    """Compare as a person would: 42 is 42.0, but true is not 1, and a third is not exact."""
+    if isinstance(found, tuple) and isinstance(expected, tuple):
+        return len(found) == len(expected) and all(map(_is_same, found, expected))
+    if isinstance(found, bool) != isinstance(expected, bool):
+        return False
+    if isinstance(found, float) and isinstance(expected, (int, float)):
+        return math.isclose(found, expected, rel_tol=_SINGLE, abs_tol=1e-12)
+    return found == expected
 
 
 def _difference(transport: str, wanted: bytes, found: bytes) -> str:

@@ -11,6 +11,7 @@ from urc.model.driver import Driver
 from urc.model.profile import Profile
 from urc.model.values import Value
 from urc.problems import UrcError
+from urc.protocol.bounds import longest_s
 from urc.protocol.engine import Engine
 from urc.protocol.events import Failed, Replied, Request
 from urc.registry import Table
@@ -160,14 +161,7 @@ class Session:
 
     def _longest_wait(self, name: str) -> float:
         """Return the seconds in which the engine itself must have given an answer."""
-        command = self.profile.driver.commands.get(name)
-        if command is None:
-            return _GRACE_S
-        timeouts = self.profile.driver.transports[command.transport].timeouts
-        reply_s = timeouts.reply_s
-        if command.reply is not None and command.reply.timeout_s is not None:
-            reply_s = command.reply.timeout_s
-        return timeouts.connect_s + 3 * reply_s + _GRACE_S
+        return longest_s(self.profile.driver, name) + _GRACE_S
 
 
 def _late(request: Request, limit_s: float) -> Failed:

@@ -333,4 +333,16 @@ def _sources(driver: Driver) -> dict[str, tuple[str, ...]]:
     for transport, read in reads:
         for field in read.fields:
             found.setdefault(field, {})[transport] = None
+    for name in driver.signals:
+        _add_sources(name, driver, found)
     return {name: tuple(transports) for name, transports in found.items()}
+
+
+def _add_sources(name: str, driver: Driver, found: dict[str, dict[str, None]]) -> dict[str, None]:
+    """Return the sources of a signal; of a computed one those of its inputs, which are added."""
+    signal = driver.signals.get(name)
+    if signal is not None and signal.formula is not None and name not in found:
+        found[name] = {}
+        for other in sorted(signal.formula.names):
+            found[name] |= _add_sources(other, driver, found)
+    return found.get(name, {})

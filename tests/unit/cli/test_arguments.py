@@ -105,7 +105,7 @@ def test_profile_is_a_path_or_the_name_of_a_robot(
     (shipped / "puppet.yaml").touch()
     monkeypatch.chdir(here)
     monkeypatch.setattr(cli_arguments, "shipped", lambda _: shipped)
-    path = cli_arguments._profile_path
+    path = cli_arguments.profile_path
     assert path("puppet") == str(shipped / "puppet.yaml")
     assert path("my/robot") == "my/robot"
     assert path("other.yaml") == "other.yaml"

@@ -114,7 +114,9 @@ def test_json_report_has_the_same_keys_whatever_is_found(capsys: Output) -> None
         output, errors = capsys.readouterr()
         report = json.loads(output)
         assert errors == ""
-        assert list(report) == ["files", "errors", "warnings", "tests", "problems"]
+        assert list(report) == [
+            "files", "errors", "warnings", "tests", "coverage", "problems",
+        ]  # fmt: skip
         assert report["tests"] == tests
         assert report["errors"] + report["warnings"] == len(report["problems"])
         for problem in report["problems"]:

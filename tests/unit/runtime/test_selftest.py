@@ -4,9 +4,10 @@ import pytest
 
 from urc.model.driver import Command, FramingSpec, Reply
 from urc.model.profile import DocumentTest, Profile, Setting
+from urc.model.values import Signal
 from urc.patterns import compile_pattern
 from urc.problems import Problem
-from urc.runtime.selftest import run_tests, sample_settings
+from urc.runtime.selftest import _is_same, run_tests, sample_settings
 from urc.testing.codec import regex, text
 from urc.testing.profile import line_profile
 
@@ -63,6 +64,60 @@ def trial(**keys: object) -> DocumentTest:
 def test_test_that_holds_passes(test: DocumentTest, is_per_request: bool) -> None:
     """Polls (late ones too), commands, replies, bytes and failures, however the line is made."""
     assert complaint(test, robot(is_per_request=is_per_request)) == ""
+
+
+@pytest.mark.parametrize(
+    "test",
+    [
+        trial(feed={"wire": b"42\n"}, reply_to=0, expect={"battery": 42}),
+        trial(feed={"wire": ("4", b"2", "\n")}, reply_to=0, expect={"battery": 42}),
+        trial(run="say", arguments={"word": "hi"}, sent={"wire": b"say hi\n"}),
+        trial(feed={"wire": "33\n"}, reply_to=0, expect={"battery": 33 + 1e-7}),
+    ],
+    ids=["bytes", "pieces", "sent", "nearly"],
+)
+def test_bytes_are_those_on_the_wire(test: DocumentTest) -> None:
+    """What the framing adds is among them; text is what the framing goes around."""
+    profile = robot()
+    signals = {**profile.driver.signals, "battery": Signal("battery", "number")}
+    profile = profile._replace(driver=profile.driver._replace(signals=signals))
+    assert complaint(test, profile) == ""
+
+
+@pytest.mark.parametrize(
+    ("found", "expected", "is_same"),
+    [
+        (0.10000000149011612, 0.1, True),
+        (0.1000001, 0.1, False),
+        (1, 1.0, True),
+        (16777217, 16777216, False),
+        (True, 1, False),
+        ((1.5, 2), (1.5, 2.0), True),
+        ((1.5, 2), (1.5, 3), False),
+        ((1.5,), (1.5, 2), False),
+        ((1.5,), 1.5, False),
+        (None, None, True),
+        (0.0, None, False),
+    ],
+)
+def test_numbers_are_the_same_to_seven_digits(
+    found: object, expected: object, is_same: bool
+) -> None:
+    """As many as a number of four bytes has; whole numbers exactly, lists element by element."""
+    assert _is_same(found, expected) is is_same
+
+
+def test_settings_of_a_test_take_the_place_of_the_defaults() -> None:
+    """They hold for this test alone."""
+    profile = robot()
+    ask = profile.driver.commands["ask"]._replace(send=text("ask {{ settings.unit }}"))
+    driver = profile.driver._replace(commands={"ask": ask})
+    profile = profile._replace(
+        driver=driver, settings={"unit": Setting("unit", "integer", default=1)}
+    )
+    assert complaint(trial(run="ask", sent={"wire": "ask 1"}), profile) == ""
+    own = trial(run="ask", sent={"wire": "ask 7"}, settings={"unit": 7})
+    assert complaint(own, profile) == ""
 
 
 def test_message_that_nobody_asked_for_is_read() -> None:

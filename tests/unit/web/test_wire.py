@@ -5,6 +5,7 @@ import math
 
 import pytest
 
+from urc.expressions import compile_expression
 from urc.model.driver import Driver, Message, Poll, Reply
 from urc.model.profile import Profile
 from urc.model.values import Limits, Sample, Signal
@@ -71,6 +72,40 @@ def test_hello_says_what_each_signal_means_and_where_it_comes_from() -> None:
              "stale_after_s": 2, "sources": ["radio"]},
         ],
     }  # fmt: skip
+
+
+def test_a_computed_signal_comes_from_where_its_inputs_come_from() -> None:
+    """It is old when none of their lines is live, by way of others too."""
+    driver = Driver(
+        signals={
+            "half": Signal("half", formula=compile_expression("power / 2")),
+            "power": Signal("power", formula=compile_expression("volts * amps")),
+            "volts": Signal("volts"),
+            "amps": Signal("amps"),
+        },
+        messages={
+            "v": Message("v", "wire", regex(r"^V(?P<volts>.*)")),
+            "a": Message("a", "radio", regex(r"^A(?P<amps>.*)")),
+        },
+    )
+    hello = json.loads(wire.encode_hello(Profile("p", "P", "p.yaml", driver=driver), "s1", 2.0))
+    sources = {one["name"]: one.get("sources") for one in hello["signals"]}
+    assert sources["half"] == sources["power"] == ["radio", "wire"]
+
+
+def test_values_of_many_parts() -> None:
+    """Lists and named parts go as they are; of bytes only how many there are."""
+    samples = [
+        Sample("cells", (3.9, None, 2**60), 1.0),
+        Sample("pose", {"x": [1, {"y": b"abc"}], 3: "z"}, 1.0),
+        Sample("picture", b"\xff" * 40000, 1.0),
+    ]
+    index = {"cells": 0, "pose": 1, "picture": 2}
+    assert json.loads(wire.encode_values(samples, index, 1.5))["v"] == [
+        [3.9, None, str(2**60)],
+        {"x": [1, {"y": {"bytes": 3}}], "3": "z"},
+        {"bytes": 40000},
+    ]
 
 
 def test_links_log_replies_and_pongs() -> None:

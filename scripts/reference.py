@@ -1,0 +1,254 @@
+"""Writes the reference of the language, docs/reference/*.md, out of the schemas.
+
+``python -m scripts.reference`` writes the pages; a test fails when they are not what this writes.
+The same schema gives the same bytes on every machine.
+"""
+
+import json
+import re
+import sys
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+__all__ = ["KINDS", "main", "missing", "page"]
+
+ROOT = Path(__file__).resolve().parents[1]
+FOLDER = ROOT / "docs" / "reference"
+SCHEMAS = ROOT / "schemas"
+KINDS = ("robot", "driver", "interface", "widget")
+
+Schema = Mapping[str, Any]
+
+_TYPES = {
+    "string": "text",
+    "number": "number",
+    "integer": "whole number",
+    "boolean": "true or false",
+    "object": "mapping",
+    "array": "list",
+    "null": "null",
+}
+_BOUNDS = {
+    "minimum": "at least {}",
+    "maximum": "at most {}",
+    "exclusiveMinimum": "more than {}",
+    "exclusiveMaximum": "less than {}",
+    "minLength": "{} characters or more",
+    "maxLength": "at most {} characters",
+    "minItems": "{} items or more",
+    "maxItems": "at most {} items",
+    "minProperties": "{} keys or more",
+    "maxProperties": "at most {} keys",
+}
+_PLAIN = re.compile(r"[A-Za-z_][\w ./%-]*")
+_WORDS_OF_YAML = frozenset(("true", "false", "null", "yes", "no", "on", "off", "y", "n"))
+
+
+def main() -> int:
+    """Write every page; print those that changed."""
+    FOLDER.mkdir(parents=True, exist_ok=True)
+    for kind in KINDS:
+        file, text = FOLDER / f"{kind}.md", page(kind)
+        if not file.is_file() or file.read_text("utf-8") != text:
+            file.write_text(text, encoding="utf-8")
+            print(f"written: {file.relative_to(ROOT)}")
+    return 0
+
+
+def read_schema(name: str) -> Schema:
+    """Return a schema by its file name."""
+    schema: Schema = json.loads((SCHEMAS / name).read_text("utf-8"))
+    return schema
+
+
+def page(kind: str) -> str:
+    """Return the page of a kind of document."""
+    file = f"{kind}.schema.json"
+    schema = read_schema(file)
+    lines = [
+        f"# {schema['title']}",
+        "",
+        f"Every key of a document with `kind: {kind}`.",
+        "Made from the schema by `python -m scripts.reference`; do not edit it.",
+        "",
+        *_paragraph(schema["description"]),
+        *_keys(file, kind, schema),
+    ]
+    for name, inner in sorted(schema.get("$defs", {}).items()):
+        lines += [f"## {name}", "", *_described(file, inner), *_keys(file, name, inner)]
+    return "\n".join(lines).rstrip() + "\n"
+
+
+def missing() -> list[str]:
+    """Return every property that has no description or no example."""
+    found = []
+    for kind in KINDS:
+        file = f"{kind}.schema.json"
+        schema = read_schema(file)
+        for place, owner in _objects(kind, schema):
+            for name, inner in owner.get("properties", {}).items():
+                whole = _whole(file, inner)
+                for word in ("description", "examples"):
+                    if not whole.get(word):
+                        found.append(f"{place}.{name}: {word}")
+    return found
+
+
+def _objects(kind: str, schema: Schema) -> Iterator[tuple[str, Schema]]:
+    yield kind, schema
+    for name, inner in schema.get("$defs", {}).items():
+        yield f"{kind}: {name}", inner
+
+
+def _keys(file: str, owner: str, schema: Schema) -> Iterator[str]:
+    """Yield a section for each property."""
+    required = dict.fromkeys(_required_when_whole(schema), "yes, in a whole document")
+    required |= dict.fromkeys(schema.get("required", ()), "yes")
+    for name, inner in schema.get("properties", {}).items():
+        yield from (f"### {owner}.{name}", "")
+        yield from _described(file, inner, required.get(name, ""))
+
+
+def _required_when_whole(schema: Schema) -> list[str]:
+    """Return the keys that only parts of documents, and those that build on others, leave out."""
+    otherwise = schema.get("else", {})
+    inner: list[str] = list(otherwise.get("required", ()))
+    return inner + _required_when_whole(otherwise) if otherwise else inner
+
+
+def _described(file: str, schema: Any, required: str = "") -> Iterator[str]:
+    """Yield what is said about one value: what it is, its type, what is allowed, an example."""
+    whole = _whole(file, schema)
+    yield from _paragraph(whole.get("description", ""))
+    facts = [("type", _type(file, schema))]
+    if required:
+        facts.append(("required", required))
+    if "default" in whole:
+        facts.append(("default", f"`{_yaml(whole['default'])}`"))
+    if allowed := _allowed(whole):
+        facts.append(("allowed", allowed))
+    if "pattern" in whole:
+        facts.append(("form", f"`{whole['pattern']}`"))
+    for name, text in facts:
+        yield f"- {name}: {text}"
+    for example in whole.get("examples", ()):
+        yield (
+            f"- example: `` {_yaml(example)} ``"
+            if "`" in _yaml(example)
+            else (f"- example: `{_yaml(example)}`")
+        )
+    yield ""
+
+
+def _paragraph(text: str) -> list[str]:
+    """Return a sentence per line, and an empty line."""
+    sentences = re.sub(r"(?<=[a-z)`'\"}\]]\.) (?=[A-Z{`])", "\n", text)
+    return [*sentences.split("\n"), ""] if text else []
+
+
+def _whole(file: str, schema: Any) -> dict[str, Any]:
+    """Return a schema with what it refers to; what stands beside a reference goes first."""
+    whole: dict[str, Any] = dict(schema) if isinstance(schema, Mapping) else {}
+    while "$ref" in whole:
+        file, target = _target(file, whole.pop("$ref"))
+        whole = {**target, **whole}
+        if "$ref" in target:
+            whole["$ref"] = target["$ref"]
+    return whole
+
+
+def _target(file: str, reference: str) -> tuple[str, Schema]:
+    other, _, pointer = reference.partition("#")
+    file = other or file
+    schema: Any = read_schema(file)
+    for part in filter(None, pointer.split("/")):
+        schema = schema[part]
+    return file, schema
+
+
+def _type(file: str, schema: Any) -> str:
+    """Return the type in words, with a link to what it is made of."""
+    if not isinstance(schema, Mapping):
+        return "anything"
+    if "$ref" in schema:
+        return _link(file, schema["$ref"])
+    kinds = _kinds(file, schema)
+    if kinds:
+        return ", or ".join(kinds)
+    types = schema.get("type", ())
+    names = [types] if isinstance(types, str) else list(types)
+    words = [_TYPES[name] for name in names]
+    if "const" in schema:
+        return f"`{_yaml(schema['const'])}`"
+    if not words:
+        return "one of the words below" if "enum" in schema else "anything"
+    inner = schema.get("additionalProperties")
+    if "object" in names and isinstance(inner, Mapping):
+        words[names.index("object")] = f"mapping of names to {_type(file, inner)}"
+    if "array" in names and "items" in schema:
+        words[names.index("array")] = f"list of {_type(file, schema['items'])}"
+    return " or ".join(words)
+
+
+def _kinds(file: str, schema: Schema) -> list[str]:
+    """Return the types between which `if` chooses."""
+    if "if" not in schema or ("properties" in schema and not _refers(schema)):
+        return []
+    found: list[str] = []
+    for branch in ("then", "else"):
+        inner = schema.get(branch)
+        if isinstance(inner, Mapping):
+            nested = _kinds(file, inner)
+            if nested:
+                found += nested
+            elif "$ref" in inner or "type" in inner:
+                found.append(_type(file, inner))
+    return list(dict.fromkeys(found))
+
+
+def _refers(schema: Schema) -> bool:
+    return any("$ref" in schema.get(branch, {}) for branch in ("then", "else"))
+
+
+def _link(file: str, reference: str) -> str:
+    other, _, pointer = reference.partition("#")
+    name = pointer.rpartition("/")[2]
+    page_name = f"{other.partition('.')[0]}.md" if other and other != file else ""
+    if not name:
+        kind = (other or file).partition(".")[0]
+        return f"[{kind}]({kind}.md)"
+    return f"[{name}]({page_name}#{name.lower()})"
+
+
+def _allowed(schema: Schema) -> str:
+    """Return the words or the range that a value may have."""
+    words = [f"`{_yaml(word)}`" for word in schema.get("enum", ())]
+    bounds = [_bound(key, schema[key]) for key in _BOUNDS if key in schema]
+    return ", ".join(words + bounds)
+
+
+def _bound(key: str, limit: object) -> str:
+    is_size = key in ("minLength", "minItems", "minProperties")
+    return "not empty" if is_size and limit == 1 else _BOUNDS[key].format(limit)
+
+
+def _yaml(value: object) -> str:
+    """Return a value in YAML's flow style, on one line."""
+    if isinstance(value, str):
+        return value if _is_plain(value) else json.dumps(value, ensure_ascii=False)
+    if isinstance(value, Mapping):
+        inside = ", ".join(f"{_yaml(str(key))}: {_yaml(item)}" for key, item in value.items())
+        return f"{{ {inside} }}" if inside else "{}"
+    if isinstance(value, list):
+        return f"[{', '.join(map(_yaml, value))}]"
+    return json.dumps(value)
+
+
+def _is_plain(text: str) -> bool:
+    is_word = _PLAIN.fullmatch(text) is not None and text == text.strip()
+    return is_word and text.lower() not in _WORDS_OF_YAML
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,51 @@
+"""The page about binary frames says what is so, and leaves no key out."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from urc.config.forms import FormContext, parse_write
+from urc.config.part import Findings, Part
+from urc.config.shape import read_schema
+from urc.problems import to_text
+from urc.source import parse_document
+from urc.testing.struct import reader, struct_read
+
+PAGE = (Path(__file__).parents[2] / "docs" / "language" / "binary.md").read_text("utf-8")
+BLOCKS = re.findall(r"^```yaml\n(.*?)^```$", PAGE, re.MULTILINE | re.DOTALL)
+
+
+@pytest.mark.parametrize("block", [one for one in BLOCKS if "struct:" in one])
+def test_struct_of_the_page_can_be_used(block: str) -> None:
+    """Without a finding, and in both directions."""
+    assert struct_read(block).fields
+    reader(block)
+
+
+@pytest.mark.parametrize("block", [one for one in BLOCKS if one.startswith("send:")])
+def test_send_of_the_page_can_be_used(block: str) -> None:
+    """Without a finding."""
+    document = parse_document(block, "page.yaml")
+    findings = Findings()
+    spec = parse_write(Part(document, (), document.data).must("send"), findings, FormContext())
+    assert [to_text(one) for one in findings] == []
+    assert spec.names
+
+
+def test_every_key_is_told_and_shown() -> None:
+    """In words, and in an example."""
+    definitions = read_schema("driver.schema.json")["$defs"]
+    keys = {
+        key
+        for name in ("longItem", "bitPart", "sendForm")
+        for key in definitions[name]["properties"]
+    } | {"by", "cases", "else", "types", "enums", "min", "max"}
+    examples = "".join(BLOCKS)
+    assert [key for key in sorted(keys) if not re.search(rf"`[^`]*\b{key}\b[^`]*`", PAGE)] == []
+    assert [key for key in sorted(keys) if not re.search(rf"\b{key}:", examples)] == []
+
+
+def test_every_block_is_tested() -> None:
+    """A block of another kind would be checked by nobody."""
+    assert all("struct:" in block or block.startswith("send:") for block in BLOCKS)

@@ -1,0 +1,32 @@
+"""The page about tests says what is so, and leaves no key out."""
+
+import re
+from pathlib import Path
+
+from urc.config.load import check
+from urc.config.shape import read_schema
+from urc.problems import to_text
+from urc.runtime.catalog import built_in_catalog
+from urc.runtime.coverage import measure
+from urc.runtime.selftest import exercise
+
+PAGE = (Path(__file__).parents[2] / "docs" / "language" / "tests.md").read_text("utf-8")
+(BLOCK,) = re.findall(r"^```yaml\n(.*?)^```$", PAGE, re.MULTILINE | re.DOTALL)
+
+
+def test_robot_of_the_page_passes_its_tests(tmp_path: Path) -> None:
+    """Without a finding, and with nothing left out."""
+    file = tmp_path / "registers.yaml"
+    file.write_text(BLOCK, "utf-8")
+    checked = check(file, built_in_catalog())
+    assert [to_text(one) for one in checked.problems] == []
+    assert checked.profile is not None
+    outcome = exercise(checked.profile)
+    assert [to_text(one) for one in outcome.problems] == []
+    assert measure("", checked.profile.driver, outcome.exercised).untested == ()
+
+
+def test_every_key_is_told() -> None:
+    """In words, and most of them in the example."""
+    keys = read_schema("driver.schema.json")["$defs"]["test"]["properties"]
+    assert [key for key in keys if not re.search(rf"`{key}\b", PAGE)] == []

@@ -1,0 +1,126 @@
+"""Filters of expressions that make bytes, and those that hash or spell bytes.
+
+Floor 1, private to `urc._filters`. Text that is hashed is UTF-8. Each is total over what documents
+can hold: it returns a value or raises TypeError or ValueError with words for a person.
+"""
+
+import binascii
+import struct
+from collections.abc import Callable
+from typing import Any, Final, Literal
+
+__all__ = ["BYTE_FILTERS", "NUMBERS", "TEXT_FILTERS", "written_number"]
+
+MAX_BYTES: Final = 65536
+_SIZES: Final = (8, 16, 24, 32, 40, 48, 56, 64)
+_FLOATS: Final = {16: "e", 32: "f", 64: "d"}
+
+
+def _numbers() -> dict[str, tuple[str, int, Literal["big", "little"]]]:
+    found: dict[str, tuple[str, int, Literal["big", "little"]]] = {}
+    for bits in _SIZES:
+        for kind in "ui":
+            if bits == 8:
+                found[f"{kind}8"] = (kind, 8, "big")
+            else:
+                found[f"{kind}{bits}be"] = (kind, bits, "big")
+                found[f"{kind}{bits}le"] = (kind, bits, "little")
+    for bits in _FLOATS:
+        found[f"f{bits}be"] = ("f", bits, "big")
+        found[f"f{bits}le"] = ("f", bits, "little")
+    return found
+
+
+NUMBERS: Final = _numbers()
+"""Filter → kind (u, i or f), bits, byte order."""
+
+
+def written_number(name: str, value: object) -> bytes:
+    """Return `value` as the bytes of the filter called `name`, whole numbers rounded."""
+    kind, bits, endian = NUMBERS[name]
+    if not isinstance(value, (int, float)):
+        raise TypeError(f"{name!r} takes a number, found {_short(value)}")
+    if kind == "f":
+        try:
+            return struct.pack((">" if endian == "big" else "<") + _FLOATS[bits], value)
+        except (OverflowError, struct.error):
+            raise ValueError(f"{_short(value)} is too large for {name!r}") from None
+    if isinstance(value, float) and not abs(value) < 1e30:
+        raise ValueError(f"{name!r} takes a whole number, found {value!r}")
+    number = round(value)
+    least = -(1 << bits - 1) if kind == "i" else 0
+    most = (1 << bits - (kind == "i")) - 1
+    if not least <= number <= most:
+        raise ValueError(f"{_short(number)} does not fit into {name!r}: {least} to {most}")
+    return number.to_bytes(bits // 8, endian, signed=kind == "i")
+
+
+def _number_filter(name: str) -> Callable[[object], bytes]:
+    return lambda value: written_number(name, value)
+
+
+def _short(value: object) -> str:
+    text = repr(value)
+    return text if len(text) <= 40 else text[:37] + "..."
+
+
+def _data(value: object) -> bytes:
+    """Return bytes as they are, and text as UTF-8."""
+    data = value.encode("utf-8", "surrogatepass") if isinstance(value, str) else value
+    if not isinstance(data, bytes):
+        raise TypeError(f"text is expected, found {_short(value)}")
+    if len(data) > MAX_BYTES:
+        raise ValueError(f"the text has more than {MAX_BYTES} bytes")
+    return data
+
+
+def _hexbytes(value: object) -> bytes:
+    if not isinstance(value, str):
+        raise TypeError(f"hex digits are expected, found {_short(value)}")
+    try:
+        return bytes.fromhex(value)
+    except ValueError:
+        raise ValueError(f"hex digits are expected, found {_short(value)}") from None
+
+
+def _b64decode(value: object) -> bytes:
+    try:
+        return binascii.a2b_base64(_data(value), strict_mode=True)
+    except binascii.Error:
+        raise ValueError(f"base64 text is expected, found {_short(value)}") from None
+
+
+def _hash(name: str) -> Callable[[object], str]:
+    def digest(value: object) -> str:
+        import hashlib  # 3 ms that only a document with a hash pays
+
+        return hashlib.new(name, _data(value), usedforsecurity=False).hexdigest()
+
+    return digest
+
+
+def _hmac_sha256(value: object, key: object) -> str:
+    import hmac
+
+    return hmac.new(_data(key), _data(value), "sha256").hexdigest()
+
+
+def _b64encode(value: object) -> str:
+    return binascii.b2a_base64(_data(value), newline=False).decode("ascii")
+
+
+BYTE_FILTERS: Final[dict[str, Callable[..., Any]]] = {
+    **{name: _number_filter(name) for name in NUMBERS},
+    "b64decode": _b64decode,
+    "hexbytes": _hexbytes,
+    "utf8": _data,
+}
+"""Filters that give bytes; none takes an argument."""
+TEXT_FILTERS: Final[dict[str, tuple[Callable[..., Any], int]]] = {
+    "b64encode": (_b64encode, 0),
+    "hmac_sha256": (_hmac_sha256, 1),
+    "md5": (_hash("md5"), 0),
+    "sha1": (_hash("sha1"), 0),
+    "sha256": (_hash("sha256"), 0),
+}
+"""Filters that give text → function and number of arguments."""

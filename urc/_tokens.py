@@ -1,0 +1,91 @@
+"""The words of expressions: text → tokens, and tokens → constants.
+
+Floor 1, private to `urc._grammar`.
+"""
+
+import re
+from typing import Final, NamedTuple
+
+__all__ = ["Refused", "Token", "float_of", "integer_of", "string_of", "tokens_of"]
+
+_TOKEN = re.compile(
+    r"""(?P<space>\s+)
+    |(?P<float>\d[\d_]*(?:\.\d[\d_]*(?:[eE][+-]?\d+)?|[eE][+-]?\d+))
+    |(?P<integer>0[xX][0-9a-fA-F_]+|0[bB][01_]+|0[oO][0-7_]+|\d[\d_]*)
+    |(?P<name>[A-Za-z_][A-Za-z0-9_]*)
+    |(?P<string>'(?:[^'\\]|\\.)*'|"(?:[^"\\]|\\.)*")
+    |(?P<operator>\*\*|//|==|!=|<=|>=|[-+*/%~<>|.,()\[\]])""",
+    re.VERBOSE | re.DOTALL | re.ASCII,
+)
+_ESCAPE = re.compile(r"\\(?:x([0-9a-fA-F]{2})|u([0-9a-fA-F]{4})|(.))", re.DOTALL)
+_ESCAPES = {"n": "\n", "r": "\r", "t": "\t", "0": "\0", "\\": "\\", "'": "'", '"': '"'}
+_MAX_DIGITS: Final = 400
+
+
+class Refused(Exception):
+    """Why this text is no expression of the language, and the 0-based character of the fault."""
+
+    def __init__(self, message: str, offset: int) -> None:
+        super().__init__(message)
+        self.offset = offset
+
+
+class Token(NamedTuple):
+    kind: str
+    text: str
+    offset: int
+
+
+def tokens_of(text: str) -> list[Token]:
+    tokens: list[Token] = []
+    position = 0
+    while position < len(text):
+        found = _TOKEN.match(text, position)
+        if found is None or found.lastgroup is None:
+            raise Refused(_unreadable(text[position]), position)
+        if found.lastgroup != "space":
+            tokens.append(Token(found.lastgroup, found[0], position))
+        position = found.end()
+    return [*tokens, Token("end", "", len(text.rstrip()))]
+
+
+def _unreadable(character: str) -> str:
+    if character in "'\"":
+        return f"the quote {character} is never closed"
+    if character in "{}":
+        return "braces are not part of an expression"
+    return f"{character!r} is not part of an expression"
+
+
+def integer_of(token: Token) -> str:
+    text = token.text
+    if len(text) > _MAX_DIGITS:
+        raise Refused("the number is too large", token.offset)
+    try:
+        # "010" is ten in some languages and eight in others; in this one it is a mistake.
+        return repr(int(text, 0))
+    except ValueError:
+        raise Refused(f"{text!r} is not a number", token.offset) from None
+
+
+def float_of(token: Token) -> str:
+    try:
+        value = float(token.text)
+    except ValueError:
+        raise Refused(f"{token.text!r} is not a number", token.offset) from None
+    if value == float("inf"):
+        raise Refused("the number is too large", token.offset)
+    return repr(value)
+
+
+def string_of(token: Token) -> str:
+    def character(found: re.Match[str]) -> str:
+        code = found[1] or found[2]
+        if code:
+            return chr(int(code, 16))
+        if found[3] not in _ESCAPES:
+            text = f"'\\{found[3]}' is no escape in an expression"
+            raise Refused(text, token.offset + 1 + found.start())
+        return _ESCAPES[found[3]]
+
+    return _ESCAPE.sub(character, token.text[1:-1])

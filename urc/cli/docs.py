@@ -1,0 +1,22 @@
+"""`urc docs`: the manual page of a profile, as Markdown."""
+
+import argparse
+
+from urc.cli.arguments import load
+
+EXAMPLE = "urc docs robots/puppet.yaml > puppet.md"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the profile."""
+    parser.add_argument(
+        "profile", metavar="PROFILE", help="a robot or driver file, or the name of a robot"
+    )
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Print the page."""
+    from urc.runtime.manual import manual
+
+    print(manual(load(arguments.profile)), end="")
+    return 0

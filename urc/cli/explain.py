@@ -1,0 +1,33 @@
+"""`urc explain`: what a code of a finding means, and what to do instead."""
+
+import argparse
+from difflib import get_close_matches
+
+from urc.cli.failures import Misuse
+from urc.config.codes import pages
+
+EXAMPLE = "urc explain unknown-key"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the code."""
+    parser.add_argument(
+        "code", metavar="CODE", nargs="?", help="as 'urc validate' prints it; without it, a list"
+    )
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Print the page of a code, or a line for each code."""
+    every = pages()
+    if arguments.code is None:
+        width = max(map(len, every))
+        for one in every.values():
+            print(f"{one.code:<{width}}  {one.what}")
+        return 0
+    page = every.get(arguments.code)
+    if page is None:
+        close = get_close_matches(arguments.code, every, n=1)
+        hint = f"did you mean '{close[0]}'?" if close else "'urc explain' lists them"
+        raise Misuse(f"there is no code {arguments.code!r}; {hint}")
+    print(page)
+    return 0

@@ -1,0 +1,44 @@
+"""Pieces of bytes with expressions between them: what the forms ``hex`` and ``bytes`` share."""
+
+from collections.abc import Sequence
+from typing import NamedTuple, cast
+
+from urc.config.part import Part
+from urc.expressions import Template
+from urc.model.codec import WriteSpec
+
+__all__ = ["Piece", "Placed", "spec_of", "templates_at"]
+
+Piece = bytes | Template
+
+
+class Placed(NamedTuple):
+    """One piece, and where it stands under the form's key."""
+
+    piece: Piece
+    path: tuple[int, ...] = ()
+    offset: int = 0
+    """Of the expression in its text."""
+
+
+def spec_of(form: str, pieces: Sequence[Placed]) -> WriteSpec:
+    """Return the form `form` of `pieces`."""
+    templates = [
+        (path, _moved(one, offset)) for one, path, offset in pieces if isinstance(one, Template)
+    ]
+    names = frozenset[str]().union(*(one.names for _, one in templates))
+    settings = frozenset[str]().union(*(one.settings for _, one in templates))
+    options = {"pieces": tuple(one for one, _, _ in pieces), "uses": tuple(templates)}
+    return WriteSpec(form, options, names, settings)
+
+
+def _moved(template: Template, offset: int) -> Template:
+    """Return the expression with blanks before it, so that its names stand where they are."""
+    source = " " * offset + template.source
+    return Template(source, template.python, template.names, template.settings)
+
+
+def templates_at(part: Part, spec: WriteSpec) -> list[tuple[Part, Template]]:
+    """Return every expression with its place."""
+    uses = cast("tuple[tuple[tuple[int, ...], Template], ...]", spec.options.get("uses", ()))
+    return [(part.items()[path[0]] if path else part, template) for path, template in uses]

@@ -1,0 +1,64 @@
+"""What each code of a finding means: the pages in ``codes.md``, for `urc explain` and for SARIF.
+
+Reads one text file and imports nothing. Each page has the same four parts; an example stands
+indented, as code.
+"""
+
+from pathlib import Path
+from typing import NamedTuple
+
+__all__ = ["Page", "pages", "summaries"]
+
+_FILE = Path(__file__).with_name("codes.md")
+_PARTS = ("What", "Why", "Example", "Use instead")
+
+
+class Page(NamedTuple):
+    """All there is to say about one code."""
+
+    code: str
+    what: str
+    """What was found, in one sentence."""
+    why: str
+    """Why it is a fault."""
+    example: str
+    """A document, or a part of one, that has it; or words, when no text can."""
+    instead: str
+    """The same without it."""
+
+    def __str__(self) -> str:
+        parts = zip(_PARTS, (self.what, self.why, self.example, self.instead), strict=True)
+        return "\n\n".join((self.code, *(_shown(*part) for part in parts)))
+
+
+def pages() -> dict[str, Page]:
+    """Return every page by its code, in the order of the file."""
+    _, *texts = _FILE.read_text("utf-8").split("\n## ")
+    found = [_page(text) for text in texts]
+    return {page.code: page for page in found}
+
+
+def summaries() -> dict[str, str]:
+    """Return what each code means, in one sentence."""
+    return {page.code: page.what for page in pages().values()}
+
+
+def _page(text: str) -> Page:
+    code, _, rest = text.partition("\n")
+    parts = []
+    for name, after in zip(_PARTS, (*_PARTS[1:], ""), strict=True):
+        _, _, rest = rest.partition(f"**{name}.**")
+        parts.append(rest.partition(f"\n**{after}.**")[0] if after else rest)
+    return Page(code.strip().strip("`"), *(part.strip("\n ") for part in map(_unfenced, parts)))
+
+
+def _unfenced(text: str) -> str:
+    """Return the code of a fenced block, or the words as they are, on one line."""
+    _, fence, code = text.partition("```yaml\n")
+    return code.partition("```")[0] if fence else " ".join(text.split())
+
+
+def _shown(name: str, text: str) -> str:
+    if "\n" not in text and not text.startswith(" ") and name in ("What", "Why"):
+        return f"{name}: {text}"
+    return f"{name}:\n" + "\n".join(f"    {line}".rstrip() for line in text.splitlines())

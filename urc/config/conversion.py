@@ -1,0 +1,101 @@
+"""The keys of a conversion, on a signal or on a field of one frame."""
+
+from itertools import pairwise
+from typing import Final
+
+from urc.config.part import Findings, Part
+from urc.model.values import Conversion
+
+__all__ = ["CONVERSION_KEYS", "parse_conversion", "parse_states"]
+
+CONVERSION_KEYS: Final = ("base", "scale", "offset", "polynomial", "points", "not_available")
+"""Beside ``states``."""
+_OF_NUMBERS: Final = ("base", "scale", "offset", "polynomial", "points")
+
+
+def parse_conversion(part: Part, findings: Findings, kind: str = "number") -> Conversion:
+    """Return the conversion among the keys of `part`, without its states.
+
+    Args:
+        part: a signal, or a conversion.
+        findings: takes what is wrong.
+        kind: what the converted value is; text and truth have no arithmetic.
+    """
+    if kind not in ("integer", "number"):
+        for key in _OF_NUMBERS:
+            if part.get(key) is not None:
+                findings.error(
+                    part,
+                    "misplaced-key",
+                    f"'{key}' means nothing for {kind}",
+                    at=key,
+                    key=True,
+                    hint="only integer and number are computed with",
+                )
+    absent = tuple(inner.data for inner in part.listed("not_available"))
+    return Conversion(
+        base=part.integer("base") or 0,
+        not_available=absent,
+        polynomial=_polynomial(part, findings),
+        points=_points(part.get("points"), findings),
+    )
+
+
+def parse_states(part: Part, kind: str, findings: Findings) -> tuple[tuple[str, str], ...]:
+    """Return the states of a signal or conversion, by their raw texts."""
+    states = part.named("states")
+    if kind in ("integer", "number"):
+        for raw, inner in states.items():
+            try:
+                float(raw)
+            except ValueError:
+                findings.error(
+                    inner,
+                    "wrong-type",
+                    f"the signal is of type {kind}, and {raw!r} is no number",
+                    key=True,
+                    hint="make it 'type: string', or map numbers to words",
+                )
+    return tuple((raw, str(inner.data)) for raw, inner in states.items())
+
+
+def _polynomial(part: Part, findings: Findings) -> tuple[float, ...]:
+    scale, offset = part.number("scale"), part.number("offset")
+    coefficients = part.listed("polynomial")
+    if coefficients:
+        for key in ("scale", "offset"):
+            if key in part.data:
+                findings.error(
+                    part,
+                    "two-conversions",
+                    f"'{key}' and 'polynomial' both compute the value",
+                    at=key,
+                    key=True,
+                    hint="scale is the second coefficient, offset the first",
+                )
+        return tuple(inner.data for inner in coefficients)
+    if scale == 0:
+        findings.error(
+            part.must("scale"),
+            "zero-scale",
+            "a scale of 0 makes every value the same",
+            hint="leave it out, or write what one step of the robot's number means",
+        )
+    if scale is None and offset is None:
+        return ()
+    return (offset or 0, 1 if scale is None else scale)
+
+
+def _points(part: Part | None, findings: Findings) -> tuple[tuple[float, float], ...]:
+    if part is None:
+        return ()
+    pairs = part.items()
+    for before, after in pairwise(pairs):
+        if before.data[0] >= after.data[0]:
+            findings.error(
+                after,
+                "wrong-order",
+                f"{after.data[0]:g} is not above {before.data[0]:g} of the point before",
+                hint="the first number of each pair is the robot's, and they rise",
+            )
+    return tuple((inner.data[0], inner.data[1]) for inner in pairs)

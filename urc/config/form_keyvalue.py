@@ -1,0 +1,41 @@
+"""The form ``keyvalue``: values by their keys, in any order."""
+
+from typing import Any
+
+from urc.config.forms import FormContext
+from urc.config.part import Findings, Part
+from urc.model.codec import ReadSpec
+
+__all__ = ["parse_read", "place_of"]
+
+
+def parse_read(part: Part, findings: Findings, context: FormContext) -> ReadSpec | None:
+    """Return the separators, and the field of each key."""
+    pairs, separator = part.must("pairs"), part.must("separator")
+    if pairs.data == separator.data:
+        findings.error(
+            separator, "same-separator", "what separates pairs also separates a key from its value"
+        )
+        return None
+    named = part.named("fields")
+    seen: set[str] = set()
+    for inner in named.values():
+        if inner.data in seen:
+            text = f"two keys set the field {inner.data!r}"
+            findings.error(inner, "duplicate-name", text)
+            return None
+        seen.add(inner.data)
+    if part.get("fields") is None:
+        keys = {name: name for name in sorted(context.signals)}
+    else:
+        keys = {key: str(inner.data) for key, inner in named.items()}
+    options = {"pairs": pairs.data, "separator": separator.data, "keys": keys}
+    return ReadSpec("keyvalue", options, tuple(keys.values()))
+
+
+def place_of(part: Part, field: str) -> tuple[Part, dict[str, Any]]:
+    """Return where the field is named."""
+    for inner in part.named("fields").values():
+        if inner.data == field:
+            return inner, {}
+    return part, {}

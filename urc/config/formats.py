@@ -1,0 +1,111 @@
+"""Findings for other programs: SARIF 2.1.0, and annotations of GitHub's workflow runs.
+
+Reporters over `Problem`, beside the text and JSON of `urc.problems`; pure.
+"""
+
+import os
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import PurePath
+from typing import Final
+from urllib.parse import quote
+
+from urc.problems import Problem, printable
+
+__all__ = ["to_github", "to_sarif"]
+
+_SCHEMA: Final = (
+    "https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/schemas/sarif-schema-2.1.0.json"
+)
+_DATA: Final = {"%": "%25", "\r": "%0D", "\n": "%0A"}
+"""What a workflow command escapes in its message …"""
+_PROPERTY: Final = str.maketrans(_DATA | {":": "%3A", ",": "%2C"})
+"""… and in its properties, which colons and commas part."""
+_MESSAGE: Final = str.maketrans(_DATA)
+
+
+def to_github(problem: Problem) -> str:
+    """Return the finding as a workflow command, one line."""
+    properties = {
+        "file": _slashed(problem.file),
+        "line": str(problem.line),
+        "endLine": str(problem.line),
+        "col": str(problem.column),
+        "endColumn": str(problem.end_column or problem.column + 1),
+        "title": f"urc {problem.code}",
+    }
+    words = ",".join(f"{name}={text.translate(_PROPERTY)}" for name, text in properties.items())
+    where = f"{problem.path}: " if problem.path else ""
+    lines = [printable(where + problem.message), *filter(None, [printable(problem.hint)])]
+    return f"::{problem.severity} {words}::" + "\n".join(lines).translate(_MESSAGE)
+
+
+def to_sarif(
+    problems: Sequence[Problem], version: str, summaries: Mapping[str, str]
+) -> dict[str, object]:
+    """Return a log of one run.
+
+    Args:
+        problems: every finding.
+        version: of URC.
+        summaries: code → what it means, in one sentence.
+    """
+    codes = list(dict.fromkeys(problem.code for problem in problems))
+    return {
+        "$schema": _SCHEMA,
+        "version": "2.1.0",
+        "runs": [
+            {
+                "tool": {
+                    "driver": {
+                        "name": "urc",
+                        "version": version,
+                        "rules": [_rule(code, summaries.get(code, "")) for code in codes],
+                    }
+                },
+                "columnKind": "unicodeCodePoints",
+                "results": [_result(problem, codes.index(problem.code)) for problem in problems],
+            }
+        ],
+    }
+
+
+def _rule(code: str, summary: str) -> dict[str, object]:
+    rule: dict[str, object] = {"id": code}
+    if summary:
+        rule["shortDescription"] = {"text": summary}
+    rule["help"] = {"text": f"'urc explain {code}' tells more."}
+    return rule
+
+
+def _result(problem: Problem, rule: int) -> dict[str, object]:
+    region: dict[str, object] = {"startLine": problem.line, "startColumn": problem.column}
+    if problem.end_column > problem.column:
+        region["endColumn"] = problem.end_column
+    place: dict[str, object] = {"artifactLocation": {"uri": _uri(problem.file)}, "region": region}
+    if problem.source:
+        whole = {"startLine": problem.line, "snippet": {"text": problem.source}}
+        place["contextRegion"] = whole
+    location: dict[str, object] = {"physicalLocation": place}
+    if problem.path:
+        location["logicalLocations"] = [{"fullyQualifiedName": problem.path}]
+    return {
+        "ruleId": problem.code,
+        "ruleIndex": rule,
+        "level": problem.severity,
+        "message": {"text": _sentences((problem.message, problem.hint))},
+        "locations": [location],
+    }
+
+
+def _sentences(texts: Iterable[str]) -> str:
+    return "\n".join(printable(text) for text in texts if text)
+
+
+def _slashed(file: str) -> str:
+    return file.replace(os.sep, "/")
+
+
+def _uri(file: str) -> str:
+    """Return a URI reference: relative to the run's folder as it was written, or absolute."""
+    path = PurePath(file)
+    return path.as_uri() if path.is_absolute() else quote(_slashed(file))

@@ -1,0 +1,227 @@
+"""Where everything is in a frame: start, length field, payload, checksum and end fit together.
+
+A frame is seen whole here: with its start and end bytes, without a delimiter or byte stuffing.
+"""
+
+from typing import Final, NamedTuple
+
+from urc.config.parse_bytes import parse_bytes
+from urc.config.parse_checksum import WrittenChecksum, parse_checksum
+from urc.config.part import Findings, Part
+from urc.model.framing import ChecksumSpec, FrameLayout, LengthSpec, Window
+
+__all__ = ["MARKED", "parse_layout"]
+
+MARKED: Final = ("fixed", "length", "brackets")
+"""Framings whose frames carry bytes of their own."""
+
+
+class _Frame(NamedTuple):
+    """What is known of a frame before its checksum is placed."""
+
+    start: bytes
+    end: bytes
+    size: int | None
+    length: LengthSpec | None
+
+
+def parse_layout(part: Part, encoding: str, findings: Findings, longest: int) -> FrameLayout:
+    """Return the layout of the framing at `part`; what was reported is left at a default."""
+    kind = part.text("type")
+    start = end = b""
+    if kind in MARKED:
+        start_key, end_key = ("open", "close") if kind == "brackets" else ("start", "end")
+        start = parse_bytes(part.get(start_key), encoding, findings) or b""
+        end = parse_bytes(part.get(end_key), encoding, findings) or b""
+        if kind == "brackets":
+            _check_marks(part, findings)
+    size = part.integer("size") if kind == "fixed" else None
+    length = _length(part.must("length")) if kind == "length" else None
+    frame = _Frame(start, end, size, length)
+    if length is not None:
+        _check_length(part.must("length"), frame, findings)
+    inner = part.get("checksum")
+    written = parse_checksum(inner, encoding, findings) if inner else None
+    layout = _placed(part, frame, written, findings)
+    _check_size(part, layout, longest, findings)
+    return layout
+
+
+def _check_marks(part: Part, findings: Findings) -> None:
+    for key in ("open", "close"):
+        inner = part.must(key)
+        if inner.data in ("", []):
+            findings.error(
+                inner,
+                "empty-mark",
+                f"an empty '{key}' marks no frame",
+                hint="name the bytes that stand there, such as '<' or STX",
+            )
+
+
+def _length(part: Part) -> LengthSpec:
+    size = part.integer("size") or 1
+    spelling = part.text("as", "raw")
+    return LengthSpec(
+        offset=part.integer("offset") or 0,
+        size=size,
+        is_big=part.text("endian", "big") == "big",
+        adjust=part.integer("adjust") or 0,
+        unit=part.integer("unit") or 1,
+        bits=part.integer("bits") or 64,
+        spelling=spelling,  # type: ignore[arg-type]  # the schema's enum is this Literal
+    )
+
+
+def _check_length(part: Part, frame: _Frame, findings: Findings) -> None:
+    length = frame.length
+    if length is None:
+        return
+    if length.offset < len(frame.start):
+        findings.error(
+            part,
+            "overlap",
+            f"the length field at {length.offset} lies in the start bytes",
+            at="offset",
+            hint="places count from the first byte of the frame, start bytes included",
+        )
+    most = 8 * length.size if length.spelling == "raw" else 64
+    if length.bits != 64 and length.bits > most:
+        findings.error(part, "too-wide", f"the field has {most} bits, not {length.bits}", at="bits")
+
+
+def _placed(
+    part: Part, frame: _Frame, written: WrittenChecksum | None, findings: Findings
+) -> FrameLayout:
+    """Return the layout with the places that follow from each other."""
+    start, end, size, length = frame
+    width = written.size if written else 0
+    last = -len(end) - width
+    at = last if written is None or written.at is None else written.at
+    if size is not None and 0 <= at == size + last:
+        at = last
+    head = len(start)
+    if length is not None and length.offset == head:
+        head = length.offset + length.size
+    if written is not None and at == head:
+        head += width
+    tail = len(end) + (width if at == last else 0)
+    payload = part.get("payload") if part.text("type") == "length" else None
+    if payload is not None:
+        head, tail = _payload(payload, frame, head, tail, findings)
+    layout = FrameLayout(start, end, head, tail, size, length)
+    if written is None:
+        return layout
+    over = _over(written, at == last, layout)
+    checksum = ChecksumSpec(
+        written.algorithm, written.bits, over, at, written.is_big, written.spelling,
+        written.salt, written.is_from_hex, written.closes,
+    )  # fmt: skip
+    _check_checksum(written.part, checksum, layout, findings)
+    return layout._replace(checksum=checksum)
+
+
+def _payload(
+    part: Part, frame: _Frame, head: int, tail: int, findings: Findings
+) -> tuple[int, int]:
+    start, stop = part.integer("from"), part.integer("to")
+    head = head if start is None else start
+    tail = tail if stop is None else -stop
+    if head < len(frame.start):
+        findings.error(
+            part,
+            "overlap",
+            f"the payload begins at {head}, inside the start bytes",
+            at="from",
+        )
+    if tail < len(frame.end):
+        findings.error(
+            part,
+            "overlap",
+            f"the payload ends {tail} bytes before the frame does, inside the end bytes",
+            at="to",
+        )
+    return head, tail
+
+
+def _over(written: WrittenChecksum, is_last: bool, layout: FrameLayout) -> Window:
+    behind = -len(layout.end) - (written.size if is_last else 0)
+    stop = behind or None
+    if isinstance(written.over, Window):
+        return written.over if written.over.stop is not None else Window(written.over.start, stop)
+    if written.over == "frame":
+        return Window(0, stop)
+    return Window(layout.head, -layout.tail or None)
+
+
+def _check_checksum(
+    part: Part, checksum: ChecksumSpec, layout: FrameLayout, findings: Findings
+) -> None:
+    """Report a checksum or window outside the frame, or on top of something else."""
+    at, size, frame_size = checksum.at, checksum.size, layout.size
+    if at < 0 and at + size > 0:
+        text = f"a checksum of {size} bytes at {at} runs over the end of the frame"
+        findings.error(part, "outside-frame", text, at="at", hint=f"the last place is {-size}")
+        return
+    if frame_size is not None and not -frame_size <= at <= frame_size - size:
+        text = f"a checksum of {size} bytes at {at} is not inside a frame of {frame_size}"
+        findings.error(part, "outside-frame", text, at="at" if "at" in part.data else "")
+        return
+    if at < 0 and at + size > -len(layout.end):
+        text = f"the checksum at {at} lies on the end bytes"
+        findings.error(
+            part, "overlap", text, at="at", hint=f"the last place is {-size - len(layout.end)}"
+        )
+    if 0 <= at < len(layout.start):
+        text = f"the checksum at {at} lies on the start bytes"
+        findings.error(part, "overlap", text, at="at")
+    length = layout.length
+    if length and at >= 0 and at < length.offset + length.size and length.offset < at + size:
+        findings.error(part, "overlap", f"the checksum at {at} lies on the length field", at="at")
+    _check_window(part, checksum, layout, findings)
+
+
+def _check_window(
+    part: Part, checksum: ChecksumSpec, layout: FrameLayout, findings: Findings
+) -> None:
+    size, over = layout.size, checksum.over
+    where = "over" if "over" in part.data else ""
+    if size is None:
+        least = layout.head + layout.tail
+        if layout.length is None or over.start >= 0 or "over" not in part.data:
+            return
+        if -over.start > least:
+            text = f"the window begins {-over.start} bytes before the end; a frame may have {least}"
+            findings.warn(part, "outside-frame", text, at=where)
+        return
+    if size < layout.head + layout.tail:
+        return  # which is reported
+    start = over.start if over.start >= 0 else size + over.start
+    stop = size if over.stop is None else over.stop if over.stop >= 0 else size + over.stop
+    if not 0 <= start <= size or not 0 <= stop <= size:
+        text = f"the window of the checksum is not inside a frame of {size} bytes"
+        findings.error(part, "outside-frame", text, at=where)
+    elif start >= stop:
+        findings.error(
+            part, "empty-window", "there is nothing that the checksum is taken over", at=where
+        )
+
+
+def _check_size(part: Part, layout: FrameLayout, longest: int, findings: Findings) -> None:
+    """Report frames that cannot hold their own parts, or are longer than any may be."""
+    least = layout.head + layout.tail
+    if layout.size is not None and layout.size < least:
+        findings.error(
+            part,
+            "frame-too-small",
+            f"{layout.size} bytes cannot hold the start, end and checksum, which take {least}",
+            at="size",
+        )
+    elif max(least, layout.size or 0) > longest:
+        findings.error(
+            part,
+            "frame-too-small",
+            f"a frame has at least {max(least, layout.size or 0)} bytes, and none may be longer"
+            f" than {longest}",
+            at="max" if "max" in part.data else "",
+        )

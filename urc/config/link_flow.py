@@ -1,0 +1,210 @@
+"""Names in conditions, correlations and what is run: do all of them exist, with good arguments?"""
+
+from collections.abc import Iterable, Mapping
+from typing import Protocol
+
+from urc.config.part import Findings, Part
+from urc.config.suggest import did_you_mean
+from urc.config.values import check_within, fit, fit_hint
+from urc.expressions import COUNTERS, Template
+from urc.model.codec import ReadSpec, WriteSpec
+from urc.model.driver import Argument, Command, Driver, Poll, Reply
+from urc.model.flow import ErrorReply
+from urc.model.values import Value
+
+__all__ = [
+    "Linker",
+    "find_command",
+    "link_arguments",
+    "link_command",
+    "link_keepalives",
+    "link_poll",
+    "link_refusals",
+    "link_reply",
+]
+
+
+class Linker(Protocol):
+    """What is used of the pass over the wire's side."""
+
+    driver: Driver
+    findings: Findings
+
+    def transport(self, part: Part, key: str, name: str) -> None:
+        """Check the transport that `part` names under `key`, or leaves out."""
+
+    def fields(self, part: Part, read: ReadSpec) -> None:
+        """Check that each field is a signal, or the document's own."""
+
+    def field(self, part: Part, name: str, place: Mapping[str, int | bool]) -> None:
+        """Check one name of a signal that is set at `part`."""
+
+    def template(self, part: Part, template: Template, known: Iterable[str] = ()) -> None:
+        """Check the names that a template uses."""
+
+    def templates(self, part: Part, spec: WriteSpec, known: Iterable[str] = ()) -> None:
+        """Check the names in every template under ``send:``."""
+
+
+def link_command(linker: Linker, part: Part, command: Command) -> None:
+    """Check what a command says beside what it sends."""
+    known = {*linker.driver.signals, *command.arguments}
+    if command.reply is not None:
+        link_reply(linker, part.must("reply"), command.reply, command.arguments, command.send)
+    for inner, one in zip(part.listed("requires"), command.requires, strict=True):
+        linker.template(inner.must("expr"), one.condition, known)
+    if command.verify is not None:
+        linker.template(part.must("verify").must("expr"), command.verify.condition, known)
+    if command.hold is not None:
+        release = part.must("hold").must("release")
+        link_arguments(linker.findings, release, command, release.entries(), "release")
+
+
+def link_poll(linker: Linker, part: Part, poll: Poll) -> None:
+    """Check what a poll asks, and when."""
+    if poll.when is not None:
+        linker.template(part.must("when"), poll.when, linker.driver.signals)
+    if not poll.run:
+        linker.transport(part, "to", poll.transport)
+        linker.templates(part.must("send"), poll.send, (COUNTERS,))
+        if poll.reply is not None:
+            link_reply(linker, part.must("reply"), poll.reply, (), poll.send)
+        return
+    command = find_command(linker, part.must("run"), poll.run)
+    if command is None:
+        return
+    if command.steps or command.hold is not None:
+        what = "a sequence" if command.steps else "a motion"
+        linker.findings.error(
+            part.must("run"),
+            "wrong-command",
+            f"{poll.run!r} is {what}: a poll asks, it does not act",
+            hint="run a command that only asks",
+        )
+        return
+    link_arguments(linker.findings, part, command, part.named("args"), "run")
+
+
+def link_reply(
+    linker: Linker, part: Part, reply: Reply, arguments: Iterable[str], send: WriteSpec
+) -> None:
+    """Check every answer, its refusals, and the correlation."""
+    stages = part.listed("stages")
+    reads = [reply.read, *(one.read for one in reply.stages)]
+    errors = [reply.faults, *(one.faults for one in reply.stages)]
+    own = len(_refusal_parts(part)) if stages else 0
+    for place, (inner, read, faults) in enumerate(
+        zip(stages or [part], reads, errors, strict=True)
+    ):
+        linker.fields(inner, read)
+        link_refusals(linker, inner, faults[: len(faults) - own] if stages else faults)
+        if stages and not place and own:
+            link_refusals(linker, part, faults[-own:])
+    if reply.match is None:
+        return
+    match = part.must("match")
+    shared = set.intersection(*(set(read.fields) - set(read.sets) for read in reads))
+    linker.template(match, reply.match, {*shared, *arguments, "seq"})
+    if "seq" in reply.match.names and COUNTERS not in send.names:
+        linker.findings.error(
+            match,
+            "unknown-counter",
+            "the request has no counter",
+            offset=reply.match.source.find("seq"),
+            length=3,
+            hint="write {{ seq('number', 0, 255) }} where the request carries it",
+        )
+
+
+def link_refusals(linker: Linker, part: Part, faults: tuple[ErrorReply, ...]) -> None:
+    """Check the refusals of any form under ``errors:``."""
+    for inner, fault in zip(_refusal_parts(part), faults, strict=True):
+        linker.fields(inner, fault.read)
+        if fault.text is not None:
+            linker.template(inner.must("text"), fault.text, fault.read.fields)
+
+
+def link_keepalives(linker: Linker, part: Part) -> None:
+    """Check what keeps the lines alive."""
+    for name, inner in part.named("transports").items():
+        keepalive = linker.driver.transports[name].keepalive
+        if keepalive is None:
+            continue
+        linker.transport(inner, "type", name)  # it is used by this
+        place = inner.must("keepalive")
+        if keepalive.send is not None:
+            linker.templates(place.must("send"), keepalive.send, (COUNTERS,))
+            continue
+        command = find_command(linker, place.must("run"), keepalive.run)
+        if command is not None:
+            link_arguments(linker.findings, place, command, {}, "run")
+
+
+def find_command(linker: Linker, part: Part, name: str) -> Command | None:
+    """Return the command or sequence that `part` names, or report that there is none."""
+    command = linker.driver.commands.get(name)
+    if command is None:
+        linker.findings.error(
+            part,
+            "unknown-command",
+            f"there is no command {name!r}",
+            hint=did_you_mean(name, linker.driver.commands, "commands"),
+        )
+    return command
+
+
+def link_arguments(
+    findings: Findings, part: Part, command: Command, given: Mapping[str, Part], at: str
+) -> None:
+    """Check plain values given to `command`.
+
+    Args:
+        findings: takes what is wrong.
+        part: where they stand.
+        command: whose arguments they are.
+        given: by name.
+        at: key that a missing one is reported at, or the last key of `part` itself.
+    """
+    for name, inner in given.items():
+        argument = command.arguments.get(name)
+        if argument is None:
+            findings.error(
+                inner,
+                "unknown-argument",
+                f"command {command.name!r} has no argument {name!r}",
+                key=True,
+                hint=did_you_mean(name, command.arguments, "arguments"),
+            )
+        elif not (isinstance(inner.data, str) and "{{" in inner.data):
+            _check_value(inner, argument, findings)  # a step's template is known when it runs
+    missing = [
+        name
+        for name, one in command.arguments.items()
+        if one.is_required and one.default is None and name not in given
+    ]
+    if missing:
+        where = {"at": at} if isinstance(part.data, dict) and at in part.data else {"key": True}
+        findings.error(
+            part,
+            "missing-argument",
+            f"command {command.name!r} needs {missing[0]!r}",
+            hint=f"give it here, or a default to the argument {missing[0]!r}",
+            **where,
+        )
+
+
+def _check_value(part: Part, argument: Argument, findings: Findings) -> None:
+    value: Value = part.data
+    try:
+        check_within(fit(value, argument.type), argument.min, argument.max, part, findings)
+    except ValueError as error:
+        text = f"argument {argument.name!r}: {error}"
+        findings.error(part, "wrong-type", text, hint=fit_hint(value, argument.type))
+        return
+    if argument.choices and value not in argument.choices:
+        text = f"{value!r} is not one of the choices of {argument.name!r}"
+        findings.error(part, "unknown-word", text)
+
+
+def _refusal_parts(part: Part) -> list[Part]:
+    return [inner for inner in part.listed("errors") if isinstance(inner.data, dict)]

@@ -1,0 +1,81 @@
+"""Signals that are computed from others: their names, and that none rests on itself."""
+
+from collections.abc import Callable, Iterable, Mapping
+
+from urc.config.part import Findings, Part
+from urc.config.suggest import did_you_mean
+from urc.expressions import Template
+from urc.model.driver import Driver
+from urc.model.values import Signal
+
+__all__ = ["link_signals"]
+
+_Check = Callable[[Part, Template, Iterable[str]], None]
+
+
+def link_signals(part: Part, driver: Driver, check: _Check, findings: Findings) -> None:
+    """Check every computed signal of the driver at `part`; `check` looks at a template's names."""
+    set_by_frames = _set_by_frames(driver)
+    for name, inner in part.named("signals").items():
+        formula = driver.signals[name].formula
+        if formula is None:
+            continue
+        place = inner.must("value")
+        check(place, formula, driver.signals)
+        if not any(one in driver.signals for one in formula.names):
+            findings.error(
+                place,
+                "constant-value",
+                "no signal is in this expression, so it would never be computed",
+                hint=did_you_mean("", driver.signals, "signals"),
+            )
+        if name in set_by_frames:
+            findings.error(
+                place,
+                "two-sources",
+                f"{name!r} is computed here, and set by {set_by_frames[name]}",
+                key=True,
+                hint="give one of them another name",
+            )
+        cycle = _cycle(name, driver.signals)
+        if cycle:
+            findings.error(
+                place,
+                "circular-value",
+                f"{name!r} rests on itself: {' → '.join(cycle)}",
+                hint="a signal is computed from signals that do not need it",
+            )
+
+
+def _set_by_frames(driver: Driver) -> dict[str, str]:
+    """Return which frame sets a signal, for each that one does."""
+    found: dict[str, str] = {}
+    for message in driver.messages.values():
+        found |= dict.fromkeys(message.read.fields, f"message {message.name!r}")
+    for command in driver.commands.values():
+        if command.reply is not None:
+            fields = command.reply.read.fields
+            found |= dict.fromkeys(fields, f"the reply of command {command.name!r}")
+    for poll in driver.polls:
+        if poll.reply is not None:
+            found |= dict.fromkeys(poll.reply.read.fields, f"poll {poll.name!r}")
+    return found
+
+
+def _cycle(start: str, signals: Mapping[str, Signal]) -> list[str]:
+    """Return the names from `start` back to itself, or nothing."""
+    came_from: dict[str, str] = {}
+    waiting = [start]
+    while waiting:
+        name = waiting.pop(0)
+        one = signals.get(name)
+        for other in sorted(one.formula.names) if one and one.formula else ():
+            if other == start:
+                path = [name]
+                while path[-1] != start:
+                    path.append(came_from[path[-1]])
+                return [*reversed(path), start]
+            if other not in came_from and other in signals:
+                came_from[other] = name
+                waiting.append(other)
+    return []

@@ -1,0 +1,73 @@
+"""Bytes as documents write them: names of control characters, numbers, lists of those, or text."""
+
+import re
+from typing import Final
+
+from urc.config.part import Findings, Part
+
+__all__ = ["CONTROL_NAMES", "parse_bytes"]
+
+_NAMES = (
+    "NUL SOH STX ETX EOT ENQ ACK BEL BS TAB LF VT FF CR SO SI DLE DC1 DC2 DC3 DC4 NAK SYN ETB CAN"
+    " EM SUB ESC FS GS RS US"
+)
+CONTROL_NAMES: Final = {name: bytes((place,)) for place, name in enumerate(_NAMES.split())} | {
+    "HT": b"\t",
+    "DEL": b"\x7f",
+    "CRLF": b"\r\n",
+}
+"""Names of control characters that bytes may be written with."""
+_HEX = re.compile(r"0x((?:[0-9A-Fa-f]{2})+)")
+_BACKSLASH = re.compile(r"\\(?:x[0-9A-Fa-f]{2}|[abefnrtv0])")
+_SPELT = {r"\r": "CR", r"\n": "LF", r"\t": "TAB", r"\0": "NUL", r"\e": "ESC", r"\x1b": "ESC"}
+
+
+def parse_bytes(part: Part | None, encoding: str, findings: Findings) -> bytes | None:
+    """Return the bytes that `part` stands for: none when there is no part, None when reported."""
+    if part is None:
+        return b""
+    if isinstance(part.data, list):
+        pieces = [parse_bytes(inner, encoding, findings) for inner in part.items()]
+        return None if None in pieces else b"".join(piece for piece in pieces if piece)
+    if not isinstance(part.data, str):
+        return bytes((int(part.data),))
+    text: str = part.data
+    if text in CONTROL_NAMES:
+        return CONTROL_NAMES[text]
+    in_hex = _HEX.fullmatch(text)
+    if in_hex:
+        return bytes.fromhex(in_hex[1])
+    return _literal(text, part, encoding, findings)
+
+
+def _literal(text: str, part: Part, encoding: str, findings: Findings) -> bytes | None:
+    backslash = _BACKSLASH.search(text)
+    if backslash is not None:
+        names = [_SPELT.get(escape, escape) for escape in _BACKSLASH.findall(text)]
+        spelt = names[0] if len(names) == 1 else "[" + ", ".join(names) + "]"
+        spelt = {"[CR, LF]": "CRLF"}.get(spelt, spelt)
+        findings.error(
+            part,
+            "literal-backslash",
+            f"these are the {len(text)} characters {text}, not a control character",
+            offset=backslash.start(),
+            length=len(backslash[0]),
+            hint=f'write {spelt}, or "{text}" in double quotes',
+        )
+        return None
+    words = text.replace(",", " ").replace("+", " ").split()
+    if words and all(word.upper() in CONTROL_NAMES for word in words):
+        spelt = ", ".join(word.upper() for word in words)
+        spelt = f"[{spelt}]" if len(words) > 1 else spelt
+        findings.error(
+            part,
+            "bad-delimiter",
+            f"{text!r} is no name of a control character",
+            hint=f"write {spelt}",
+        )
+        return None
+    try:
+        return text.encode(encoding)
+    except UnicodeEncodeError:
+        findings.error(part, "bad-delimiter", f"{text!r} does not exist in the encoding {encoding}")
+        return None

@@ -1,0 +1,259 @@
+"""How talk flows: queues, rates, conditions, what is held and what is kept alive."""
+
+from collections.abc import Iterable, Mapping
+from typing import Final, Literal, cast
+
+from urc.config.forms import FormContext, parse_write
+from urc.config.parse_reply import refuse
+from urc.config.parse_steps import StepContext, parse_steps
+from urc.config.part import Findings, Part
+from urc.expressions import compile_template
+from urc.model.codec import WriteSpec
+from urc.model.driver import Command, Message, Poll, TransportSpec
+from urc.model.flow import (
+    MAX_STEP_S,
+    Confirm,
+    ExpectStep,
+    Hold,
+    Keepalive,
+    Offline,
+    Priority,
+    PromptStep,
+    Queue,
+    Requirement,
+    SendStep,
+    Verify,
+    all_steps,
+)
+from urc.model.values import Signal, Value
+
+__all__ = [
+    "NOTHING_SENT",
+    "command_with_flow",
+    "line_with_flow",
+    "parse_sequence",
+    "poll_with_flow",
+]
+
+_PER_S: Final = {"s": 1.0, "m": 60.0, "h": 3600.0}
+NOTHING_SENT: Final = WriteSpec("text", {"template": compile_template("")})
+"""What a sequence sends by itself."""
+
+
+def line_with_flow(
+    spec: TransportSpec, part: Part, context: FormContext, findings: Findings
+) -> TransportSpec:
+    """Return the transport with what it does by itself."""
+    queue = part.get("queue")
+    if spec.connection == "per_request":
+        refuse(part, ("keepalive",), "means nothing where each request connects anew", findings)
+        if queue is not None:
+            refuse(queue, ("in_flight",), "is 1 where each request connects anew", findings)
+    steps = StepContext(spec.name, is_named=False, forms=context)
+    on_connect, on_close = part.get("on_connect"), part.get("on_close")
+    return spec._replace(
+        queue=_queue(queue) if queue else Queue(),
+        keepalive=_keepalive(part.get("keepalive"), context, findings),
+        on_connect=parse_steps(on_connect, steps, findings) if on_connect else (),
+        on_close=parse_steps(on_close, steps, findings) if on_close else (),
+        stale_after_s=findings.duration(part, "stale_after", 0.0, least=0.05) or None,
+    )
+
+
+def aged_by_lines(
+    signals: Mapping[str, Signal],
+    transports: Mapping[str, TransportSpec],
+    messages: Mapping[str, Message],
+    polls: Iterable[Poll],
+) -> dict[str, Signal]:
+    """Return the signals, as old as the silence of the line that they come over.
+
+    Where a line says nothing of its silence, and for a signal with an age of its own, nothing is
+    changed.
+    """
+    ages: dict[str, list[float]] = {}
+    frames = [(one.transport, one.read) for one in messages.values()]
+    frames += [(one.transport, one.reply.read) for one in polls if one.reply is not None]
+    for transport, read in frames:
+        spec = transports.get(transport)
+        if spec is not None and spec.stale_after_s is not None:
+            for name in read.fields:
+                ages.setdefault(name, []).append(spec.stale_after_s)
+    return {
+        name: one._replace(stale_after_s=min(ages[name]))
+        if name in ages and not one.stale_after_s
+        else one
+        for name, one in signals.items()
+    }
+
+
+def command_with_flow(command: Command, part: Part, findings: Findings) -> Command:
+    """Return the command with when it may be sent, and how."""
+    hold, confirm, verify = part.get("hold"), part.get("confirm"), part.get("verify")
+    retries = part.integer("retries") or 0
+    is_idempotent = part.flag("idempotent", default=False)
+    if retries and not is_idempotent:
+        findings.error(
+            part,
+            "not-idempotent",
+            "it may be done twice when its answer is lost",
+            at="retries",
+            hint="write idempotent: true when twice is the same as once, or take 'retries' away",
+        )
+    if retries and command.reply is None:
+        findings.error(
+            part, "misplaced-key", "'retries' without 'reply': nothing tells of a failure",
+            at="retries", key=True,
+        )  # fmt: skip
+    if part.text("priority") == "realtime":
+        refuse(part, ("coalesce", "rate_limit"), "means nothing for what never waits", findings)
+    return command._replace(
+        priority=cast("Priority", part.text("priority", "normal")),
+        is_latest_only=part.text("coalesce") == "latest",
+        rate_per_s=_rate(part.get("rate_limit"), findings),
+        retries=retries,
+        is_idempotent=is_idempotent,
+        hold=_hold(hold, findings) if hold else None,
+        confirm=_confirm(confirm) if confirm else None,
+        requires=_requires(part, findings),
+        verify=_verify(verify, findings) if verify else None,
+    )
+
+
+def poll_with_flow(
+    poll: Poll, part: Part, commands: dict[str, Command], findings: Findings
+) -> Poll:
+    """Return the poll with the command that it runs, and when it is asked."""
+    offline, when = part.get("offline"), part.get("when")
+    poll = poll._replace(
+        when=findings.expression(when) if when else None,
+        priority=cast("Priority", part.text("priority", "low")),
+        offline=_offline(offline, findings) if offline else None,
+    )
+    run = part.get("run")
+    if run is None:
+        if "send" not in part.data:
+            findings.error(
+                part, "missing-key", "'send' or 'run' is missing: it asks nothing", key=True
+            )
+        refuse(part, ("args",), "belongs to 'run'", findings)
+        return poll
+    refuse(part, ("send", "reply", "to"), "means nothing beside 'run'", findings)
+    poll = poll._replace(run=str(run.data), arguments=_arguments(part))
+    command = commands.get(poll.run)
+    if command is None:
+        return poll  # reported with the names
+    defaults = {name: one.default for name, one in command.arguments.items()}
+    return poll._replace(
+        transport=command.transport,
+        send=command.send,
+        reply=command.reply,
+        arguments={**defaults, **poll.arguments},
+    )
+
+
+def parse_sequence(
+    part: Part, title: str, only: str, context: FormContext, findings: Findings
+) -> Command:
+    """Return the command that stands for a sequence.
+
+    Args:
+        part: the list of steps.
+        title: as people read its name.
+        only: the only transport there is, or "".
+        context: of forms.
+        findings: takes what is wrong.
+    """
+    steps = parse_steps(part, StepContext(only, is_named=True, forms=context), findings)
+    named = [
+        step.transport
+        for step in all_steps(steps)
+        if isinstance(step, (SendStep, ExpectStep, PromptStep)) and step.transport
+    ]
+    return Command(
+        name=part.name,
+        transport=named[0] if named else only,
+        send=NOTHING_SENT,
+        title=title,
+        steps=steps,
+    )
+
+
+def _arguments(part: Part) -> dict[str, Value]:
+    return {name: inner.data for name, inner in part.named("args").items()}
+
+
+def _queue(part: Part) -> Queue:
+    default = Queue()
+    return Queue(
+        part.integer("in_flight") or default.in_flight, part.integer("depth") or default.depth
+    )
+
+
+def _keepalive(part: Part | None, context: FormContext, findings: Findings) -> Keepalive | None:
+    if part is None:
+        return None
+    given = [key for key in ("send", "run") if key in part.data]
+    if len(given) != 1:
+        text = "'send' and 'run' both say it" if given else "'send' or 'run' is missing"
+        where = {"at": "run"} if given else {}
+        findings.error(part, "two-forms" if given else "missing-key", text, key=True, **where)
+        return None
+    send = part.get("send")
+    return Keepalive(
+        every_s=findings.duration(part, "every", 1.0, least=0.05),
+        run=part.text("run"),
+        send=parse_write(send, findings, context) if send else None,
+        watchdog_s=findings.duration(part, "watchdog", 0.0) or None,
+    )
+
+
+def _rate(part: Part | None, findings: Findings) -> float | None:
+    if part is None:
+        return None
+    number, _, unit = str(part.data).partition("/")
+    rate = float(number) / _PER_S[unit]
+    if not 1 / 3600 <= rate <= 1000:
+        findings.error(part, "out-of-range", f"expected 1/h to 1000/s, found {part.data}")
+        return None
+    return rate
+
+
+def _hold(part: Part, findings: Findings) -> Hold:
+    repeat_s = findings.duration(part, "repeat", 0.05, least=0.01, most=10)
+    release = part.get("release")
+    if release is None:
+        findings.error(
+            part,
+            "missing-release",
+            "nothing says how the motion stops when it is let go",
+            key=True,
+            hint="write release: { … } with the arguments that mean standstill",
+        )
+        return Hold(repeat_s)
+    return Hold(repeat_s, {name: inner.data for name, inner in release.entries().items()})
+
+
+def _confirm(part: Part) -> Confirm:
+    level = cast("Literal['normal', 'hazardous']", part.text("level", "normal"))
+    return Confirm(level, part.must("text").data)
+
+
+def _requires(part: Part, findings: Findings) -> tuple[Requirement, ...]:
+    found = []
+    for inner in part.listed("requires"):
+        condition = findings.expression(inner.must("expr"))
+        if condition is not None:
+            found.append(Requirement(condition, inner.must("else").data))
+    return tuple(found)
+
+
+def _verify(part: Part, findings: Findings) -> Verify | None:
+    condition = findings.expression(part.must("expr"))
+    within_s = findings.duration(part, "within", 1.0, most=MAX_STEP_S)
+    return None if condition is None else Verify(condition, within_s)
+
+
+def _offline(part: Part, findings: Findings) -> Offline:
+    after = part.integer("after") or 1
+    return Offline(after, findings.duration(part, "retry", 10.0, least=0.05))

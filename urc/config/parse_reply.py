@@ -1,0 +1,91 @@
+"""What answers a request: mapping → `Reply`, with its stages, its errors and its correlation."""
+
+from urc.config.beside_form import parse_lines
+from urc.config.forms import READ_FORMS, FormContext, parse_read
+from urc.config.parse_framing import parse_framing
+from urc.config.part import Findings, Part
+from urc.model.codec import ReadSpec
+from urc.model.driver import FramingSpec, Reply
+from urc.model.flow import ErrorReply, Stage
+from urc.patterns import Pattern
+
+__all__ = ["parse_errors", "parse_reply", "parse_stage", "refuse"]
+
+_OF_THE_WHOLE = ("match", "stages", "framing")
+"""Keys that belong to the reply, not to one of its stages."""
+
+
+def parse_reply(part: Part | None, findings: Findings, context: FormContext) -> Reply | None:
+    """Return the reply at `part`; None when there is none."""
+    if part is None:
+        return None
+    if "framing" in part.data:
+        context = context._replace(framing=None)
+    stages = part.listed("stages")
+    for inner in stages:
+        refuse(inner, _OF_THE_WHOLE, "belongs to the whole reply", findings)
+    if stages:
+        beside = (*READ_FORMS, "fields", "set", "when", "lines", "timeout")
+        refuse(part, beside, "belongs to one of the stages", findings)
+    first, *others = [parse_stage(inner, findings, context) for inner in stages or [part]]
+    errors, faults = parse_errors(part, findings, context) if stages else ((), ())
+    framing, match = part.get("framing"), part.get("match")
+    return Reply(
+        read=first.read,
+        errors=(*first.errors, *errors),
+        faults=(*first.faults, *faults),
+        timeout_s=first.timeout_s,
+        match=findings.expression(match) if match else None,
+        stages=tuple(
+            one._replace(errors=(*one.errors, *errors), faults=(*one.faults, *faults))
+            for one in others
+        ),
+        framing=_framing(framing, findings, context) if framing else None,
+    )
+
+
+def parse_stage(part: Part, findings: Findings, context: FormContext) -> Stage:
+    """Return one answer, whatever it belongs to."""
+    errors, faults = parse_errors(part, findings, context)
+    return Stage(
+        read=_read(part, findings, context),
+        errors=errors,
+        faults=faults,
+        timeout_s=findings.duration(part, "timeout", 0.0, most=3600) or None,
+    )
+
+
+def parse_errors(
+    part: Part, findings: Findings, context: FormContext
+) -> tuple[tuple[Pattern, ...], tuple[ErrorReply, ...]]:
+    """Return the answers under ``errors:``: patterns, and those of any form."""
+    patterns: list[Pattern] = []
+    faults: list[ErrorReply] = []
+    for inner in part.listed("errors"):
+        if isinstance(inner.data, dict):
+            text = inner.get("text")
+            read = parse_read(inner, findings, context)
+            faults.append(ErrorReply(read, findings.template(text) if text else None))
+        else:
+            pattern = findings.pattern(inner)
+            if pattern is not None:
+                patterns.append(pattern)
+    return tuple(patterns), tuple(faults)
+
+
+def refuse(part: Part, keys: tuple[str, ...], why: str, findings: Findings) -> None:
+    """Report each of `keys` that stands in `part`."""
+    for key in keys:
+        if key in part.data:
+            findings.error(part, "misplaced-key", f"'{key}' {why}", at=key, key=True)
+
+
+def _framing(part: Part, findings: Findings, context: FormContext) -> FramingSpec | None:
+    if context.catalog is None:
+        return None  # in a document that has no transports, which was reported
+    return parse_framing(part, context.encoding, findings, context.catalog)
+
+
+def _read(part: Part, findings: Findings, context: FormContext) -> ReadSpec:
+    lines = parse_lines(part.get("lines"), findings)
+    return parse_read(part, findings, context)._replace(lines=lines)

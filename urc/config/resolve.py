@@ -1,0 +1,199 @@
+"""A profile as one document: all that it is made of put together, with the place of every key.
+
+Pure but for the reading. What comes out is a document itself: it loads, and means the same.
+"""
+
+import json
+import math
+import re
+from collections.abc import Iterator, Mapping
+from typing import Final, NamedTuple
+
+from urc.config.gather import Sources, gather
+from urc.config.merge import Tree, merge
+from urc.config.parse_widget import Shelf
+from urc.config.part import Part
+from urc.config.shape import read_schema
+from urc.problems import Problem, has_errors, printable
+from urc.source import Document, Mark
+
+__all__ = ["Resolved", "resolve", "written"]
+
+_HEADER: Final = ("urc", "kind", "name", "title", "summary", "licence", "author")
+_BUILDING: Final = ("extends", "include", "partial", "params", "driver", "interfaces")
+_BESIDE: Final = ("settings", "widgets", "tests", "simulator")
+_PLAIN: Final = re.compile(r"[A-Za-z_](?:[\w./ -]*[\w./-])?|\d+(?:ms|s|m|h)", re.ASCII)
+_WORDS: Final = frozenset(("null", "true", "false", "yes", "no", "on", "off", "y", "n"))
+"""What some reader of YAML does not take for text."""
+_UNSAFE: Final = re.compile("[\x7f-\x9f\u2028\u2029\ud800-\udfff\ufeff\ufffe\uffff]")
+_BLOCK: Final = re.compile(r"(?:[!-~](?:[ -~]*[!-~])?\n){2,}")
+_INLINE_MOST: Final = 60
+
+
+class Resolved(NamedTuple):
+    """What came of putting a document together."""
+
+    text: str
+    """The whole document; "" when there are errors."""
+    problems: tuple[Problem, ...]
+
+
+def resolve(path: str, shelf: Shelf) -> Resolved:
+    """Return the document at `path` with everything that it is made of.
+
+    Args:
+        path: a robot, driver, interface or widget.
+        shelf: the widgets there are.
+    """
+    sources, problems, _, _ = gather(path)
+    if sources is None:
+        if not has_errors(problems):
+            text = "this is only a part of a document: resolve one that includes or extends it"
+            problems.append(Problem("partial-document", text, path))
+        return Resolved("", tuple(problems))
+    lines = [f"# {path}, put together by 'urc resolve'."]
+    for key, node in _sections(sources, shelf):
+        lines += _entry(key, node, 0)
+    return Resolved("\n".join(lines) + "\n", tuple(problems))
+
+
+def _sections(sources: Sources, shelf: Shelf) -> Iterator[tuple[str, object]]:
+    root = sources.root
+    if sources.kind not in ("robot", "driver"):
+        yield from ((key, part) for key, part in root.entries().items() if key not in _BUILDING)
+        return
+    for key in _HEADER:
+        if key in root.data:
+            yield key, root.must(key)
+    if sources.settings:
+        yield "settings", sources.settings
+    for key in read_schema("robot.schema.json")["$defs"]["inlineDriver"]["properties"]:
+        if key in sources.driver.data and key not in _BESIDE:
+            yield key, sources.driver.must(key)
+    if sources.slots:
+        yield "widgets", {slot: _slot(parts, shelf) for slot, parts in sources.slots.items()}
+    if sources.interfaces:
+        yield "interfaces", {name: _layout(part) for name, part in sources.interfaces.items()}
+    if sources.tests:
+        yield "tests", sources.tests
+    if sources.simulator:
+        yield "simulator", sources.simulator
+
+
+def _layout(part: Part) -> Mapping[str, Part]:
+    """Return what of an interface stands in a robot's document."""
+    keys = read_schema("interface.schema.json")["$defs"]["inlineInterface"]["properties"]
+    return {key: inner for key, inner in part.entries().items() if key in keys}
+
+
+def _slot(parts: list[Part], shelf: Shelf) -> Part:
+    """Return what fills a slot, a later part over an earlier one."""
+    tree = _tree(parts[0])
+    for part in parts[1:]:
+        over = _tree(part)
+        if part.data.get("use", tree.value["use"]) != tree.value["use"]:  # type: ignore[index]
+            tree = _for_widget(tree, str(part.data["use"]), shelf)
+        tree = merge(tree, over)
+    home = tree.home
+    document = Document(home.file, home.text, home.lines, tree.value, tree.mark)
+    return Part(document, (), tree.value)
+
+
+def _tree(part: Part) -> Tree:
+    mark = part.document.at(part.path) or Mark(part.document.mark.span, "{")
+    return Tree(part.data, mark, part.document.source_of(part.path))
+
+
+def _for_widget(tree: Tree, name: str, shelf: Shelf) -> Tree:
+    """Return what another widget takes over: bindings of the same names, but no options."""
+    widget = shelf.get(name)
+    ports = {**widget.inputs, **widget.outputs} if widget is not None else {}
+    value = {key: item for key, item in dict(tree.value).items() if key != "options"}  # type: ignore[call-overload]
+    bind = value.get("bind")
+    if isinstance(bind, dict):
+        value["bind"] = {key: item for key, item in bind.items() if key in ports}
+    return Tree(value, tree.mark, tree.home)
+
+
+# ---- text
+
+
+def written(key: str, value: object) -> str:
+    """Return ``key: value`` as a document writes it, without places."""
+    return "\n".join(_entry(key, value, 0)) + "\n"
+
+
+def _entry(key: str, node: object, depth: int) -> Iterator[str]:
+    """Yield the lines of one key."""
+    yield from _value(f"{'  ' * depth}{_text(key)}:", node, depth, _place(node))
+
+
+def _value(head: str, node: object, depth: int, place: str) -> Iterator[str]:
+    """Yield the lines of a value behind `head`, which says where it belongs."""
+    value = node.data if isinstance(node, Part) else node
+    if isinstance(value, Mapping):
+        entries = node.entries() if isinstance(node, Part) else value
+        yield f"{head}{'' if entries else ' {}'}{place}"
+        for key, inner in entries.items():
+            yield from _entry(key, inner, depth + 1)
+    elif isinstance(value, list):
+        yield from _list(head, node, value, depth, place)
+    elif isinstance(value, str) and _BLOCK.fullmatch(value):
+        yield f"{head} |{place}"
+        for line in value.splitlines():
+            yield f"{'  ' * (depth + 1)}{line}".rstrip()
+    else:
+        yield f"{head} {_scalar(value)}{place}"
+
+
+def _list(head: str, node: object, value: list[object], depth: int, place: str) -> Iterator[str]:
+    if not any(isinstance(_data(item), (Mapping, list)) for item in value):
+        inline = f"[{', '.join(_scalar(_data(item)) for item in value)}]"
+        if len(inline) <= _INLINE_MOST or not value:
+            yield f"{head} {inline}{place}"
+            return
+    yield f"{head}{place}"
+    items = node.items() if isinstance(node, Part) else value
+    pad = "  " * (depth + 1)
+    for item in items:
+        inside = _data(item)
+        if not isinstance(inside, Mapping) or not inside:
+            yield from _value(f"{pad}-", item, depth + 1, _place(item))
+            continue
+        entries = item.entries() if isinstance(item, Part) else inside
+        lines = [line for key, one in entries.items() for line in _entry(key, one, depth + 2)]
+        yield f"{pad}- {lines[0].lstrip()}"
+        yield from lines[1:]
+
+
+def _data(node: object) -> object:
+    return node.data if isinstance(node, Part) else node
+
+
+def _place(node: object) -> str:
+    """Return where the key of a value stands, as a comment."""
+    if not isinstance(node, Part):
+        return ""
+    mark = node.document.at(node.path)
+    if mark is None:
+        return ""
+    span = mark.key or mark.span
+    return printable(f"  # {node.document.source_of(node.path).file}:{span.line}")
+
+
+def _scalar(value: object) -> str:
+    if isinstance(value, str):
+        return _text(value)
+    if isinstance(value, float) and not math.isfinite(value):
+        return ".nan" if math.isnan(value) else ".inf" if value > 0 else "-.inf"
+    return json.dumps(value)
+
+
+def _text(text: str) -> str:
+    """Return text unquoted where no reader of YAML could take it for anything else."""
+    if _PLAIN.fullmatch(text) and text.lower() not in _WORDS:
+        return text
+    if "\\" in text and text.isascii() and text.isprintable() and "'" not in text:
+        return f"'{text}'"  # a pattern, most likely
+    quoted = json.dumps(text, ensure_ascii=False)
+    return _UNSAFE.sub(lambda found: f"\\u{ord(found[0]):04x}", quoted)

@@ -1,0 +1,178 @@
+"""Numbers of a ``struct:``: widths, constants, enums and ranges, checked against their types."""
+
+from collections.abc import Iterable, Mapping
+from typing import Final
+
+from urc.config.part import Findings, Part
+from urc.config.suggest import did_you_mean
+from urc.model.binary import WORDS_OF_TYPES, Number, number_of
+
+__all__ = [
+    "NumberParser",
+    "check_fits",
+    "parse_enum",
+    "parse_enums",
+    "parse_valid",
+    "unknown_type",
+    "written_constant",
+]
+
+Enum = tuple[tuple[int, str], ...]
+_COMMON_TYPES: Final = ("u8", "i8", "u16be", "u16le", "u32be", "u32le", "f32be", "f32le", "bool")
+_LARGEST: Final = {16: 65504.0, 32: 3.4028234663852886e38, 64: 1.7976931348623157e308}
+_WORDS: Final[Mapping[str, int | float | bool]] = {"true": True, "false": False}
+
+
+def written_constant(text: str) -> int | float | bool | None:
+    """Return the constant of a short item, or None when the text is a name."""
+    if text in _WORDS:
+        return _WORDS[text]
+    try:
+        return int(text, 0)
+    except ValueError:
+        pass
+    if not text[:1].isdigit() and text[:1] not in ("-", "+", "."):
+        return None
+    try:
+        return float(text)
+    except ValueError:
+        return None
+
+
+def unknown_type(
+    part: Part, word: str, types: Iterable[str], findings: Findings, *, only_types: bool = False
+) -> None:
+    """Report a word that is no type."""
+    if number_of(f"{word}be") is not None:
+        hint = f"say the order of its bytes: {word}be or {word}le"
+    elif word[:-2] in ("u8", "i8"):
+        hint = f"one byte has no order: {word[:-2]}"
+    else:
+        known = [*types, *(() if only_types else (*_COMMON_TYPES, *WORDS_OF_TYPES))]
+        hint = did_you_mean(word, known, "types")
+    findings.error(part, "unknown-type", f"there is no type {word!r}", length=len(word), offset=0,
+                   hint=hint)  # fmt: skip
+
+
+def check_fits(
+    part: Part, number: Number, value: object, findings: Findings, *, key: bool = False
+) -> None:
+    """Report a constant that its type cannot hold."""
+    if number.kind == "float":
+        is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
+        is_fine = is_number and abs(value) <= _LARGEST[number.bits]  # type: ignore[arg-type]
+        text = f"a number, {_LARGEST[number.bits]:.4g} at most"
+    elif number.kind == "boolean":
+        is_fine, text = value in (0, 1), "true or false"
+    else:
+        is_whole = isinstance(value, int) and not isinstance(value, bool)
+        is_fine = is_whole and number.least <= value <= number.most  # type: ignore[operator]
+        sign = "signed " if number.is_signed else ""
+        text = f"a whole number of {number.bits} {sign}bits, {number.least} to {number.most}"
+    if not is_fine:
+        findings.error(part, "does-not-fit", f"expected {text}, found {value!r}", key=key)
+
+
+class NumberParser:
+    """Reads the keys of one number."""
+
+    def __init__(self, part: Part, findings: Findings) -> None:
+        self._part = part
+        self._findings = findings
+
+    def width(self) -> Number:
+        """Return the number that one of ``bits`` is."""
+        return Number(
+            "integer",
+            self._part.integer("width") or 1,
+            self._part.flag("signed", default=False),
+        )
+
+    def constant(self, number: Number) -> int | float | bool | None:
+        """Return ``const``."""
+        inner = self._part.get("const")
+        if inner is None:
+            return None
+        for key in ("value", "enum", "scale", "offset", "valid"):
+            if key in self._part.data:
+                text = f"'{key}' means nothing for a constant, which is raw"
+                self._findings.error(self._part, "misplaced-key", text, at=key, key=True)
+        check_fits(inner, number, inner.data, self._findings)
+        is_number = isinstance(inner.data, (bool, int, float))
+        return inner.data if is_number else 0
+
+    def scale(self) -> float:
+        """Return ``scale``; 0 would make every number the same."""
+        inner = self._part.get("scale")
+        if inner is not None and inner.data == 0:
+            self._findings.error(inner, "zero-scale", "a scale of 0 cannot be undone")
+            return 1
+        return 1 if inner is None else inner.data
+
+
+def parse_valid(part: Part, findings: Findings) -> tuple[float, float] | None:
+    """Return ``valid``."""
+    inner = part.get("valid")
+    if inner is None:
+        return None
+    low, high = inner.number("min"), inner.number("max")
+    low, high = -1e308 if low is None else low, 1e308 if high is None else high
+    if low > high:
+        findings.error(inner, "wrong-order", f"min {low:g} is above max {high:g}", at="min")
+        return None
+    return low, high
+
+
+def parse_enums(part: Part, findings: Findings) -> dict[str, Enum]:
+    """Return the driver's ``enums:``."""
+    return {name: _enum(inner, findings) for name, inner in part.named("enums").items()}
+
+
+def parse_enum(part: Part, number: Number, enums: Mapping[str, Enum], findings: Findings) -> Enum:
+    """Return ``enum`` of an item: one of the driver's, or its own."""
+    inner = part.get("enum")
+    if inner is None:
+        return ()
+    if number.kind != "integer":
+        text = "'enum' means nothing for a number that is not whole"
+        findings.error(part, "misplaced-key", text, at="enum", key=True)
+        return ()
+    for key in ("scale", "offset"):
+        if key in part.data:
+            text = f"'{key}' means nothing beside 'enum'"
+            findings.error(part, "misplaced-key", text, at=key, key=True)
+    is_named = isinstance(inner.data, str)
+    enum = enums.get(inner.data) if is_named else _enum(inner, findings)
+    if enum is None:
+        hint = did_you_mean(inner.data, enums, "enums")
+        findings.error(inner, "unknown-enum", f"there is no enum {inner.data!r}", hint=hint)
+        return ()
+    places = {} if is_named else {int(key, 0): one for key, one in inner.entries().items()}
+    for raw, word in enum:
+        if not number.least <= raw <= number.most:
+            findings.error(
+                places.get(raw, inner),
+                "does-not-fit",
+                f"{raw} ({word}) does not fit into {number.bits} bits,"
+                f" which hold {number.least} to {number.most}",
+                key=not is_named,
+            )
+            break
+    return enum
+
+
+def _enum(part: Part, findings: Findings) -> Enum:
+    found: dict[int, str] = {}
+    words: set[str] = set()
+    for key, inner in part.entries().items():
+        raw, word = int(key, 0), str(inner.data)
+        if raw in found:
+            text = f"{key} is {raw}, which is here already"
+            findings.error(inner, "duplicate-name", text, key=True)
+        elif word in words:
+            text = f"another number is called {word!r} too"
+            hint = "give each its own word: it is also how the word becomes a number again"
+            findings.error(inner, "duplicate-name", text, hint=hint)
+        found[raw] = word
+        words.add(word)
+    return tuple(found.items())

@@ -1,0 +1,96 @@
+"""The names that the expressions of one struct can use, and each of them only once."""
+
+from collections.abc import Iterator
+from typing import Literal
+
+from urc.config.part import Findings, Part
+from urc.config.suggest import did_you_mean
+from urc.expressions import Template
+from urc.model.binary import FRAME_NAMES, Item, names_of, number_of, scope_of
+
+__all__ = ["Scope"]
+
+
+class Scope:
+    """What is known at one point of a struct: the items before it."""
+
+    def __init__(self, findings: Findings, purpose: Literal["read", "send", "type"]) -> None:
+        self.known: dict[str, Item | None] = {}
+        """Name → its item, where it is one of this struct."""
+        self.uses: list[tuple[Part, Template]] = []
+        """Expressions that can name arguments and settings, with their places."""
+        self._findings = findings
+        self._purpose = purpose
+
+    def get(self, name: str) -> Item | None:
+        """Return the item called `name`."""
+        return self.known.get(name.strip())
+
+    @staticmethod
+    def names(item: Item) -> Iterator[str]:
+        """Yield the names that an item adds."""
+        yield from names_of((item,))
+
+    def add(self, part: Part, item: Item) -> None:
+        """Take note of an item; what is there twice is reported at `part`."""
+        own = {one.id: one for one in scope_of((item,)) if one.id}
+        if item.switch is not None:
+            return  # its cases were noted one by one
+        for name in self.names(item):
+            self.know(part, name, own.get(name))
+            if self._purpose == "send" and own.get(name, item).value is None:
+                self.uses.append((part, _argument(part, name)))
+
+    def know(self, part: Part, name: str, item: Item | None) -> None:
+        """Take note of one name."""
+        if name in self.known:
+            at = "id" if isinstance(part.data, dict) and "id" in part.data else ""
+            text = f"another item is called {name!r} too"
+            self._findings.error(part, "duplicate-name", text, at=at, hint="give each its own name")
+        self.known[name] = item
+
+    def check_name(self, part: Part, name: str) -> None:
+        """Report an id that means something else already."""
+        if name in FRAME_NAMES or number_of(name) is not None or name == "settings":
+            self._findings.error(part, "bad-name", f"{name!r} means something else here")
+        elif name and not (name.isidentifier() and name.isascii() and name == name.lower()):
+            text = f"{name!r} cannot be the name of an item"
+            hint = "lower-case letters, digits and underscores"
+            self._findings.error(part, "bad-name", text, hint=hint)
+
+    def expression(self, part: Part) -> Template | None:
+        """Return the expression at `part`, over the items before it."""
+        expression = self._findings.expression(part)
+        return None if expression is None else self._checked(part, expression)
+
+    def value(self, part: Part | None) -> Template | None:
+        """Return what is sent: an expression, or a plain number."""
+        if part is None:
+            return None
+        if isinstance(part.data, str):
+            return self.expression(part)
+        from urc.expressions import compile_expression
+
+        return compile_expression(repr(part.data))
+
+    def _checked(self, part: Part, expression: Template) -> Template:
+        if self._purpose == "send":
+            self.uses.append((part, expression))
+            return expression
+        for name in sorted(expression.names - self.known.keys() - FRAME_NAMES):
+            found = expression.source.find(name)
+            self._findings.error(
+                part,
+                "unknown-name",
+                f"{name!r} is no item before this one",
+                offset=max(found, 0),
+                length=len(name),
+                hint=did_you_mean(name, [*self.known, *FRAME_NAMES], "names"),
+            )
+        return expression
+
+
+def _argument(part: Part, name: str) -> Template:
+    """Return the use of an argument, whose source is the text that names it in the document."""
+    source = part.data if isinstance(part.data, str) else name
+    return Template(source, f"ns[{name!r}]", frozenset((name,)), frozenset())

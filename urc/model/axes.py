@@ -1,0 +1,84 @@
+"""Which way axes point, and how values go from one way to another.
+
+Floor 2, arithmetic only. Body axes: FLU (x forward, y left, z up; REP-103) and FRD (x forward,
+y right, z down). Axes of the world: ENU (east, north, up) and NED (north, east, down). A bearing
+is the angle from north, clockwise.
+"""
+
+import math
+from collections.abc import Sequence
+from typing import Final
+
+from urc.model.values import Axes
+
+__all__ = ["ANGLE_UNITS", "turn_angle", "turn_quaternion", "turn_vector", "turns"]
+
+ANGLE_UNITS: Final = ("rad", "deg", "°")
+_BODY: Final = ("FLU", "FRD")
+_WORLD: Final = ("ENU", "NED")
+_HALF: Final = math.sqrt(0.5)
+
+
+def turns(here: Axes, there: Axes) -> bool:
+    """Return whether values can go from one to the other: body to body, or world to world."""
+    if here == there or not here or not there:
+        return here == there
+    world = (*_WORLD, "bearing")
+    return (here in _BODY and there in _BODY) or (here in world and there in world)
+
+
+def turn_vector(vector: Sequence[float], here: Axes, there: Axes) -> tuple[float, ...]:
+    """Return a vector of two or three numbers in the axes `there`."""
+    if here == there:
+        return tuple(vector)
+    if here in _BODY and there in _BODY:
+        first, *others = vector
+        return (first, *(-one for one in others))
+    if here in _WORLD and there in _WORLD:
+        east, north, *up = vector
+        return (north, east, *(-one for one in up))
+    raise ValueError(f"a vector cannot go from {here} to {there}")
+
+
+def turn_quaternion(
+    quaternion: Sequence[float], here: Axes, there: Axes
+) -> tuple[float, float, float, float]:
+    """Return an orientation [x, y, z, w] in the axes `there`.
+
+    From body axes to body axes it is the same turn, told in the other axes. From ENU to NED both
+    ends change: of a FLU body in ENU it makes the FRD body in NED, as autopilots have it.
+    """
+    x, y, z, w = quaternion
+    if here == there:
+        return (x, y, z, w)
+    if here in _BODY and there in _BODY:
+        return (x, -y, -z, w)
+    if here in _WORLD and there in _WORLD:
+        return ((x + y) * _HALF, (x - y) * _HALF, (w - z) * _HALF, (w + z) * _HALF)
+    raise ValueError(f"an orientation cannot go from {here} to {there}")
+
+
+def turn_angle(
+    angle: float, here: Axes, there: Axes, *, about: str = "z", unit: str = "rad"
+) -> float:
+    """Return an angle or a rate about one axis of the body, or a heading, in the axes `there`.
+
+    Args:
+        angle: in `unit`.
+        here: its axes; for a heading ENU, NED or bearing.
+        there: the wanted ones.
+        about: ``x`` (roll), ``y`` (pitch) or ``z`` (yaw), for body axes.
+        unit: ``rad``, ``deg`` or ``°``; of headings, which are a matter of full turns.
+    """
+    if here == there:
+        return angle
+    if here in _BODY and there in _BODY:
+        return angle if about == "x" else -angle
+    if not turns(here, there):
+        raise ValueError(f"an angle cannot go from {here} to {there}")
+    full = 2 * math.pi if unit == "rad" else 360.0
+    from_north = full / 4 - angle if here == "ENU" else angle
+    turned = full / 4 - from_north if there == "ENU" else from_north
+    if there == "bearing":
+        return turned % full
+    return (turned + full / 2) % full - full / 2

@@ -1,0 +1,207 @@
+"""How talk flows: queues, stages of an answer, conditions, and ordered steps.
+
+Everything here is data, made by `urc.config` and acted upon by `urc.protocol`.
+"""
+
+from collections.abc import Iterator, Mapping
+from typing import Literal, NamedTuple
+
+from urc.expressions import Template
+from urc.model.codec import ReadSpec, WriteSpec
+from urc.model.values import NOTHING, Value
+from urc.patterns import Pattern
+
+__all__ = [
+    "MAX_STEPS",
+    "MAX_STEP_S",
+    "Confirm",
+    "ErrorReply",
+    "ExpectStep",
+    "FailStep",
+    "Hold",
+    "IfStep",
+    "Keepalive",
+    "Offline",
+    "Priority",
+    "PromptStep",
+    "Queue",
+    "Requirement",
+    "RunStep",
+    "SendStep",
+    "SetStep",
+    "Stage",
+    "Step",
+    "Verify",
+    "WaitStep",
+    "all_steps",
+]
+
+MAX_STEPS = 200
+"""Steps of one sequence, those in its branches included."""
+MAX_STEP_S = 600.0
+"""Longest wait of one step, in seconds."""
+
+Priority = Literal["realtime", "high", "normal", "low"]
+"""``realtime`` waits for nothing: neither for the queue, nor for the gap, nor for an answer."""
+
+
+class Queue(NamedTuple):
+    """What may wait on one line."""
+
+    in_flight: int = 1
+    """Requests that may wait for their answer at a time, 1 to 64."""
+    depth: int = 64
+    """Requests that may wait to be sent; one more is refused."""
+
+
+class Keepalive(NamedTuple):
+    """What is said when nothing else has been said for a while."""
+
+    every_s: float
+    """How long the line may be without anything sent, in seconds."""
+    run: str = ""
+    """Command to run; "" when `send` says it."""
+    send: WriteSpec | None = None
+    watchdog_s: float | None = None
+    """After how long without a word the robot hangs up or stops, as its maker says."""
+
+
+class ErrorReply(NamedTuple):
+    """An answer that means failure, read by any form."""
+
+    read: ReadSpec
+    text: Template | None = None
+    """What to tell people, over the answer's fields; None: the answer as it came."""
+
+
+class Stage(NamedTuple):
+    """A further answer to a request, after the first one."""
+
+    read: ReadSpec
+    errors: tuple[Pattern, ...] = ()
+    faults: tuple[ErrorReply, ...] = ()
+    timeout_s: float | None = None
+    """None: the transport's ``timeouts.reply``."""
+
+
+class Hold(NamedTuple):
+    """A command that means motion for as long as it is held."""
+
+    repeat_s: float
+    """How often the newest values are sent, in seconds."""
+    release: Mapping[str, Value] = NOTHING
+    """Arguments that stop the motion; those left out take their defaults."""
+
+
+class Confirm(NamedTuple):
+    """A question before the command is sent."""
+
+    level: Literal["normal", "hazardous"] = "normal"
+    text: str = ""
+
+
+class Requirement(NamedTuple):
+    """What must hold for a command to be sent."""
+
+    condition: Template
+    """Over fresh signals, settings and the command's arguments."""
+    text: str
+    """What to tell people where it does not hold."""
+
+
+class Verify(NamedTuple):
+    """What must come true for a command to count as done."""
+
+    condition: Template
+    """Over settings, the command's arguments, and signals read after it was sent."""
+    within_s: float
+
+
+class Offline(NamedTuple):
+    """How a poll treats a robot, or a part of it, that does not answer."""
+
+    after: int
+    """Misses in a row."""
+    retry_s: float
+    """Period from then on, until it answers; in seconds."""
+
+
+class SendStep(NamedTuple):
+    """Send a frame."""
+
+    transport: str
+    send: WriteSpec
+    is_secret: bool = False
+    """Its text must not appear in any message."""
+
+
+class ExpectStep(NamedTuple):
+    """Wait for a frame; its ``_fields`` are names in the steps that follow."""
+
+    transport: str
+    read: ReadSpec
+    errors: tuple[Pattern, ...] = ()
+    faults: tuple[ErrorReply, ...] = ()
+    timeout_s: float | None = None
+    """None: the transport's ``timeouts.reply``."""
+    otherwise: "tuple[Step, ...] | None" = None
+    """What to do when it does not come; None: fail."""
+    text: str = ""
+    """What to say when it does not come; "" for words of our own."""
+
+
+class PromptStep(NamedTuple):
+    """Wait for text that nothing ends, as a prompt for a password."""
+
+    transport: str
+    pattern: Pattern
+    timeout_s: float | None = None
+    otherwise: "tuple[Step, ...] | None" = None
+    text: str = ""
+
+
+class WaitStep(NamedTuple):
+    """Do nothing for a while."""
+
+    seconds: float
+
+
+class RunStep(NamedTuple):
+    """Run a command, or another sequence, and wait until it is done."""
+
+    command: str
+    arguments: Mapping[str, Template | Value] = NOTHING
+
+
+class SetStep(NamedTuple):
+    """Set signals."""
+
+    values: Mapping[str, Template | Value]
+
+
+class IfStep(NamedTuple):
+    """Choose between two ways on."""
+
+    condition: Template
+    then: "tuple[Step, ...]"
+    otherwise: "tuple[Step, ...]" = ()
+
+
+class FailStep(NamedTuple):
+    """End without success."""
+
+    text: Template
+
+
+Step = SendStep | ExpectStep | PromptStep | WaitStep | RunStep | SetStep | IfStep | FailStep
+
+
+def all_steps(steps: tuple[Step, ...]) -> Iterator[Step]:
+    """Yield the steps and those in their branches."""
+    for step in steps:
+        yield step
+        if isinstance(step, IfStep):
+            yield from all_steps(step.then)
+            yield from all_steps(step.otherwise)
+        elif isinstance(step, (ExpectStep, PromptStep)):
+            yield from all_steps(step.otherwise or ())

@@ -1,0 +1,150 @@
+"""What a frame is made of: its constant bytes, length field, checksum, and where the payload is.
+
+The loader resolves every default, so that a place here is a place: counted from the frame's first
+byte, or, when it is negative, from behind its last one.
+"""
+
+from collections.abc import Mapping
+from typing import Any, Final, Literal, NamedTuple
+
+from urc.model.values import NOTHING
+
+__all__ = [
+    "FOLDED",
+    "PLAIN_CHECKSUMS",
+    "ChecksumSpec",
+    "CrcSpec",
+    "FoldSpec",
+    "FrameLayout",
+    "LengthSpec",
+    "Salt",
+    "Spelling",
+    "Window",
+    "spelt_size",
+]
+
+Spelling = Literal["raw", "hex", "HEX", "dec"]
+"""How a number stands in a frame: as bytes, or as digits (``HEX``: in capitals)."""
+
+
+class CrcSpec(NamedTuple):
+    """A cyclic redundancy check by its Rocksoft parameters."""
+
+    width: int
+    poly: int
+    init: int = 0
+    refin: bool = False
+    refout: bool = False
+    xorout: int = 0
+
+
+class FoldSpec(NamedTuple):
+    """All numbers of a window put together by one operation."""
+
+    operation: Literal["sum", "xor"]
+    bits: int = 8
+    """Width of the result."""
+    of: int = 8
+    """Width of the numbers; the last one is filled up with zeros."""
+    complement: Literal["none", "ones", "twos"] = "none"
+    mask: int | None = None
+    """Bits of the result that are kept."""
+    ored: int = 0
+    """Bits of the result that are set, after the mask."""
+
+
+class Window(NamedTuple):
+    """Part of a frame, as Python slices it."""
+
+    start: int = 0
+    stop: int | None = None
+
+
+class Salt(NamedTuple):
+    """Bytes that only the two ends know, fed to the checksum behind the window."""
+
+    constant: bytes = b""
+    offset: int = 0
+    """Place of the number that chooses among `table`."""
+    size: int = 1
+    is_big: bool = False
+    table: Mapping[Any, bytes] = NOTHING
+    """Number → bytes."""
+
+
+class ChecksumSpec(NamedTuple):
+    """A number over part of a frame that shows whether the frame is whole."""
+
+    algorithm: CrcSpec | FoldSpec | str
+    """A word stands for an algorithm without parameters: ``fletcher16``, ``adler32`` …"""
+    bits: int
+    over: Window
+    at: int
+    is_big: bool = True
+    spelling: Spelling = "raw"
+    salt: Salt = Salt()
+    is_from_hex: bool = False
+    """Whether the window spells, in hex digits, the bytes that are summed up."""
+    closes: bool = False
+    """Whether a wrong one ends the connection instead of the frame alone."""
+
+    @property
+    def size(self) -> int:
+        """Bytes that it takes in the frame."""
+        return spelt_size(self.bits, self.spelling)
+
+
+class LengthSpec(NamedTuple):
+    """A number in the frame that says how long the frame is: field x `unit` + `adjust` bytes."""
+
+    offset: int
+    size: int
+    """Bytes that the number takes: digits, when it is spelt out."""
+    is_big: bool = True
+    adjust: int = 0
+    unit: int = 1
+    bits: int = 64
+    """Lowest bits of the number that are the length; the others are the payload's."""
+    spelling: Spelling = "raw"
+
+
+class FrameLayout(NamedTuple):
+    """Where everything is in a frame."""
+
+    start: bytes = b""
+    end: bytes = b""
+    head: int = 0
+    """Bytes before the payload."""
+    tail: int = 0
+    """Bytes behind the payload."""
+    size: int | None = None
+    """Of the whole frame, where it is always the same."""
+    length: LengthSpec | None = None
+    checksum: ChecksumSpec | None = None
+
+
+def spelt_size(bits: int, spelling: Spelling) -> int:
+    """Return how many bytes of a frame a number of `bits` bits takes."""
+    size = (bits + 7) // 8
+    if spelling == "raw":
+        return size
+    return 2 * size if spelling != "dec" else len(str((1 << bits) - 1))
+
+
+FOLDED: Final = {
+    "sum8": FoldSpec("sum"),
+    "sum16": FoldSpec("sum", 16),
+    "sum32": FoldSpec("sum", 32),
+    "xor8": FoldSpec("xor"),
+    "lrc": FoldSpec("sum", complement="twos"),
+}
+"""Names of common folds."""
+PLAIN_CHECKSUMS: Final = {
+    "adler32": 32,
+    "fletcher8": 8,
+    "fletcher16": 16,
+    "fletcher16-mod256": 16,
+    "fletcher32": 32,
+    "internet": 16,
+}
+"""Algorithms without parameters, and the bits of their results."""

@@ -1,0 +1,203 @@
+"""Checksums: the number over part of a frame, checked when it comes in, written when it goes out.
+
+Floor 3, pure. The arithmetic of CRCs is a library's (`anycrc`, or the standard library where it has
+that very one); sums and folds are one call into C each. Nothing here takes more than linear time.
+"""
+
+import binascii
+import operator
+import zlib
+from collections.abc import Callable, Mapping
+from functools import reduce
+from itertools import accumulate
+from typing import Final
+
+from urc.model.framing import ChecksumSpec, CrcSpec, FoldSpec, Salt, Window
+from urc.problems import UrcError
+
+__all__ = ["NAMED", "BadFrame", "Checksum", "build_algorithm"]
+
+Compute = Callable[[bytes], int]
+
+
+class BadFrame(UrcError):
+    """Bytes that are no frame."""
+
+    def __init__(self, code: str, message: str, *, closes: bool = False) -> None:
+        super().__init__(message)
+        self.code = code
+        self.closes = closes
+        """Whether the connection is to be given up."""
+
+
+def build_algorithm(spec: CrcSpec | FoldSpec | str, *, is_big: bool = True) -> Compute:
+    """Return the function from bytes to the checksum's number.
+
+    Args:
+        spec: which one.
+        is_big: order of bytes in numbers that are wider than one; only folds have such.
+    """
+    if isinstance(spec, str):
+        return NAMED[spec]
+    if isinstance(spec, FoldSpec):
+        return _fold(spec, is_big)
+    builtin = _BUILT_IN.get(spec)
+    if builtin is not None:
+        return builtin
+    from anycrc import CRC  # 14 ms that only a driver with such a checksum pays
+
+    compute: Compute = CRC(*spec).calc
+    return compute
+
+
+def _fold(spec: FoldSpec, is_big: bool) -> Compute:
+    full = (1 << spec.bits) - 1
+    mask = full if spec.mask is None else spec.mask & full
+    flip, minus = spec.complement == "ones", spec.complement == "twos"
+    is_sum, size, order = spec.operation == "sum", spec.of // 8, "big" if is_big else "little"
+
+    def compute(data: bytes) -> int:
+        numbers = data if size == 1 else _numbers(data, size, order)
+        value = sum(numbers) if is_sum else reduce(operator.xor, numbers, 0)
+        if flip:
+            value = ~value
+        elif minus:
+            value = -value
+        return value & mask | spec.ored
+
+    return compute
+
+
+def _numbers(data: bytes, size: int, order: str) -> list[int]:
+    filled = data + bytes(-len(data) % size)
+    is_big = order == "big"
+    return [
+        int.from_bytes(filled[place : place + size], "big" if is_big else "little")
+        for place in range(0, len(filled), size)
+    ]
+
+
+def _fletcher(modulus: int, bits: int, size: int = 1) -> Compute:
+    """Return Fletcher's sum of sums; `size` is that of the little-endian numbers it adds up."""
+
+    def compute(data: bytes) -> int:
+        numbers = data if size == 1 else _numbers(data, size, "little")
+        second = sum(accumulate(numbers))
+        return second % modulus << bits | sum(numbers) % modulus
+
+    return compute
+
+
+def _internet(data: bytes) -> int:
+    """Return the checksum of RFC 1071: the ones' complement of the ones' complement sum."""
+    total = sum(_numbers(data, 2, "big"))
+    while total > 0xFFFF:
+        total = (total & 0xFFFF) + (total >> 16)
+    return ~total & 0xFFFF
+
+
+NAMED: Final[Mapping[str, Compute]] = {
+    "adler32": zlib.adler32,
+    "fletcher8": _fletcher(15, 4),
+    "fletcher16": _fletcher(255, 8),
+    "fletcher16-mod256": _fletcher(256, 8),
+    "fletcher32": _fletcher(65535, 16, 2),
+    "internet": _internet,
+}
+"""Algorithms that have no parameters."""
+
+_BUILT_IN: Final[Mapping[CrcSpec, Compute]] = {
+    CrcSpec(32, 0x04C11DB7, 0xFFFFFFFF, True, True, 0xFFFFFFFF): zlib.crc32,
+    CrcSpec(16, 0x1021): lambda data: binascii.crc_hqx(data, 0),
+    CrcSpec(16, 0x1021, 0xFFFF): lambda data: binascii.crc_hqx(data, 0xFFFF),
+}
+
+
+class Checksum:
+    """One checksum of one kind of frame."""
+
+    def __init__(self, spec: ChecksumSpec) -> None:
+        self.spec = spec
+        self.size = spec.size
+        self._compute = build_algorithm(spec.algorithm, is_big=spec.is_big)
+        self._salt = _salter(spec.salt)
+
+    def check(self, frame: bytes) -> None:
+        """Raise `BadFrame` unless the frame carries the right number."""
+        place, window = self._place(frame), self._window(frame)
+        found = frame[place : place + self.size]
+        right = self._spelt(self._compute(window))
+        if found == right or (self.spec.spelling[0] in "hH" and found.upper() == right.upper()):
+            return
+        shown, wanted = _shown(found, self.spec.spelling), _shown(right, self.spec.spelling)
+        raise BadFrame(
+            "bad-checksum",
+            f"the frame carries the checksum {shown}, but {wanted} would be right; dropped",
+            closes=self.spec.closes,
+        )
+
+    def put(self, frame: bytearray) -> None:
+        """Write the right number into its place; raise `BadFrame` when the frame has none."""
+        place = self._place(frame)
+        right = self._spelt(self._compute(self._window(frame)))
+        frame[place : place + self.size] = right
+
+    def _place(self, frame: bytes | bytearray) -> int:
+        place = self.spec.at if self.spec.at >= 0 else len(frame) + self.spec.at
+        if place < 0 or place + self.size > len(frame):
+            raise BadFrame("short-frame", f"{len(frame)} bytes are too few to hold the checksum")
+        return place
+
+    def _window(self, frame: bytes | bytearray) -> bytes:
+        """Return what is summed up: the checksum's own bytes count as zeros, the salt is added."""
+        window: Window = self.spec.over
+        start, stop, _ = slice(window.start, window.stop).indices(len(frame))
+        if start > stop:
+            raise BadFrame("short-frame", f"{len(frame)} bytes are too few for the checksum")
+        place = self._place(frame)
+        data = bytes(frame[start:stop])
+        first, last = max(start, place), min(stop, place + self.size)
+        if first < last:
+            data = data[: first - start] + bytes(last - first) + data[last - start :]
+        if self.spec.is_from_hex:
+            data = _from_hex(data)
+        return data if self._salt is None else data + self._salt(frame)
+
+    def _spelt(self, number: int) -> bytes:
+        spec = self.spec
+        if spec.spelling == "dec":
+            return b"%0*d" % (self.size, number)
+        data = number.to_bytes((spec.bits + 7) // 8, "big" if spec.is_big else "little")
+        if spec.spelling == "raw":
+            return data
+        digits = data.hex()
+        return (digits if spec.spelling == "hex" else digits.upper()).encode()
+
+
+def _from_hex(digits: bytes) -> bytes:
+    try:
+        return binascii.unhexlify(digits)
+    except binascii.Error:
+        raise BadFrame("bad-checksum", "the checksum is taken over what is no hex digits") from None
+
+
+def _salter(salt: Salt) -> Callable[[bytes | bytearray], bytes] | None:
+    if salt.constant:
+        constant = salt.constant
+        return lambda _: constant
+    if not salt.table:
+        return None
+
+    def choose(frame: bytes | bytearray) -> bytes:
+        field = frame[salt.offset : salt.offset + salt.size]
+        number = int.from_bytes(field, "big" if salt.is_big else "little")
+        found = salt.table.get(number)
+        if found is None or len(field) < salt.size:
+            raise BadFrame("no-salt", f"the salt of the checksum's table has no row {number}")
+        return found
+
+    return choose
+
+
+def _shown(data: bytes, spelling: str) -> str:
+    return data.hex(" ") if spelling == "raw" else ascii(data.decode("latin-1"))

@@ -1,0 +1,342 @@
+"""Conversions: from what a robot says to what it means, and back for the emulated robot.
+
+Floor 3, pure. A conversion is a chain of small functions, made once when an engine is built. Each
+takes a raw value and returns the next one; None means "not available" and ends the chain.
+"""
+
+import math
+import sys
+from bisect import bisect_right
+from collections.abc import Callable
+from itertools import pairwise
+from typing import Final
+
+from urc.model.values import Conversion, Value
+
+__all__ = [
+    "BadValue",
+    "Unusable",
+    "build_conversion",
+    "build_inverse",
+    "divisor_of",
+    "number_of",
+    "short",
+    "spelt",
+    "whole_of",
+]
+
+Step = Callable[[object], object]
+
+_LARGEST: Final = sys.float_info.max
+"""Whole numbers beyond it cannot be computed with."""
+_DIGITS: Final = "0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZ"
+_ALL_ONES: Final = frozenset((1 << 8 * size) - 1 for size in range(1, 9))
+
+
+class BadValue(ValueError):
+    """A raw value that means nothing; the message says what was found and expected."""
+
+
+class Unusable:
+    """Stands for a field that could not be converted; whoever needs it says why."""
+
+    __slots__ = ("why",)
+
+    def __init__(self, why: str) -> None:
+        self.why = why
+
+    def __repr__(self) -> str:
+        return f"Unusable({self.why!r})"
+
+
+def build_conversion(conversion: Conversion) -> Step | None:
+    """Return the function from a raw value to a converted one, or None when there is none.
+
+    The function raises `BadValue`.
+    """
+    steps: list[Step] = []
+    if conversion.base:
+        steps.append(_from_base(conversion.base))
+    if conversion.not_available:
+        steps.append(_absent(conversion.not_available))
+    if conversion.polynomial:
+        steps.append(_polynomial(conversion.polynomial))
+    if conversion.points:
+        steps.append(_on_points(conversion.points))
+    if conversion.states:
+        steps.append(_words(conversion.states))
+    return _chain(steps)
+
+
+def build_inverse(conversion: Conversion) -> Step | None:
+    """Return the function from a converted value to a raw one, or None when there is none.
+
+    The function raises `BadValue` for a value that no raw one gives.
+    """
+    steps: list[Step] = []
+    if conversion.states:
+        steps.append(_words_back(conversion.states))
+    if conversion.points:
+        steps.append(_on_points(_turned(conversion.points)))
+    if conversion.polynomial:
+        steps.append(_line_back(conversion.polynomial))
+    if conversion.base:
+        steps.append(_to_base(conversion.base))
+    chain = _chain(steps)
+    if not conversion.not_available:
+        return chain
+    absent = _first_absent(conversion)
+
+    def back(value: object) -> object:
+        if value is None:
+            return absent
+        return value if chain is None else chain(value)
+
+    return back
+
+
+def whole_of(raw: object) -> int:
+    """Return a raw value as a whole number; raise `BadValue` when it is none."""
+    if isinstance(raw, int) and not isinstance(raw, bool):
+        return raw
+    if isinstance(raw, float) and raw.is_integer():
+        return int(raw)
+    if isinstance(raw, str) and _is_plain(raw):
+        try:
+            return int(raw)
+        except ValueError:
+            pass
+    raise BadValue(f"{short(raw)} is not a whole number")
+
+
+def number_of(raw: object) -> float:
+    """Return a raw value as a number; raise `BadValue` when it is none."""
+    if isinstance(raw, float):
+        return raw
+    if isinstance(raw, int) and not isinstance(raw, bool) and -_LARGEST <= raw <= _LARGEST:
+        return raw
+    if isinstance(raw, str) and _is_plain(raw):
+        try:
+            return float(raw)
+        except ValueError:
+            pass
+    raise BadValue(f"{short(raw)} is not a number")
+
+
+def spelt(raw: object) -> str:
+    """Return a raw value as it is written in documents: ``true``, ``3``, ``2.5``."""
+    if isinstance(raw, bool):
+        return "true" if raw else "false"
+    if isinstance(raw, float) and raw.is_integer():
+        return str(int(raw))
+    return str(raw)
+
+
+def short(raw: object) -> str:
+    """Return a raw value for a message, cut when it is long."""
+    if isinstance(raw, (str, bytes)) and len(raw) > 60:
+        raw = raw[:60]
+    text = repr(raw)
+    return text if len(text) <= 40 else text[:37] + "..."
+
+
+def _is_plain(text: str) -> bool:
+    """Python's int and float take '1_0' and other scripts' digits, which no robot means."""
+    return text.isascii() and "_" not in text
+
+
+def _chain(steps: list[Step]) -> Step | None:
+    if not steps:
+        return None
+    first, *others = steps
+    if not others:
+        return lambda raw: None if raw is None else first(raw)
+
+    def convert(raw: object) -> object:
+        for step in steps:
+            if raw is None:
+                return None
+            raw = step(raw)
+        return raw
+
+    return convert
+
+
+def _from_base(base: int) -> Step:
+    def convert(raw: object) -> object:
+        if not isinstance(raw, str):
+            return raw
+        if _is_plain(raw):
+            try:
+                return int(raw, base)
+            except ValueError:
+                pass
+        raise BadValue(f"{short(raw)} is not a whole number of base {base}")
+
+    return convert
+
+
+def _to_base(base: int) -> Step:
+    def convert(value: object) -> object:
+        number = whole_of(value)
+        if base == 10:
+            return number
+        digits, rest = "", abs(number)
+        while rest:
+            rest, digit = divmod(rest, base)
+            digits = _DIGITS[digit] + digits
+        return ("-" if number < 0 else "") + (digits or "0")
+
+    return convert
+
+
+def _absent(values: tuple[Value, ...]) -> Step:
+    """Return the step that gives None for each of `values`, and for the numbers some words name."""
+    texts = {value for value in values if isinstance(value, str)}
+    booleans = {value for value in values if isinstance(value, bool)}
+    numbers = {
+        value for value in values if isinstance(value, (int, float)) and not isinstance(value, bool)
+    }
+    numbers |= {float(word) for word in ("inf", "-inf") if word in texts}
+    if "all_ones" in texts:
+        numbers |= _ALL_ONES
+
+    def convert(raw: object) -> object:
+        if isinstance(raw, str):
+            return None if raw in texts or _number_in(raw) in numbers else raw
+        if isinstance(raw, bool):
+            return None if raw in booleans else raw
+        if isinstance(raw, (int, float)):
+            return None if raw in numbers or raw != raw else raw
+        return raw
+
+    return convert
+
+
+def _number_in(text: str) -> float | None:
+    try:
+        return float(text) if _is_plain(text) else None
+    except ValueError:
+        return None
+
+
+def _first_absent(conversion: Conversion) -> Value:
+    first = conversion.not_available[0]
+    if first == "all_ones":
+        return "FF" if conversion.base == 16 else 255
+    return float(first) if first in ("nan", "inf", "-inf") else first
+
+
+def _polynomial(coefficients: tuple[float, ...]) -> Step:
+    if len(coefficients) == 2:
+        return _line(*coefficients)
+    falling = coefficients[::-1]
+
+    def convert(raw: object) -> object:
+        number, value = number_of(raw), 0.0
+        for coefficient in falling:
+            value = value * number + coefficient
+        return value
+
+    return convert
+
+
+def _line(offset: float, scale: float) -> Step:
+    divisor = divisor_of(scale)
+    if divisor:
+        # Adding before dividing keeps what decimals mean: (2512 - 4000) / 100 is -14.88 exactly.
+        shift = _tidy(offset * divisor)
+        if isinstance(shift, int):
+            return lambda raw: (number_of(raw) + shift) / divisor
+        return lambda raw: number_of(raw) / divisor + offset
+    if offset:
+        return lambda raw: number_of(raw) * scale + offset
+    return lambda raw: number_of(raw) * scale
+
+
+def divisor_of(scale: float) -> int:
+    """Return n when `scale` is 1/n, else 0: 3 / 10 is 0.3 to the last digit, 3 * 0.1 is not."""
+    if not 0 < abs(scale) < 1:
+        return 0
+    divisor = round(1 / scale)
+    return divisor if 1 / divisor == scale else 0
+
+
+def _line_back(coefficients: tuple[float, ...]) -> Step:
+    if len(coefficients) != 2 or not coefficients[1]:
+
+        def refuse(value: object) -> object:
+            raise BadValue("only a scale and an offset can be turned round")
+
+        return refuse
+    offset, scale = coefficients
+    divisor = divisor_of(scale)
+
+    def convert(value: object) -> object:
+        number = number_of(value) - offset
+        raw = number * divisor if divisor else number / scale
+        if not math.isfinite(raw):
+            raise BadValue(f"{short(value)} has no raw number")
+        return _tidy(raw)
+
+    return convert
+
+
+def _tidy(number: float) -> float:
+    """Return the whole number that `number` is but for rounding, else `number`."""
+    if not math.isfinite(number):
+        return number
+    nearest = round(number)
+    return nearest if abs(number - nearest) <= 1e-9 * max(1.0, abs(number)) else number
+
+
+def _turned(points: tuple[tuple[float, float], ...]) -> tuple[tuple[float, float], ...]:
+    turned = tuple((after, before) for before, after in points)
+    return turned if turned[0][0] < turned[-1][0] else turned[::-1]
+
+
+def _on_points(points: tuple[tuple[float, float], ...]) -> Step:
+    places = [place for place, _ in points]
+    rising = all(before < after for before, after in pairwise(places))
+
+    def convert(raw: object) -> object:
+        number = number_of(raw)
+        if not rising:
+            raise BadValue("points that turn back cannot be turned round")
+        if number != number:
+            return None
+        if number <= places[0]:
+            return points[0][1]
+        if number >= places[-1]:
+            return points[-1][1]
+        after = bisect_right(places, number)
+        (x0, y0), (x1, y1) = points[after - 1], points[after]
+        return y0 + (number - x0) * (y1 - y0) / (x1 - x0)
+
+    return convert
+
+
+def _words(states: tuple[tuple[str, str], ...]) -> Step:
+    words = dict(states)
+    known = ", ".join(sorted(words))
+
+    def convert(raw: object) -> object:
+        word = words.get(spelt(raw))
+        if word is None:
+            raise BadValue(f"{short(raw)} is none of the states {known}")
+        return word
+
+    return convert
+
+
+def _words_back(states: tuple[tuple[str, str], ...]) -> Step:
+    raws = {word: raw for raw, word in reversed(states)}
+
+    def convert(value: object) -> object:
+        raw = raws.get(value) if isinstance(value, str) else None
+        if raw is None:
+            raise BadValue(f"{short(value)} is none of the states {', '.join(raws)}")
+        # A binary frame wants the number, and in text it reads the same.
+        return int(raw) if raw.isdecimal() and str(int(raw)) == raw else raw
+
+    return convert

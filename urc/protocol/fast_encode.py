@@ -1,0 +1,152 @@
+"""One function made for one command: arguments → bytes, as fast as a format string by hand.
+
+Floor 3. The function takes the case that happens: every argument a number of its type. For anything
+else it calls the closures (`urc.protocol.encode`), which are also the oracle of its tests. What is
+not sums, products and ``fixed`` over numbers has no such function.
+"""
+
+import ast
+from collections.abc import Callable, Mapping
+from typing import Final
+
+from urc.expressions import Template
+from urc.model.driver import Argument
+from urc.model.values import Value
+from urc.protocol.framing import DelimiterFraming, Framing
+from urc.protocol.generate import function_of
+
+__all__ = ["build_fast_check", "build_fast_encode"]
+
+Encode = Callable[[Mapping[str, object]], bytes]
+
+_OPERATORS: Final[Mapping[str, ast.operator]] = {
+    "_add": ast.Add(),
+    "_sub": ast.Sub(),
+    "_mul": ast.Mult(),
+    "_div": ast.Div(),
+}
+_IN_NUMBERS: Final = frozenset(b"0123456789+-.einfa")
+"""Bytes that a number may be written with."""
+_MOST_DIGITS: Final = 20
+_LARGEST: Final = 1e308
+"""As in `urc.protocol.encode`: not-a-number and infinity fail the comparison with it."""
+
+
+class _Unsupported(Exception):
+    """Part of a template that has no translation here."""
+
+
+def build_fast_encode(
+    template: Template,
+    arguments: Mapping[str, Argument],
+    framing: Framing,
+    encoding: str,
+    slow: Encode,
+) -> Encode | None:
+    """Return namespace → bytes on the wire, or None where only `slow` can do it."""
+    if type(framing) is not DelimiterFraming or framing.seal is not None:
+        return None
+    names = sorted(template.names)
+    kinds = {name: arguments[name].type for name in names if name in arguments}
+    if not names or len(kinds) != len(names) or not {*kinds.values()} <= {"number", "integer"}:
+        return None
+    try:
+        variables = {name: f"v{place}" for place, name in enumerate(names)}
+        pieces = _pieces(ast.parse(template.python, mode="eval").body, variables)
+        tail = _tail(pieces, framing.tx, encoding)
+    except (_Unsupported, UnicodeError):
+        return None
+    if tail:
+        pieces.append(ast.Constant(tail))
+    text = ast.unparse(ast.fix_missing_locations(ast.JoinedStr(pieces)))
+    lines = [f"    v{place} = ns[{name!r}]" for place, name in enumerate(names)]
+    checks = [_check(f"v{place}", kinds[name]) for place, name in enumerate(names)]
+    lines += [
+        f"    if {' and '.join(checks)}:",
+        "        try:",
+        f"            return {text}.encode({encoding!r})",
+        "        except ArithmeticError:",
+        "            pass",
+        "    return slow(ns)",
+    ]
+    scope = {
+        "ArithmeticError": ArithmeticError, "float": float, "int": int, "slow": slow, "type": type,
+    }  # fmt: skip
+    return function_of("encode", "ns", lines, scope)
+
+
+def build_fast_check(
+    arguments: Mapping[str, Argument], slow: Callable[[Mapping[str, object]], dict[str, Value]]
+) -> Callable[[Mapping[str, object]], dict[str, Value]]:
+    """Return the check of a command's arguments; `slow` where one is left out, or no number."""
+    kinds = {one.type for one in arguments.values()}
+    if not arguments or kinds - {"number", "integer"}:
+        return slow
+    if any(one.choices for one in arguments.values()):
+        return slow
+    lines = [f"    if len(given) == {len(arguments)}:", "        try:"]
+    lines += [f"            v{place} = given[{name!r}]" for place, name in enumerate(arguments)]
+    lines += ["        except KeyError:", "            return slow(given)"]
+    checks = []
+    for place, one in enumerate(arguments.values()):
+        low = -_LARGEST if one.min is None else one.min
+        high = _LARGEST if one.max is None else one.max
+        whole = f"type(v{place}) is int"
+        kind = whole if one.type == "integer" else f"(type(v{place}) is float or {whole})"
+        checks.append(f"{kind} and {low!r} <= v{place} <= {high!r}")
+    values = ", ".join(f"{name!r}: v{place}" for place, name in enumerate(arguments))
+    lines += [f"        if {' and '.join(checks)}:", f"            return {{{values}}}"]
+    lines.append("    return slow(given)")
+    scope = {
+        "KeyError": KeyError, "float": float, "int": int, "len": len, "slow": slow, "type": type,
+    }  # fmt: skip
+    return function_of("check", "given", lines, scope)
+
+
+def _check(variable: str, kind: str) -> str:
+    # Larger whole numbers go the slow way, which bounds what they are computed to.
+    whole = f"type({variable}) is int and -4611686018427387904 < {variable} < 4611686018427387904"
+    return f"({whole})" if kind == "integer" else f"(type({variable}) is float or {whole})"
+
+
+def _tail(pieces: list[ast.expr], tx: bytes, encoding: str) -> str:
+    """Return the delimiter as text of the frame, if nothing in the frame can look like it."""
+    literals = [one.value for one in pieces if isinstance(one, ast.Constant)]
+    texts = [text.encode(encoding) for text in literals if isinstance(text, str)]
+    if any(tx and tx in text for text in texts) or not _IN_NUMBERS.isdisjoint(tx):
+        raise _Unsupported
+    tail = tx.decode(encoding)
+    if tail.encode(encoding) != tx:
+        raise _Unsupported
+    return tail
+
+
+def _pieces(node: ast.expr, variables: Mapping[str, str]) -> list[ast.expr]:
+    """Return the parts of a format string: texts, and numbers put into them."""
+    if isinstance(node, ast.Constant) and isinstance(node.value, str):
+        return [node]
+    if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
+        if node.func.id == "_join":
+            return [piece for part in node.args for piece in _pieces(part, variables)]
+        if node.func.id == "_filter_fixed" and len(node.args) == 2:
+            subject, digits = node.args
+            if isinstance(digits, ast.Constant) and type(digits.value) is int:
+                if not 0 <= digits.value <= _MOST_DIGITS:
+                    raise _Unsupported
+                form = ast.JoinedStr([ast.Constant(f".{digits.value}f")])
+                return [ast.FormattedValue(_number(subject, variables), -1, form)]
+    return [ast.FormattedValue(_number(node, variables), -1, None)]
+
+
+def _number(node: ast.expr, variables: Mapping[str, str]) -> ast.expr:
+    """Return Python for a number: arguments, constants and their sums and products."""
+    if isinstance(node, ast.Subscript) and isinstance(node.slice, ast.Constant):
+        return ast.Name(variables[str(node.slice.value)])  # only `ns[NAME]` has this form
+    if isinstance(node, ast.Constant) and type(node.value) in (int, float):
+        return node
+    if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
+        operator = _OPERATORS.get(node.func.id)
+        if operator is not None and len(node.args) == 2:
+            left, right = (_number(one, variables) for one in node.args)
+            return ast.BinOp(left, operator, right)
+    raise _Unsupported

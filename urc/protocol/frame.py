@@ -1,0 +1,107 @@
+"""One frame: from payload to all its bytes and back, as its layout says.
+
+Floor 3, pure. A `Seal` is one layout at work; framings cut the stream and leave the rest to it.
+"""
+
+from typing import Literal
+
+from urc.model.framing import FrameLayout, LengthSpec
+from urc.protocol.checksums import BadFrame, Checksum
+from urc.protocol.open_source import generate_open
+
+__all__ = ["BadFrame", "LengthField", "Seal"]
+
+
+class Seal:
+    """Wraps payloads into frames and unwraps them: constants, length and checksum."""
+
+    def __init__(self, layout: FrameLayout) -> None:
+        self.layout = layout
+        self.length = LengthField(layout.length) if layout.length else None
+        self._checksum = Checksum(layout.checksum) if layout.checksum else None
+        self.open = generate_open(layout, self._open)
+        """Frame → payload; raises `BadFrame` when the checksum is wrong or lacks its place."""
+
+    def _open(self, frame: bytes) -> bytes:
+        """Return the payload; raise `BadFrame` when the checksum is wrong or lacks its place."""
+        if self._checksum is not None:
+            self._checksum.check(frame)
+        head, stop = self.layout.head, len(frame) - self.layout.tail
+        if stop < head:
+            raise BadFrame("short-frame", f"{len(frame)} bytes are too few for this kind of frame")
+        return frame[head:stop]
+
+    def close(self, payload: bytes) -> bytes:
+        """Return the frame around `payload`; raise `BadFrame` when there can be none.
+
+        Bytes that neither the payload nor the layout names are zeros.
+        """
+        layout = self.layout
+        frame = bytearray(layout.head) + payload + bytes(layout.tail)
+        if layout.size is not None and len(frame) != layout.size:
+            wanted = layout.size - layout.head - layout.tail
+            raise BadFrame(
+                "wrong-size", f"{len(payload)} bytes found, where a frame holds exactly {wanted}"
+            )
+        start, end = layout.start, layout.end
+        if start:
+            frame[: len(start)] = start
+        if end:
+            frame[len(frame) - len(end) :] = end
+        if self.length is not None:
+            self.length.put(frame, len(frame) - layout.tail)
+        if self._checksum is not None:
+            self._checksum.put(frame)
+        return bytes(frame)
+
+
+class LengthField:
+    """The number that says how long its frame is."""
+
+    def __init__(self, spec: LengthSpec) -> None:
+        self._spec = spec
+        self.end = spec.offset + spec.size
+        """How many bytes of a frame must be there to read it."""
+        self._mask = (1 << min(spec.bits, 8 * spec.size)) - 1
+
+    def total(self, data: bytes | bytearray, at: int) -> int:
+        """Return the size of the frame at `at`; negative when the field is no number."""
+        spec = self._spec
+        field = data[at + spec.offset : at + self.end]
+        if spec.spelling == "raw":
+            number = int.from_bytes(field, "big" if spec.is_big else "little") & self._mask
+        else:
+            base = 10 if spec.spelling == "dec" else 16
+            if not field.isalnum():
+                return -1
+            try:
+                number = int(field, base)
+            except ValueError:
+                return -1
+        return number * spec.unit + spec.adjust
+
+    def put(self, frame: bytearray, stop: int) -> None:
+        """Write the size of `frame` into it, before the place `stop`.
+
+        Raises:
+            BadFrame: there is no room for the field, or it cannot say the size.
+        """
+        spec = self._spec
+        number, left = divmod(len(frame) - spec.adjust, spec.unit)
+        place = slice(spec.offset, self.end)
+        if left:
+            raise BadFrame("wrong-size", f"the frame is counted in {spec.unit} bytes; {left} over")
+        if self.end > stop or number < 0:
+            raise BadFrame("wrong-size", f"{len(frame)} bytes are too few for this kind of frame")
+        if spec.spelling == "raw":
+            if number > self._mask:
+                raise BadFrame("wrong-size", f"the length field cannot say {number}")
+            order: Literal["big", "little"] = "big" if spec.is_big else "little"
+            kept = int.from_bytes(frame[place], order) & ~self._mask
+            frame[place] = (kept | number).to_bytes(spec.size, order)
+            return
+        digits = b"%0*d" if spec.spelling == "dec" else b"%0*x"
+        text = digits % (spec.size, number)
+        if len(text) > spec.size:
+            raise BadFrame("wrong-size", f"the length field cannot say {number}")
+        frame[place] = text.upper() if spec.spelling == "HEX" else text

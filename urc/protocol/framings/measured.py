@@ -1,0 +1,124 @@
+"""Frames whose size is known from their first bytes: ``fixed`` and ``length``.
+
+Theory of operation of the search. Where the frame has start bytes, the decoder goes to the next
+ones; where it has none, it takes every byte for the first one of a frame. What turns out to be no
+frame (no good length, wrong end bytes, wrong checksum) costs its first byte only: the true frame
+may begin right behind it. Checksums are the only part that would then look at the same bytes again
+and again, so `Credit` pays for them; when it is used up, the whole candidate is dropped.
+"""
+
+from typing import NamedTuple
+
+from urc.model.driver import FramingSpec
+from urc.model.framing import FrameLayout
+from urc.protocol.frame import BadFrame, Seal
+from urc.protocol.framing import (
+    Credit,
+    Decoder,
+    FrameFault,
+    Stream,
+    StreamDecoder,
+    seal_of,
+    sealed,
+)
+
+__all__ = ["MeasuredFraming"]
+
+
+class MeasuredFraming(NamedTuple):
+    """Frames of one size, or with a field that says their size; the same in both directions."""
+
+    seal: Seal
+    max_bytes: int
+
+    @classmethod
+    def from_spec(cls, spec: FramingSpec) -> "MeasuredFraming":
+        """Return the framing for the option ``layout``."""
+        return cls(seal_of(spec) or Seal(FrameLayout()), spec.max_bytes)
+
+    def encode(self, payload: bytes) -> bytes:
+        """Return the bytes of one frame, or raise `FramingError`."""
+        return sealed(self.seal, payload, self.max_bytes)
+
+    def decoder(self, stream: Stream | None = None) -> Decoder:
+        """Return a fresh decoder."""
+        return _MeasuredDecoder(stream, self.seal, self.max_bytes)
+
+    def reversed(self) -> "MeasuredFraming":
+        """Return the same framing seen from the other end of the line."""
+        return self
+
+
+class _MeasuredDecoder(StreamDecoder):
+    def __init__(self, stream: Stream | None, seal: Seal, max_bytes: int) -> None:
+        super().__init__(stream, max_bytes)
+        layout = seal.layout
+        self._seal = seal
+        self._start, self._end = layout.start, layout.end
+        self._size, self._length = layout.size, seal.length
+        self._header = self._length.end if self._length else 0
+        parts = (layout.head + layout.tail, self._header + layout.tail, len(layout.start))
+        self._least = max(*parts, 1)
+        self._credit = Credit()
+
+    def next(self, now: float = 0.0) -> bytes | FrameFault | None:
+        stream, data = self._stream, self._stream.data
+        while True:
+            fault = self._to_start()
+            if fault is not None:
+                return fault
+            at, there = stream.at, len(stream)
+            if there < len(self._start) or there < self._header or not there:
+                return None
+            size = self._size or (self._length.total(data, at) if self._length else 0)
+            if not self._least <= size <= self._max_bytes:
+                fault = self._bad_length(size)
+            elif there < size:
+                return None
+            elif not data.startswith(self._end, at + size - len(self._end)):
+                fault = self._leave(1)
+            else:
+                frame = self._frame(bytes(data[at : at + size]))
+                if frame is not None:
+                    return frame
+            if fault is not None:
+                return fault
+
+    def _to_start(self) -> FrameFault | None:
+        """Go to the next start bytes, or to what may become them."""
+        stream, start = self._stream, self._start
+        if not start or stream.data.startswith(start, stream.at):
+            return None
+        found = stream.data.find(start, stream.at)
+        if found < 0:
+            found = max(stream.at, len(stream.data) - len(start) + 1)
+            while not start.startswith(stream.data[found:]):
+                found += 1
+        return self._leave(found - stream.at) if found > stream.at else None
+
+    def _frame(self, frame: bytes) -> bytes | FrameFault | None:
+        """Return the payload, a fault, or None when the frame was none of the first in its run."""
+        try:
+            payload = self._seal.open(frame)
+        except BadFrame as error:
+            affordable = self._credit.spend(len(frame))
+            self._move(1 if affordable else len(frame))
+            return self._lost(error.code, str(error), closes=error.closes)
+        self._move(len(frame))
+        self._is_lost = False
+        return payload
+
+    def _leave(self, count: int) -> FrameFault | None:
+        self._credit.earn(count)
+        return self._skip(count)
+
+    def _move(self, count: int) -> None:
+        self._credit.earn(count)
+        self._stream.at += count
+
+    def _bad_length(self, size: int) -> FrameFault | None:
+        self._move(1)
+        if size > self._max_bytes:
+            text = f"a frame says that it has {size} bytes; the longest may have {self._max_bytes}"
+            return self._lost("frame-too-long", text)
+        return self._lost("bad-length", "a frame says a length that it cannot have; skipped")

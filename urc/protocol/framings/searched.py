@@ -1,0 +1,281 @@
+"""Frames that are found by looking for them: ``regex`` and ``brackets``."""
+
+import re
+from collections.abc import Callable
+from typing import Any, Final, NamedTuple, cast
+
+from urc.model.driver import FramingSpec
+from urc.model.framing import FrameLayout
+from urc.protocol.frame import BadFrame, Seal
+from urc.protocol.framing import (
+    Decoder,
+    DelimiterDecoder,
+    FrameFault,
+    FramingError,
+    Stream,
+    StreamDecoder,
+    seal_of,
+    sealed,
+)
+
+__all__ = ["BracketsFraming", "RegexFraming"]
+
+Search = Callable[[bytes | bytearray, int], Any]
+"""Data and where to begin → a match of `re` or RE2, or None."""
+
+_SMALL: Final = 256
+"""Bytes that are searched anew at every receive."""
+_GROWTH: Final = 8
+"""More bytes are searched anew when they have grown by this part, or after `_QUIET_S`."""
+_QUIET_S: Final = 0.005
+
+
+class RegexFraming(NamedTuple):
+    """A frame is what a pattern matches.
+
+    With `tx`, what is sent need not match: it ends with `tx` instead, as the other end reads it.
+    """
+
+    search: Search
+    tx: bytes
+    seal: Seal | None
+    max_bytes: int
+    is_reversed: bool = False
+
+    @classmethod
+    def from_spec(cls, spec: FramingSpec) -> "RegexFraming":
+        """Return the framing for the options ``pattern`` (its text) and ``tx`` (bytes)."""
+        search = _searcher(cast("str", spec.options["pattern"]))
+        tx = cast("bytes", spec.options.get("tx", b""))
+        return cls(search, tx, seal_of(spec), spec.max_bytes)
+
+    def encode(self, payload: bytes) -> bytes:
+        """Return the bytes of one frame, or raise `FramingError`."""
+        frame = sealed(self.seal, payload, self.max_bytes)
+        if self.tx and not self.is_reversed:
+            if self.tx in frame:
+                raise FramingError(f"{payload!r} contains {self.tx!r}: it would be two frames")
+            return frame + self.tx
+        found = self.search(frame, 0)
+        if found is None or found.span() != (0, len(frame)):
+            raise FramingError(f"{payload!r} makes no frame that the pattern of the framing takes")
+        return frame
+
+    def decoder(self, stream: Stream | None = None) -> Decoder:
+        """Return a fresh decoder."""
+        if self.tx and self.is_reversed:
+            opened = None if self.seal is None else self.seal.open
+            return DelimiterDecoder(stream, self.tx, self.max_bytes, opened)
+        return _RegexDecoder(stream, self.search, self.seal, self.max_bytes)
+
+    def reversed(self) -> "RegexFraming":
+        """Return the same framing seen from the other end of the line."""
+        return self._replace(is_reversed=not self.is_reversed)
+
+
+def _searcher(pattern: str) -> Search:
+    """Return the search over bytes; each character of the pattern is the byte of its number."""
+    source = pattern.removeprefix("^").encode("latin-1")
+    try:
+        import re2
+    except ImportError:
+        # The loader lets pass only what is linear at each place where a match may begin.
+        compiled: Search = re.compile(source).search
+        return compiled
+    options = re2.Options()
+    options.log_errors = False
+    options.max_mem = 1 << 23
+    options.encoding = re2.Options.Encoding.LATIN1
+    searched: Search = re2.compile(source, options).search
+    return searched
+
+
+class _RegexDecoder(StreamDecoder):
+    def __init__(
+        self, stream: Stream | None, search: Search, seal: Seal | None, max_bytes: int
+    ) -> None:
+        super().__init__(stream, max_bytes)
+        self._search = search
+        self._seal = seal
+        self._tried = 0
+        """How many bytes of the stream were searched without finding a frame."""
+        self._newest = 0.0
+
+    @property
+    def deadline(self) -> float | None:
+        return self._newest + _QUIET_S if len(self._stream) > self._tried else None
+
+    def restart(self) -> None:
+        super().restart()
+        self._tried = 0
+
+    def push(self, data: bytes, now: float = 0.0) -> None:
+        super().push(data, now)
+        self._newest = now
+
+    def next(self, now: float = 0.0) -> bytes | FrameFault | None:
+        there = len(self._stream)
+        is_due = there > self._tried and (
+            there <= _SMALL or there >= self._tried + self._tried // _GROWTH
+        )
+        return self._find() if is_due else None
+
+    def tick(self, now: float) -> list[bytes | FrameFault]:
+        frames: list[bytes | FrameFault] = []
+        if len(self._stream) <= self._tried or now < self._newest + _QUIET_S:
+            return frames
+        while (frame := self._find()) is not None:
+            frames.append(frame)
+        return frames
+
+    def _find(self) -> bytes | FrameFault | None:
+        stream = self._stream
+        while len(stream) > self._tried:
+            found = self._search(stream.data, stream.at)
+            if found is None:
+                return self._wait()
+            start, stop = found.span()
+            self._tried = 0
+            if start > stream.at:
+                fault = self._skip(start - stream.at)
+                if fault is not None:
+                    return fault
+            frame = bytes(stream.data[start:stop])
+            stream.at = stop
+            if len(frame) > self._max_bytes:
+                text = f"a frame has {len(frame)} bytes, more than {self._max_bytes}; dropped"
+                return FrameFault("frame-too-long", text)
+            self._is_lost = False
+            try:
+                return frame if self._seal is None else self._seal.open(frame)
+            except BadFrame as error:
+                return FrameFault(error.code, str(error), error.closes)
+        return None
+
+    def _wait(self) -> FrameFault | None:
+        """Keep the newest bytes, in which a frame may have begun."""
+        fault = None
+        surplus = len(self._stream) - self._max_bytes
+        if surplus > 0:
+            fault = self._skip(surplus)
+        self._tried = len(self._stream)
+        return fault
+
+
+class BracketsFraming(NamedTuple):
+    """Frames between two marks, which are no part of the payload; what is between frames is not.
+
+    Nothing may be nested: where a second opening mark comes, the frame begins there.
+    """
+
+    seal: Seal
+    max_bytes: int
+
+    @classmethod
+    def from_spec(cls, spec: FramingSpec) -> "BracketsFraming":
+        """Return the framing for the option ``layout``, with its start and end."""
+        return cls(seal_of(spec) or Seal(FrameLayout()), spec.max_bytes)
+
+    def encode(self, payload: bytes) -> bytes:
+        """Return the bytes of one frame, or raise `FramingError`."""
+        frame = sealed(self.seal, payload, self.max_bytes)
+        layout = self.seal.layout
+        inner = frame[len(layout.start) : len(frame) - len(layout.end)]
+        for mark in (layout.start, layout.end):
+            if mark in inner:
+                raise FramingError(f"{payload!r} contains {mark!r}, which marks a frame")
+        if layout.start == layout.end and not inner:
+            raise FramingError("nothing between two marks that are the same is no frame")
+        return frame
+
+    def decoder(self, stream: Stream | None = None) -> Decoder:
+        """Return a fresh decoder."""
+        return _BracketsDecoder(stream, self.seal, self.max_bytes)
+
+    def reversed(self) -> "BracketsFraming":
+        """Return the same framing seen from the other end of the line."""
+        return self
+
+
+class _BracketsDecoder(StreamDecoder):
+    def __init__(self, stream: Stream | None, seal: Seal, max_bytes: int) -> None:
+        super().__init__(stream, max_bytes)
+        self._seal = seal
+        self._open, self._close = seal.layout.start, seal.layout.end
+        self._searched = 0
+        """How many bytes of the stream are known to have no closing mark; 0: none is opened."""
+
+    def restart(self) -> None:
+        super().restart()
+        self._searched = 0
+
+    def next(self, now: float = 0.0) -> bytes | FrameFault | None:
+        stream, data = self._stream, self._stream.data
+        while True:
+            if not self._searched:
+                fault = self._to_open()
+                if fault is not None or not self._searched:
+                    return fault
+            close = data.find(self._close, stream.at + self._searched)
+            if close < 0:
+                self._searched = max(len(self._open), len(stream) - len(self._close) + 1)
+                if len(stream) <= self._max_bytes:
+                    return None
+                fault = self._overflow()
+            else:
+                # A mark that opens again: what was before it has lost its end.
+                last = data.rfind(self._open, stream.at + len(self._open), close)
+                if last < 0:
+                    frame = self._frame(close)
+                    if frame is not None:
+                        return frame
+                    continue
+                fault = self._skip(last - stream.at)
+                self._searched = max(len(self._open), close - last)
+            if fault is not None:
+                return fault
+
+    def _to_open(self) -> FrameFault | None:
+        stream, data, mark = self._stream, self._stream.data, self._open
+        found = data.find(mark, stream.at)
+        if found >= 0:
+            self._searched = len(mark)
+        else:
+            found = max(stream.at, len(data) - len(mark) + 1)
+            while not mark.startswith(data[found:]):
+                found += 1
+        return self._skip(found - stream.at) if found > stream.at else None
+
+    def _overflow(self) -> FrameFault | None:
+        """Go on at the newest opening mark, the only one that may still be closed in time."""
+        stream = self._stream
+        fault = self._too_long()
+        last = stream.data.rfind(self._open, stream.at + len(self._open))
+        gone = last - stream.at if last >= 0 else 1
+        stream.at += gone
+        self._searched = max(len(self._open), self._searched - gone) if last >= 0 else 0
+        return fault
+
+    def _too_long(self) -> FrameFault | None:
+        text = f"a frame has more than {self._max_bytes} bytes without {self._close!r}; dropped"
+        return self._lost("frame-too-long", text)
+
+    def _frame(self, close: int) -> bytes | FrameFault | None:
+        """Take the frame that ends with the mark at `close`; None when it is no frame at all."""
+        stream = self._stream
+        stop = close + len(self._close)
+        if self._open == self._close and close == stream.at + len(self._open):
+            # Two equal marks side by side: the second one opens.
+            stream.at = close
+            self._searched = len(self._open)
+            return None
+        frame = bytes(stream.data[stream.at : stop])
+        stream.at = stop
+        self._searched = 0
+        if len(frame) > self._max_bytes:
+            return self._too_long()
+        self._is_lost = False
+        try:
+            return self._seal.open(frame)
+        except BadFrame as error:
+            return FrameFault(error.code, str(error), error.closes)

@@ -1,0 +1,134 @@
+"""Byte stuffing: ``slip`` (RFC 1055) and ``cobs`` (Cheshire and Baker, 1999).
+
+Both free one byte value from the payload, so that it can end the frame.
+"""
+
+import re
+from collections.abc import Callable
+from typing import Final, NamedTuple
+
+from urc.model.driver import FramingSpec
+from urc.protocol.frame import BadFrame, Seal
+from urc.protocol.framing import (
+    Decoder,
+    DelimiterDecoder,
+    FramingError,
+    Stream,
+    seal_of,
+    sealed,
+)
+
+__all__ = ["CobsFraming", "SlipFraming"]
+
+_END, _ESCAPE = b"\xc0", b"\xdb"
+_ESCAPED_END, _ESCAPED_ESCAPE = b"\xdb\xdc", b"\xdb\xdd"
+_BAD_ESCAPE: Final = re.compile(rb"\xdb(?![\xdc\xdd])")
+_BLOCK: Final = 254
+"""Most bytes other than zero behind one code byte of COBS."""
+
+
+class SlipFraming(NamedTuple):
+    """Frames that end with END (0xC0), which is escaped inside."""
+
+    seal: Seal | None
+    max_bytes: int
+
+    @classmethod
+    def from_spec(cls, spec: FramingSpec) -> "SlipFraming":
+        """Return the framing."""
+        return cls(seal_of(spec), spec.max_bytes)
+
+    def encode(self, payload: bytes) -> bytes:
+        """Return the bytes of one frame, or raise `FramingError`."""
+        frame = sealed(self.seal, payload, self.max_bytes)
+        if not frame:
+            raise FramingError("nothing at all is no frame of SLIP")
+        return frame.replace(_ESCAPE, _ESCAPED_ESCAPE).replace(_END, _ESCAPED_END) + _END
+
+    def decoder(self, stream: Stream | None = None) -> Decoder:
+        """Return a fresh decoder."""
+        most = 2 * self.max_bytes
+        opened = _opener(_from_slip, self.seal, self.max_bytes)
+        return DelimiterDecoder(stream, _END, most, opened, skips_empty=True)
+
+    def reversed(self) -> "SlipFraming":
+        """Return the same framing seen from the other end of the line."""
+        return self
+
+
+class CobsFraming(NamedTuple):
+    """Frames that end with a zero, of which none is inside."""
+
+    seal: Seal | None
+    max_bytes: int
+
+    @classmethod
+    def from_spec(cls, spec: FramingSpec) -> "CobsFraming":
+        """Return the framing."""
+        return cls(seal_of(spec), spec.max_bytes)
+
+    def encode(self, payload: bytes) -> bytes:
+        """Return the bytes of one frame, or raise `FramingError`."""
+        return _to_cobs(sealed(self.seal, payload, self.max_bytes)) + b"\0"
+
+    def decoder(self, stream: Stream | None = None) -> Decoder:
+        """Return a fresh decoder."""
+        most = self.max_bytes + self.max_bytes // _BLOCK + 1
+        opened = _opener(_from_cobs, self.seal, self.max_bytes)
+        return DelimiterDecoder(stream, b"\0", most, opened, skips_empty=True)
+
+    def reversed(self) -> "CobsFraming":
+        """Return the same framing seen from the other end of the line."""
+        return self
+
+
+def _opener(
+    unstuffed: Callable[[bytes], bytes], seal: Seal | None, max_bytes: int
+) -> Callable[[bytes], bytes]:
+    def opened(stuffed: bytes) -> bytes:
+        frame = unstuffed(stuffed)
+        if len(frame) > max_bytes:
+            raise BadFrame("frame-too-long", f"a frame has more than {max_bytes} bytes; dropped")
+        return frame if seal is None else seal.open(frame)
+
+    return opened
+
+
+def _from_slip(stuffed: bytes) -> bytes:
+    bad = _BAD_ESCAPE.search(stuffed)
+    if bad is not None:
+        shown = stuffed[bad.start() : bad.start() + 2].hex(" ")
+        raise BadFrame("bad-stuffing", f"{shown} is no escape of SLIP; the frame is dropped")
+    return stuffed.replace(_ESCAPED_END, _END).replace(_ESCAPED_ESCAPE, _ESCAPE)
+
+
+def _to_cobs(data: bytes) -> bytes:
+    pieces: list[bytes] = []
+    blocks = data.split(b"\0")
+    for place, block in enumerate(blocks):
+        # A full block ends without a zero of its own, so the rest follows in one more.
+        at = 0
+        while len(block) - at >= _BLOCK:
+            pieces.append(b"\xff" + block[at : at + _BLOCK])
+            at += _BLOCK
+        if at and at == len(block) and place == len(blocks) - 1:
+            break
+        pieces.append(bytes((len(block) - at + 1,)) + block[at:])
+    return b"".join(pieces)
+
+
+def _from_cobs(stuffed: bytes) -> bytes:
+    pieces: list[bytes] = []
+    at = 0
+    while at < len(stuffed):
+        code = stuffed[at]
+        block = stuffed[at + 1 : at + code]
+        if len(block) != code - 1:
+            raise BadFrame(
+                "bad-stuffing", f"the code {code:02x} of COBS points behind its frame; dropped"
+            )
+        pieces.append(block)
+        at += code
+        if code <= _BLOCK and at < len(stuffed):
+            pieces.append(b"\0")
+    return b"".join(pieces)

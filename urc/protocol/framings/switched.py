@@ -1,0 +1,133 @@
+"""Several framings on one stream, told apart by the first bytes of each frame: ``switch``.
+
+Theory of operation. All cases work on one `Stream`. At the begin of a frame the first bytes choose
+the case; as soon as it has given a frame or lost its way, the choice is made anew. Bytes that begin
+no case are skipped up to the next that do.
+"""
+
+import re
+from typing import NamedTuple, cast
+
+from urc.model.driver import FramingSpec
+from urc.protocol.framing import (
+    Decoder,
+    FrameFault,
+    Framing,
+    FramingError,
+    Stream,
+    StreamDecoder,
+    build_framing,
+)
+
+__all__ = ["SwitchFraming"]
+
+
+class SwitchFraming(NamedTuple):
+    """Cases in the order in which they are tried."""
+
+    cases: tuple[tuple[bytes, Framing], ...]
+    max_bytes: int
+
+    @classmethod
+    def from_spec(cls, spec: FramingSpec) -> "SwitchFraming":
+        """Return the framing for the option ``cases``: pairs of first bytes and `FramingSpec`."""
+        cases = cast("tuple[tuple[bytes, FramingSpec], ...]", spec.options["cases"])
+        return cls(tuple((first, build_framing(one)) for first, one in cases), spec.max_bytes)
+
+    def encode(self, payload: bytes) -> bytes:
+        """Return the frame of the first case that begins as it must with this payload."""
+        refused = ""
+        for first, framing in self.cases:
+            try:
+                frame = framing.encode(payload)
+            except FramingError as error:
+                refused = refused or str(error)
+                continue
+            if frame.startswith(first):
+                return frame
+        raise FramingError(refused or f"no case of the framing begins as {payload[:40]!r} does")
+
+    def decoder(self, stream: Stream | None = None) -> Decoder:
+        """Return a fresh decoder."""
+        shared = Stream() if stream is None else stream
+        cases = [(first, framing.decoder(shared)) for first, framing in self.cases]
+        return _SwitchDecoder(shared, cast("list[tuple[bytes, StreamDecoder]]", cases))
+
+    def reversed(self) -> "SwitchFraming":
+        """Return the same framing seen from the other end of the line."""
+        cases = tuple((first, framing.reversed()) for first, framing in self.cases)
+        return self._replace(cases=cases)
+
+
+class _SwitchDecoder(StreamDecoder):
+    def __init__(self, stream: Stream, cases: list[tuple[bytes, StreamDecoder]]) -> None:
+        super().__init__(stream, 0)
+        self._cases = cases
+        self._any = re.compile(b"|".join(re.escape(first) for first, _ in cases))
+        self._longest = max(len(first) for first, _ in cases)
+        self._active: StreamDecoder | None = None
+
+    @property
+    def deadline(self) -> float | None:
+        return None if self._active is None else self._active.deadline
+
+    def restart(self) -> None:
+        super().restart()
+        self._active = None
+
+    def push(self, data: bytes, now: float = 0.0) -> None:
+        if self._active is None:
+            super().push(data, now)
+        else:
+            self._active.push(data, now)
+
+    def next(self, now: float = 0.0) -> bytes | FrameFault | None:
+        while True:
+            if self._active is None:
+                fault = self._choose()
+                if fault is not None or self._active is None:
+                    return fault
+            found = self._active.next(now)
+            if found is None:
+                return None
+            told = self._told(found)
+            if told is not None:
+                return told
+
+    def tick(self, now: float) -> list[bytes | FrameFault]:
+        if self._active is None:
+            return []
+        told = [self._told(found) for found in self._active.tick(now)]
+        frames = [one for one in told if one is not None]
+        while (frame := self.next(now)) is not None:
+            frames.append(frame)
+        return frames
+
+    def _told(self, found: bytes | FrameFault) -> bytes | FrameFault | None:
+        """End the case that has given `found`; return None for what need not be told again."""
+        self._active = None
+        if isinstance(found, bytes):
+            self._is_lost = False
+            return found
+        return self._lost(*found[:2], closes=found.closes)
+
+    def _choose(self) -> FrameFault | None:
+        """Choose the case of the frame at the front, and go there."""
+        stream = self._stream
+        found = self._any.search(stream.data, stream.at)
+        if found is None:
+            # What may be the beginning of a case is kept.
+            place = max(stream.at, len(stream.data) - self._longest + 1)
+            while not self._may_begin(bytes(stream.data[place:])):
+                place += 1
+        else:
+            place = found.start()
+        fault = self._skip(place - stream.at) if place > stream.at else None
+        if found is not None:
+            data = stream.data
+            self._active = next(one for first, one in self._cases if data.startswith(first, place))
+            self._active.restart()
+        return fault
+
+    def _may_begin(self, data: bytes) -> bool:
+        return any(first.startswith(data) for first, _ in self._cases)

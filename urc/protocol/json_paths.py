@@ -1,0 +1,148 @@
+"""The form ``json`` in the reading direction: fields out of a document, by paths.
+
+Theory of operation. Plain paths become types of our own for `msgspec`, with a place for each step
+that some path takes; its decoder then skips whatever no path wants, and the fields are picked out
+by a function made for these paths (`urc.protocol.generate`). Where a document has a list for a
+mapping or the like, that decoder refuses it, and the document is decoded whole and walked step by
+step; the same is done for JMESPath. Both ways give the same fields for the same document.
+"""
+
+import json
+from collections.abc import Callable, Mapping
+from typing import Any, Final, cast
+
+import msgspec
+
+from urc.model.codec import Envelope, Payload, ReadSpec
+from urc.model.text import JsonPath
+from urc.protocol.forms import CodecContext, Frame, NotWritable
+from urc.protocol.json_types import build_pick
+
+__all__ = ["JsonReader"]
+
+_MISSING: Final = object()
+_Find = Callable[[Any], object]
+
+
+class JsonReader:
+    """Reads what the paths lead to; writes a document in which they lead there."""
+
+    def __init__(self, spec: ReadSpec, context: CodecContext) -> None:
+        paths = cast("Mapping[str, object]", spec.options["paths"])
+        self._paths: dict[str, JsonPath] = {
+            name: path for name, path in paths.items() if isinstance(path, tuple)
+        }
+        others = {name: path for name, path in paths.items() if not isinstance(path, tuple)}
+        self._finders: dict[str, _Find] = {
+            **{name: _walker(path) for name, path in self._paths.items()},
+            **{name: _searcher(path) for name, path in others.items()},
+        }
+        self._is_utf8 = context.encoding in ("utf-8", "ascii")
+        self.pick = build_pick(self._paths) if self._is_utf8 and not others else None
+        self._encoding = context.encoding
+
+    def read(self, frame: Frame) -> Mapping[str, object] | None:
+        """Return the fields found, or None when there is none or the frame is no document."""
+        if self.pick is not None and isinstance(frame.payload, bytes):
+            try:
+                return self.pick(frame.payload)
+            except (msgspec.DecodeError, RecursionError, UnicodeDecodeError):
+                pass  # not as the paths would have it: look at the whole document
+        return self.read_whole(frame)
+
+    def read_whole(self, frame: Frame) -> Mapping[str, object] | None:
+        """Do what `read` does without the types made for the paths."""
+        document = self._document(frame)
+        if document is _MISSING:
+            return None
+        found = {name: find(document) for name, find in self._finders.items()}
+        return {name: value for name, value in found.items() if value is not _MISSING} or None
+
+    def write(self, fields: Mapping[str, object]) -> Payload:
+        """Return a document with `fields` where their paths lead."""
+        root: dict[str, Any] = {}
+        for name, value in fields.items():
+            if name in self._paths:
+                _put(root, self._paths[name], value)
+            elif name in self._finders:
+                raise NotWritable(f"{name}: a search in a document cannot be turned round")
+        try:
+            payload = json.dumps(root, separators=(",", ":"), default=_plain).encode("utf-8")
+        except (TypeError, ValueError, RecursionError) as error:
+            raise NotWritable(f"no JSON for these values: {error}") from None
+        found = self.read(Frame(payload, self._encoding))
+        if found is None or not fields.keys() <= found.keys():
+            raise NotWritable("nothing to write, or two paths that exclude each other")
+        return payload
+
+    def _document(self, frame: Frame) -> object:
+        payload = frame.payload
+        if isinstance(payload, Envelope):
+            if not isinstance(payload.body, (bytes, str)):
+                return _MISSING if payload.body is None else payload.body
+            payload = payload.body if isinstance(payload.body, bytes) else payload.body.encode()
+        text = payload if self._is_utf8 else frame.text
+        try:
+            return msgspec.json.decode(text)
+        except (msgspec.DecodeError, RecursionError, UnicodeError):
+            pass
+        try:
+            return json.loads(text)  # takes NaN, which robots written in Python send
+        except (ValueError, RecursionError):
+            return _MISSING
+
+
+def _walker(path: JsonPath) -> _Find:
+    def find(document: Any) -> object:
+        for step in path:
+            if isinstance(step, str):
+                if not isinstance(document, Mapping) or step not in document:
+                    return _MISSING
+            elif not isinstance(document, (list, tuple)) or step >= len(document):
+                return _MISSING
+            document = document[step]
+        return document
+
+    return find
+
+
+def _searcher(expression: Any) -> _Find:
+    from jmespath.exceptions import JMESPathError
+
+    def find(document: Any) -> object:
+        try:
+            value: object = expression.search(document)
+        except (JMESPathError, ArithmeticError, RecursionError, TypeError, ValueError):
+            return _MISSING
+        return _MISSING if value is None else value
+
+    return find
+
+
+def _put(root: dict[str, Any], path: JsonPath, value: object) -> None:
+    """Set the value at `path`, making what leads there."""
+    holder: Any = root
+    for step, after in zip(path, (*path[1:], None), strict=True):
+        if isinstance(step, int):
+            if not isinstance(holder, list):
+                return  # another path wants something else here; `write` sees that it is missing
+            holder += [None] * (step + 1 - len(holder))
+        elif not isinstance(holder, dict):
+            return
+        if after is None:
+            holder[step] = value
+            return
+        inner = holder[step] if isinstance(step, int) else holder.get(step)
+        if inner is None:
+            inner = holder[step] = [] if isinstance(after, int) else {}
+        holder = inner
+
+
+def _plain(value: object) -> object:
+    if isinstance(value, bytes):
+        from urc.protocol.vectors import bytes_text
+
+        return bytes_text(value)
+    if isinstance(value, Mapping):
+        return dict(value)
+    raise TypeError(f"{type(value).__name__} has no JSON")

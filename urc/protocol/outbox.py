@@ -1,0 +1,111 @@
+"""What waits to be sent on one line, and when it may go.
+
+Floor 3, pure. See `urc.protocol.line` for the theory of operation.
+"""
+
+from urc.expressions import COUNTERS
+from urc.model.driver import TransportSpec
+from urc.protocol.exchange import Exchange, Outcome
+from urc.protocol.flights import Flights
+from urc.protocol.gate import Counters, Waiting
+
+__all__ = ["Outbox", "counted"]
+
+
+class Outbox(Waiting[Exchange]):
+    """The queue of one line, with its shortest gap and its limit of requests in flight."""
+
+    __slots__ = ("_flights", "_limit", "_next_send", "_spec")
+
+    def __init__(self, spec: TransportSpec, flights: Flights) -> None:
+        super().__init__(spec.queue.depth)
+        self._spec = spec
+        self._flights = flights
+        self._limit = spec.queue.in_flight if spec.connection == "persistent" else 1
+        self._next_send = float("-inf")
+
+    def take(self, exchange: Exchange) -> tuple[Exchange, Outcome] | None:
+        """Take a request; return the one that had to make room, and what becomes of it."""
+        gone = self.put(exchange)
+        if gone is None:
+            return None
+        if gone is not exchange and gone.latest_key and gone.latest_key == exchange.latest_key:
+            return gone, Outcome("superseded", "a newer one took its place before it was sent")
+        text = f"{self._spec.queue.depth} requests are waiting on {self._spec.name} already"
+        return gone, Outcome("queue-full", text)
+
+    def has(self, label: str) -> bool:
+        """Return whether a request of that name waits."""
+        return any(exchange.ask.label == label for exchange in self)
+
+    def sent(self, exchange: Exchange, now: float) -> None:
+        """Count a request that goes out now."""
+        self._next_send = now + self._spec.min_gap_s
+        if exchange.ask.bucket is not None:
+            exchange.ask.bucket.take(now)
+
+    def next(self, now: float, *, is_ready: bool) -> Exchange | None:
+        """Return what is to be sent now, still in its place.
+
+        Args:
+            now: the time.
+            is_ready: whether anybody may talk; else only what is privileged.
+        """
+        if not self:
+            return None
+        is_full, is_wary = False, False
+        if self._flights:
+            is_full, is_wary = self._flights.waiting >= self._limit, self._flights.is_wary
+        for exchange in self:
+            if not (is_ready or exchange.is_privileged) or _free_at(exchange) > now:
+                continue
+            if is_wary and _may_be_mistaken(exchange):
+                continue
+            return None if is_full or now < self._next_send else exchange
+        return None
+
+    def is_free(self, exchange: Exchange, now: float) -> bool:
+        """Return whether `exchange` may be sent at once, past an empty queue."""
+        return not (self or self._flights or now < self._next_send or _free_at(exchange) > now)
+
+    def wants_line(self, now: float) -> bool:
+        """Return whether something could go if there were a connection."""
+        return any(_free_at(exchange) <= now for exchange in self)
+
+    def may_send_at(self, *, is_ready: bool) -> float | None:
+        """Return when time alone lets something be sent; None when only an answer does."""
+        if not self or self._flights.waiting >= self._limit:
+            return None
+        is_wary = self._flights.is_wary
+        times = [
+            max(self._next_send, _free_at(exchange))
+            for exchange in self
+            if (is_ready or exchange.is_privileged) and not (is_wary and _may_be_mistaken(exchange))
+        ]
+        return min(times, default=None)
+
+
+def _may_be_mistaken(exchange: Exchange) -> bool:
+    """Return whether an answer that comes late could be taken for the one to this."""
+    return bool(exchange.ask.answers) and exchange.ask.match is None
+
+
+def _free_at(exchange: Exchange) -> float:
+    """Return when its rate lets it go."""
+    bucket = exchange.ask.bucket
+    return float("-inf") if bucket is None else bucket.free_at
+
+
+def counted(exchange: Exchange, counters: Counters) -> bytes:
+    """Make a frame with the next numbers of its counters; sent again, it keeps them.
+
+    Raises:
+        BadArgument: it cannot be written with these numbers, which are used up nevertheless.
+    """
+    draw = counters.draw()
+    try:
+        data = exchange.ask.encode({**exchange.namespace, COUNTERS: draw})
+    finally:
+        counters.count(draw)
+    exchange.data, exchange.numbers = data, draw.values
+    return data

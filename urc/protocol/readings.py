@@ -1,0 +1,185 @@
+"""The readings of one engine: fields → samples, with alarms and with what is computed from them.
+
+Floor 3, pure: time is passed in. One `Readings` belongs to one engine, so a signal that several
+frames set has one alarm state, and a computed signal sees the newest value of each of its inputs.
+"""
+
+from collections.abc import Callable, Iterable, Mapping
+from typing import NamedTuple
+
+from urc.expressions import ExpressionError, Template
+from urc.model.values import NOTHING, Alarm, Limits, Reading, Sample, Signal
+from urc.protocol.convert import BadValue
+from urc.protocol.decode import Convert, build_converter
+from urc.protocol.limits import Judge
+
+__all__ = ["Decode", "Readings"]
+
+Decode = Callable[[Mapping[str, object], float], tuple[list[Sample], list[str]]]
+"""Fields of a frame and the time → the samples, and a line for each value that was refused."""
+
+
+class _Computed(NamedTuple):
+    name: str
+    formula: Template
+    inputs: tuple[str, ...]
+    shortest_s: float
+    """Age at which the first of its inputs is old."""
+    convert: Convert
+
+
+class Readings:
+    """The newest value of every signal that something computes from, and every alarm's state.
+
+    Args:
+        signals: as loaded: no computed signal depends on itself.
+        names: what formulas know beside signals, such as ``settings``.
+    """
+
+    def __init__(
+        self, signals: Mapping[str, Signal], names: Mapping[str, object] = NOTHING
+    ) -> None:
+        self.signals = signals
+        self.settings: Mapping[str, object] = names.get("settings", NOTHING)  # type: ignore[assignment]
+        self._converters: dict[str, Convert] = {}
+        self._judges = {
+            name: Judge(one.limits) for name, one in signals.items() if one.limits != Limits()
+        }
+        self._timed = tuple(name for name in self._judges if signals[name].limits.for_s > 0)
+        self._last: dict[str, Sample] = {}
+        """Newest sample of each input of a formula, and of each signal in `_timed`."""
+        self._namespace: dict[str, object] = dict(names)
+        self._computed = tuple(self._in_order())
+        inputs = (name for one in self._computed for name in one.inputs)
+        self._kept = frozenset((*inputs, *self._timed))
+
+    def decoder(self, fields: Iterable[str]) -> Decode:
+        """Return the function that turns the fields of one kind of frame into samples.
+
+        Fields whose name starts with ``_`` are the document's own and become no samples.
+        """
+        converters = {name: self._converter(name) for name in fields if not name.startswith("_")}
+
+        def decode(found: Mapping[str, object], now: float) -> tuple[list[Sample], list[str]]:
+            samples: list[Sample] = []
+            refused: list[str] = []
+            for name, raw in found.items():
+                convert = converters.get(name)
+                if convert is None:
+                    continue
+                try:
+                    value = convert(raw)
+                except BadValue as error:
+                    refused.append(f"{name}: {error}")
+                else:
+                    samples.append(Sample(name, value, now, self.alarm(name, value, now)))
+            if self._kept:
+                self.follow(samples, refused, now)
+            return samples, refused
+
+        return decode
+
+    def put(self, values: Mapping[str, object], now: float) -> tuple[list[Sample], list[str]]:
+        """Take values that no frame brought, as a decoder takes fields."""
+        return self.decoder(values)(values, now)
+
+    def alarm(self, name: str, value: Reading, now: float) -> Alarm:
+        """Take a reading and return which limit it has passed."""
+        judge = self._judges.get(name)
+        return "" if judge is None else judge.judge(value, now)
+
+    def judges(self, name: str) -> bool:
+        """Return whether the signal has limits."""
+        return name in self._judges
+
+    def keeps(self, name: str) -> bool:
+        """Return whether something rests on the signal, so that `follow` must know of it."""
+        return name in self._kept
+
+    @property
+    def deadline(self) -> float | None:
+        """When `tick` may begin an alarm; None when only a reading can."""
+        if not self._timed:
+            return None
+        times = [self._judges[name].deadline for name in self._timed]
+        return min((time for time in times if time is not None), default=None)
+
+    def tick(self, now: float) -> list[Sample]:
+        """Return the newest sample of each signal whose alarm begins by `now`, as old as it is."""
+        samples = []
+        for name in self._timed:
+            due = self._judges[name].deadline
+            if due is not None and due <= now:
+                sample = self._last[name]._replace(alarm=self._judges[name].tick(now))
+                self._last[name] = sample
+                samples.append(sample)
+        return samples
+
+    def follow(self, samples: list[Sample], refused: list[str], now: float) -> None:
+        """Add to `samples` everything that is computed from one of them."""
+        changed = set()
+        for taken in samples:
+            if taken.signal in self._kept:
+                self._keep(taken)
+                changed.add(taken.signal)
+        for computed in self._computed:
+            if changed.isdisjoint(computed.inputs):
+                continue
+            try:
+                sample = self._compute(computed, now)
+            except (BadValue, ExpressionError) as error:
+                refused.append(f"{computed.name}: {error}")
+                continue
+            if sample is not None:
+                samples.append(sample)
+                self._keep(sample)
+                changed.add(computed.name)
+
+    def _keep(self, sample: Sample) -> None:
+        if sample.signal in self._kept:
+            self._last[sample.signal] = sample
+            self._namespace[sample.signal] = sample.value
+
+    def _compute(self, computed: _Computed, now: float) -> Sample | None:
+        """Return the sample, or None while an input has never been read."""
+        time_s, is_absent = now, False
+        for name in computed.inputs:
+            sample = self._last.get(name)
+            if sample is None:
+                return None
+            # As old as the first of its inputs to grow old: never fresh over a dead one.
+            left_s = self.signals[name].stale_after_s - computed.shortest_s
+            time_s = min(time_s, sample.time_s + left_s)
+            is_absent |= sample.value is None
+        try:
+            value = computed.convert(computed.formula.evaluate(self._namespace))
+        except ExpressionError:
+            if not is_absent:
+                raise
+            value = None
+        return Sample(computed.name, value, time_s, self.alarm(computed.name, value, now))
+
+    def _converter(self, name: str) -> Convert:
+        if name not in self._converters:
+            self._converters[name] = build_converter(self.signals[name])
+        return self._converters[name]
+
+    def _in_order(self) -> Iterable[_Computed]:
+        """Yield the computed signals, each after those that it uses."""
+        waiting = {name: one for name, one in self.signals.items() if one.formula is not None}
+        while waiting:
+            ready = [
+                name
+                for name, one in waiting.items()
+                if one.formula and not any(other in waiting for other in one.formula.names)
+            ]
+            if not ready:
+                raise ValueError(f"signals depend on each other: {', '.join(waiting)}")
+            for name in ready:
+                formula = waiting.pop(name).formula
+                if formula is not None:
+                    inputs = tuple(one for one in sorted(formula.names) if one in self.signals)
+                    ages = [self.signals[one].stale_after_s for one in inputs]
+                    yield _Computed(
+                        name, formula, inputs, min(ages, default=0.0), self._converter(name)
+                    )

@@ -1,0 +1,147 @@
+"""What is asked again and again: polls, and what keeps a line alive.
+
+Floor 3, pure.
+"""
+
+from collections.abc import Callable, Mapping
+
+from urc.expressions import COUNTERS
+from urc.model.driver import Poll
+from urc.model.flow import Keepalive
+from urc.protocol.encode import BadArgument
+from urc.protocol.events import Fault
+from urc.protocol.exchange import Ask, Exchange, LineEvent, Outcome, expires_at
+from urc.protocol.gate import Counters
+from urc.protocol.known import Known
+from urc.protocol.line import Line
+
+__all__ = ["KeptAlive", "PollState"]
+
+
+class PollState:
+    """One poll at work."""
+
+    def __init__(self, poll: Poll, ask: Ask, line: Line, known: Known) -> None:
+        self.poll = poll
+        self.due: float | None = None
+        """When it is next asked; None while its line is not up."""
+        self._ask = ask
+        self._line = line
+        self._known = known
+        self._names = {**known.names, **poll.arguments}
+        self._misses = 0
+        self._is_offline = False
+
+    def begin(self, now: float) -> None:
+        """Take note that its line is up."""
+        self._misses, self._is_offline = 0, False
+        self.due = now + self.poll.phase_s
+
+    def stop(self) -> None:
+        """Take note that its line is down."""
+        self.due = None
+
+    def ask(self, now: float) -> list[LineEvent]:
+        """Ask if it is due. One that still waits for its turn is not asked twice."""
+        if self.due is None or self.due > now:
+            return []
+        every_s = self.poll.every_s
+        if self._is_offline and self.poll.offline is not None:
+            every_s = self.poll.offline.retry_s
+        # Kept on its own grid of times, so that polls neither drift nor bunch up after a pause.
+        self.due += ((now - self.due) // every_s + 1) * every_s
+        if self.due <= now:  # a period too small for the digits of the clock
+            self.due = now + every_s
+        if self._line.has(self._ask.label):
+            return []
+        when = self.poll.when
+        if when is not None and not self._known.holds(when, now, self.poll.arguments):
+            return []
+        return _submit(self._line, self._ask, self, self._names, now)
+
+    def ended(self, exchange: Exchange, outcome: Outcome, now: float) -> list[LineEvent]:
+        """Count misses; tell of a robot that refuses."""
+        if outcome.code == "timed-out" and self.poll.offline is not None:
+            self._misses += 1
+            if self._misses >= self.poll.offline.after:
+                self._is_offline = True
+                if self.due is not None:
+                    self.due = max(self.due, now + self.poll.offline.retry_s)
+        elif outcome.code in ("", "refused"):
+            self._misses = 0
+            if self._is_offline and self.due is not None:
+                self.due = now + self.poll.every_s
+            self._is_offline = False
+        # A poll comes again by itself, so only a robot that refuses it is worth a line.
+        if outcome.code in ("refused", "bad-argument"):
+            text = f"{self._ask.label}: {outcome.message}"
+            return [Fault(self.poll.transport, outcome.code, text)]
+        return []
+
+
+class KeptAlive:
+    """What is said on one line when nothing else has been said for a while."""
+
+    def __init__(self, keepalive: Keepalive, line: Line, ask: Ask | None, known: Known) -> None:
+        """Prepare.
+
+        Args:
+            keepalive: as declared.
+            line: whose it is.
+            ask: None when a command is run.
+            known: the names of its templates.
+        """
+        self._keepalive = keepalive
+        self._line = line
+        self._ask = ask
+        self._known = known
+        self._is_asked = False
+        self._spoke_at = float("-inf")
+
+    @property
+    def deadline(self) -> float | None:
+        """When it must speak; None while it has, or the line is not up."""
+        if not self._line.is_ready or self._is_asked:
+            return None
+        # One that could not be sent, because it is not allowed, is not tried again at once.
+        return max(self._line.last_sent, self._spoke_at) + self._keepalive.every_s
+
+    def forget(self) -> None:
+        """Take note that the line is up anew."""
+        self._is_asked = False
+
+    def speak(self, run: Callable[[str], list[LineEvent]], now: float) -> list[LineEvent]:
+        """Speak if it is due; `run` runs a command and calls `done`."""
+        due = self.deadline
+        if due is None or due > now:
+            return []
+        self._is_asked, self._spoke_at = True, now
+        if self._ask is None:
+            return run(self._keepalive.run)
+        return _submit(self._line, self._ask, self, self._known.names, now)
+
+    def ended(self, exchange: Exchange, outcome: Outcome, now: float) -> list[LineEvent]:
+        """Take note that it has been said."""
+        return self.done(outcome, now)
+
+    def done(self, outcome: Outcome, now: float) -> list[LineEvent]:
+        """Take note that the command has been run; a failure of it shows by itself."""
+        self._is_asked = False
+        return []
+
+
+def _submit(
+    line: Line, ask: Ask, owner: PollState | KeptAlive, names: Mapping[str, object], now: float
+) -> list[LineEvent]:
+    try:
+        data = ask.encode({**names, COUNTERS: Counters().draw()} if ask.has_counters else names)
+    except BadArgument as error:
+        return [Fault(line.spec.name, "bad-argument", f"{ask.label}: {error}")]
+    exchange = Exchange(
+        ask,
+        owner,
+        names,
+        None if ask.has_counters else data,
+        gives_up_at=expires_at(line.spec, ask, now),
+    )
+    return line.submit(exchange, now)

@@ -1,0 +1,89 @@
+"""What stands beside a form: conversions of this frame's fields, ``set`` and ``when``.
+
+Floor 3, pure. Wraps the reader of the form, in both directions.
+"""
+
+from collections.abc import Mapping
+
+from urc.expressions import ExpressionError
+from urc.model.codec import Payload, ReadSpec
+from urc.protocol.convert import BadValue, Unusable, build_conversion, build_inverse
+from urc.protocol.forms import CodecContext, Frame, NotWritable, Reader
+
+__all__ = ["ShapedReader"]
+
+
+class ShapedReader:
+    """Reads as the form does, then converts, asks ``when``, and adds what ``set`` computes."""
+
+    def __init__(self, inner: Reader, spec: ReadSpec, context: CodecContext) -> None:
+        self._inner = inner
+        self._conversions = {
+            name: convert
+            for name, one in spec.conversions.items()
+            if (convert := build_conversion(one)) is not None
+        }
+        self._inverses = {
+            name: back
+            for name, one in spec.conversions.items()
+            if (back := build_inverse(one)) is not None
+        }
+        self._sets = dict(spec.sets)
+        self._when = spec.when
+        self._settings = context.settings
+        self._encoding = context.encoding
+
+    def read(self, frame: Frame) -> Mapping[str, object] | None:
+        """Return the fields, or None when the frame is another one."""
+        raw = self._inner.read(frame)
+        if raw is None:
+            return None
+        found = dict(raw)
+        for name, convert in self._conversions.items():
+            if name in found:
+                try:
+                    found[name] = convert(found[name])
+                except BadValue as error:
+                    found[name] = Unusable(str(error))
+        if self._when is None and not self._sets:
+            return found
+        namespace = {"settings": self._settings, **found}
+        if self._when is not None and not self._is_meant(namespace):
+            return None
+        for name, template in self._sets.items():
+            try:
+                found[name] = template.evaluate(namespace)
+            except ExpressionError as error:
+                if all(one in namespace for one in template.names):
+                    found[name] = _without_value(error, [found.get(one) for one in template.names])
+        return found
+
+    def _is_meant(self, namespace: Mapping[str, object]) -> bool:
+        try:
+            return self._when is not None and bool(self._when.evaluate(namespace))
+        except ExpressionError:
+            return False  # it asks for a field that only another frame has
+
+    def write(self, fields: Mapping[str, object]) -> Payload:
+        """Return a frame that is read as `fields`, those of ``set`` aside."""
+        raw: dict[str, object] = {}
+        for name, value in fields.items():
+            if name in self._sets:
+                continue
+            back = self._inverses.get(name)
+            try:
+                raw[name] = value if back is None else back(value)
+            except BadValue as error:
+                raise NotWritable(f"{name}: {error}") from None
+        payload = self._inner.write(raw)
+        if self._when is not None and self.read(Frame(payload, self._encoding)) is None:
+            raise NotWritable(f"{self._when.source!r} is not true of these values")
+        return payload
+
+
+def _without_value(error: ExpressionError, operands: list[object]) -> Unusable | None:
+    """Return what an expression gives that could not be computed: None where an operand is."""
+    for operand in operands:
+        if isinstance(operand, Unusable):
+            return operand
+    return None if None in operands else Unusable(str(error))

@@ -1,0 +1,76 @@
+"""The form ``struct``: binary frames, item by item."""
+
+from collections.abc import Mapping
+from typing import cast
+
+from urc.expressions import ExpressionError
+from urc.model.binary import Item, names_of
+from urc.model.codec import Payload, ReadSpec, WriteSpec
+from urc.protocol.forms import BadText, CodecContext, Frame, NotWritable
+from urc.protocol.struct_source import generate_read
+from urc.protocol.struct_source_write import generate_write
+from urc.protocol.struct_write import build_write_steps, write_frame
+from urc.protocol.texts import counter_in
+
+__all__ = ["StructReader", "StructWriter"]
+
+
+class StructReader:
+    """Reads the items of a frame as fields; writes a frame of which some fields are given."""
+
+    def __init__(self, spec: ReadSpec, context: CodecContext) -> None:
+        self._items = cast("tuple[Item, ...]", spec.options["items"])
+        self._names = frozenset(names_of(self._items))
+        self._encoding = context.encoding
+        self.read = generate_read(self._items, context.encoding)
+        """Generated; return the fields, None for another frame, raise `BadItem`."""
+        self._steps = build_write_steps(self._items, context.encoding, is_lenient=True)
+
+    def write(self, fields: Mapping[str, object]) -> Payload:
+        """Return the frame; what is not given is zero."""
+        known = {name: value for name, value in fields.items() if name in self._names}
+        data = write_frame(self._steps, known)
+        try:
+            found = self.read(Frame(data, self._encoding))
+        except BadText as error:
+            raise NotWritable(str(error)) from None
+        if found is None:
+            raise NotWritable(f"no frame has the fields {known!r}"[:200])
+        return data
+
+
+class StructWriter:
+    """Writes the items of a frame out of arguments; reads them back."""
+
+    def __init__(self, spec: WriteSpec, context: CodecContext) -> None:
+        items = cast("tuple[Item, ...]", spec.options["items"])
+        self.write = generate_write(items, context.encoding)
+        """Generated; return the frame, raise `NotWritable`."""
+        named, counters = _with_counters(items)
+        self._names = {name: name for name in names_of(items, sent=True)} | counters
+        self._read = generate_read(named, context.encoding)
+
+    def read(self, frame: Frame) -> Mapping[str, object] | None:
+        """Return the arguments of a frame, or None when it is none of these.
+
+        A counter's number is there as ``seq.NAME``.
+        """
+        try:
+            found = self._read(frame)
+        except (BadText, ExpressionError):
+            return None
+        if found is None:
+            return None
+        names = self._names
+        return {names[name]: value for name, value in found.items() if name in names}
+
+
+def _with_counters(items: tuple[Item, ...]) -> tuple[tuple[Item, ...], dict[str, str]]:
+    """Return the items with an id for each that is a counter, and id → ``seq.NAME``."""
+    named, counters = list(items), dict[str, str]()
+    for place, item in enumerate(items):
+        counter = counter_in(item.value.source) if item.value is not None else ""
+        if counter:
+            named[place] = item._replace(id=item.id or f"_seq_{counter}")
+            counters[named[place].id] = f"seq.{counter}"
+    return tuple(named), counters

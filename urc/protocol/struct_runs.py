@@ -1,0 +1,112 @@
+"""Which items of a struct are fixed, so that one `struct.Struct` takes a run of them apart.
+
+Floor 3, pure; for the generators of `urc.protocol.struct_source` and `.struct_source_write`.
+"""
+
+from collections.abc import Iterator
+from struct import Struct
+from typing import Literal, NamedTuple
+
+from urc.model.binary import Item, joined_name
+from urc.protocol.struct_read import BitPart, bit_parts
+from urc.protocol.struct_value import format_of
+
+__all__ = ["Leaf", "Run", "runs_of"]
+
+MOST_IN_A_RUN = 256
+"""Values of one `struct.Struct`; a longer array is read by its closure."""
+
+
+class Leaf(NamedTuple):
+    """One fixed item in a run."""
+
+    item: Item
+    name: str
+    """Of its field, outer structs included; "" for none."""
+    outer: str
+    """Name of the structs around it."""
+    code: str
+    """Letters for `struct`; "x" takes no value."""
+    endian: Literal["", "big", "little"] = ""
+    values: int = 1
+
+    def bit_parts(self) -> list[BitPart]:
+        """Return the parts of ``bits``, called as their fields."""
+        outer = self.outer
+        return [
+            (part._replace(id=joined_name(outer, part.id) if part.id else ""), at, mask, sign, told)
+            for part, at, mask, sign, told in bit_parts(self.item)
+        ]
+
+
+class Run(NamedTuple):
+    """Fixed items of one byte order, one behind the other."""
+
+    leaves: tuple[Leaf, ...]
+
+    @property
+    def struct(self) -> Struct:
+        """What takes them apart."""
+        endian = next((leaf.endian for leaf in self.leaves if leaf.endian), "big")
+        codes = "".join(leaf.code for leaf in self.leaves)
+        return Struct(("<" if endian == "little" else ">") + codes)
+
+
+def _leaves(item: Item, outer: str) -> list[Leaf] | None:
+    """Return the parts of a fixed item, or None when it is none."""
+    if item.condition is not None or item.switch is not None:
+        return None
+    name = joined_name(outer, item.id) if item.id else ""
+    number = item.number
+    if item.kind == "struct":
+        if item.times is not None or item.size is not None:
+            return None
+        return _all_leaves(item.items, name or outer)
+    if item.kind in ("number", "bits"):
+        code = format_of(number) or f"{number.size}s"
+        count = 1
+        if item.times is not None:
+            count = item.times.number
+            if item.times.kind != "fixed" or count > MOST_IN_A_RUN or not format_of(number):
+                return None
+            code = f"{count}{code}"
+        is_ordered = number.size > 1 and bool(format_of(number))
+        return [Leaf(item, name, outer, code, number.endian if is_ordered else "", count)]
+    if item.times is not None or item.until or item.size is None or item.size.kind != "fixed":
+        return None
+    if item.kind == "padding":
+        return [Leaf(item, "", outer, f"{item.size.number}x", values=0)]
+    return [Leaf(item, name, outer, f"{item.size.number}s")]
+
+
+def _all_leaves(items: tuple[Item, ...], outer: str) -> list[Leaf] | None:
+    found: list[Leaf] = []
+    for item in items:
+        leaves = _leaves(item, outer)
+        if leaves is None:
+            return None
+        found += leaves
+    return found
+
+
+def runs_of(items: tuple[Item, ...]) -> Iterator[Run | Item]:
+    """Yield runs of fixed items, and the items between them."""
+    run: list[Leaf] = []
+    endian = ""
+    for item in items:
+        leaves = _leaves(item, "")
+        for leaf in leaves or ():
+            if run and leaf.endian and endian and leaf.endian != endian:
+                yield Run(tuple(run))
+                run = []
+            if not run:
+                endian = ""
+            endian = leaf.endian or endian
+            run.append(leaf)
+        if leaves is None:
+            if run:
+                yield Run(tuple(run))
+            run, endian = [], ""
+            yield item
+    if run:
+        yield Run(tuple(run))

@@ -1,0 +1,262 @@
+"""What the raw number, bytes or text of one struct item means, and back.
+
+Floor 3, pure. Shared by the closures and by the generator's slow paths. Raw is what lies in the
+frame; a value is what fields and arguments have: scaled, and a word where the item has an enum.
+"""
+
+import struct
+from collections.abc import Callable
+from typing import Any
+
+from urc.model.binary import Item, Number
+from urc.protocol.forms import BadItem, NotWritable
+
+__all__ = [
+    "bytes_of_text",
+    "checked_raw",
+    "divisor_of",
+    "fitting",
+    "fixed_bytes",
+    "format_of",
+    "meaning_of",
+    "not_valid",
+    "number_reader",
+    "number_writer",
+    "order_of",
+    "raw_of",
+    "text_of_bytes",
+]
+
+_CODES = {
+    ("integer", 8): "B",
+    ("integer", 16): "H",
+    ("integer", 32): "I",
+    ("integer", 64): "Q",
+    ("float", 16): "e",
+    ("float", 32): "f",
+    ("float", 64): "d",
+    ("boolean", 8): "?",
+}
+
+
+def format_of(number: Number) -> str:
+    """Return `struct`'s letter of a number, "" where it has none: 24, 40, 48 and 56 bits."""
+    code = _CODES.get((number.kind, number.bits), "")
+    return code.lower() if number.is_signed and number.kind == "integer" else code
+
+
+def order_of(number: Number) -> str:
+    """Return `struct`'s sign of a byte order."""
+    return "<" if number.endian == "little" else ">"
+
+
+def divisor_of(scale: float) -> int:
+    """Return n where `scale` is 1/n, else 0: to divide by ten is exact where times 0.1 is not."""
+    if not 1e-15 < abs(scale) < 1:
+        return 0
+    divisor = round(1 / scale)
+    return divisor if 1 / divisor == scale else 0
+
+
+def meaning_of(item: Item) -> Callable[[Any], Any]:
+    """Return the function from raw to value; it raises `BadItem` for what is not valid."""
+    words, scale, offset, valid = dict(item.enum), item.scale, item.offset, item.valid
+    divisor = divisor_of(scale)
+
+    def meaning(raw: Any) -> Any:
+        value = raw
+        if divisor:
+            value = value / divisor
+        elif scale != 1:
+            value = value * scale
+        if offset:
+            value = value + offset
+        if valid is not None and not valid[0] <= value <= valid[1]:
+            raise not_valid(item.id, value, valid)
+        return words.get(value, value) if words else value
+
+    return meaning
+
+
+def not_valid(name: str, value: object, valid: tuple[float, float]) -> BadItem:
+    """Return the fault of a value outside of its ``valid``."""
+    return BadItem(f"{name}: expected {valid[0]:g} to {valid[1]:g}, found {value!r}")
+
+
+def raw_of(item: Item) -> Callable[[Any], Any]:
+    """Return the function from value to raw; it raises `NotWritable`.
+
+    Whole numbers are rounded to the nearest one, halves to the even one.
+    """
+    numbers = {word: number for number, word in item.enum}
+    number, valid, scale, offset = item.number, item.valid, item.scale, item.offset
+    divisor = divisor_of(scale)
+    name = item.id or "a number"
+
+    def raw(value: Any) -> Any:
+        if isinstance(value, str):
+            if value not in numbers:
+                raise NotWritable(f"{name}: {_wanted(item)} expected, found {_short(value)}")
+            value = numbers[value]
+        elif not isinstance(value, (int, float)):
+            raise NotWritable(f"{name}: {_wanted(item)} expected, found {_short(value)}")
+        elif isinstance(value, int) and value.bit_length() > 1000:
+            raise NotWritable(f"{name}: {_short(value)} is too large")
+        if valid is not None and not valid[0] <= value <= valid[1]:
+            raise NotWritable(f"{name}: expected {valid[0]:g} to {valid[1]:g}, found {value!r}")
+        if offset:
+            value = value - offset
+        if divisor:
+            value = value * divisor
+        elif scale != 1:
+            value = value / scale
+        return fitting(number, value, name)
+
+    return raw
+
+
+def fitting(number: Number, value: int | float, name: str) -> int | float | bool:
+    """Return `value` as `number` holds it, or raise `NotWritable`."""
+    if number.kind == "float":
+        try:
+            return float(value)
+        except OverflowError:
+            raise NotWritable(f"{name}: {_short(value)} is too large") from None
+    if number.kind == "boolean":
+        if value in (0, 1):
+            return bool(value)
+        raise NotWritable(f"{name}: true or false expected, found {_short(value)}")
+    if isinstance(value, float):
+        if not abs(value) < 1e30:  # not-a-number fails every comparison
+            raise NotWritable(f"{name}: a whole number is expected, found {_short(value)}")
+        value = round(value)
+    if not number.least <= value <= number.most:
+        sign = "signed " if number.is_signed else ""
+        raise NotWritable(
+            f"{name}: {value} does not fit into {number.bits} {sign}bits,"
+            f" which hold {number.least} to {number.most}"
+        )
+    return int(value)
+
+
+def _wanted(item: Item) -> str:
+    if not item.enum:
+        return "a number"
+    words = [word for _, word in item.enum]
+    return "one of " + ", ".join(words[:8]) + (" …" if len(words) > 8 else "")
+
+
+def _short(value: object) -> str:
+    text = repr(value)
+    return text if len(text) <= 40 else text[:37] + "..."
+
+
+def checked_raw(item: Item) -> Callable[[Any], tuple[Any, Any]]:
+    """Return the function from a value to the raw number, and to the value as it is read again."""
+    raw_from, meaning = raw_of(item), meaning_of(item)
+
+    def checked(value: Any) -> tuple[Any, Any]:
+        raw = raw_from(value)
+        try:
+            return raw, meaning(raw)
+        except BadItem as error:  # rounding took it out of its range
+            raise NotWritable(str(error)) from None
+
+    return checked
+
+
+def number_reader(number: Number) -> Callable[[bytes, int], Any]:
+    """Return the function from bytes and a place to the raw number; the bytes must be there."""
+    code = format_of(number)
+    if code:
+        unpack = struct.Struct(order_of(number) + code).unpack_from
+        return lambda data, at: unpack(data, at)[0]
+    size, endian, is_signed = number.size, number.endian, number.is_signed
+    return lambda data, at: int.from_bytes(data[at : at + size], endian, signed=is_signed)
+
+
+def number_writer(number: Number, name: str) -> Callable[[Any], bytes]:
+    """Return the function from a raw number, which fits, to its bytes."""
+    code = format_of(number)
+    if not code:
+        size, endian, is_signed = number.size, number.endian, number.is_signed
+        return lambda raw: int(raw).to_bytes(size, endian, signed=is_signed)
+    pack = struct.Struct(order_of(number) + code).pack
+
+    def write(raw: Any) -> bytes:
+        try:
+            return pack(raw)
+        except (OverflowError, struct.error):  # a float too large for its 16 or 32 bits
+            text = f"{name or 'a number'}: {_short(raw)} does not fit into f{number.bits}"
+            raise NotWritable(text) from None
+
+    return write
+
+
+def text_of_bytes(item: Item, encoding: str) -> Callable[[bytes], object]:
+    """Return the function from the bytes of a text or bytes item to its value."""
+    if item.kind == "bytes":
+        return bytes
+    codec, name = item.encoding or encoding, item.id
+    pad = bytes((item.pad,))
+    is_padded = item.size is not None and item.size.kind == "fixed"
+
+    def text(raw: bytes) -> str:
+        if is_padded:
+            # Behind the first NUL of a C string there may be anything.
+            raw = raw.rstrip(pad) if item.pad else raw.partition(pad)[0]
+        try:
+            return raw.decode(codec)
+        except UnicodeDecodeError as error:
+            wrong = raw[error.start : error.end]
+            raise BadItem(f"{name}: {wrong!r} is not {codec} text") from None
+
+    return text
+
+
+def bytes_of_text(item: Item, encoding: str) -> Callable[[object], bytes]:
+    """Return the function from a value to the bytes of a text or bytes item, without padding."""
+    codec, name = item.encoding or encoding, item.id or item.kind
+
+    def encode(value: object) -> bytes:
+        if isinstance(value, bytes):
+            raw = value
+        elif not isinstance(value, str):
+            raise NotWritable(f"{name}: text is expected, found {_short(value)}")
+        elif item.kind == "bytes":
+            raw = hex_bytes(value, name)
+        else:
+            try:
+                raw = value.encode(codec)
+            except UnicodeEncodeError as error:
+                wrong = error.object[error.start]
+                raise NotWritable(f"{name}: {wrong!r} does not exist in {codec}") from None
+        if item.until and item.until in raw:
+            raise NotWritable(f"{name}: {raw!r} contains what ends it, {item.until!r}")
+        return raw
+
+    return encode
+
+
+def fixed_bytes(item: Item) -> Callable[[bytes], bytes]:
+    """Return the function that pads bytes to their fixed size."""
+    assert item.size is not None  # noqa: S101  # the caller has looked
+    name, size, pad = item.id or item.kind, item.size.number, bytes((item.pad,))
+    ends_at_nul = item.kind == "text" and not item.pad
+
+    def padded(raw: bytes) -> bytes:
+        if len(raw) > size:
+            raise NotWritable(f"{name}: {len(raw)} bytes do not fit into {size}")
+        if ends_at_nul and pad in raw:
+            raise NotWritable(f"{name}: {raw!r} contains a NUL, which would end it")
+        return raw.ljust(size, pad)
+
+    return padded
+
+
+def hex_bytes(text: str, name: str) -> bytes:
+    """Return the bytes that hex digits stand for."""
+    try:
+        return bytes.fromhex(text)
+    except ValueError:
+        raise NotWritable(f"{name}: hex digits are expected, found {_short(text)}") from None

@@ -1,0 +1,393 @@
+"""Struct items written by closures: values → bytes.
+
+Floor 3, pure. The other direction of `urc.protocol.struct_read`. Theory of operation: every item
+becomes a step ``(pen, scope)`` that puts its bytes behind what is there. What is known only later
+leaves a gap that is filled in: the size of a text that follows (its `Gap` waits in the scope), and
+expressions over the size of the whole frame (`Pen.late`).
+"""
+
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
+
+from urc.expressions import ExpressionError, Template
+from urc.model.binary import (
+    FRAME_NAMES,
+    Extent,
+    Item,
+    Number,
+    Switch,
+    derived_sizes,
+    joined_name,
+    least_size,
+    names_of,
+)
+from urc.protocol.forms import NotWritable
+from urc.protocol.struct_pen import GAP, LARGEST_FRAME, Gap, Pen, Scope
+from urc.protocol.struct_read import bit_parts, const_of
+from urc.protocol.struct_value import (
+    bytes_of_text,
+    checked_raw,
+    fitting,
+    fixed_bytes,
+    number_writer,
+)
+
+__all__ = [
+    "Rules",
+    "WriteStep",
+    "build_write_steps",
+    "write_frame",
+]
+
+WriteStep = Callable[[Pen, Scope], None]
+
+
+class Rules(NamedTuple):
+    """What the steps of one scope share."""
+
+    encoding: str
+    derived: Mapping[str, Template]
+    """Items that are filled in from what they count → how that says it."""
+    is_lenient: bool
+    """A value that is missing is zero, as for a robot of which only some values matter."""
+
+
+def build_write_steps(
+    items: tuple[Item, ...], encoding: str, *, is_lenient: bool
+) -> tuple[WriteStep, ...]:
+    """Return the steps of a scope of its own."""
+    rules = Rules(encoding, derived_sizes(items), is_lenient)
+    return tuple(_build(item, rules) for item in items)
+
+
+def write_frame(steps: tuple[WriteStep, ...], namespace: Mapping[str, object]) -> bytes:
+    """Return the frame with the values of `namespace`; raise `NotWritable` when there is none."""
+    pen = Pen()
+    scope: Scope = dict(namespace)
+    for step in steps:
+        step(pen, scope)
+    size = len(pen.bytes)
+    for gap, template, known in pen.late:
+        frame = {"_size": size, "_left": size - gap.at}
+        pen.fill(gap, _evaluate(template, {**known, **frame}))
+    return bytes(pen.bytes)
+
+
+def _evaluate(template: Template, scope: Scope) -> Any:
+    try:
+        return template.evaluate(scope)
+    except ExpressionError as error:
+        raise NotWritable(str(error)) from None
+
+
+def _build(item: Item, rules: Rules) -> WriteStep:
+    single = item._replace(condition=None)
+    if item.times is not None:
+        step = _array_step(single, item.times, rules)
+    else:
+        step = _STEPS[item.kind](single, rules)
+    return step if item.condition is None else _conditional(step, item, item.condition, rules)
+
+
+def _conditional(step: WriteStep, item: Item, condition: Template, rules: Rules) -> WriteStep:
+    # What depends on the frame that is yet to be written is there when its value is.
+    is_known = not condition.names & (FRAME_NAMES | rules.derived.keys())
+    names = tuple(names_of((item,)))
+
+    def conditional(pen: Pen, scope: Scope) -> None:
+        if is_known:
+            is_there = _evaluate(condition, scope)
+        else:
+            is_there = any(scope.get(name) is not None for name in names)
+        if is_there:
+            step(pen, scope)
+
+    return conditional
+
+
+def _given(item: Item, scope: Scope, rules: Rules, zero: object) -> Any:
+    """Return the value of `item`: computed, given, or zero."""
+    if item.value is not None:
+        return _evaluate(item.value, scope)
+    value = scope.get(item.id) if item.id else None
+    if value is not None:
+        return value
+    if rules.is_lenient or not item.id:
+        return zero
+    raise NotWritable(f"{item.id!r} has no value here")
+
+
+def _raw_number(item: Item, rules: Rules) -> Callable[[Scope], Any]:
+    """Return the function from a scope to the raw number; the scope then has it as it is read."""
+    checked, zero, name = checked_raw(item), _zero_of(item), item.id
+
+    def raw_number(scope: Scope) -> Any:
+        raw, value = checked(_given(item, scope, rules, zero))
+        if name:
+            scope[name] = value
+        return raw
+
+    return raw_number
+
+
+def _deferral(item: Item, rules: Rules) -> Callable[[Pen, Scope, Gap], None] | None:
+    """Return what to do with the gap of a number that is known only later, or None."""
+    value = item.value
+    if value is None and item.id in rules.derived:
+        return lambda pen, scope, gap: scope.__setitem__(GAP + item.id, gap)
+    if value is not None and value.names & (FRAME_NAMES | rules.derived.keys()):
+        return lambda pen, scope, gap: pen.late.append((gap, value, scope))
+    return None
+
+
+def _number_step(item: Item, rules: Rules) -> WriteStep:
+    write = number_writer(item.number, item.id)
+    if item.const is not None:
+        constant = write(const_of(item))
+        return lambda pen, scope: pen.put(constant)
+    defer, blank = _deferral(item, rules), bytes(item.number.size)
+    if defer is not None:
+
+        def leave_gap(pen: Pen, scope: Scope) -> None:
+            defer(pen, scope, Gap(len(pen.bytes), item, item.number))
+            pen.put(blank)
+
+        return leave_gap
+    raw_number = _raw_number(item, rules)
+    return lambda pen, scope: pen.put(write(raw_number(scope)))
+
+
+def _zero_of(item: Item) -> float:
+    """Return zero, or the valid value that is nearest to it."""
+    zero = item.offset if item.id else 0
+    if item.valid is None:
+        return zero
+    return min(max(zero, item.valid[0]), item.valid[1])
+
+
+def _bits_step(item: Item, rules: Rules) -> WriteStep:
+    container = item.number
+    write = number_writer(container, item.id)
+    parts = [
+        (part, shift, mask, _deferral(part, rules), _raw_number(part, rules))
+        for part, shift, mask, _, _ in bit_parts(item)
+    ]
+
+    def step(pen: Pen, scope: Scope) -> None:
+        whole = 0
+        for part, shift, mask, defer, raw_number in parts:
+            if part.const is not None:
+                whole |= (int(part.const) & mask) << shift
+            elif defer is not None:
+                defer(pen, scope, Gap(len(pen.bytes), part, container, shift))
+            else:
+                whole |= (raw_number(scope) & mask) << shift
+        pen.put(write(whole))
+
+    return step
+
+
+def _text_step(item: Item, rules: Rules) -> WriteStep:
+    encode, zero = bytes_of_text(item, rules.encoding), b"" if item.kind == "bytes" else ""
+    finish = _finisher(item, rules)
+
+    def step(pen: Pen, scope: Scope) -> None:
+        if item.const is not None:
+            finish(pen, scope, item.const)
+            return
+        value = _given(item, scope, rules, zero)
+        if item.id:
+            scope[item.id] = value
+        finish(pen, scope, encode(value))
+
+    return step
+
+
+def _finisher(item: Item, rules: Rules) -> Callable[[Pen, Scope, Any], None]:
+    """Return the function that puts bytes in their size: padded, counted or ended."""
+    name, size = item.id or item.kind, item.size
+    if size is None or item.const is not None:
+        return lambda pen, scope, raw: pen.put(raw + item.until)
+    if size.kind == "fixed":
+        padded = fixed_bytes(item)
+        return lambda pen, scope, raw: pen.put(padded(raw))
+
+    def finish(pen: Pen, scope: Scope, raw: bytes) -> None:
+        _put_size(pen, scope, size, len(raw), name, rules)
+        pen.put(raw)
+
+    return finish
+
+
+def _put_size(pen: Pen, scope: Scope, extent: Extent, number: int, name: str, rules: Rules) -> None:
+    """Say `number` where the reader will look for it, or check what was said."""
+    if extent.prefix is not None:
+        pen.put(number_writer(extent.prefix, name)(fitting(extent.prefix, number, name)))
+    elif extent.kind == "fixed":
+        if number != extent.number:
+            raise NotWritable(f"{name}: expected {extent.number} items, found {number}")
+    elif extent.expression is not None:
+        (only, *others) = extent.expression.names or ("",)
+        gap = scope.pop(GAP + only, None)
+        if gap is not None and not others:
+            scope[only] = _solved(extent.expression, only, number, name)
+            pen.fill(gap, scope[only])
+        elif _evaluate(extent.expression, scope) != number:
+            wanted = f"{extent.expression.source.strip()!r} says otherwise"
+            raise NotWritable(f"{name}: it is {number} long, but {wanted}")
+
+
+def _solved(expression: Template, only: str, number: int, name: str) -> int:
+    """Return the value of the one name in `expression` for which it gives `number`."""
+    at_zero = _evaluate(expression, {only: 0})
+    slope = _evaluate(expression, {only: 1}) - at_zero
+    solution = round((number - at_zero) / slope) if slope else 0
+    if _evaluate(expression, {only: solution}) != number:
+        raise NotWritable(f"{name}: no {only!r} makes {expression.source!r} equal {number}")
+    return solution
+
+
+def _padding_step(item: Item, rules: Rules) -> WriteStep:
+    if item.size is None or item.size.kind == "rest":
+        return lambda pen, scope: None
+    if item.size.kind == "fixed":
+        padding = bytes((item.pad,)) * item.size.number
+        return lambda pen, scope: pen.put(padding)
+    expression = item.size.expression
+
+    def pad(pen: Pen, scope: Scope) -> None:
+        number = 0 if expression is None else _evaluate(expression, scope)
+        if not isinstance(number, int) or not 0 <= number <= LARGEST_FRAME:
+            raise NotWritable(f"padding: {number!r} is no size")
+        pen.put(bytes((item.pad,)) * number)
+
+    return pad
+
+
+def _array_step(item: Item, count: Extent, rules: Rules) -> WriteStep:
+    if item.kind == "struct" and not item.id:
+        return _records_step(item, count, rules)
+    name, single = item.id or "an array", item._replace(times=None, value=None)
+    is_struct = item.kind == "struct"
+    if is_struct:
+        steps = build_write_steps(item.items, rules.encoding, is_lenient=rules.is_lenient)
+    else:
+        steps = (_STEPS[item.kind](single, rules),)
+    missing: list[Any] = [_ZEROS.get(item.kind, _zero_of(item))]
+
+    def array(pen: Pen, scope: Scope) -> None:
+        zeros = missing * (count.number if count.kind == "fixed" else 0)
+        values = _given(item, scope, rules, zeros)
+        if not isinstance(values, (list, tuple)):
+            raise NotWritable(f"{name}: a list is expected, found {values!r}"[:200])
+        _put_size(pen, scope, count, len(values), name, rules)
+        for value in values:
+            if is_struct and not isinstance(value, Mapping):
+                raise NotWritable(f"{name}: a mapping is expected, found {value!r}"[:200])
+            inner: Scope = dict(value) if is_struct else {item.id: value}
+            for step in steps:
+                step(pen, inner)
+
+    return array
+
+
+def _records_step(item: Item, count: Extent, rules: Rules) -> WriteStep:
+    """Write nameless structs, as of a list of records of which each sets its own signals.
+
+    There is one for each case whose fields are all given; without a switch, there is one in all.
+    """
+    body = _struct_step(item._replace(times=None), rules)
+    switches = [one for one in item.items if one.switch is not None]
+    switch = switches[0].switch if switches else None
+    cases = [(key, frozenset(names_of(inner))) for key, inner in switch.cases] if switch else []
+    by = switch.by.source.strip() if switch else ""
+
+    def records(pen: Pen, scope: Scope) -> None:
+        chosen = [{by: key} for key, names in cases if names and _has_all(scope, names)]
+        if not switch:
+            chosen = [{}] if _has_all(scope, frozenset(names_of(item.items))) else []
+        _put_size(pen, scope, count, len(chosen), "the records", rules)
+        for choice in chosen:
+            body(pen, {**scope, **choice})
+
+    return records
+
+
+def _has_all(scope: Scope, names: frozenset[str]) -> bool:
+    return all(scope.get(name) is not None for name in names)
+
+
+def _struct_step(item: Item, rules: Rules) -> WriteStep:
+    if item.id:
+        steps = build_write_steps(item.items, rules.encoding, is_lenient=rules.is_lenient)
+    else:
+        steps = tuple(_build(inner, rules) for inner in item.items)
+    names = {name: joined_name(item.id, name) for name in names_of(item.items)}
+
+    def struct(pen: Pen, scope: Scope) -> None:
+        inner = scope
+        if item.id:
+            inner = {name: scope[full] for name, full in names.items() if full in scope}
+        for step in steps:
+            step(pen, inner)
+
+    return struct if item.size is None else _windowed(struct, item, item.size, rules)
+
+
+def _windowed(body: WriteStep, item: Item, size: Extent, rules: Rules) -> WriteStep:
+    """Write a struct, and what its window needs: its size in front of it, no trimmed bytes."""
+    full, name = least_size(item.items), item.id or "a struct"
+    gap = bytes(size.prefix.size) if size.prefix else b""
+
+    def windowed(pen: Pen, scope: Scope) -> None:
+        pen.put(gap)
+        start = len(pen.bytes)
+        body(pen, scope)
+        if item.trim is not None and size.kind != "fixed":
+            kept = len(pen.bytes[start : start + full].rstrip(bytes((item.trim,))))
+            del pen.bytes[start + max(kept, 1) :]
+        number = len(pen.bytes) - start
+        if size.kind == "fixed":
+            if number != size.number:
+                raise NotWritable(f"{name}: it has {number} bytes, its size is {size.number}")
+        elif size.prefix is not None:
+            pen.fill(_prefix_gap(start, size.prefix, name), number)
+        else:
+            _put_size(pen, scope, size, number, name, rules)
+
+    return windowed
+
+
+def _prefix_gap(start: int, prefix: Number, name: str) -> Gap:
+    return Gap(start - prefix.size, Item("number", name, prefix), prefix)
+
+
+def _switch_step(item: Item, rules: Rules) -> WriteStep:
+    switch: Switch = item.switch  # type: ignore[assignment]  # a switch has one
+    cases: dict[object, tuple[WriteStep, ...] | None] = {
+        key: tuple(_build(one, rules) for one in inner) for key, inner in switch.cases
+    }
+    default = switch.default
+    otherwise = None if default is None else tuple(_build(one, rules) for one in default)
+
+    def step(pen: Pen, scope: Scope) -> None:
+        key = _evaluate(switch.by, scope)
+        steps = cases.get(key, otherwise) if isinstance(key, (int, float, str)) else otherwise
+        if steps is None:
+            raise NotWritable(f"no case for {switch.by.source.strip()} = {key!r}")
+        for one in steps:
+            one(pen, scope)
+
+    return step
+
+
+_ZEROS: dict[str, Any] = {"struct": {}, "text": "", "bytes": b""}
+_STEPS: dict[str, Callable[[Item, Rules], WriteStep]] = {
+    "number": _number_step,
+    "bits": _bits_step,
+    "bytes": _text_step,
+    "text": _text_step,
+    "padding": _padding_step,
+    "struct": _struct_step,
+    "switch": _switch_step,
+}

@@ -1,0 +1,274 @@
+"""A profile's manual page, as Markdown: what the robot is, says and can be told.
+
+Floor 4, pure: the same profile gives the same page. It is made for who operates the robot; what a
+document says in its descriptions is passed on word by word.
+"""
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Final
+
+from urc.config.part import shown_duration
+from urc.config.values import shown
+from urc.expressions import Template
+from urc.model.driver import Argument, Command, Driver, TransportSpec
+from urc.model.profile import Profile, Setting
+from urc.model.values import Limits, Signal, Value
+from urc.problems import UrcError, printable
+from urc.protocol.encode import build_encode
+from urc.protocol.forms import CodecContext
+from urc.protocol.framing import build_framing
+
+__all__ = ["manual"]
+
+_SHOWN_BYTES: Final = 48
+_SHOWN_TEXTS: Final = 12
+_MARKUP: Final = {ord(char): f"\\{char}" for char in "\\`*_[]<>|#"}
+_LIMITS: Final = (
+    ("lolo", "alarm at or below {}"),
+    ("low", "warning at or below {}"),
+    ("high", "warning at or above {}"),
+    ("hihi", "alarm at or above {}"),
+)
+
+
+def manual(profile: Profile) -> str:
+    """Return the page."""
+    driver = profile.driver
+    sections = (
+        ("Settings", _settings(profile.settings)),
+        ("Connections", _connections(driver)),
+        ("Signals", _signals(driver.signals)),
+        ("Commands", _commands(driver)),
+        ("When control is lost", _releases(driver)),
+        ("Polls", _polls(driver)),
+        ("Tests", [f"- {_plain(test.name)}" for test in profile.tests]),
+        ("Licence", _origin(profile)),
+    )
+    lines = [f"# {_plain(profile.title)}", ""]
+    if profile.summary:
+        lines += [_plain(profile.summary), ""]
+    for title, inside in sections:
+        text = list(inside)
+        if text:
+            lines += [f"## {title}", "", *text, ""]
+    return "\n".join(lines).rstrip("\n") + "\n"
+
+
+def _settings(settings: Mapping[str, Setting]) -> Iterator[str]:
+    if not settings:
+        return
+    rows = []
+    for setting in settings.values():
+        default = "to be filled in" if setting.default is None else _code(_value(setting.default))
+        if setting.is_secret:
+            default = "secret, to be filled in"
+        allowed = ", ".join(_code(choice) for choice in setting.choices)
+        allowed = allowed or _range(setting.min, setting.max, "")
+        rows.append((_code(setting.name), _plain(setting.title), setting.type, default, allowed))
+    yield from _table(("setting", "", "type", "default", "allowed"), rows)
+    yield from _descriptions(settings.values())
+
+
+def _connections(driver: Driver) -> Iterator[str]:
+    rows = []
+    for spec in driver.transports.values():
+        options = ", ".join(
+            f"{name} {_code(option.source if isinstance(option, Template) else str(option))}"
+            for name, option in spec.options.items()
+        )
+        kept = "kept" if spec.connection == "persistent" else "one for each request"
+        rows.append((_code(spec.name), spec.type, options, spec.framing.type, kept))
+    yield from _table(("name", "type", "to", "framing", "connection"), rows)
+
+
+def _signals(signals: Mapping[str, Signal]) -> Iterator[str]:
+    if not signals:
+        return
+    rows = [
+        (
+            _code(signal.name),
+            _plain(signal.title),
+            signal.type,
+            _plain(signal.unit),
+            _range(signal.min, signal.max, ""),
+            _limits(signal.limits),
+            _states(signal),
+            shown_duration(signal.stale_after_s),
+        )
+        for signal in signals.values()
+    ]
+    header = ("signal", "", "type", "unit", "range", "limits", "states", "old after")
+    yield from _table(header, rows)
+    yield from _descriptions(signals.values())
+
+
+def _limits(limits: Limits) -> str:
+    told = [
+        text.format(f"{value:g}")
+        for name, text in _LIMITS
+        if (value := getattr(limits, name)) is not None
+    ]
+    if told and limits.hysteresis:
+        told.append(f"hysteresis {limits.hysteresis:g}")
+    return ", ".join(told)
+
+
+def _states(signal: Signal) -> str:
+    shown_ones = signal.states[:_SHOWN_TEXTS]
+    more = ", …" if len(signal.states) > _SHOWN_TEXTS else ""
+    return ", ".join(f"{_code(raw)} {_plain(word)}" for raw, word in shown_ones) + more
+
+
+def _commands(driver: Driver) -> Iterator[str]:
+    for command in driver.commands.values():
+        yield from (f"### {_plain(command.title)}", "")
+        if command.description:
+            yield from (_plain(command.description), "")
+        yield f"- name: {_code(command.name)}"
+        yield from _what_goes_out(command, driver.transports.get(command.transport))
+        if command.confirm is not None:
+            asked = _plain(command.confirm.text) or "yes"
+            yield f"- asks first ({command.confirm.level}): {asked}"
+        for requirement in command.requires:
+            yield f"- needs {_code(requirement.condition.source)}: {_plain(requirement.text)}"
+        if command.verify is not None:
+            within = shown_duration(command.verify.within_s)
+            yield f"- done when {_code(command.verify.condition.source)}, within {within}"
+        if command.hold is not None:
+            yield f"- held: sent every {shown_duration(command.hold.repeat_s)} while it is held"
+        yield ""
+        yield from _arguments(command)
+
+
+def _what_goes_out(command: Command, spec: TransportSpec | None) -> Iterator[str]:
+    if command.steps:
+        yield f"- a sequence of {len(command.steps)} step{'' if len(command.steps) == 1 else 's'}"
+        return
+    data = _constant_bytes(command, spec)
+    if data is not None:
+        yield f"- sends {_code(_text_of(data))}, in hex {_code(_hex_of(data))}"
+    else:
+        template = command.send.options.get("template")
+        if isinstance(template, Template):
+            yield f"- sends {_code(template.source)}"
+    if command.reply is None:
+        yield "- done when it is sent"
+
+
+def _constant_bytes(command: Command, spec: TransportSpec | None) -> bytes | None:
+    """Return what always goes out, or None where that depends on something."""
+    if command.send.names or spec is None:
+        return None
+    try:
+        encode = build_encode(
+            command.send, build_framing(spec.framing), CodecContext(spec.encoding)
+        )
+        return encode({})
+    except UrcError:
+        return None  # a counter, for one: it is not the same every time
+
+
+def _text_of(data: bytes) -> str:
+    text = printable(data[:_SHOWN_BYTES].decode("latin-1"))
+    return text + ("…" if len(data) > _SHOWN_BYTES else "")
+
+
+def _hex_of(data: bytes) -> str:
+    return data[:_SHOWN_BYTES].hex(" ") + (" …" if len(data) > _SHOWN_BYTES else "")
+
+
+def _arguments(command: Command) -> Iterator[str]:
+    if not command.arguments:
+        return
+    rows = [
+        (
+            _code(argument.name),
+            _plain(argument.title),
+            argument.type,
+            _plain(argument.unit),
+            _allowed(argument),
+            _need(argument),
+        )
+        for argument in command.arguments.values()
+    ]
+    yield from _table(("argument", "", "type", "unit", "allowed", "default"), rows)
+    yield from _descriptions(command.arguments.values())
+
+
+def _allowed(argument: Argument) -> str:
+    if argument.choices:
+        return ", ".join(_code(_value(choice)) for choice in argument.choices)
+    return _range(argument.min, argument.max, "")
+
+
+def _need(argument: Argument) -> str:
+    if argument.default is not None:
+        return _code(_value(argument.default))
+    return "needed" if argument.is_required else ""
+
+
+def _releases(driver: Driver) -> Iterator[str]:
+    """Yield what the server sends when a control is let go of, or the one who holds it is gone."""
+    for command in driver.commands.values():
+        if command.hold is not None:
+            values = {
+                name: command.hold.release.get(name, argument.default)
+                for name, argument in command.arguments.items()
+            }
+            given = ", ".join(f"{name} {_value(value)}" for name, value in values.items())
+            yield f"- {_code(command.name)}: {_code(given) if given else 'nothing more is sent'}"
+
+
+def _polls(driver: Driver) -> Iterator[str]:
+    for poll in driver.polls:
+        fields = poll.reply.read.fields if poll.reply else ()
+        sets = ", ".join(_code(name) for name in fields if not name.startswith("_"))
+        what = f" → {sets}" if sets else ""
+        yield f"- {_code(poll.name)} every {shown_duration(poll.every_s)}{what}"
+
+
+def _origin(profile: Profile) -> Iterator[str]:
+    if profile.licence:
+        yield _plain(profile.licence)
+    if profile.author:
+        yield f"By {_plain(profile.author)}."
+
+
+def _range(low: float | None, high: float | None, otherwise: str) -> str:
+    if low is not None and high is not None:
+        return f"{low:g} to {high:g}"
+    if low is not None:
+        return f"{low:g} or more"
+    return otherwise if high is None else f"{high:g} or less"
+
+
+def _value(value: Value) -> str:
+    return value if isinstance(value, str) else shown(value)
+
+
+def _descriptions(named: Iterable[Signal | Argument | Setting]) -> Iterator[str]:
+    told = [f"- {_code(one.name)}: {_plain(one.description)}" for one in named if one.description]
+    if told:
+        yield from ("", *told)
+
+
+def _table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> Iterator[str]:
+    """Yield a table without the columns in which no row says anything."""
+    kept = [place for place in range(len(header)) if any(row[place] for row in rows)]
+    yield f"| {' | '.join(header[place] for place in kept)} |"
+    yield f"|{'---|' * len(kept)}"
+    for row in rows:
+        yield f"| {' | '.join(row[place] for place in kept)} |"
+
+
+def _plain(text: str) -> str:
+    """Return text of a document that no reader of Markdown takes for markup."""
+    return printable(" ".join(text.split())).translate(_MARKUP)
+
+
+def _code(text: str) -> str:
+    """Return text as code, whatever is in it; a bar would end the cell of a table."""
+    clean = printable(text).replace("|", "\\|")
+    if "`" in clean:
+        return f"`` {clean} ``"
+    return f"`{clean}`" if clean else ""

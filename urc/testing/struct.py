@@ -1,0 +1,67 @@
+"""Binary frames' forms, made of YAML text without a whole document."""
+
+from collections.abc import Mapping
+
+from urc.config.form_struct import parse_read, parse_write
+from urc.config.forms import FormContext
+from urc.config.parse_types import parse_types
+from urc.config.part import Findings, Part
+from urc.config.struct_numbers import parse_enums
+from urc.model.codec import ReadSpec, WriteSpec
+from urc.problems import to_text
+from urc.protocol.forms import CodecContext, Frame, Reader, Writer, build_reader, build_writer
+from urc.source import parse_document
+
+__all__ = ["frame", "reader", "struct_read", "struct_write", "writer"]
+
+
+def struct_read(source: str) -> ReadSpec:
+    """Return the form of ``struct:``, with ``types:`` and ``enums:`` beside it, in `source`.
+
+    Raises:
+        AssertionError: a finding, as it is told.
+    """
+    part, context, findings = _context(source)
+    spec = parse_read(part.must("struct"), findings, context)
+    _assert_none(findings)
+    assert spec is not None  # noqa: S101  # what this function is for
+    return spec
+
+
+def struct_write(source: str) -> WriteSpec:
+    """Return the same as something to send."""
+    part, context, findings = _context(source)
+    spec = parse_write(part.must("struct"), findings, context)
+    _assert_none(findings)
+    assert spec is not None  # noqa: S101  # what this function is for
+    return spec
+
+
+def reader(source: str, encoding: str = "utf-8") -> Reader:
+    """Return what reads such frames."""
+    return build_reader(struct_read(source), CodecContext(encoding))
+
+
+def writer(source: str, encoding: str = "utf-8") -> Writer:
+    """Return what writes such frames."""
+    return build_writer(struct_write(source), CodecContext(encoding))
+
+
+def frame(data: bytes | str) -> Frame:
+    """Return a frame of bytes, or of hex digits."""
+    return Frame(bytes.fromhex(data) if isinstance(data, str) else data, "utf-8")
+
+
+def _context(source: str) -> tuple[Part, FormContext, Findings]:
+    document = parse_document(source, "test.yaml")
+    findings = Findings()
+    assert isinstance(document.data, Mapping)  # noqa: S101  # a mistake in the test
+    part = Part(document, (), document.data)
+    enums = parse_enums(part, findings)
+    types = parse_types(part, enums, findings)
+    return part, FormContext(types=types, enums=enums), findings
+
+
+def _assert_none(findings: Findings) -> None:
+    told = "".join(map(to_text, findings))
+    assert not told, told  # noqa: S101  # what this module is for
