@@ -17,8 +17,14 @@ from types import FrameType
 from typing import Any
 
 import pytest
+from hypothesis import settings
 
 from scripts.needs import NEEDS
+from tests.effort import examples
+
+# Properties that name no number of their own; a busy machine is no failure.
+settings.register_profile("urc", max_examples=examples(100), deadline=None)
+settings.load_profile("urc")
 
 PROGRAMS = {need.name: need for need in NEEDS}
 BROWSER_FIXTURES = {"browser", "new_page"}

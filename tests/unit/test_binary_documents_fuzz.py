@@ -8,6 +8,7 @@ import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tests.effort import examples
 from urc.config.load import Shelf, check
 from urc.expressions import ExpressionError
 from urc.model.driver import Driver
@@ -86,7 +87,7 @@ PLACES = [
 
 
 @given(st.sampled_from(PLACES), values)
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=examples(300), deadline=None)
 def test_any_change_of_a_good_document_is_told(path: tuple[str | int, ...], value: object) -> None:
     """Never another exception, and always a place."""
     with tempfile.TemporaryDirectory() as folder:

@@ -6,6 +6,7 @@ from pathlib import Path
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tests.effort import examples
 from urc.config.load import Shelf, check
 from urc.problems import ProblemsError, to_json, to_text
 from urc.runtime.catalog import built_in_catalog
@@ -48,7 +49,7 @@ def test_any_bytes_are_a_document_or_findings(content: bytes) -> None:
 
 
 @given(yamlish)
-@settings(max_examples=400, deadline=None)
+@settings(max_examples=examples(400), deadline=None)
 def test_any_yamlish_text_is_a_document_or_findings(text: str) -> None:
     """Made of the signs that mean something, so that the parser gets far."""
     assert_told(text)
@@ -114,7 +115,7 @@ def flow(value: object) -> str:
 
 
 @given(st.sampled_from(PLACES), values)
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=examples(300), deadline=None)
 def test_any_change_of_a_good_document_is_told(path: tuple[str | int, ...], value: object) -> None:
     """All passes meet values that their authors did not think of."""
     text = flow(replaced(DATA, path, value))

@@ -8,6 +8,7 @@ from typing import Any
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tests.effort import examples
 from urc.config.load import check
 from urc.config.parse_widget import Shelf
 from urc.config.resolve import resolve, written
@@ -34,7 +35,7 @@ anything = st.recursive(
 
 
 @given(data=st.data())
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=examples(40), deadline=None)
 def test_no_change_of_the_documents_raises(data: st.DataObject, tmp_path_factory: Any) -> None:
     """Two changes anywhere: each document is checked, and put together where that is possible."""
     folder = tmp_path_factory.getbasetemp() / "reuse-fuzz"

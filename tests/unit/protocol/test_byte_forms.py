@@ -6,6 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tests.effort import examples
 from urc.config import form_bytes, form_hex, form_json_text
 from urc.config.forms import FormContext
 from urc.config.part import Findings, Part
@@ -88,7 +89,7 @@ def test_another_frame_is_not_read(data: str) -> None:
 
 
 @given(st.binary(max_size=20))
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=examples(200), deadline=None)
 def test_any_bytes_are_read_or_not(data: bytes) -> None:
     """Bytes that nobody wrote give a mapping or None; what was read is written again."""
     for source in ("hex: '91 {{ x | i16be }} {{ t | hexbytes }} 03'", "bytes: [2, '{{ x | u8 }}']"):
@@ -123,7 +124,7 @@ plain = st.none() | st.booleans() | st.integers(-(2**53), 2**53) | st.text(max_s
 
 
 @given(st.dictionaries(st.sampled_from(["a", "b", "c"]), plain, min_size=3))
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=examples(100), deadline=None)
 def test_json_is_read_as_it_was_written(values: dict[str, Any]) -> None:
     """For every value that JSON has."""
     one = writer("json: { a: '{{ a }}', deep: { b: ['{{ b }}'] }, c: '{{ c }}', d: 1 }")

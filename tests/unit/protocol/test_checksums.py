@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tests.effort import examples
 from tests.unit.protocol.framing_samples import NMEA, framing, spec
 from urc.config.parse_checksum import parse_checksum
 from urc.config.part import Findings, Part
@@ -104,7 +105,7 @@ def test_names_that_the_loader_knows_are_those_that_there_is_code_for() -> None:
 @pytest.mark.parametrize(
     "name", ["sum8", "crc16-modbus", "crc24-ble", "crc32", "crc7-mmc", "crc64-xz"]
 )
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=examples(20), deadline=None)
 @given(payload=st.binary(max_size=40))
 def test_every_spelling_and_order_is_read_as_written(
     name: str, endian: str, spelling: str, payload: bytes

@@ -6,6 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tests.effort import examples
 from urc.expressions import compile_template
 from urc.model.codec import Payload
 from urc.model.driver import Argument, Command, FramingSpec
@@ -123,7 +124,7 @@ frames = st.one_of(
 
 @pytest.mark.parametrize("form", FAST)
 @given(lines=st.lists(frames, min_size=1, max_size=6))
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=examples(150), deadline=None)
 def test_function_and_closures_agree(form: str, lines: list[str]) -> None:
     """The closures are the oracle; the state of alarms goes along with both."""
     oracle, fast = both(form)
@@ -143,7 +144,7 @@ def plain(taken: Taken | None) -> Any:
 
 
 @given(lines=st.lists(frames | st.binary(max_size=9), min_size=WARM_AFTER, max_size=WARM_AFTER + 9))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=examples(60), deadline=None)
 def test_the_right_message_has_the_frame(lines: list[str | bytes]) -> None:
     """Found by its beginning or tried in turn: the first one declared that takes it."""
     context = CodecContext()
@@ -204,7 +205,7 @@ def outcome(function: Any, *given_arguments: Any) -> object:
 
 @pytest.mark.parametrize("source", TEMPLATES)
 @given(given_arguments=values_of)
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=examples(150), deadline=None)
 def test_command_is_written_as_by_closures(source: str, given_arguments: dict[str, Any]) -> None:
     """Checks, arithmetic, digits and delimiter."""
     send = text(source)

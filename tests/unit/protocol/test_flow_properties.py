@@ -13,6 +13,7 @@ from hypothesis.stateful import (
 )
 
 from tests.dialogue import driver_of
+from tests.effort import examples
 from urc.protocol.engine import Engine
 from urc.protocol.events import Close, Event, Failed, Open, Replied, Request
 
@@ -214,4 +215,4 @@ class Machine(RuleBasedStateMachine):
 
 
 TestMachine = Machine.TestCase
-TestMachine.settings = settings(max_examples=60, stateful_step_count=60, deadline=None)
+TestMachine.settings = settings(max_examples=examples(60), stateful_step_count=60, deadline=None)

@@ -4,6 +4,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tests.effort import examples
 from tests.unit.protocol.framing_samples import (
     ARM,
     GGA,
@@ -322,7 +323,7 @@ HOLDS_LENGTH = (
     "flags beside the length",
     "nmea and ubx",
 )
-A_FEW = settings(max_examples=25, deadline=None)
+A_FEW = settings(max_examples=examples(25), deadline=None)
 """For each of some thirty samples."""
 
 

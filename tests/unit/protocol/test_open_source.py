@@ -3,6 +3,7 @@
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tests.effort import examples
 from urc.model.framing import FOLDED, ChecksumSpec, CrcSpec, FrameLayout, Window
 from urc.protocol.frame import BadFrame, Seal
 
@@ -33,7 +34,7 @@ def layouts(draw: st.DrawFn) -> FrameLayout:
 
 
 @given(layouts(), st.binary(min_size=1, max_size=20), st.binary(max_size=4), st.data())
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=examples(300), deadline=None)
 def test_generated_and_general_agree(
     layout: FrameLayout, payload: bytes, noise: bytes, data: st.DataObject
 ) -> None:

@@ -8,6 +8,7 @@ from typing import Any
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tests.effort import examples
 from urc.expressions import compile_expression
 from urc.model.binary import Extent, Item, Number, Switch, joined_name
 from urc.model.codec import Envelope, ReadSpec
@@ -228,7 +229,7 @@ def without_sizes(found: object) -> object:
 
 
 @given(declarations().flatmap(lambda one: st.tuples(st.just(one[0]), one[1])))
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=examples(150), deadline=None)
 def test_what_is_written_is_read_again(case: tuple[tuple[Item, ...], dict[str, Any]]) -> None:
     """By the closures and by the generated functions, which write the same bytes."""
     items, values = case
@@ -243,7 +244,7 @@ def test_what_is_written_is_read_again(case: tuple[tuple[Item, ...], dict[str, A
 
 
 @given(st.data())
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=examples(150), deadline=None)
 def test_any_bytes_give_fields_or_none_or_a_fault(data: st.DataObject) -> None:
     """A frame with a changed, missing or added byte: closures and generated code agree."""
     items, values = data.draw(declarations())
@@ -256,7 +257,7 @@ def test_any_bytes_give_fields_or_none_or_a_fault(data: st.DataObject) -> None:
 
 
 @given(declarations(), st.binary(max_size=200))
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=examples(150), deadline=None)
 def test_noise_gives_fields_or_none_or_a_fault(declared: Declared, noise: bytes) -> None:
     """Bytes that nobody wrote."""
     assert_bounded(declared[0], noise)
@@ -285,7 +286,7 @@ odd_values = st.one_of(
 
 
 @given(st.data())
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=examples(150), deadline=None)
 def test_any_values_give_bytes_or_are_refused(data: st.DataObject) -> None:
     """Whatever an argument is: the same bytes or the same words from both."""
     items, values = data.draw(declarations())

@@ -154,7 +154,7 @@ def test_arguments_are_what_nobody_computes() -> None:
 
 
 def test_counter_of_a_request_can_be_read_back() -> None:
-    """The emulated robot repeats it in its answer; a computed item that is no counter is skipped."""
+    """The emulated robot repeats it in its answer; what is computed otherwise is skipped."""
     made = writer(
         "struct: [{ type: u16be, value: \"seq('id', 1, 99)\" }, { type: u8, value: _size }, u8 a]"
     )

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tests.effort import examples
 from urc.protocol.forms import BadText, CodecContext, Frame, NotWritable, build_reader
 from urc.protocol.json_paths import JsonReader
 from urc.testing.reading import read_spec, reader_of
@@ -177,7 +178,7 @@ fields_of = st.fixed_dictionaries(
 
 @pytest.mark.parametrize("form", FORMS)
 @given(fields=fields_of)
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=examples(80), deadline=None)
 def test_written_frame_reads_back(form: str, fields: dict[str, Any]) -> None:
     """Whatever can be written says what was meant, or it is refused."""
     spec = read_spec(form, SIGNALS)
@@ -208,7 +209,7 @@ def is_same(found: object, value: object) -> bool:
 
 @pytest.mark.parametrize("form", [*FORMS, "equals: pong"])
 @given(data=st.binary(max_size=200) | st.text(max_size=100).map(str.encode))
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=examples(80), deadline=None)
 def test_any_bytes_are_read_or_refused(form: str, data: bytes) -> None:
     """No frame of a robot raises anything but that it is no text."""
     with suppress(BadText):
@@ -227,7 +228,7 @@ documents = st.recursive(
 
 
 @given(document=documents)
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=examples(300), deadline=None)
 def test_json_by_types_and_json_as_a_whole_agree(document: object) -> None:
     """The walk over the whole document is the oracle of the decoder made for the paths."""
     reader = JsonReader(read_spec(JSON), CodecContext())
