@@ -59,6 +59,9 @@ class EngineLike(Protocol):
     def command(self, request: Request, now: float) -> Sequence[Event]:
         """Somebody wants this done."""
 
+    def finish(self, now: float) -> list[Event]:
+        """Close every line in good order."""
+
     def tick(self, now: float) -> Sequence[Event]:
         """The deadline has come."""
 
@@ -76,8 +79,8 @@ class Port(Protocol):
     def want_close(self, reason: str) -> None:
         """Write what is queued and close; at once when there is a reason."""
 
-    def queue(self, data: bytes) -> None:
-        """Write these bytes."""
+    def queue(self, data: bytes, *, is_secret: bool = False) -> None:
+        """Write these bytes; secret ones are not shown to whoever watches the traffic."""
 
     def heard(self) -> None:
         """A good frame arrived."""
@@ -143,6 +146,16 @@ class Dispatcher:
         """Begin: let the engine say when it wants to be called."""
         self._arm()
 
+    def finish(self) -> None:
+        """Let every open line say its good-bye; each ends with the engine closing it."""
+        try:
+            events = self._engine.finish(self._clock.now())
+        except Exception as bug:  # supervisor, as in `command`
+            self._survive(bug)
+            return
+        self._perform(events, None)
+        self._arm()
+
     def stop(self, reason: str) -> None:
         """Call no engine from now on, and fail every command that still waits."""
         self._is_stopped = True
@@ -191,7 +204,7 @@ class Dispatcher:
                 case Fault():
                     self._ports[event.transport].count(event)
                 case Send():
-                    self._ports[event.transport].queue(event.data)
+                    self._ports[event.transport].queue(event.data, is_secret=event.is_secret)
                 case Open():
                     self._ports[event.transport].want_open()
                 case Close():

@@ -25,7 +25,7 @@ from urc.protocol.events import Fault
 from urc.runtime.clock import Alarm, Clock, within
 from urc.runtime.dispatcher import Dispatcher
 from urc.runtime.hub import Hub, LinkState
-from urc.runtime.report import LinkReport
+from urc.runtime.report import REDACTED, LinkReport
 from urc.transports.base import Transport, TransportError
 
 __all__ = ["Link"]
@@ -93,7 +93,8 @@ class Link:
         """None while not connected; its result says why the connection ended."""
         self._close_reason: str | None = None
         """Set when the engine has closed the line: what arrives now is nobody's."""
-        self._outgoing: list[bytes] = []
+        self._outgoing: list[tuple[bytes, bytes]] = []
+        """What is written, and what the traffic shows of it."""
         self._queued_bytes = 0
         self._has_output = asyncio.Event()
         self._heard_s = 0.0
@@ -105,8 +106,6 @@ class Link:
         if not self._is_persistent:
             self.tried.set()
         self._report = LinkReport(spec.name, transport.address, hub, clock)
-
-    # -- asked by the dispatcher; only sets state
 
     @property
     def is_full(self) -> bool:
@@ -131,15 +130,20 @@ class Link:
         else:
             self._has_output.set()
 
-    def queue(self, data: bytes) -> None:
-        """Write `data` with the next turn of the loop, joined with what else comes till then."""
+    @property
+    def is_connected(self) -> bool:
+        """Whether the transport is open."""
+        return self._ended is not None
+
+    def queue(self, data: bytes, *, is_secret: bool = False) -> None:
+        """Write `data` with the next turn of the loop; secret bytes are shown to nobody."""
         if self._ended is None or self._ended.done() or self._close_reason is not None:
             return
         if self._queued_bytes + len(data) > MAX_QUEUED_BYTES:
             dropped = self._queued_bytes + len(data)
             self._end(f"the robot takes no more bytes; {dropped} waiting ones were dropped")
             return
-        self._outgoing.append(data)
+        self._outgoing.append((data, REDACTED if is_secret else data))
         self._queued_bytes += len(data)
         self._has_output.set()
 
@@ -163,8 +167,6 @@ class Link:
     def publish(self) -> None:
         """Put the state into the hub, if anything about it has changed."""
         self._report.publish()
-
-    # -- its own task
 
     async def run(self) -> None:
         """Keep the line, until cancelled. Leaves nothing open behind."""
@@ -290,8 +292,6 @@ class Link:
         except Exception as bug:  # supervisor, as in `_open`
             self._mistake(bug)
 
-    # -- the two lanes of an open connection
-
     async def _lane(self, work: Callable[[], Coroutine[Any, Any, None]]) -> None:
         try:
             await work()
@@ -324,12 +324,12 @@ class Link:
             await self._has_output.wait()
             self._has_output.clear()
             if self._outgoing:
-                data = b"".join(self._outgoing)
+                data, shown = map(b"".join, zip(*self._outgoing, strict=True))
                 self._outgoing.clear()
                 with self._watched():
                     await self._transport.send(data)
                 self._queued_bytes -= len(data)
-                self._report.saw("sent", data)
+                self._report.saw("sent", shown)
             if self._close_reason is not None and not self._outgoing:
                 self._end("")
 
@@ -346,8 +346,6 @@ class Link:
     def _end(self, reason: str) -> None:
         if self._ended is not None and not self._ended.done():
             self._ended.set_result(reason)
-
-    # -- rules about time
 
     def _set_alarms(self) -> list["_Repeating"]:
         alarms = [_Repeating(self._clock, SETTLE_S, self._settled)]

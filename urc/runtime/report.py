@@ -7,10 +7,12 @@ from urc.protocol.events import Fault
 from urc.runtime.clock import Clock
 from urc.runtime.hub import Hub, LinkState, LinkStatus, Note, Traffic
 
-__all__ = ["LinkReport", "NoteLimiter"]
+__all__ = ["REDACTED", "LinkReport", "NoteLimiter"]
 
 BURST = 4
 """Notes of one kind that are told at once."""
+REDACTED = "‹secret›".encode()
+"""Stands for secret bytes in the traffic."""
 REFILL_S = 10.0
 """After so many seconds one more of that kind is told."""
 KINDS = 64

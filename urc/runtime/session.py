@@ -11,7 +11,7 @@ from urc.model.driver import Driver
 from urc.model.profile import Profile
 from urc.model.values import Value
 from urc.problems import UrcError
-from urc.protocol.bounds import longest_s
+from urc.protocol.bounds import GOOD_BYE_S, longest_s
 from urc.protocol.engine import Engine
 from urc.protocol.events import Failed, Replied, Request
 from urc.registry import Table
@@ -24,6 +24,7 @@ from urc.transports.base import Transport
 
 __all__ = ["CommandFailed", "Session", "resolve_settings"]
 
+_LOOK_S = 0.02
 _GRACE_S = 2.0
 """What a command may take beyond all its declared waits together."""
 
@@ -110,6 +111,7 @@ class Session:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
+        await self._say_goodbye()
         self._dispatcher.stop("the session was closed")
         for task in self._tasks:
             task.cancel()
@@ -119,6 +121,20 @@ class Session:
             await self._group.__aexit__(kind, error, trace)
         else:
             await self._group.__aexit__(None, None, None)
+
+    async def _say_goodbye(self) -> None:
+        """Run what drivers declare under `on_close`, for as long as that is allowed to take."""
+        polite = [
+            link
+            for name, link in self._links.items()
+            if self.profile.driver.transports[name].on_close and link.is_connected
+        ]
+        if not polite:
+            return
+        self._dispatcher.finish()
+        until = self._clock.now() + GOOD_BYE_S + _GRACE_S
+        while any(link.is_connected for link in polite) and self._clock.now() < until:
+            await self._clock.sleep(_LOOK_S)
 
     async def command(self, name: str, arguments: Mapping[str, Value] | None = None) -> Replied:
         """Run a command and return its reply; the wait is always bounded.
