@@ -8,7 +8,8 @@ turns small operands into a large result.
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
-from urc import _bytes, _rotation
+from urc import _bytes, _cuts, _lists, _rotation
+from urc._spelling import spelt
 
 __all__ = ["FILTERS", "SCOPE", "filter_names"]
 
@@ -95,7 +96,15 @@ def _join(*parts: Any) -> str:
 def _text(value: Any) -> str:
     if isinstance(value, bytes):
         raise TypeError("bytes are no text; 'hex:' and 'bytes:' take them")
-    return "" if value is None else str(value)
+    return spelt(value)
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool)
+
+
+def _is_string(value: Any) -> bool:
+    return isinstance(value, str)
 
 
 def _is_defined(look: Callable[[], Any]) -> bool:
@@ -214,11 +223,16 @@ FILTERS |= {
 }
 FILTERS |= {name: Filter(one, (more, more)) for name, (one, more) in _bytes.TEXT_FILTERS.items()}
 
-_OPERATORS = (_add, _sub, _mul, _div, _floordiv, _mod, _pow, _item, _join, _is_defined)
+FILTERS |= {name: Filter(*one) for name, one in _lists.LIST_FILTERS.items()}
+FILTERS |= {name: Filter(*one) for name, one in _cuts.CUT_FILTERS.items()}
+
+_OPERATORS = (_add, _sub, _mul, _div, _floordiv, _mod, _pow, _item, _join)
+_TESTS = (_is_defined, _is_number, _is_string)
 
 SCOPE: dict[str, Any] = {"__builtins__": {}}
 """The only names that compiled Python can reach."""
-SCOPE |= {function.__name__: function for function in _OPERATORS}
+SCOPE |= {"_slice": _lists.sliced, "_match": _lists.is_match, "_search": _lists.is_search}
+SCOPE |= {function.__name__: function for function in (*_OPERATORS, *_TESTS)}
 SCOPE |= {f"_filter_{name}": filter_.function for name, filter_ in FILTERS.items()}
 
 

@@ -14,7 +14,9 @@ from collections.abc import Callable
 from typing import Final
 
 from urc import _filters
+from urc._lists import compiled
 from urc._tokens import Refused, Token, float_of, integer_of, string_of, tokens_of
+from urc.problems import UrcError
 
 __all__ = ["COUNTERS", "MAX_DEPTH", "Refused", "translate"]
 
@@ -33,7 +35,10 @@ _KEYWORDS = frozenset(("and", "or", "not", "in", "is", "if", "else"))
 _COMPARE = frozenset(("==", "!=", "<", "<=", ">", ">="))
 _SUM = {"+": "_add", "-": "_sub"}
 _PRODUCT = {"*": "_mul", "/": "_div", "//": "_floordiv", "%": "_mod"}
-_TESTS = ("defined", "undefined", "none", "odd", "even")
+_TESTS = (
+    "defined", "undefined", "none", "odd", "even", "number", "string", "match", "search", "in",
+)  # fmt: skip
+_PATTERNS = ("match", "search")
 COUNTERS: Final = "seq()"
 """The root name under which a namespace keeps its counters; no name of a document can be so."""
 _COUNTER = re.compile(r"[a-z][a-z0-9_]{0,63}")
@@ -212,7 +217,7 @@ class _Parser:
             if self._take("."):
                 value = f"_item({value}, {self._key(is_settings)})"
             elif self._take("["):
-                value = f"_item({value}, {self._subscript(is_settings)})"
+                value = self._subscript(value, is_settings)
             elif self._next.text == "(" and self._next.kind == "operator":
                 text = "calls are not part of the language, only filters and seq()"
                 raise Refused(text, self._next.offset)
@@ -230,13 +235,20 @@ class _Parser:
             self._settings.add(token.text)
         return repr(token.text)
 
-    def _subscript(self, is_settings: bool) -> str:
+    def _subscript(self, value: str, is_settings: bool) -> str:
+        """``[key]``, or a part such as ``[1:3]``."""
         token = self._next
-        key = self.expression()
+        key = "None" if token.text == ":" and token.kind == "operator" else self.expression()
+        if self._take(":"):
+            stop = "None" if self._next.text == "]" else self.expression()
+            if self._next.text == ":":
+                raise Refused("a part of a row has a begin and an end, no step", self._next.offset)
+            self._expect("]")
+            return f"_slice({value}, {key}, {stop})"
         if is_settings and token.kind == "string" and self._next.text == "]":
             self._settings.add(string_of(token))
         self._expect("]")
-        return key
+        return f"_item({value}, {key})"
 
     def _primary(self) -> str:
         token = self._advance()
@@ -305,6 +317,20 @@ class _Parser:
             else:
                 return value
 
+    def _pattern(self, test: Token) -> str:
+        """``('regular expression')`` behind a test: compiled with the expression, never later."""
+        self._expect("(")
+        token = self._advance()
+        if token.kind != "string":
+            raise Refused(f"{test.text!r} takes a pattern in quotes", token.offset)
+        source = token.text[1:-1]  # as written: a backslash is the pattern's
+        self._expect(")")
+        try:
+            compiled(source, test.text)
+        except UrcError as error:
+            raise Refused(str(error), token.offset) from None
+        return source
+
     def _filter(self, subject: str) -> str:
         token = self._advance()
         if token.kind != "name" or token.text not in _filters.FILTERS:
@@ -334,6 +360,12 @@ class _Parser:
         if token.text in ("defined", "undefined"):
             python = f"_is_defined(lambda: {subject})"
             is_negated ^= token.text == "undefined"
+        elif token.text in _PATTERNS:
+            python = f"_{token.text}({subject}, {self._pattern(token)!r})"
+        elif token.text == "in":
+            python = f"({subject} in {self._unary()})"
+        elif token.text in ("number", "string"):
+            python = f"_is_{token.text}({subject})"
         elif token.text == "none":
             python = f"({subject} is None)"
         else:

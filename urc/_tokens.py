@@ -14,7 +14,7 @@ _TOKEN = re.compile(
     |(?P<integer>0[xX][0-9a-fA-F_]+|0[bB][01_]+|0[oO][0-7_]+|\d[\d_]*)
     |(?P<name>[A-Za-z_][A-Za-z0-9_]*)
     |(?P<string>'(?:[^'\\]|\\.)*'|"(?:[^"\\]|\\.)*")
-    |(?P<operator>\*\*|//|==|!=|<=|>=|[-+*/%~<>|.,()\[\]])""",
+    |(?P<operator>\*\*|//|==|!=|<=|>=|[-+*/%~<>|.,:()\[\]])""",
     re.VERBOSE | re.DOTALL | re.ASCII,
 )
 _ESCAPE = re.compile(r"\\(?:x([0-9a-fA-F]{2})|u([0-9a-fA-F]{4})|(.))", re.DOTALL)

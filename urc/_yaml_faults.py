@@ -123,7 +123,8 @@ def _escape(at: _Clue) -> Fault | None:
         column,
         "bad-escape",
         f"'{shown}' means nothing in double quotes",
-        "write the text in single quotes, where a backslash is a backslash",
+        "write the text in single quotes: there a backslash is a backslash, and a quote is written"
+        " twice: ''; in double quotes a backslash is written \\\\",
     )
 
 

@@ -14,6 +14,7 @@ from typing import Any, Final
 
 from urc import _filters
 from urc._grammar import COUNTERS, Refused, translate
+from urc._spelling import spelt
 from urc.problems import UrcError
 
 __all__ = [
@@ -24,6 +25,7 @@ __all__ = [
     "compile_template",
     "is_byte_filter",
     "last_filter",
+    "spelt",
     "split_template",
     "text_of",
 ]
@@ -134,7 +136,7 @@ def text_of(value: object) -> str:
     """Return `value` as it goes into text."""
     if isinstance(value, bytes):
         raise ExpressionError("bytes are no text; 'hex:' and 'bytes:' take them")
-    return value if isinstance(value, str) else "" if value is None else str(value)
+    return value if isinstance(value, str) else spelt(value)
 
 
 def _check_length(text: str) -> None:

@@ -16,21 +16,22 @@ FLOORS = {
     "__init__": 7,  # the names for Python users: each is imported on first use, from any floor
     "cli": 6,
     "web": 5,
-    "runtime": 4, "simulator": 4, "guard": 4,
-    "config": 3, "protocol": 3, "transports": 3, "packages": 3,
+    "runtime": 4, "simulator": 4,
+    "guard": 3.5,  # a landing: it stands on transports and motion, and sessions stand on it
+    "config": 3, "protocol": 3, "transports": 3, "packages": 3, "motion": 3,
     "model": 2,
     "source": 1, "registry": 1, "shipped": 1, "expressions": 1, "patterns": 1,
     "problems": -1,  # the ground: every error of ours is an UrcError, so all may stand on it
 }  # fmt: skip
 
 # Pure floors do no I/O and have no clock: that is why they can be tested to the last byte.
-PURE = {"model", "protocol"}
+PURE = {"model", "protocol", "motion"}
 IMPURE = {"asyncio", "socket", "ssl", "threading", "starlette", "uvicorn", "websockets"}
 
 MODULES = [str(path.relative_to(ROOT)) for path in sorted((ROOT / "urc").rglob("*.py"))]
 
 
-def floor_of(part: str) -> int:
+def floor_of(part: str) -> float:
     """Return a part's floor: private modules at the top are the cellar, unknown parts a tower."""
     return FLOORS.get(part, 0 if part.startswith("_") else 99)
 

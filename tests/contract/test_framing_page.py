@@ -17,7 +17,7 @@ BLOCKS = re.findall(r"^```yaml\n(.*?)^```$", PAGE, re.MULTILINE | re.DOTALL)
 DEFINITIONS = (
     *(f"{name}Framing" for name in FRAMINGS),
     *("lengthField", "payloadWindow", "switchCase", "checksum", "crcAlgorithm", "foldAlgorithm"),
-    *("checksumWindow", "saltTable"),
+    *("checksumWindow", "saltTable", "escape"),
 )
 
 

@@ -151,7 +151,7 @@ def test_the_emulated_robot_answers_its_polls(file: Path) -> None:
 
 
 def test_the_emulated_robot_answers_its_commands(file: Path) -> None:
-    """With the arguments of the document's own tests; what has conditions is left out."""
+    """With the arguments of the document's own tests; what they require and verify comes true."""
     profile = profile_of(file)
     commands = profile.driver.commands
     talk = Conversation(profile)
@@ -159,7 +159,7 @@ def test_the_emulated_robot_answers_its_commands(file: Path) -> None:
     talk.wait(SHORTEST_S)
     for test in profile.tests:
         command = commands.get(test.run or "")
-        if command is None or test.fails is not None or command.requires or command.verify:
+        if command is None or test.fails is not None:
             continue
         request = Request(1, command.name, test.arguments)
         talk.perform(talk.engine.command(request, talk.now))
@@ -203,7 +203,7 @@ def test_sticks_of_the_tello_wait_for_no_answer() -> None:
     for place, forward in enumerate((10, 20, 30)):
         request = Request(2, "fly", {"forward": forward})
         assert sent(engine.command(request, 0.3 + place / 20)) == b"rc 0 %d 0 0" % forward
-    assert engine.release("fly") == b"rc 0 0 0 0"
+    assert engine.motions.stop_frame("fly") == b"rc 0 0 0 0"
 
 
 def test_answers_of_the_dashboard_are_told_apart_between_each_other() -> None:

@@ -3,6 +3,8 @@
 import re
 from pathlib import Path
 
+import pytest
+
 from urc.config.load import check
 from urc.config.shape import read_schema
 from urc.problems import to_text
@@ -11,13 +13,14 @@ from urc.runtime.coverage import measure
 from urc.runtime.selftest import exercise
 
 PAGE = (Path(__file__).parents[2] / "docs" / "language" / "tests.md").read_text("utf-8")
-(BLOCK,) = re.findall(r"^```yaml\n(.*?)^```$", PAGE, re.MULTILINE | re.DOTALL)
+BLOCKS = re.findall(r"^```yaml\n(.*?)^```$", PAGE, re.MULTILINE | re.DOTALL)
 
 
-def test_robot_of_the_page_passes_its_tests(tmp_path: Path) -> None:
+@pytest.mark.parametrize("block", BLOCKS, ids=range(len(BLOCKS)))
+def test_robot_of_the_page_passes_its_tests(block: str, tmp_path: Path) -> None:
     """Without a finding, and with nothing left out."""
-    file = tmp_path / "registers.yaml"
-    file.write_text(BLOCK, "utf-8")
+    file = tmp_path / "robot.yaml"
+    file.write_text(block, "utf-8")
     checked = check(file, built_in_catalog())
     assert [to_text(one) for one in checked.problems] == []
     assert checked.profile is not None
@@ -28,5 +31,14 @@ def test_robot_of_the_page_passes_its_tests(tmp_path: Path) -> None:
 
 def test_every_key_is_told() -> None:
     """In words, and most of them in the example."""
-    keys = read_schema("driver.schema.json")["$defs"]["test"]["properties"]
-    assert [key for key in keys if not re.search(rf"`{key}\b", PAGE)] == []
+    definitions = read_schema("driver.schema.json")["$defs"]
+    mappings = (
+        "test",
+        "testStep",
+        "testMessage",
+        "testState",
+        "simulatorRule",
+        "simulatorReaction",
+    )
+    keys = {key for name in mappings for key in definitions[name]["properties"]} - {"value"}
+    assert [key for key in sorted(keys) if not re.search(rf"`{key}\b", PAGE)] == []

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from scripts import check, docs
+from scripts import check, docs, needs
 from scripts.needs import NEEDS, Brought
 
 OK = check.Outcome("lint", "", 0.1)
@@ -65,6 +65,28 @@ def test_the_summary_names_the_command_that_brings_what_is_missing(
     lines = capsys.readouterr().out.splitlines()
     assert "LEFT OUT  the tests against a client that is not URC: no netcat" in lines
     assert lines[-2].endswith("apt-get install -y netcat-openbsd")
+
+
+def test_what_npm_brings_is_named_and_left_out_until_it_is_there(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    """Without npm the tests in an editor are left out by name; with it they are not."""
+    monkeypatch.setattr(needs, "LANGUAGE_SERVER", tmp_path / "server")
+    server = next(need for need in NEEDS if need.name == "language-server")
+    brought = Brought(left_out=[server])
+    brought.look_again()
+    assert brought.environment["URC_LEFT_OUT"] == "language-server"
+    check.summarise([OK], brought, "")
+    lines = capsys.readouterr().out.splitlines()
+    assert (
+        "LEFT OUT  the tests of the schemas in an editor's language server: no language-server"
+        in lines
+    )
+    assert lines[-2].endswith("npm ci --ignore-scripts")
+    (tmp_path / "server").touch()
+    brought.look_again()
+    assert brought.left_out == []
+    assert brought.environment["URC_LEFT_OUT"] == ""
 
 
 @pytest.mark.parametrize(

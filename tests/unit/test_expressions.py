@@ -10,7 +10,13 @@ from jinja2.sandbox import SandboxedEnvironment
 
 from urc.expressions import COUNTERS, ExpressionError, compile_expression, compile_template
 
-NAMESPACE = {"x": 7, "y": 2.5, "word": "Go", "settings": {"host": "10.0.0.5", "port": 6789}}
+NAMESPACE = {
+    "row": [3, 1, 2],
+    "x": 7,
+    "y": 2.5,
+    "word": "Go",
+    "settings": {"host": "10.0.0.5", "port": 6789},
+}
 
 SAME_AS_JINJA = [
     "x + 1",
@@ -64,6 +70,23 @@ SAME_AS_JINJA = [
     "'it\\'s' ~ \"\\n\"",
     "1.5e3",
     "1 if false else 2 if false else 3",
+    "row[1:]",
+    "row[:-1]",
+    "row[:]",
+    "word[0:1]",
+    "row[-2:x]",
+    "row | join(',')",
+    "row[:2] | join",
+    "row | min",
+    "row | max",
+    "row | sum",
+    "row | first",
+    "row | last",
+    "word | last",
+    "[] | sum",
+    "x is in row",
+    "x is not in row",
+    "x is number and word is string",
 ]
 
 
@@ -112,7 +135,12 @@ def test_a_template_of_one_expression_keeps_its_type(source: str, expected: obje
         ("{{ x | nope }}", 7, "no filter 'nope'"),
         ("{{ x | hex(1, 2) }}", 7, "takes 0 to 1 arguments"),
         ("{{ x() }}", 4, "calls are not part of the language"),
-        ("{{ word[0:1] }}", 9, "':' is not part of an expression"),
+        ("{{ word[0:1:2] }}", 11, "a begin and an end, no step"),
+        ("{{ x : 1 }}", 5, "':' is not expected here"),
+        ("{{ word is match(x) }}", 17, "a pattern in quotes"),
+        ("{{ word is match }}", 16, "'(' is expected"),
+        ("{{ word is search('a(') }}", 18, "not a pattern"),
+        ("{{ word is match('(?=a)') }}", 17, "look-ahead"),
         ("{{ 1 if x }}", 9, "needs an 'else'"),
         ("{{ x is divisibleby 3 }}", 8, "no test 'divisibleby'"),
         ("{{ }}", 2, "ends too early"),
@@ -155,12 +183,46 @@ def test_a_fault_in_a_template_is_found_when_it_is_compiled(
         ("word.upper", "no part 'upper'"),
         ("word > 3", "not supported"),
         ("word | replace('', 'x')", "something to look for"),
+        ("x[0:1]", "no parts in a row"),
+        ("row['a':]", "a place in a row is a whole number"),
+        ("word | join", "a list is expected"),
+        ("[] | max", "an empty list has none"),
+        ("[] | first", "nothing in it"),
+        ("['a'] | sum", "a list of numbers is expected"),
+        ("word | split('')", "something to look for"),
+        ("x is match('a')", "text is expected"),
+        ("4807 | ddmm('Q')", "N, S, E or W is expected"),
+        ("4867 | ddmm", "degrees and minutes are expected"),
+        ("'x' | ddmm", "degrees and minutes are expected"),
     ],
 )
 def test_a_wrong_operand_is_one_clear_line(source: str, words: str) -> None:
     """Jinja would answer some of these with 0 or a Python attribute."""
     with pytest.raises(ExpressionError, match=words.replace("'", ".")):
         compile_expression(source).evaluate(NAMESPACE)
+
+
+@pytest.mark.parametrize(
+    ("source", "expected"),
+    [
+        ("'4807.038' | ddmm('N')", 48.1173),
+        ("'14718.5084' | ddmm('W')", -147.30847333333333),
+        ("'' | ddmm('N')", None),
+        ("none | ddmm", None),
+        ("'a,b,,c' | split(',')", ["a", "b", "", "c"]),
+        ("' a  b ' | split", ["a", "b"]),
+        ("'OK 12' is match('OK')", True),
+        ("'an OK' is match('OK')", False),
+        ("'an OK' is search('OK$')", True),
+        ("'12' is match('[0-9]+$') and '1x' is not match('[0-9]+$')", True),
+        (r"'a1' is search('\d')", True),
+        ("'OK' is match('NO|OK')", True),
+        ("('1 2 3' | split)[1:] | join('+')", "2+3"),
+    ],
+)
+def test_rows_and_patterns_are_taken_apart(source: str, expected: object) -> None:
+    """What Jinja has not, or has otherwise."""
+    assert compile_expression(source).evaluate(NAMESPACE) == expected
 
 
 def test_the_names_that_a_template_uses_are_known() -> None:

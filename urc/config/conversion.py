@@ -4,6 +4,7 @@ from itertools import pairwise
 from typing import Final
 
 from urc.config.part import Findings, Part
+from urc.config.values import fraction_of
 from urc.model.values import Conversion
 
 __all__ = ["CONVERSION_KEYS", "parse_conversion", "parse_states"]
@@ -60,7 +61,10 @@ def parse_states(part: Part, kind: str, findings: Findings) -> tuple[tuple[str, 
 
 
 def _polynomial(part: Part, findings: Findings) -> tuple[float, ...]:
-    scale, offset = part.number("scale"), part.number("offset")
+    written = part.get("scale")
+    is_fraction = written is not None and isinstance(written.data, str)
+    scale = fraction_of(part.text("scale")) if is_fraction else part.number("scale")
+    offset = part.number("offset")
     coefficients = part.listed("polynomial")
     if coefficients:
         for key in ("scale", "offset"):

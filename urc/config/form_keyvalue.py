@@ -29,13 +29,26 @@ def parse_read(part: Part, findings: Findings, context: FormContext) -> ReadSpec
         keys = {name: name for name in sorted(context.signals)}
     else:
         keys = {key: str(inner.data) for key, inner in named.items()}
-    options = {"pairs": pairs.data, "separator": separator.data, "keys": keys}
-    return ReadSpec("keyvalue", options, tuple(keys.values()))
+    bare = tuple(inner.data or "" for inner in part.listed("first"))
+    for place, inner in enumerate(part.listed("first")):
+        if inner.data and (inner.data in bare[:place] or inner.data in keys.values()):
+            text = f"the field {inner.data!r} stands here twice"
+            findings.error(inner, "duplicate-name", text)
+            return None
+    strip = part.get("strip")
+    options = {
+        "pairs": pairs.data,
+        "separator": separator.data,
+        "keys": keys,
+        "first": bare,
+        "strip": str(strip.data) if strip else None,
+    }
+    return ReadSpec("keyvalue", options, (*filter(None, bare), *keys.values()))
 
 
 def place_of(part: Part, field: str) -> tuple[Part, dict[str, Any]]:
     """Return where the field is named."""
-    for inner in part.named("fields").values():
+    for inner in [*part.listed("first"), *part.named("fields").values()]:
         if inner.data == field:
             return inner, {}
     return part, {}

@@ -13,7 +13,7 @@ __all__ = ["parse_read", "place_of"]
 
 _KINDS: Final = get_args(FieldKind)
 _PIECE = re.compile(r"\{\{|\}\}|\{([^{}]*)\}|[{}]")
-_FIELD = re.compile(r"(_?[A-Za-z][A-Za-z0-9_]*)?:([a-z]+)")
+_FIELD = re.compile(r"(_?[A-Za-z][A-Za-z0-9_]*)?:([a-z]+)(?::([1-9][0-9]{0,3}))?")
 _EATS: Final = {"integer": "0123456789", "number": "0123456789.eE", "hex": "0123456789abcdefABCDEF"}
 """Characters that a field may end with, so that what follows it cannot begin with one."""
 
@@ -56,7 +56,9 @@ def _parse(text: str) -> tuple[tuple[Hole, ...], str]:
             hint = "write {{ or }} for a brace of the frame"
             raise _Fault(f"{piece[0]!r} has no partner", piece.start(), hint=hint)
         else:
-            before = _blanks(literal)
+            # Before a field of fixed width, every blank is a place of its own.
+            is_fixed = piece[1].rpartition(":")[2].isdecimal()
+            before = literal if is_fixed else _blanks(literal)
             _check_after(holes, before, last)
             holes.append(_hole(piece[1], before, piece.start() + 1, holes))
             literal, last = "", piece.span()
@@ -83,18 +85,21 @@ def _hole(inside: str, before: str, offset: int, holes: list[Hole]) -> Hole:
         raise _Fault(text, offset + found.start(2), len(kind), hint)
     if name and any(hole.name == name for hole in holes):
         raise _Fault(f"the field {name!r} stands here twice", offset, len(name))
-    return Hole(before, name, cast("FieldKind", kind))
+    if found[3] and kind == "rest":
+        text = "the rest has no width: it is everything to the end"
+        raise _Fault(text, offset + found.start(3), len(found[3]))
+    return Hole(before, name, cast("FieldKind", kind), int(found[3] or 0))
 
 
 def _check_after(holes: list[Hole], literal: str, last: tuple[int, int]) -> None:
     """Complain when it cannot be told where the last field ends."""
-    if not holes:
+    if not holes or holes[-1].width:
         return
     kind, (start, end) = holes[-1].kind, last
     if kind == "rest":
         raise _Fault("nothing can follow a field of kind 'rest'", start, end - start)
     if not literal:
-        hint = "put what stands between them, or use a regex"
+        hint = "put what stands between them, or say a width: {name:number:6}"
         text = "there is nothing between this field and the next one"
         raise _Fault(text, start, end - start, hint)
     if literal[0] in _EATS.get(kind, ""):

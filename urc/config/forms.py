@@ -32,6 +32,7 @@ __all__ = [
     "FormContext",
     "ReadForm",
     "WriteForm",
+    "body_form",
     "parse_read",
     "parse_write",
     "read_form",
@@ -46,6 +47,7 @@ READ_FORMS = {
     "json": "urc.config.form_json",
     "xml": "urc.config.form_xml",
     "equals": "urc.config.form_equals",
+    "raw": "urc.config.form_raw",
     "struct": "urc.config.form_struct",
 }
 WRITE_FORMS = {
@@ -54,7 +56,14 @@ WRITE_FORMS = {
     "bytes": "urc.config.form_bytes",
     "json": "urc.config.form_json_text",
     "struct": "urc.config.form_struct",
+    "publish": "urc.config.form_envelope",
+    "call": "urc.config.form_envelope",
+    "goal": "urc.config.form_envelope",
+    "cancel": "urc.config.form_envelope",
+    "request": "urc.config.form_envelope",
 }
+_BODIES = ("json", "text", "hex", "bytes", "struct")
+"""Forms that may be the body of an envelope."""
 _NO_READ = ReadSpec("regex")
 _NO_WRITE = WriteSpec("text")
 
@@ -112,6 +121,14 @@ def write_form(part: Part) -> tuple[Part, WriteForm]:
             if key in WRITE_FORMS:
                 return part.must(key), cast("WriteForm", import_module(WRITE_FORMS[key]))
     return part, cast("WriteForm", import_module(WRITE_FORMS["text"]))
+
+
+def body_form(part: Part) -> tuple[Part, WriteForm] | None:
+    """Return what stands under a form's key inside an envelope, and the form's module."""
+    for key in part.data:
+        if key in _BODIES:
+            return part.must(key), cast("WriteForm", import_module(WRITE_FORMS[key]))
+    return None
 
 
 def parse_read(part: Part, findings: Findings, context: FormContext) -> ReadSpec:

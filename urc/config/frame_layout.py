@@ -7,10 +7,11 @@ from typing import Final, NamedTuple
 
 from urc.config.parse_bytes import parse_bytes
 from urc.config.parse_checksum import WrittenChecksum, parse_checksum
+from urc.config.parse_length import check_length, check_loose, parse_length
 from urc.config.part import Findings, Part
 from urc.model.framing import ChecksumSpec, FrameLayout, LengthSpec, Window
 
-__all__ = ["MARKED", "parse_layout"]
+__all__ = ["MARKED", "checksums_of", "parse_layout"]
 
 MARKED: Final = ("fixed", "length", "brackets")
 """Framings whose frames carry bytes of their own."""
@@ -36,15 +37,24 @@ def parse_layout(part: Part, encoding: str, findings: Findings, longest: int) ->
         if kind == "brackets":
             _check_marks(part, findings)
     size = part.integer("size") if kind == "fixed" else None
-    length = _length(part.must("length")) if kind == "length" else None
+    length = parse_length(part.must("length"), encoding, findings) if kind == "length" else None
     frame = _Frame(start, end, size, length)
     if length is not None:
-        _check_length(part.must("length"), frame, findings)
-    inner = part.get("checksum")
-    written = parse_checksum(inner, encoding, findings) if inner else None
-    layout = _placed(part, frame, written, findings)
+        check_length(part.must("length"), start, length, findings)
+        if length.is_loose:
+            check_loose(part, findings)
+    found = [parse_checksum(one, encoding, findings) for one in checksums_of(part)]
+    layout = _placed(part, frame, [one for one in found if one is not None], findings)
     _check_size(part, layout, longest, findings)
     return layout
+
+
+def checksums_of(part: Part) -> list[Part]:
+    """Return the checksums of the framing at `part`: there may be one, or a list of them."""
+    inner = part.get("checksum")
+    if inner is None:
+        return []
+    return inner.items() if isinstance(inner.data, list) else [inner]
 
 
 def _check_marks(part: Part, findings: Findings) -> None:
@@ -59,66 +69,57 @@ def _check_marks(part: Part, findings: Findings) -> None:
             )
 
 
-def _length(part: Part) -> LengthSpec:
-    size = part.integer("size") or 1
-    spelling = part.text("as", "raw")
-    return LengthSpec(
-        offset=part.integer("offset") or 0,
-        size=size,
-        is_big=part.text("endian", "big") == "big",
-        adjust=part.integer("adjust") or 0,
-        unit=part.integer("unit") or 1,
-        bits=part.integer("bits") or 64,
-        spelling=spelling,  # type: ignore[arg-type]  # the schema's enum is this Literal
-    )
-
-
-def _check_length(part: Part, frame: _Frame, findings: Findings) -> None:
-    length = frame.length
-    if length is None:
-        return
-    if length.offset < len(frame.start):
-        findings.error(
-            part,
-            "overlap",
-            f"the length field at {length.offset} lies in the start bytes",
-            at="offset",
-            hint="places count from the first byte of the frame, start bytes included",
-        )
-    most = 8 * length.size if length.spelling == "raw" else 64
-    if length.bits != 64 and length.bits > most:
-        findings.error(part, "too-wide", f"the field has {most} bits, not {length.bits}", at="bits")
-
-
 def _placed(
-    part: Part, frame: _Frame, written: WrittenChecksum | None, findings: Findings
+    part: Part, frame: _Frame, written: list[WrittenChecksum], findings: Findings
 ) -> FrameLayout:
     """Return the layout with the places that follow from each other."""
     start, end, size, length = frame
-    width = written.size if written else 0
-    last = -len(end) - width
-    at = last if written is None or written.at is None else written.at
-    if size is not None and 0 <= at == size + last:
-        at = last
-    head = len(start)
-    if length is not None and length.offset == head:
+    head, tail = len(start), len(end)
+    if length is not None and length.is_loose:
+        head = length.offset
+    elif length is not None and length.offset == head:
         head = length.offset + length.size
-    if written is not None and at == head:
-        head += width
-    tail = len(end) + (width if at == last else 0)
+    places: list[int] = []
+    lasts: list[bool] = []
+    for one in written:
+        # Those at the end stand in their order: what comes later lies further back.
+        behind = [other.size for other in written[len(places) + 1 :] if other.at is None]
+        last = -len(end) - one.size - sum(behind)
+        at = last if one.at is None else one.at
+        if size is not None and 0 <= at == size + last:
+            at = last
+        if at == head:
+            head += one.size
+        if at == last:
+            tail += one.size
+        places.append(at)
+        lasts.append(at == last)
     payload = part.get("payload") if part.text("type") == "length" else None
     if payload is not None:
         head, tail = _payload(payload, frame, head, tail, findings)
     layout = FrameLayout(start, end, head, tail, size, length)
-    if written is None:
+    specs = []
+    for one, at, is_last in zip(written, places, lasts, strict=True):
+        spec = _checksum(one, at, is_last, layout)
+        _check_checksum(one.part, spec, layout, findings)
+        specs.append(spec)
+    if not specs:
         return layout
-    over = _over(written, at == last, layout)
-    checksum = ChecksumSpec(
+    return layout._replace(checksum=specs[-1], checksums=tuple(specs[:-1]))
+
+
+def _checksum(
+    written: WrittenChecksum, at: int, is_last: bool, layout: FrameLayout
+) -> ChecksumSpec:
+    # A window without an end goes up to a checksum that stands at the end, or to the end bytes.
+    behind = len(layout.end)
+    if is_last:
+        behind = -at if at < 0 else behind + written.size
+    over = _over(written, behind, layout)
+    return ChecksumSpec(
         written.algorithm, written.bits, over, at, written.is_big, written.spelling,
-        written.salt, written.is_from_hex, written.closes,
+        written.salt, written.is_from_hex, written.closes, written.before,
     )  # fmt: skip
-    _check_checksum(written.part, checksum, layout, findings)
-    return layout._replace(checksum=checksum)
 
 
 def _payload(
@@ -144,9 +145,8 @@ def _payload(
     return head, tail
 
 
-def _over(written: WrittenChecksum, is_last: bool, layout: FrameLayout) -> Window:
-    behind = -len(layout.end) - (written.size if is_last else 0)
-    stop = behind or None
+def _over(written: WrittenChecksum, behind: int, layout: FrameLayout) -> Window:
+    stop = -behind or None
     if isinstance(written.over, Window):
         return written.over if written.over.stop is not None else Window(written.over.start, stop)
     if written.over == "frame":

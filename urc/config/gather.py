@@ -4,7 +4,7 @@ The result says, for each part of a profile, in which document it stands: a robo
 driver and its interfaces in files of their own, and each of them may build on others.
 """
 
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 from urc.config.each import expand
 from urc.config.library import Library
@@ -15,7 +15,10 @@ from urc.config.shape import check_shape, kind_of, read_schema
 from urc.problems import Problem, ProblemsError, has_errors
 from urc.source import Document
 
-__all__ = ["Gathered", "Sources", "gather"]
+__all__ = ["EMULATED", "Gathered", "Sources", "gather"]
+
+EMULATED: Final = ("signals", "state")
+"""Keys of a simulator that are no transports: the values with which it begins."""
 
 
 class Sources:
@@ -32,6 +35,7 @@ class Sources:
         self.interfaces: dict[str, Part] = {}
         self.tests: list[Part] = []
         self.simulator: dict[str, Part] = {}
+        """Rules by transport, and what is under the keys in `EMULATED`."""
 
     def add(self, part: Part) -> None:
         """Take what `part` says beside its wire; it goes before what was there."""
@@ -40,6 +44,11 @@ class Sources:
             self.slots.setdefault(slot, []).append(use)
         self.tests += part.listed("tests")
         self.simulator |= part.named("simulator")
+        simulator = part.get("simulator")
+        for key in EMULATED:
+            inner = simulator.get(key) if simulator else None
+            if inner is not None:
+                self.simulator[key] = inner
 
 
 class Gathered(NamedTuple):

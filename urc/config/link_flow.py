@@ -5,12 +5,11 @@ from typing import Protocol
 
 from urc.config.part import Findings, Part
 from urc.config.suggest import did_you_mean
-from urc.config.values import check_within, fit, fit_hint
+from urc.config.values import check_within, fit_argument, fit_hint
 from urc.expressions import COUNTERS, Template
 from urc.model.codec import ReadSpec, WriteSpec
 from urc.model.driver import Argument, Command, Driver, Poll, Reply
 from urc.model.flow import ErrorReply
-from urc.model.values import Value
 
 __all__ = [
     "Linker",
@@ -49,15 +48,46 @@ class Linker(Protocol):
 def link_command(linker: Linker, part: Part, command: Command) -> None:
     """Check what a command says beside what it sends."""
     known = {*linker.driver.signals, *command.arguments}
-    if command.reply is not None:
+    if command.reply is not None and "reply" in part.data:
         link_reply(linker, part.must("reply"), command.reply, command.arguments, command.send)
-    for inner, one in zip(part.listed("requires"), command.requires, strict=True):
-        linker.template(inner.must("expr"), one.condition, known)
+    link_requirements(linker, part, command)
     if command.verify is not None:
         linker.template(part.must("verify").must("expr"), command.verify.condition, known)
     if command.hold is not None:
         release = part.must("hold").must("release")
         link_arguments(linker.findings, release, command, release.entries(), "release")
+        if _needs_two(command):
+            linker.findings.error(
+                part.must("hold"),
+                "wrong-command",
+                "what is held is one person's doing: nobody can confirm it with every newest value",
+                key=True,
+                hint="let two people confirm a command that enables the motion",
+            )
+
+
+def link_requirements(linker: Linker, part: Part, command: Command) -> None:
+    """Check the names in the conditions of a command or sequence."""
+    known = {*linker.driver.signals, *command.arguments}
+    for inner, one in zip(part.listed("requires"), command.requires, strict=True):
+        linker.template(inner.must("expr"), one.condition, known)
+
+
+def refuse_two_person(linker: Linker, part: Part, command: Command) -> None:
+    """Report what is done by nobody, and yet wants two people to say yes."""
+    if _needs_two(command):
+        linker.findings.error(
+            part,
+            "wrong-command",
+            f"{command.name!r} must be confirmed by two people, and here nobody asks for it",
+            hint="run a command that needs no second person",
+        )
+
+
+def _needs_two(command: Command) -> bool:
+    asked = [one for argument in command.arguments.values() for one in argument.confirm.values()]
+    asked += [command.confirm] if command.confirm is not None else []
+    return any(one.is_two_person for one in asked)
 
 
 def link_poll(linker: Linker, part: Part, poll: Poll) -> None:
@@ -67,7 +97,7 @@ def link_poll(linker: Linker, part: Part, poll: Poll) -> None:
     if not poll.run:
         linker.transport(part, "to", poll.transport)
         linker.templates(part.must("send"), poll.send, (COUNTERS,))
-        if poll.reply is not None:
+        if poll.reply is not None and "reply" in part.data:
             link_reply(linker, part.must("reply"), poll.reply, (), poll.send)
         return
     command = find_command(linker, part.must("run"), poll.run)
@@ -83,6 +113,7 @@ def link_poll(linker: Linker, part: Part, poll: Poll) -> None:
         )
         return
     link_arguments(linker.findings, part, command, part.named("args"), "run")
+    refuse_two_person(linker, part.must("run"), command)
 
 
 def link_reply(
@@ -138,6 +169,7 @@ def link_keepalives(linker: Linker, part: Part) -> None:
         command = find_command(linker, place.must("run"), keepalive.run)
         if command is not None:
             link_arguments(linker.findings, place, command, {}, "run")
+            refuse_two_person(linker, place.must("run"), command)
 
 
 def find_command(linker: Linker, part: Part, name: str) -> Command | None:
@@ -194,16 +226,18 @@ def link_arguments(
 
 
 def _check_value(part: Part, argument: Argument, findings: Findings) -> None:
-    value: Value = part.data
+    value = part.data
     try:
-        check_within(fit(value, argument.type), argument.min, argument.max, part, findings)
+        elements = fit_argument(value, argument.type, argument.of, argument.size)
     except ValueError as error:
         text = f"argument {argument.name!r}: {error}"
         findings.error(part, "wrong-type", text, hint=fit_hint(value, argument.type))
         return
-    if argument.choices and value not in argument.choices:
-        text = f"{value!r} is not one of the choices of {argument.name!r}"
-        findings.error(part, "unknown-word", text)
+    for one in elements:
+        check_within(one, argument.min, argument.max, part, findings)
+        if argument.choices and one not in argument.choices:
+            text = f"{one!r} is not one of the choices of {argument.name!r}"
+            findings.error(part, "unknown-word", text)
 
 
 def _refusal_parts(part: Part) -> list[Part]:

@@ -3,11 +3,12 @@
 Frames with expressions in them are checked when they are made.
 """
 
+from collections.abc import Iterable
 from typing import cast
 
 from urc.config.forms import write_form
 from urc.config.part import Findings, Part
-from urc.expressions import ExpressionError
+from urc.expressions import ExpressionError, Template
 from urc.model.codec import WriteSpec
 from urc.model.driver import Driver, FramingSpec, TransportSpec
 from urc.model.framing import FrameLayout
@@ -27,16 +28,16 @@ def check_frames(part: Part, driver: Driver, findings: Findings) -> None:
 
 def _check(part: Part, send: WriteSpec, spec: TransportSpec | None, findings: Findings) -> None:
     written = part.get("send")
-    if spec is None or written is None or send.form != "text":
+    if spec is None or written is None:
         return
     inner, form = write_form(written)
-    templates = [template for _, template in form.templates(inner, send)]
-    if len(templates) != 1 or not templates[0].is_constant:
+    if send.form == "text":
+        _check_end(inner, findings)
+        data = _text(form.templates(inner, send), spec.encoding)
+    else:
+        data = _bytes(send)
+    if data is None:
         return
-    try:
-        data = templates[0].render({}).encode(spec.encoding)
-    except (ExpressionError, UnicodeEncodeError):
-        return  # told elsewhere
     framing = spec.framing.sent or spec.framing
     layout = cast("FrameLayout | None", framing.options.get("layout")) or FrameLayout()
     for mark in _marks(framing, layout):
@@ -44,7 +45,7 @@ def _check(part: Part, send: WriteSpec, spec: TransportSpec | None, findings: Fi
             findings.error(
                 inner,
                 "contains-delimiter",
-                f"the text has {_shown(mark)} in it, which the framing puts around each frame:"
+                f"{_what(send)} {_shown(mark)} in it, which the framing puts around each frame:"
                 " it would be two frames",
                 hint="take it away: the framing adds what marks a frame",
             )
@@ -54,7 +55,40 @@ def _check(part: Part, send: WriteSpec, spec: TransportSpec | None, findings: Fi
         findings.error(
             inner,
             "wrong-size",
-            f"the text has {len(data)} bytes, and a frame of this line holds exactly {wanted}",
+            f"{_what(send)} {len(data)} bytes, and a frame of this line holds exactly {wanted}",
+        )
+
+
+def _text(templates: Iterable[tuple[Part, Template]], encoding: str) -> bytes | None:
+    """Return the bytes of a constant text; None when it is none, or that is told elsewhere."""
+    found = [template for _, template in templates]
+    if len(found) != 1 or not found[0].is_constant:
+        return None
+    try:
+        return found[0].render({}).encode(encoding)
+    except (ExpressionError, UnicodeEncodeError):
+        return None
+
+
+def _bytes(send: WriteSpec) -> bytes | None:
+    """Return the bytes that ``hex`` and ``bytes`` write out; None where something varies."""
+    pieces = cast("tuple[object, ...]", send.options.get("pieces", (None,)))
+    fixed = [one for one in pieces if isinstance(one, bytes)]
+    return b"".join(fixed) if len(fixed) == len(pieces) else None
+
+
+def _what(send: WriteSpec) -> str:
+    return "the text has" if send.form == "text" else "the frame has"
+
+
+def _check_end(part: Part, findings: Findings) -> None:
+    """Warn of a text that ends in a backslash and a letter, as if it were a line end."""
+    if isinstance(part.data, str) and part.data.endswith(("\\n", "\\r")):
+        findings.warn(
+            part,
+            "literal-backslash",
+            f"this ends in the 2 characters {part.data[-2:]}, not in a control character",
+            hint='take them away: the framing adds the end; "\\r" in double quotes is a CR',
         )
 
 

@@ -3,12 +3,13 @@
 from collections.abc import Mapping
 
 from urc.config.gather import Sources
+from urc.config.link_outputs import link_output
 from urc.config.parse_widget import Shelf
 from urc.config.part import Findings, Part
 from urc.config.shape import check_options
 from urc.config.suggest import did_you_mean, listed
 from urc.model.driver import Driver
-from urc.model.interface import Interface, WidgetUse
+from urc.model.interface import Given, Interface, WidgetUse
 from urc.model.values import Signal
 from urc.model.widget import Port, Widget
 
@@ -107,7 +108,7 @@ def _use(
                 hint=shelf.hint(name),
             )
         return None  # a broken manifest is told where it stands
-    inputs, outputs = _bindings(part, widget, base, driver, findings)
+    inputs, outputs, given = _bindings(part, widget, base, driver, findings)
     return WidgetUse(
         slot=part.name,
         widget=name,
@@ -115,28 +116,32 @@ def _use(
         outputs=outputs,
         options=_options(part, widget, base, findings),
         title=part.text("title", base.title if base else ""),
+        given=given,
     )
 
 
 def _bindings(
     part: Part, widget: Widget, base: WidgetUse | None, driver: Driver | None, findings: Findings
-) -> tuple[dict[str, str], dict[str, str]]:
+) -> tuple[dict[str, str], dict[str, str], dict[str, Given]]:
     inputs = _kept(base.inputs if base else {}, widget.inputs)
     outputs = _kept(base.outputs if base else {}, widget.outputs)
+    given = {key: one for key, one in (base.given if base else {}).items() if key in outputs}
     for key, inner in part.named("bind").items():
         if key in widget.inputs:
+            if not isinstance(inner.data, str):
+                findings.error(
+                    inner,
+                    "wrong-type",
+                    f"{key!r} is an input: the name of a signal is expected",
+                    hint="only outputs take a command with its arguments",
+                )
+                continue
             inputs[key] = inner.data
             if driver is not None:
                 _check_signal(inner, widget, widget.inputs[key], driver, findings)
         elif key in widget.outputs:
-            outputs[key] = inner.data
-            if driver is not None and inner.data not in driver.commands:
-                findings.error(
-                    inner,
-                    "unknown-command",
-                    f"there is no command {inner.data!r}",
-                    hint=did_you_mean(inner.data, driver.commands, "commands"),
-                )
+            port = widget.outputs[key]
+            outputs[key], given[key] = link_output(inner, port, widget, driver, findings)
         else:
             findings.error(
                 inner,
@@ -157,7 +162,7 @@ def _bindings(
                     key=True,
                     hint=_binding_hint(port, driver),
                 )
-    return inputs, outputs
+    return inputs, outputs, given
 
 
 def _kept(bound: Mapping[str, str], ports: Mapping[str, Port]) -> dict[str, str]:

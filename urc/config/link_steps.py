@@ -1,6 +1,13 @@
 """Names in sequences: what is sent, expected and run, and that no sequence runs itself."""
 
-from urc.config.link_flow import Linker, find_command, link_arguments, link_refusals
+from urc.config.link_flow import (
+    Linker,
+    find_command,
+    link_arguments,
+    link_refusals,
+    link_requirements,
+    refuse_two_person,
+)
 from urc.config.part import Part
 from urc.expressions import COUNTERS, Template
 from urc.model.driver import Driver
@@ -9,14 +16,21 @@ from urc.model.flow import (
     FailStep,
     IfStep,
     PromptStep,
+    RepeatStep,
     RunStep,
     SendStep,
     SetStep,
     Step,
+    UntilStep,
     all_steps,
 )
 
-__all__ = ["link_sequences"]
+__all__ = ["link_sequences", "steps_of"]
+
+
+def steps_of(part: Part) -> Part:
+    """Return the list of steps of the sequence at `part`, however it is written."""
+    return part.must("steps") if isinstance(part.data, dict) else part
 
 
 def link_sequences(linker: Linker, part: Part) -> None:
@@ -32,7 +46,10 @@ def link_sequences(linker: Linker, part: Part) -> None:
                 hint="give each its own name",
             )
             continue
-        _Walk(linker, is_named=True).steps(inner, linker.driver.commands[name].steps)
+        command = linker.driver.commands[name]
+        if isinstance(inner.data, dict):
+            link_requirements(linker, inner, command)
+        _Walk(linker, is_named=True).steps(steps_of(inner), command.steps)
         cycle = _cycle(name, linker.driver)
         if cycle:
             linker.findings.error(
@@ -40,7 +57,7 @@ def link_sequences(linker: Linker, part: Part) -> None:
                 "circular-run",
                 f"{name!r} runs itself: {' → '.join(cycle)}",
                 key=True,
-                hint="a sequence has an end: there are no loops",
+                hint="write repeat: [ … ] with 'times' for what is done again and again",
             )
     for name, inner in part.named("transports").items():
         spec = linker.driver.transports[name]
@@ -75,6 +92,11 @@ class _Walk:
                 self._transport(part, "from", step.transport)
                 self._must_last(part.must("prompt"), step.transport)
                 self._otherwise(part, step.otherwise)
+            case UntilStep():
+                self._template(part.must("wait").must("until"), step.condition)
+                self._otherwise(part, step.otherwise)
+            case RepeatStep():
+                self._repeat(part, step)
             case RunStep():
                 self._run(part, step)
             case SetStep():
@@ -103,6 +125,26 @@ class _Walk:
                 self._linker.field(inner, name, {"offset": offset, "length": len(name)})
         self._known |= {name for name in step.read.fields if name.startswith("_")}
 
+    def _repeat(self, part: Part, step: RepeatStep) -> None:
+        self.steps(part.must("repeat"), step.body)
+        if step.until is not None:
+            self._template(part.must("until"), step.until)
+        self._otherwise(part, step.otherwise)
+        commands = self._linker.driver.commands
+        for one in all_steps(step.body):
+            if isinstance(one, RunStep) and one.command in commands:
+                loops = _loops(one.command, self._linker.driver)
+                if loops:
+                    self._linker.findings.error(
+                        part,
+                        "too-many-steps",
+                        f"{loops!r} repeats, too, and it is run in here: nobody can say how long"
+                        " that takes",
+                        at="repeat",
+                        key=True,
+                        hint="repeat in one of them only",
+                    )
+
     def _run(self, part: Part, step: RunStep) -> None:
         command = find_command(self._linker, part.must("run"), step.command)
         given = part.named("args")
@@ -111,6 +153,8 @@ class _Walk:
         if command is None:
             return
         link_arguments(self._linker.findings, part, command, given, "run")
+        if not self._is_named:
+            refuse_two_person(self._linker, part.must("run"), command)
         if command.reply is not None:
             reads = [command.reply.read, *(one.read for one in command.reply.stages)]
             self._known |= {f"_{name.lstrip('_')}" for read in reads for name in read.fields}
@@ -138,6 +182,21 @@ class _Walk:
                 f"{transport!r} has a connection for each request, and none between two steps",
                 hint="run a command that has a reply, or make the connection persistent",
             )
+
+
+def _loops(start: str, driver: Driver) -> str:
+    """Return the first sequence that `start` runs, or is, and that repeats something; else ""."""
+    waiting, seen = [start], {start}
+    while waiting:
+        name = waiting.pop(0)
+        command = driver.commands.get(name)
+        for step in all_steps(command.steps if command else ()):
+            if isinstance(step, RepeatStep):
+                return name
+            if isinstance(step, RunStep) and step.command not in seen:
+                seen.add(step.command)
+                waiting.append(step.command)
+    return ""
 
 
 def _cycle(start: str, driver: Driver) -> list[str]:

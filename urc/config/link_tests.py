@@ -1,14 +1,15 @@
 """Names in the tests that documents carry about themselves."""
 
 from collections.abc import Mapping
+from typing import Final
 
 from urc.config.parse_profile import setting_value
 from urc.config.part import Findings, Part
 from urc.config.suggest import did_you_mean
-from urc.config.values import check_within, fit, fit_hint
+from urc.config.values import check_within, fit, fit_argument, fit_hint
 from urc.model.driver import Command, Driver
-from urc.model.profile import DocumentTest, Setting
-from urc.model.values import Signal, Value
+from urc.model.profile import DialogueStep, DocumentTest, Expected, Setting, State
+from urc.model.values import Limits, Signal, Value
 
 __all__ = ["link_test"]
 
@@ -21,38 +22,138 @@ def link_test(
     findings: Findings,
 ) -> DocumentTest:
     """Return the test with values of the signals' types and the poll it names by its index."""
-    if not test.feed and test.run is None and test.reply_to is None:
-        findings.error(
-            part, "missing-key", "'feed' or 'run' is missing: this test does nothing", key=True
-        )
-    elif not test.expect and not test.sent and test.fails is None:
-        findings.error(
-            part,
-            "missing-key",
-            "'expect', 'sent' or 'fails' is missing: this test cannot fail",
-            key=True,
-        )
-    for key in ("feed", "sent"):
-        for name, inner in part.named(key).items():
-            if name not in driver.transports:
-                findings.error(
-                    inner,
-                    "unknown-transport",
-                    f"there is no transport {name!r}",
-                    key=True,
-                    hint=did_you_mean(name, driver.transports, "transports"),
-                )
-    expect = {}
-    for name, inner in part.named("expect").items():
-        expect[name] = _expected(name, inner, driver, findings)
-    _check_run(part, test, driver, findings)
+    if test.steps:
+        _check_polls(part, driver, findings)
+        steps = _link_steps(part, test.steps, driver, findings)
+    else:
+        _check_purpose(part, test, findings)
+        steps = ()
+    _check_transports(part, driver, findings)
+    _check_run(part, test.run, test.arguments, driver, findings, may_fail=test.fails is not None)
     return test._replace(
-        expect=expect,
+        expect=_link_expect(part, driver, findings),
         reply_to=_reply_to(part, test, driver, findings),
         settings={
             name: _setting(inner, settings, findings)
             for name, inner in part.named("settings").items()
         },
+        steps=steps,
+    )
+
+
+def _check_purpose(part: Part, test: DocumentTest, findings: Findings) -> None:
+    text = ""
+    if not test.feed and test.run is None and test.reply_to is None:
+        text = "'feed' or 'run' is missing: this test does nothing"
+    elif not test.expect and not test.sent and test.fails is None:
+        text = "'expect', 'sent' or 'fails' is missing: this test cannot fail"
+    if text:
+        findings.error(part, "missing-key", text, key=True)
+
+
+_COMES: Final = ("message", "response", "feedback")
+_GOES: Final = ("publish", "call", "goal", "cancel", "request")
+"""Kinds of messages that are fed, and of those that are sent."""
+
+
+def _check_transports(part: Part, driver: Driver, findings: Findings) -> None:
+    for key, verbs in (("feed", _COMES), ("sent", _GOES)):
+        for name, inner in part.named(key).items():
+            _check_transport(name, inner, driver, findings, key=True)
+            for one in inner.items() if isinstance(inner.data, list) else [inner]:
+                _check_verb(one, verbs, f"is never {'fed' if key == 'feed' else key}", findings)
+
+
+def _check_verb(part: Part, verbs: tuple[str, ...], why_not: str, findings: Findings) -> None:
+    if isinstance(part.data, dict):
+        for verb in part.data.keys() - {"hex", *verbs}:
+            hint = did_you_mean(verb, verbs, "kinds")
+            findings.error(
+                part, "misplaced-key", f"'{verb}' {why_not}", at=verb, key=True, hint=hint
+            )
+
+
+def _check_transport(
+    name: str, part: Part, driver: Driver, findings: Findings, *, key: bool = False
+) -> None:
+    if name not in driver.transports:
+        findings.error(
+            part,
+            "unknown-transport",
+            f"there is no transport {name!r}",
+            key=key,
+            hint=did_you_mean(name, driver.transports, "transports"),
+        )
+
+
+def _check_polls(part: Part, driver: Driver, findings: Findings) -> None:
+    names = [poll.name for poll in driver.polls]
+    for inner in part.listed("polls"):
+        if inner.data not in names:
+            text = f"no poll is called {inner.data!r}"
+            hint = did_you_mean(str(inner.data), names, "polls")
+            findings.error(inner, "unknown-request", text, hint=hint)
+
+
+_CHECKS: Final = ("sent", "expect", "reply", "fails", "closed")
+
+
+def _link_steps(
+    part: Part, steps: tuple[DialogueStep, ...], driver: Driver, findings: Findings
+) -> tuple[DialogueStep, ...]:
+    parts = part.listed("steps")
+    if not any(key in inner.data for inner in parts for key in _CHECKS):
+        words = ", ".join(f"'{key}'" for key in _CHECKS[:-1])
+        text = f"{words} or '{_CHECKS[-1]}' is in no step: this test cannot fail"
+        findings.error(part, "missing-key", text, at="steps", key=True)
+    linked = []
+    for place, (inner, step) in enumerate(zip(parts, steps, strict=True)):
+        after = steps[place + 1] if place + 1 < len(steps) else step
+        _check_transports(inner, driver, findings)
+        for key in ("connects", "closes", "closed"):
+            if key in inner.data:
+                named = inner.must(key)
+                _check_transport(str(named.data), named, driver, findings)
+        spec = driver.transports.get(step.connects)
+        if spec is not None and spec.connection == "per_request":
+            text = f"{spec.name!r} is connected for each request, and by it"
+            hint = "run a command that asks something there"
+            findings.error(inner, "wrong-transport", text, at="connects", hint=hint)
+        may_fail = bool(step.fails or after.fails)
+        _check_run(inner, step.run or None, step.arguments, driver, findings, may_fail=may_fail)
+        if step.of and step.of not in driver.commands:
+            text = f"there is no command {step.of!r}"
+            hint = did_you_mean(step.of, driver.commands, "commands")
+            findings.error(inner, "unknown-command", text, at="of", hint=hint)
+        linked.append(step._replace(expect=_link_expect(inner, driver, findings)))
+    return tuple(linked)
+
+
+def _link_expect(part: Part, driver: Driver, findings: Findings) -> dict[str, Expected]:
+    """Return what is expected, with values of the signals' types."""
+    return {
+        name: _state(name, inner, driver, findings) for name, inner in part.named("expect").items()
+    }
+
+
+def _state(name: str, part: Part, driver: Driver, findings: Findings) -> Expected:
+    if not isinstance(part.data, dict):
+        return _expected(name, part, driver, findings)
+    signal = driver.signals.get(name)
+    alarm = part.text("alarm")
+    if signal is not None and alarm not in ("", "none") and signal.limits == Limits():
+        text = f"signal {name!r} has no limits"
+        findings.error(part, "misplaced-key", text, at="alarm", hint="give it limits")
+    if "value" in part.data and part.text("age") == "never":
+        text = "what was never set has no value"
+        findings.error(part, "misplaced-key", text, at="value", key=True)
+    inner = part.get("value")
+    value = _expected(name, inner if inner else part, driver, findings, is_part=inner is None)
+    return State(
+        has_value=inner is not None,
+        value=value,
+        alarm=None if not alarm else "" if alarm == "none" else alarm,  # type: ignore[arg-type]  # the schema's enum
+        age=part.text("age"),  # type: ignore[arg-type]  # as above
     )
 
 
@@ -73,8 +174,9 @@ def _setting(part: Part, settings: Mapping[str, Setting], findings: Findings) ->
 
 
 def _expected(
-    name: str, part: Part, driver: Driver, findings: Findings
+    name: str, part: Part, driver: Driver, findings: Findings, *, is_part: bool = False
 ) -> Value | tuple[Value, ...]:
+    """Return the value at `part`, or None when it is only a `part` of what is expected."""
     signal = driver.signals.get(name)
     if signal is None:
         findings.error(
@@ -85,7 +187,7 @@ def _expected(
             hint=did_you_mean(name, driver.signals, "signals"),
         )
         return None
-    if part.data is None:
+    if part.data is None or is_part:
         return None
     if (signal.type == "array") != isinstance(part.data, list):
         wanted = f"a list of {signal.of}s" if signal.type == "array" else "no list"
@@ -157,39 +259,47 @@ def _reply_to(
     return waiting
 
 
-def _check_run(part: Part, test: DocumentTest, driver: Driver, findings: Findings) -> None:
-    if test.run is None:
+def _check_run(
+    part: Part,
+    run: str | None,
+    arguments: Mapping[str, object],
+    driver: Driver,
+    findings: Findings,
+    *,
+    may_fail: bool,
+) -> None:
+    if run is None:
         if "args" in part.data:
             findings.error(part, "misplaced-key", "'args' without 'run'", at="args", key=True)
         return
-    command = driver.commands.get(test.run)
+    command = driver.commands.get(run)
     if command is None:
         findings.error(
             part,
             "unknown-command",
-            f"there is no command {test.run!r}",
+            f"there is no command {run!r}",
             at="run",
-            hint=did_you_mean(test.run, driver.commands, "commands"),
+            hint=did_you_mean(run, driver.commands, "commands"),
         )
         return
     for name, inner in part.named("args").items():
-        _check_argument(name, inner, command, test, findings)
+        _check_argument(name, inner, command, findings, may_fail=may_fail)
     missing = [
         name for name, one in command.arguments.items()
-        if one.is_required and one.default is None and name not in test.arguments
+        if one.is_required and one.default is None and name not in arguments
     ]  # fmt: skip
-    if missing and test.fails is None:
+    if missing and not may_fail:
         findings.error(
             part,
             "missing-argument",
-            f"command {test.run!r} needs {missing[0]!r}",
+            f"command {run!r} needs {missing[0]!r}",
             at="run",
             hint=f"write args: {{ {missing[0]}: … }}",
         )
 
 
 def _check_argument(
-    name: str, part: Part, command: Command, test: DocumentTest, findings: Findings
+    name: str, part: Part, command: Command, findings: Findings, *, may_fail: bool
 ) -> None:
     argument = command.arguments.get(name)
     if argument is None:
@@ -201,10 +311,10 @@ def _check_argument(
             hint=did_you_mean(name, command.arguments, "arguments"),
         )
         return
-    if test.fails is not None:
+    if may_fail:
         return  # a test about a failure may give what is refused
     try:
-        value = fit(part.data, argument.type)
+        elements = fit_argument(part.data, argument.type, argument.of, argument.size)
     except ValueError as error:
         findings.error(
             part,
@@ -213,6 +323,8 @@ def _check_argument(
             hint=fit_hint(part.data, argument.type),
         )
         return
-    check_within(value, argument.min, argument.max, part, findings)
-    if argument.choices and value not in argument.choices:
-        findings.error(part, "unknown-word", f"{part.data!r} is not one of the choices of {name!r}")
+    for one in elements:
+        check_within(one, argument.min, argument.max, part, findings)
+        if argument.choices and one not in argument.choices:
+            text = f"{one!r} is not one of the choices of {name!r}"
+            findings.error(part, "unknown-word", text)

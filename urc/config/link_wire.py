@@ -7,15 +7,18 @@ from urc.config.forms import read_form, write_form
 from urc.config.gather import Sources
 from urc.config.link_flow import link_command, link_keepalives, link_poll
 from urc.config.link_frames import check_frames
+from urc.config.link_messages import check_messages, check_via
+from urc.config.link_options import check_option
 from urc.config.link_signals import link_signals
 from urc.config.link_steps import link_sequences
-from urc.config.parse_line import templates_of
+from urc.config.parse_line import option_templates
 from urc.config.part import Findings, Part
 from urc.config.suggest import did_you_mean
 from urc.expressions import COUNTERS, Template
 from urc.model.codec import ReadSpec, WriteSpec
 from urc.model.driver import Driver
 from urc.model.profile import Setting, SimulatorRule
+from urc.model.values import NOTHING, Reading
 
 __all__ = ["Uses", "link_driver", "link_simulator"]
 
@@ -69,6 +72,8 @@ class _Linker:
         for field in read.fields:
             if field in read.sets:
                 self.field(part.must("set").must(field), field, {"key": True})
+            elif field in read.collects:
+                self.field(part.must("collect").must(field), field, {"key": True})
             elif field in self.driver.signals or not field.startswith("_"):
                 place, where = form.place_of(inner, field)
                 self.field(place, field, where)
@@ -89,7 +94,9 @@ class _Linker:
 
     def _beside(self, part: Part, read: ReadSpec) -> None:
         """Check the names in what stands beside a form."""
-        known = [name for name in read.fields if name not in read.sets]
+        known = [
+            name for name in read.fields if name not in read.sets and name not in read.collects
+        ]
         for name, inner in part.named("fields").items():
             if name not in known:
                 self.findings.error(
@@ -99,10 +106,18 @@ class _Linker:
                     key=True,
                     hint=did_you_mean(name, known, "fields"),
                 )
+        if read.topic is not None:
+            self.template(part.must("subscribe").must("topic"), read.topic)
         for name, template in read.sets.items():
             self.template(part.must("set").must(name), template, known)
         if read.when is not None:
             self.template(part.must("when"), read.when, known)
+        for name, collect in read.collects.items():
+            inner = part.must("collect").must(name)
+            for key in ("value", "begin", "end"):
+                template = getattr(collect, key)
+                if template is not None:
+                    self.template(inner.must(key), template, (*known, *read.sets))
 
     def templates(self, part: Part, spec: WriteSpec, known: Iterable[str] = ()) -> None:
         """Check the names in every template under ``send:``."""
@@ -177,8 +192,10 @@ def link_driver(
     """Check every name in the driver at `part`; return what is used."""
     linker = _Linker(driver, settings, findings)
     for name, inner in part.named("transports").items():
-        for option, template in templates_of(driver.transports[name]).items():
-            linker.template(inner.must(option), template)
+        for place, template in option_templates(inner, driver.transports[name]):
+            linker.template(place, template)
+            check_option(place, driver.transports[name].type, template, settings, findings)
+    linker.uses.transports |= check_via(part.named("transports"), driver.transports, findings)
     for inner, poll in zip(part.listed("polls"), driver.polls, strict=True):
         link_poll(linker, inner, poll)
     _check_poll_names(part, driver, findings)
@@ -192,10 +209,14 @@ def link_driver(
     link_keepalives(linker, part)
     link_sequences(linker, part)
     check_frames(part, driver, findings)
+    check_messages(part, driver, findings)
     for name, inner in part.named("messages").items():
         message = driver.messages[name]
         linker.transport(inner, "from", message.transport)
         linker.fields(inner, message.read)
+        if message.answer is not None:
+            known = (*message.read.fields, *driver.signals, COUNTERS)
+            linker.templates(inner.must("answer"), message.answer, known)
     return linker.uses
 
 
@@ -233,20 +254,24 @@ def link_simulator(
     rules: Mapping[str, list[SimulatorRule]],
     settings: Mapping[str, Setting],
     findings: Findings,
-) -> None:
-    """Check every name in the rules of the emulated robot."""
+) -> Mapping[str, Reading]:
+    """Check every name in the rules of the emulated robot; return the values it begins with."""
+    if not sources.simulator:
+        return NOTHING
+    from urc.config.link_rules import link_rules, link_values
+
     linker = _Linker(driver, settings, findings)
-    for name, part in sources.simulator.items():
+    parts = sources.simulator
+    for name, found in rules.items():
         if name not in driver.transports:
             findings.error(
-                part,
+                parts[name],
                 "unknown-transport",
                 f"there is no transport {name!r}",
                 key=True,
                 hint=did_you_mean(name, driver.transports, "transports"),
             )
             continue
-        for inner, rule in zip(part.items(), rules[name], strict=True):
-            if rule.send is not None:
-                groups = rule.pattern.groups if rule.pattern else ()
-                linker.template(inner.must("send"), rule.send, ("now", *groups))
+        state = parts["state"].data if "state" in parts else ()
+        link_rules(linker, parts[name], found, state)
+    return link_values(parts, driver, findings)

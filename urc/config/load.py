@@ -15,7 +15,8 @@ from urc.config.link_tests import link_test
 from urc.config.link_wire import link_driver, link_simulator
 from urc.config.parse_driver import parse_driver, spoken_name
 from urc.config.parse_interface import parse_interface
-from urc.config.parse_profile import parse_rule, parse_setting
+from urc.config.parse_profile import parse_setting
+from urc.config.parse_simulator import parse_simulator
 from urc.config.parse_test import parse_test
 from urc.config.parse_widget import Shelf, parse_widget
 from urc.config.part import Findings
@@ -128,17 +129,15 @@ class _Parsed(NamedTuple):
 def _profile(
     sources: Sources, catalog: Catalog, shelf: Shelf, findings: Findings
 ) -> Profile | None:
+    driver = parse_driver(sources.driver, findings, catalog)
     parsed = _Parsed(
-        driver=parse_driver(sources.driver, findings, catalog),
+        driver=driver,
         settings={name: parse_setting(part, findings) for name, part in sources.settings.items()},
         interfaces={
             name: parse_interface(part, name, findings) for name, part in sources.interfaces.items()
         },
         tests=[parse_test(part, findings) for part in sources.tests],
-        rules={
-            name: [parse_rule(inner, name, findings) for inner in part.items()]
-            for name, part in sources.simulator.items()
-        },
+        rules=parse_simulator(sources, driver, catalog, findings) if sources.simulator else {},
     )
     if has_errors(findings):
         return None
@@ -148,7 +147,7 @@ def _profile(
 def _link(sources: Sources, parsed: _Parsed, shelf: Shelf, findings: Findings) -> Profile | None:
     driver = parsed.driver
     uses = link_driver(sources.driver, driver, parsed.settings, findings)
-    link_simulator(sources, driver, parsed.rules, parsed.settings, findings)
+    emulated = link_simulator(sources, driver, parsed.rules, parsed.settings, findings)
     tests = [
         link_test(part, test, driver, parsed.settings, findings)
         for part, test in zip(sources.tests, parsed.tests, strict=True)
@@ -182,6 +181,7 @@ def _link(sources: Sources, parsed: _Parsed, shelf: Shelf, findings: Findings) -
         widgets={one: widget for one, widget in widgets.items() if widget is not None},
         tests=tuple(tests),
         simulator=tuple(rule for rules in parsed.rules.values() for rule in rules),
+        emulated=emulated,
         licence=root.text("licence"),
         author=root.text("author"),
     )

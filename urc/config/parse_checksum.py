@@ -37,6 +37,7 @@ class WrittenChecksum(NamedTuple):
     salt: Salt
     is_from_hex: bool
     closes: bool
+    before: bytes
 
     @property
     def size(self) -> int:
@@ -56,6 +57,7 @@ def parse_checksum(part: Part, encoding: str, findings: Findings) -> WrittenChec
     is_big = part.text("endian", "big") == "big"
     is_from_hex = part.flag("from_hex", default=False)
     closes = part.text("on_error", "drop") == "close"
+    before = parse_bytes(part.get("before"), encoding, findings)
     if algorithm is None or salt is None:
         return None
     place = None if at is None or isinstance(at.data, str) else int(at.data)
@@ -70,6 +72,7 @@ def parse_checksum(part: Part, encoding: str, findings: Findings) -> WrittenChec
         salt,
         is_from_hex,
         closes,
+        before or b"",
     )
 
 
@@ -139,6 +142,11 @@ def _fold(part: Part, findings: Findings) -> FoldSpec | None:
         is_good = False
         text = f"numbers of {of} bits do not fit a result of {bits}"
         findings.error(part, "too-wide", text, at="of")
+    is_odd_xored = part.text("odd", "zeros") == "xor"
+    if "odd" in part.data and of == 8:
+        is_good = False
+        text = "'odd' means nothing where single bytes are put together"
+        findings.error(part, "misplaced-key", text, at="odd", key=True, hint="add 'of: 16'")
     if not is_good:
         return None
     return FoldSpec(
@@ -148,6 +156,7 @@ def _fold(part: Part, findings: Findings) -> FoldSpec | None:
         "ones" if complement == "ones" else "twos" if complement == "twos" else "none",
         mask,
         ored,
+        is_odd_xored,
     )
 
 
@@ -180,4 +189,5 @@ def _salt(part: Part | None, encoding: str, findings: Findings) -> Salt | None:
             rows[int(name, 0)] = row
     offset, size = part.integer("offset") or 0, part.integer("size") or 1
     is_big = part.text("endian", "big") == "big"
-    return Salt(b"", offset, size, is_big, rows) if is_good else None
+    otherwise: Any = part.text("else", "fault")
+    return Salt(b"", offset, size, is_big, rows, otherwise) if is_good else None

@@ -3,22 +3,24 @@
 from collections.abc import Mapping
 from typing import Any
 
+from urc.config.beside_form import with_collected
 from urc.config.forms import FormContext, parse_read, parse_write
 from urc.config.parse_flow import (
     NOTHING_SENT,
     aged_by_lines,
     command_with_flow,
     line_with_flow,
+    parse_choice_questions,
     parse_sequence,
     poll_with_flow,
 )
 from urc.config.parse_line import parse_transport
-from urc.config.parse_reply import parse_reply
+from urc.config.parse_reply import implied_reply, parse_reply
 from urc.config.parse_signal import parse_signal, with_ages
 from urc.config.part import Findings, Part
-from urc.config.values import check_range, check_within, fit, fit_hint
+from urc.config.values import check_range, check_within, element_of, fit, fit_hint, shown
 from urc.model.driver import Argument, Command, Driver, Message, Poll, Reply, TransportSpec
-from urc.model.values import NOTHING, Value
+from urc.model.values import NOTHING, Reading, Value
 from urc.registry import Catalog
 
 __all__ = ["parse_driver", "spoken_name"]
@@ -57,7 +59,13 @@ def parse_driver(part: Part, findings: Findings, catalog: Catalog) -> Driver:
         commands={**_sequences(part, lines, findings), **commands},
         messages=messages,
         polls=polls,
+        discovery=_discovery(part.get("discovery")),
     )
+
+
+def _discovery(part: Part | None) -> tuple[str, ...]:
+    """Return the types of services."""
+    return () if part is None else tuple(str(one.data) for one in part.listed("mdns"))
 
 
 def _set_by_frames(part: Part) -> frozenset[str]:
@@ -86,12 +94,17 @@ def _types(part: Part, findings: Findings) -> tuple[Mapping[str, Any], Mapping[s
 
 
 class _Lines:
-    """The transports, for those who name one, or may leave it out because there is only one."""
+    """The transports, for those who name one, or may leave it out because there is only one.
+
+    A line that only carries others does not count.
+    """
 
     def __init__(self, transports: Mapping[str, TransportSpec], context: FormContext) -> None:
         self._transports = transports
         self._context = context
-        self.only = next(iter(transports)) if len(transports) == 1 else ""
+        own = [one.name for one in transports.values() if one.options.get("mode") != "forward"]
+        own = own or list(transports)
+        self.only = own[0] if len(own) == 1 else ""
 
     def name(self, part: Part, key: str) -> str:
         """Return the transport that `part` names under `key`."""
@@ -119,19 +132,23 @@ def reply_timeout_s(reply: Reply, transport: TransportSpec | None) -> float:
 
 def _message(part: Part, lines: _Lines, findings: Findings) -> Message:
     transport = lines.name(part, "from")
-    return Message(part.name, transport, parse_read(part, findings, lines.context(transport)))
+    context, answer = lines.context(transport), part.get("answer")
+    read = with_collected(part, parse_read(part, findings, context), findings)
+    sent = None if answer is None else parse_write(answer, findings, context)
+    return Message(part.name, transport, read, sent)
 
 
 def _poll(part: Part, lines: _Lines, commands: dict[str, Command], findings: Findings) -> Poll:
     transport = lines.name(part, "to")
     context = lines.context(transport)
     send = part.get("send")
+    asked = parse_write(send, findings, context) if send else NOTHING_SENT
     poll = Poll(
         name=part.text("name", f"polls.{part.name}"),
         transport=transport,
         every_s=findings.duration(part, "every", 1.0, least=0.005),
-        send=parse_write(send, findings, context) if send else NOTHING_SENT,
-        reply=parse_reply(part.get("reply"), findings, context),
+        send=asked,
+        reply=parse_reply(part.get("reply"), findings, context) or implied_reply(asked),
         phase_s=findings.duration(part, "phase", 0.0, least=0.0, most=3600),
     )
     return poll_with_flow(poll, part, commands, findings)
@@ -140,12 +157,13 @@ def _poll(part: Part, lines: _Lines, commands: dict[str, Command], findings: Fin
 def _command(part: Part, lines: _Lines, findings: Findings) -> Command:
     transport = lines.name(part, "to")
     context = lines.context(transport)
+    send = parse_write(part.must("send"), findings, context)
     command = Command(
         name=part.name,
         transport=transport,
-        send=parse_write(part.must("send"), findings, context),
+        send=send,
         arguments={name: _argument(inner, findings) for name, inner in part.named("args").items()},
-        reply=parse_reply(part.get("reply"), findings, context),
+        reply=parse_reply(part.get("reply"), findings, context) or implied_reply(send),
         title=part.text("title", spoken_name(part.name)),
         description=part.text("description"),
     )
@@ -154,7 +172,8 @@ def _command(part: Part, lines: _Lines, findings: Findings) -> Command:
 
 def _argument(part: Part, findings: Findings) -> Argument:
     kind = part.text("type", "number")
-    low, high = check_range(part, kind, findings)
+    of = element_of(part, kind, findings)
+    low, high = check_range(part, of, findings)
     if part.name == "settings":
         findings.error(
             part,
@@ -163,15 +182,17 @@ def _argument(part: Part, findings: Findings) -> Argument:
             key=True,
             hint="templates find the settings under that name",
         )
-    choices = [_fitting(inner, kind, findings) for inner in part.listed("choices")]
+    choices = [_fitting(inner, of, findings) for inner in part.listed("choices")]
     default_part = part.get("default")
-    default = None
+    default: Reading = None
     if default_part is not None:
-        default = _fitting(default_part, kind, findings)
-        check_within(default, low, high, default_part, findings)
-        if choices and default not in choices:
-            findings.error(default_part, "unknown-word", "the default is not one of the choices")
-    if kind != "string" and "allow_control" in part.data:
+        default = _default(default_part, part, kind, findings)
+        for one in default if isinstance(default, tuple) else (default,):
+            check_within(one, low, high, default_part, findings)
+            if choices and one not in choices:
+                text = "the default is not one of the choices"
+                findings.error(default_part, "unknown-word", text)
+    if of != "string" and "allow_control" in part.data:
         findings.error(
             part,
             "misplaced-key",
@@ -179,7 +200,7 @@ def _argument(part: Part, findings: Findings) -> Argument:
             at="allow_control",
             key=True,
         )
-    return Argument(
+    argument = Argument(
         name=part.name,
         type=kind,  # type: ignore[arg-type]  # the schema's enum is this Literal
         title=part.text("title", spoken_name(part.name)),
@@ -191,7 +212,25 @@ def _argument(part: Part, findings: Findings) -> Argument:
         is_required=part.flag("required", default=default is None),
         allows_control=part.flag("allow_control", default=False),
         description=part.text("description"),
+        of=of,  # type: ignore[arg-type]  # as above
+        size=part.integer("size"),
     )
+    return parse_choice_questions(part, argument, findings)
+
+
+def _default(inner: Part, argument: Part, kind: str, findings: Findings) -> Reading:
+    """Return the default; of an array, a list of as many elements as it has."""
+    if kind != "array":
+        return _fitting(inner, kind, findings)
+    if not isinstance(inner.data, list):
+        text = f"expected a list, found {shown(inner.data)}"
+        findings.error(inner, "wrong-type", text, hint="such as [0, 0, 0]")
+        return None
+    size = argument.integer("size")
+    if size is not None and len(inner.data) != size:
+        text = f"expected {size} elements, found {len(inner.data)}"
+        findings.error(inner, "wrong-size", text)
+    return tuple(_fitting(one, argument.text("of", "number"), findings) for one in inner.items())
 
 
 def _fitting(part: Part, kind: str, findings: Findings) -> Value:

@@ -1,15 +1,19 @@
 """How talk flows: queues, rates, conditions, what is held and what is kept alive."""
 
+import math
 from collections.abc import Iterable, Mapping
 from typing import Final, Literal, cast
 
 from urc.config.forms import FormContext, parse_write
+from urc.config.messaging import MESSAGING
 from urc.config.parse_reply import refuse
 from urc.config.parse_steps import StepContext, parse_steps
 from urc.config.part import Findings, Part
+from urc.config.suggest import did_you_mean
+from urc.config.values import given
 from urc.expressions import compile_template
 from urc.model.codec import WriteSpec
-from urc.model.driver import Command, Message, Poll, TransportSpec
+from urc.model.driver import Argument, Command, Message, Poll, TransportSpec
 from urc.model.flow import (
     MAX_STEP_S,
     Confirm,
@@ -21,16 +25,18 @@ from urc.model.flow import (
     PromptStep,
     Queue,
     Requirement,
+    Retry,
     SendStep,
     Verify,
     all_steps,
 )
-from urc.model.values import Signal, Value
+from urc.model.values import Reading, Signal, Value
 
 __all__ = [
     "NOTHING_SENT",
     "command_with_flow",
     "line_with_flow",
+    "parse_choice_questions",
     "parse_sequence",
     "poll_with_flow",
 ]
@@ -49,10 +55,13 @@ def line_with_flow(
         refuse(part, ("keepalive",), "means nothing where each request connects anew", findings)
         if queue is not None:
             refuse(queue, ("in_flight",), "is 1 where each request connects anew", findings)
+    timeouts = part.get("timeouts")
+    if timeouts is not None and "on_connect" not in part.data:
+        refuse(timeouts, ("on_connect",), "limits nothing: there are no steps", findings)
     steps = StepContext(spec.name, is_named=False, forms=context)
     on_connect, on_close = part.get("on_connect"), part.get("on_close")
     return spec._replace(
-        queue=_queue(queue) if queue else Queue(),
+        queue=_queue(queue, spec.type),
         keepalive=_keepalive(part.get("keepalive"), context, findings),
         on_connect=parse_steps(on_connect, steps, findings) if on_connect else (),
         on_close=parse_steps(on_close, steps, findings) if on_close else (),
@@ -90,7 +99,7 @@ def aged_by_lines(
 def command_with_flow(command: Command, part: Part, findings: Findings) -> Command:
     """Return the command with when it may be sent, and how."""
     hold, confirm, verify = part.get("hold"), part.get("confirm"), part.get("verify")
-    retries = part.integer("retries") or 0
+    retries, retry = _retries(part.get("retries"), findings)
     is_idempotent = part.flag("idempotent", default=False)
     if retries and not is_idempotent:
         findings.error(
@@ -112,6 +121,7 @@ def command_with_flow(command: Command, part: Part, findings: Findings) -> Comma
         is_latest_only=part.text("coalesce") == "latest",
         rate_per_s=_rate(part.get("rate_limit"), findings),
         retries=retries,
+        retry=retry,
         is_idempotent=is_idempotent,
         hold=_hold(hold, findings) if hold else None,
         confirm=_confirm(confirm) if confirm else None,
@@ -158,33 +168,49 @@ def parse_sequence(
     """Return the command that stands for a sequence.
 
     Args:
-        part: the list of steps.
+        part: the list of steps, or a mapping with it.
         title: as people read its name.
         only: the only transport there is, or "".
         context: of forms.
         findings: takes what is wrong.
     """
-    steps = parse_steps(part, StepContext(only, is_named=True, forms=context), findings)
+    inner = part.must("steps") if isinstance(part.data, dict) else part
+    steps = parse_steps(inner, StepContext(only, is_named=True, forms=context), findings)
     named = [
         step.transport
         for step in all_steps(steps)
         if isinstance(step, (SendStep, ExpectStep, PromptStep)) and step.transport
     ]
-    return Command(
+    sequence = Command(
         name=part.name,
         transport=named[0] if named else only,
         send=NOTHING_SENT,
         title=title,
         steps=steps,
     )
+    if not isinstance(part.data, dict):
+        return sequence
+    confirm = part.get("confirm")
+    return sequence._replace(
+        title=part.text("title", title),
+        description=part.text("description"),
+        confirm=_confirm(confirm) if confirm else None,
+        requires=_requires(part, findings),
+    )
 
 
-def _arguments(part: Part) -> dict[str, Value]:
-    return {name: inner.data for name, inner in part.named("args").items()}
+def _arguments(part: Part) -> dict[str, Reading]:
+    return {name: given(inner.data) for name, inner in part.named("args").items()}
 
 
-def _queue(part: Part) -> Queue:
-    default = Queue()
+_NUMBERED_IN_FLIGHT: Final = 16
+"""Where answers say whose they are, nothing needs to wait for them."""
+
+
+def _queue(part: Part | None, kind: str) -> Queue:
+    default = Queue(in_flight=_NUMBERED_IN_FLIGHT if kind in MESSAGING else 1)
+    if part is None:
+        return default
     return Queue(
         part.integer("in_flight") or default.in_flight, part.integer("depth") or default.depth
     )
@@ -221,6 +247,7 @@ def _rate(part: Part | None, findings: Findings) -> float | None:
 
 def _hold(part: Part, findings: Findings) -> Hold:
     repeat_s = findings.duration(part, "repeat", 0.05, least=0.01, most=10)
+    lease_s = findings.duration(part, "lease", 0.25, least=0.1, most=1.0)
     release = part.get("release")
     if release is None:
         findings.error(
@@ -231,12 +258,71 @@ def _hold(part: Part, findings: Findings) -> Hold:
             hint="write release: { … } with the arguments that mean standstill",
         )
         return Hold(repeat_s)
-    return Hold(repeat_s, {name: inner.data for name, inner in release.entries().items()})
+    values = {name: given(inner.data) for name, inner in release.entries().items()}
+    return Hold(repeat_s, values, lease_s, _watchdog_s(part, findings))
+
+
+def _watchdog_s(part: Part, findings: Findings) -> float | None:
+    if part.text("watchdog") == "none":
+        return math.inf
+    return findings.duration(part, "watchdog", 0.0) or None
 
 
 def _confirm(part: Part) -> Confirm:
     level = cast("Literal['normal', 'hazardous']", part.text("level", "normal"))
-    return Confirm(level, part.must("text").data)
+    return Confirm(level, part.must("text").data, part.flag("two_person", default=False))
+
+
+def parse_choice_questions(part: Part, argument: Argument, findings: Findings) -> Argument:
+    """Return the argument with the questions before some of its values."""
+    asked = part.named("confirm")
+    if not asked:
+        return argument
+    kind = argument.of if argument.type == "array" else argument.type
+    words = ["true", "false"] if kind == "boolean" else [_written(one) for one in argument.choices]
+    if not words:
+        findings.error(
+            part,
+            "misplaced-key",
+            "'confirm' is about some of its choices, and there are none",
+            at="confirm",
+            key=True,
+            hint="write choices: […], or 'confirm' beside 'send' to ask every time",
+        )
+    for name, inner in asked.items():
+        if words and name not in words:
+            findings.error(
+                inner,
+                "unknown-word",
+                f"{name!r} is not one of the choices",
+                key=True,
+                hint=did_you_mean(name, words, "choices"),
+            )
+    return argument._replace(confirm={name: _confirm(inner) for name, inner in asked.items()})
+
+
+def _written(value: Value) -> str:
+    """Return a choice as a document writes it as a key."""
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def _retries(part: Part | None, findings: Findings) -> tuple[int, Retry]:
+    """Return how often a request is sent again, and after which waits."""
+    if part is None:
+        return 0, Retry()
+    if not isinstance(part.data, dict):
+        return int(part.data), Retry()
+    initial_s = findings.duration(part, "initial", 0.0, most=MAX_STEP_S)
+    max_s = findings.duration(part, "max", initial_s, most=MAX_STEP_S)
+    if max_s < initial_s:
+        findings.error(
+            part,
+            "wrong-order",
+            "the first wait is longer than the longest one",
+            at="initial",
+            hint="'initial' is the first wait, 'max' the longest",
+        )
+    return part.integer("count") or 0, Retry(initial_s, max_s)
 
 
 def _requires(part: Part, findings: Findings) -> tuple[Requirement, ...]:

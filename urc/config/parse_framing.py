@@ -3,9 +3,10 @@
 from collections.abc import Callable
 from typing import Any, Final
 
-from urc.config.frame_layout import MARKED, parse_layout
+from urc.config.frame_layout import MARKED, checksums_of, parse_layout
 from urc.config.frame_pattern import check_frame_pattern
 from urc.config.parse_bytes import parse_bytes
+from urc.config.parse_escape import parse_escape
 from urc.config.part import Findings, Part
 from urc.config.suggest import did_you_mean, listed
 from urc.model.driver import FramingSpec
@@ -40,9 +41,23 @@ def parse_framing(part: Part, encoding: str, findings: Findings, catalog: Catalo
         return FramingSpec(kind.data, options, longest)
     options = parse(part, encoding, findings)
     layout = parse_layout(part, encoding, findings, longest)
+    escape = parse_escape(part, layout, options, encoding, findings)
+    if escape is not None and escape.is_of_payload:
+        layout = layout._replace(escape=escape)
+    elif escape is not None:
+        options["escape"] = escape
     if layout != FrameLayout() or kind.data in MARKED:
         options["layout"] = layout
-    return FramingSpec(kind.data, options, longest)
+    return _with_patience(part, FramingSpec(kind.data, options, longest), findings)
+
+
+def _with_patience(part: Part, spec: FramingSpec, findings: Findings) -> FramingSpec:
+    """Return the framing with what any may have besides."""
+    if "timeout" not in part.data and "strip_ansi" not in part.data:
+        return spec
+    timeout_s = findings.duration(part, "timeout", 0.0, least=0.001, most=60) or None
+    strips = "strip_ansi" in part.data and part.flag("strip_ansi", default=False)
+    return spec._replace(timeout_s=timeout_s, strips_ansi=strips)
 
 
 def _delimiter(part: Part, encoding: str, findings: Findings) -> dict[str, Any]:
@@ -57,7 +72,8 @@ def _delimiter(part: Part, encoding: str, findings: Findings) -> dict[str, Any]:
             hint="name what the robot sends after each answer, such as LF or CRLF",
         )
     checksum = part.get("checksum")
-    if checksum is not None and checksum.text("as", "raw") == "raw":
+    spelling = [one.text("as", "raw") for one in checksums_of(part)]
+    if checksum is not None and "raw" in spelling and "escape" not in part.data:
         findings.warn(
             checksum,
             "raw-checksum",
@@ -106,16 +122,15 @@ def _switch(part: Part, encoding: str, findings: Findings, catalog: Catalog) -> 
     for case in part.listed("cases"):
         first_part, inner = case.must("first"), case.must("framing")
         first = parse_bytes(first_part, encoding, findings)
-        kind = inner.must("type")
-        if kind.data not in _SWITCHABLE:
-            findings.error(
-                kind,
-                "misplaced-framing",
-                f"a case of 'switch' cannot be of type {kind.data!r}",
-                hint=f"its framing must find the end of a frame by itself: {listed(_SWITCHABLE)}",
-            )
+        if not _is_switchable(inner.must("type"), findings):
             continue
-        spec = parse_framing(inner, encoding, findings, catalog)
+        for key in ("timeout", "strip_ansi"):
+            if key in inner.data:
+                text = f"'{key}' belongs to the 'switch' itself"
+                findings.error(inner, "misplaced-key", text, at=key, key=True)
+        spec = parse_framing(inner, encoding, findings, catalog)._replace(
+            timeout_s=None, strips_ansi=False
+        )
         if first is None:
             continue
         if not first:
@@ -125,8 +140,25 @@ def _switch(part: Part, encoding: str, findings: Findings, catalog: Catalog) -> 
             continue
         _check_case(first_part, first, spec, cases, findings)
         cases.append((first, spec))
+    options: dict[str, Any] = {"cases": tuple(cases)}
     longest = max((spec.max_bytes for _, spec in cases), default=FramingSpec().max_bytes)
-    return FramingSpec("switch", {"cases": tuple(cases)}, longest)
+    other = part.get("else")
+    if other is not None and _is_switchable(other.must("type"), findings):
+        options["otherwise"] = parse_framing(other, encoding, findings, catalog)
+        longest = max(longest, options["otherwise"].max_bytes)
+    return _with_patience(part, FramingSpec("switch", options, longest), findings)
+
+
+def _is_switchable(kind: Part, findings: Findings) -> bool:
+    if kind.data in _SWITCHABLE:
+        return True
+    findings.error(
+        kind,
+        "misplaced-framing",
+        f"a case of 'switch' cannot be of type {kind.data!r}",
+        hint=f"its framing must find the end of a frame by itself: {listed(_SWITCHABLE)}",
+    )
+    return False
 
 
 def _check_case(

@@ -1,19 +1,21 @@
 """Transports of a driver: mapping → `TransportSpec`."""
 
+from collections.abc import Iterator
 from typing import Final
 
+from urc.config.form_json_text import compiled_tree, placed_templates
 from urc.config.parse_framing import parse_framing
 from urc.config.part import Findings, Part
 from urc.config.suggest import did_you_mean
 from urc.expressions import Template
-from urc.model.driver import Backoff, FramingSpec, ScalarOrTemplate, Timeouts, TransportSpec
+from urc.model.driver import Backoff, FramingSpec, Timeouts, TransportSpec
 from urc.registry import Catalog
 
-__all__ = ["parse_transport"]
+__all__ = ["option_templates", "parse_transport"]
 
 _COMMON: Final = (
     "type", "connection", "framing", "send_framing", "encoding", "timeouts", "reconnect", "min_gap",
-    "queue", "keepalive", "on_connect", "on_close", "stale_after",
+    "queue", "keepalive", "on_connect", "on_close", "stale_after", "via",
 )  # fmt: skip
 
 
@@ -44,27 +46,28 @@ def parse_transport(part: Part, findings: Findings, catalog: Catalog) -> Transpo
         timeouts=_timeouts(part.get("timeouts"), findings),
         backoff=_backoff(part.get("reconnect"), findings),
         min_gap_s=findings.duration(part, "min_gap", 0.0, least=0.0, most=3600),
+        via=part.text("via"),
     )
 
 
 def _framing(part: Part, encoding: str, findings: Findings, catalog: Catalog) -> FramingSpec:
     """Return the framing of what comes, with that of what is sent where it is another one."""
-    framing = parse_framing(part.must("framing"), encoding, findings, catalog)
+    own = part.get("framing")
+    if own is None:
+        return FramingSpec("datagram")  # the schema asks for it where the line is a stream
+    framing = parse_framing(own, encoding, findings, catalog)
     sent = part.get("send_framing")
     if sent is None:
         return framing
     return framing._replace(sent=parse_framing(sent, encoding, findings, catalog))
 
 
-def _option(part: Part, findings: Findings) -> ScalarOrTemplate:
-    if not isinstance(part.data, str):
-        value: ScalarOrTemplate = part.data
-        return value
-    template = findings.template(part)
-    if template is None or not template.is_constant:
-        return template
-    constant: ScalarOrTemplate = template.evaluate({})
-    return constant
+def _option(part: Part, findings: Findings) -> object:
+    """Return an option: plain, a template, or a list or mapping of them."""
+    tree = compiled_tree(part, findings)
+    if isinstance(tree, Template) and tree.is_constant:
+        return tree.evaluate({})
+    return tree
 
 
 def _timeouts(part: Part | None, findings: Findings) -> Timeouts:
@@ -74,6 +77,7 @@ def _timeouts(part: Part | None, findings: Findings) -> Timeouts:
         connect_s=findings.duration(part, "connect", 3.0, least=0.01, most=300),
         reply_s=findings.duration(part, "reply", 2.0, most=3600),
         idle_s=findings.duration(part, "idle", 0.0, least=0.01) or None,
+        on_connect_s=findings.duration(part, "on_connect", 0.0, least=0.01, most=3600) or None,
     )
 
 
@@ -95,6 +99,7 @@ def _backoff(part: Part | None, findings: Findings) -> Backoff:
     return Backoff(initial, longest, default.jitter if jitter is None else jitter)
 
 
-def templates_of(spec: TransportSpec) -> dict[str, Template]:
-    """Return the options of a transport that are templates."""
-    return {name: value for name, value in spec.options.items() if isinstance(value, Template)}
+def option_templates(part: Part, spec: TransportSpec) -> Iterator[tuple[Part, Template]]:
+    """Yield every template in the options of the transport at `part`, with its place."""
+    for name, tree in spec.options.items():
+        yield from placed_templates(part.must(name), tree)

@@ -1,13 +1,13 @@
-"""The rest of a profile: settings, the documents' own tests, the emulated robot."""
+"""The settings of a profile."""
 
 from typing import Final
 
 from urc.config.part import Findings, Part
 from urc.config.values import check_range, check_within, fit, fit_hint, shown
-from urc.model.profile import Setting, SimulatorRule
+from urc.model.profile import Setting
 from urc.model.values import Value
 
-__all__ = ["parse_rule", "parse_setting", "setting_value"]
+__all__ = ["parse_setting", "setting_value"]
 
 _VALUE_TYPES: Final = {
     "integer": "integer",
@@ -90,35 +90,3 @@ def setting_value(part: Part, kind: str, choices: tuple[str, ...], findings: Fin
 def _is_host(text: str) -> bool:
     """Return whether a name or address is plausible: no scheme, no port, no blank."""
     return 0 < len(text) <= 253 and not any(char.isspace() or char in "/@?#'\"" for char in text)
-
-
-def parse_rule(part: Part, transport: str, findings: Findings) -> SimulatorRule:
-    """Return one rule of the emulated robot."""
-    match, send = part.get("match"), part.get("send")
-    every = part.get("every")
-    if match is None and every is None:
-        findings.error(
-            part,
-            "missing-key",
-            "'match' or 'every' is missing from this rule",
-            key=True,
-            hint="a rule answers a frame, or speaks every so often",
-        )
-    if match is not None and every is not None:
-        findings.error(
-            every,
-            "misplaced-key",
-            "a rule answers a frame, or speaks every so often",
-            key=True,
-            hint="make two rules of it",
-        )
-    if every is not None and send is None:
-        findings.error(
-            part, "missing-key", "'send' is missing: what is said every so often?", key=True
-        )
-    return SimulatorRule(
-        transport=transport,
-        pattern=None if match is None else findings.pattern(match),
-        send=None if send is None else findings.template(send),
-        every_s=None if every is None else findings.duration(part, "every", 1.0, least=0.005),
-    )

@@ -4,12 +4,12 @@ from urc.config.beside_form import parse_lines
 from urc.config.forms import READ_FORMS, FormContext, parse_read
 from urc.config.parse_framing import parse_framing
 from urc.config.part import Findings, Part
-from urc.model.codec import ReadSpec
+from urc.model.codec import NUMBERED, ReadSpec, WriteSpec
 from urc.model.driver import FramingSpec, Reply
 from urc.model.flow import ErrorReply, Stage
 from urc.patterns import Pattern
 
-__all__ = ["parse_errors", "parse_reply", "parse_stage", "refuse"]
+__all__ = ["implied_reply", "parse_errors", "parse_reply", "parse_stage", "refuse"]
 
 _OF_THE_WHOLE = ("match", "stages", "framing")
 """Keys that belong to the reply, not to one of its stages."""
@@ -42,6 +42,14 @@ def parse_reply(part: Part | None, findings: Findings, context: FormContext) -> 
         ),
         framing=_framing(framing, findings, context) if framing else None,
     )
+
+
+def implied_reply(send: WriteSpec) -> Reply | None:
+    """Return the answer of a request that has one whether or not the driver looks at it.
+
+    So a request that the robot refuses fails, and is not taken for done once it is sent.
+    """
+    return Reply(ReadSpec("any")) if send.options.get("verb") in NUMBERED else None
 
 
 def parse_stage(part: Part, findings: Findings, context: FormContext) -> Stage:

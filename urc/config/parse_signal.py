@@ -47,6 +47,8 @@ def parse_signal(part: Part, title: str, findings: Findings) -> Signal:
         size=part.integer("size"),
         axes=axes,  # type: ignore[arg-type]  # as above
         formula=_formula(part, findings),
+        deadband=_deadband(part, element, (low, high), findings),
+        debounce_s=_debounce_s(part, kind, findings),
     )
 
 
@@ -122,6 +124,33 @@ def _axes(part: Part, kind: str, findings: Findings) -> str:
     return axes
 
 
+def _deadband(
+    part: Part, element: str, bounds: tuple[float | None, float | None], findings: Findings
+) -> float:
+    band = part.number("deadband") or 0.0
+    if not band:
+        return 0.0
+    low, high = bounds
+    if element not in _NUMBERS:
+        text = f"'deadband' means nothing for {element}"
+        findings.error(part, "misplaced-key", text, at="deadband", key=True)
+    elif low is not None and high is not None and band > high - low:
+        findings.error(
+            part,
+            "out-of-range",
+            f"no change between {low:g} and {high:g} is as large as {band:g}: none would be told",
+            at="deadband",
+        )
+    return band
+
+
+def _debounce_s(part: Part, kind: str, findings: Findings) -> float:
+    if kind not in (*_NUMBERS, "boolean", "string") and "debounce" in part.data:
+        text = f"'debounce' means nothing for {kind}"
+        findings.error(part, "misplaced-key", text, at="debounce", key=True)
+    return findings.duration(part, "debounce", 0.0, most=3600)
+
+
 def _formula(part: Part, findings: Findings) -> Template | None:
     inner = part.get("value")
     if inner is None:
@@ -137,6 +166,22 @@ def _formula(part: Part, findings: Findings) -> Template | None:
                 hint="write it into 'value'",
             )
     return findings.expression(inner)
+
+
+def _check_hysteresis(part: Part, values: Mapping[str, float | None], findings: Findings) -> None:
+    """Warn of an alarm that ends only where the next one has begun."""
+    width = part.number("hysteresis") or 0.0
+    low = values["low"] if values["low"] is not None else values["lolo"]
+    high = values["high"] if values["high"] is not None else values["hihi"]
+    if low is not None and high is not None and width >= high - low > 0:
+        findings.warn(
+            part,
+            "wide-hysteresis",
+            f"the alarm at {low:g} would end only at {low + width:g}, where the one at {high:g} has"
+            " begun",
+            at="hysteresis",
+            hint=f"make it smaller than {high - low:g}, the way between the two",
+        )
 
 
 def _limits(
@@ -162,6 +207,7 @@ def _limits(
             )
     for name, value in given:
         check_within(value, *bounds, inner.must(name), findings)
+    _check_hysteresis(inner, values, findings)
     return Limits(
         lolo=values["lolo"],
         low=values["low"],

@@ -10,17 +10,21 @@ from urc.model.codec import ReadSpec
 from urc.model.flow import (
     MAX_STEP_S,
     MAX_STEPS,
+    MAX_STEPS_DONE,
     ExpectStep,
     FailStep,
     IfStep,
     PromptStep,
+    RepeatStep,
     RunStep,
     SendStep,
     SetStep,
     Stage,
     Step,
+    UntilStep,
     WaitStep,
     all_steps,
+    most_steps,
 )
 from urc.model.values import Value
 
@@ -30,7 +34,8 @@ _BESIDE: Final = {
     "send": ("redact", "to"),
     "expect": ("from", "timeout", "else"),
     "prompt": ("from", "timeout", "else"),
-    "wait": (),
+    "wait": ("else",),
+    "repeat": ("times", "until", "else"),
     "run": ("args",),
     "set": (),
     "if": ("then", "else"),
@@ -59,6 +64,14 @@ def parse_steps(part: Part, context: StepContext, findings: Findings) -> tuple[S
     if count > MAX_STEPS:
         findings.error(
             part, "too-many-steps", f"there are {count} steps, branches included; {MAX_STEPS} fit"
+        )
+    most = most_steps(steps)
+    if most > MAX_STEPS_DONE:
+        findings.error(
+            part,
+            "too-many-steps",
+            f"with all rounds of 'repeat' it would do {most} steps; {MAX_STEPS_DONE} are allowed",
+            hint="make 'times' smaller",
         )
     return steps
 
@@ -104,7 +117,9 @@ def _one(verb: str, part: Part, context: StepContext, findings: Findings) -> Ste
         case "prompt":
             return _prompt(part, inner, context, findings)
         case "wait":
-            return WaitStep(findings.duration(part, "wait", 0.0, most=MAX_STEP_S))
+            return _wait(part, inner, context, findings)
+        case "repeat":
+            return _repeat(part, inner, context, findings)
         case "run":
             return RunStep(str(inner.data), _values(part.named("args"), findings))
         case "set":
@@ -147,6 +162,39 @@ def _prompt(part: Part, inner: Part, context: StepContext, findings: Findings) -
     otherwise, text = _else(part, context, findings)
     transport = part.text("from", context.transport)
     return PromptStep(transport, pattern, _timeout_s(part, findings), otherwise, text)
+
+
+def _wait(part: Part, inner: Part, context: StepContext, findings: Findings) -> Step | None:
+    if not isinstance(inner.data, dict):
+        refuse(part, ("else",), "means nothing for a plain wait", findings)
+        return WaitStep(findings.duration(part, "wait", 0.0, most=MAX_STEP_S))
+    condition = findings.expression(inner.must("until"))
+    otherwise, text = _else(part, context, findings)
+    timeout_s = findings.duration(inner, "timeout", 0.0, most=MAX_STEP_S)
+    return None if condition is None else UntilStep(condition, timeout_s, otherwise, text)
+
+
+def _repeat(part: Part, inner: Part, context: StepContext, findings: Findings) -> Step | None:
+    times = part.integer("times")
+    if times is None:
+        findings.error(
+            part,
+            "missing-key",
+            "'times' is missing: nothing says how often at most",
+            key=True,
+            hint="write times: 10, and until: CONDITION to end earlier",
+        )
+    until = part.get("until")
+    if until is None:
+        refuse(part, ("else",), "means nothing without 'until'", findings)
+    otherwise, text = _else(part, context, findings)
+    return RepeatStep(
+        _steps(inner, context, findings),
+        times or 1,
+        findings.expression(until) if until else None,
+        otherwise,
+        text,
+    )
 
 
 def _timeout_s(part: Part, findings: Findings) -> float | None:

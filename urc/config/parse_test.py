@@ -1,51 +1,172 @@
 """A test that a document carries about itself: mapping → `DocumentTest`."""
 
+from typing import Final
+
 from urc.config.part import Findings, Part
-from urc.model.profile import DocumentTest, Fed
+from urc.model.codec import Envelope
+from urc.model.profile import DialogueStep, DocumentTest, Expected, Fed, State
 from urc.model.values import Value
 
 __all__ = ["parse_test"]
 
+_AT_ONCE: Final = ("feed", "reply_to", "run", "args", "expect", "sent", "fails")
+"""Keys of a test in one instant."""
+_IN_STEPS: Final = ("polls", "ready")
+"""Keys that say how steps are done."""
+_VERBS: Final = (
+    "message", "response", "feedback", "publish", "call", "goal", "cancel", "request",
+)  # fmt: skip
+"""Kinds of messages."""
+_ADDRESS: Final = (
+    "topic", "type", "service", "action", "method", "path", "query", "headers", "qos", "retain",
+    "ok", "status", "reason",
+)  # fmt: skip
+"""Keys of a message that are not its body."""
+_BODIES: Final = ("json", "text", "hex")
+"""Keys of a message that are its body."""
+_HAPPENS: Final = ("feed", "run", "wait", "connects", "closes", "leaves")
+"""Keys of a step of which one may happen at a time."""
+
 
 def parse_test(part: Part, findings: Findings) -> DocumentTest:
     """Return one test; what it names is looked up when names are linked."""
-    mark, home = part.document.at(part.path), part.document.source_of(part.path)
-    line, column = (mark.span.line, mark.span.column) if mark else (1, 1)
+    line, column, source = _place(part)
     reply_to = part.scalar("reply_to")
     if isinstance(reply_to, float):
         reply_to = int(reply_to)
+    _check_keys(part, findings)
     return DocumentTest(
         name=part.text("name"),
         line=line,
-        feed={name: _fed(inner, findings) for name, inner in part.named("feed").items()},
+        feed=_fed(part, "feed", findings),
         reply_to=reply_to,
         run=part.text("run") or None,
-        arguments={name: inner.data for name, inner in part.named("args").items()},
-        expect={name: _expected(inner) for name, inner in part.named("expect").items()},
-        sent={name: _wire(inner, findings) for name, inner in part.named("sent").items()},
+        arguments=_values(part, "args"),
+        expect=_expected(part),
+        sent=_fed(part, "sent", findings),
         fails=part.text("fails") or None,
-        file=home.file,
+        file=part.document.source_of(part.path).file,
         column=column,
-        source=home.lines[line - 1],
+        source=source,
         settings={name: inner.data for name, inner in part.named("settings").items()},
+        steps=tuple(_step(inner, findings) for inner in part.listed("steps")),
+        polls=tuple(str(inner.data) for inner in part.listed("polls")),
+        is_ready=part.flag("ready", default=False),
     )
 
 
-def _expected(part: Part) -> Value | tuple[Value, ...]:
+def _check_keys(part: Part, findings: Findings) -> None:
+    has_steps = "steps" in part.data
+    for key in _AT_ONCE if has_steps else _IN_STEPS:
+        if key in part.data:
+            why = "belongs into one of the steps" if has_steps else "is for tests with 'steps'"
+            findings.error(part, "misplaced-key", f"'{key}' {why}", at=key, key=True)
+
+
+def _step(part: Part, findings: Findings) -> DialogueStep:
+    happens = [key for key in _HAPPENS if part.data.get(key, False) is not False]
+    if len(happens) > 1:
+        findings.error(
+            part,
+            "two-verbs",
+            f"'{happens[0]}' and '{happens[1]}' are two steps",
+            at=happens[1],
+            key=True,
+            hint="write one step after the other",
+        )
+    if "of" in part.data and not {"reply", "fails"} & part.data.keys():
+        text = "'of' says whose 'reply' or failure it is, and there is none"
+        findings.error(part, "misplaced-key", text, at="of", key=True)
+    line, column, source = _place(part)
+    wait = part.get("wait")
+    return DialogueStep(
+        line=line,
+        column=column,
+        source=source,
+        feed=_fed(part, "feed", findings),
+        run=part.text("run"),
+        arguments=_values(part, "args"),
+        wait_s=findings.duration(part, "wait", 0.0) if wait else None,
+        connects=part.text("connects"),
+        closes=part.text("closes"),
+        leaves=part.flag("leaves", default=False),
+        sent=_fed(part, "sent", findings),
+        expect=_expected(part),
+        reply=_values(part, "reply") if "reply" in part.data else None,
+        of=part.text("of"),
+        fails=part.text("fails"),
+        closed=part.text("closed"),
+    )
+
+
+def _place(part: Part) -> tuple[int, int, str]:
+    """Return line, column and the text of the line."""
+    mark, home = part.document.at(part.path), part.document.source_of(part.path)
+    line, column = (mark.span.line, mark.span.column) if mark else (1, 1)
+    return line, column, home.lines[line - 1]
+
+
+def _values(part: Part, key: str) -> dict[str, Value | tuple[Value, ...]]:
+    return {name: _value(inner) for name, inner in part.named(key).items()}
+
+
+def _value(part: Part) -> Value | tuple[Value, ...]:
     return tuple(part.data) if isinstance(part.data, list) else part.data
 
 
-def _fed(part: Part, findings: Findings) -> Fed | tuple[Fed, ...]:
+def _expected(part: Part) -> dict[str, Expected]:
+    return {name: _state(inner) for name, inner in part.named("expect").items()}
+
+
+def _state(part: Part) -> Expected:
+    if not isinstance(part.data, dict):
+        return _value(part)
+    value, alarm = part.get("value"), part.text("alarm")
+    return State(
+        has_value=value is not None,
+        value=None if value is None else _value(value),
+        alarm=None if not alarm else "" if alarm == "none" else alarm,  # type: ignore[arg-type]  # the schema's enum
+        age=part.text("age"),  # type: ignore[arg-type]  # as above
+    )
+
+
+def _fed(part: Part, key: str, findings: Findings) -> dict[str, Fed | tuple[Fed, ...]]:
+    return {name: _pieces(inner, findings) for name, inner in part.named(key).items()}
+
+
+def _pieces(part: Part, findings: Findings) -> Fed | tuple[Fed, ...]:
     if isinstance(part.data, list):
         return tuple(_wire(inner, findings) for inner in part.items())
     return _wire(part, findings)
 
 
 def _wire(part: Part, findings: Findings) -> Fed:
-    """Return text, or the bytes under ``hex``."""
+    """Return text, the bytes under ``hex``, or a message."""
     if not isinstance(part.data, dict):
         return str(part.data)
-    inner = part.must("hex")
+    inner = part.get("hex")
+    return _message(part, findings) if inner is None else _hex(inner, findings)
+
+
+def _message(part: Part, findings: Findings) -> Envelope:
+    verb, inner = next((verb, one) for verb in _VERBS if (one := part.get(verb)) is not None)
+    bodies = [key for key in _BODIES if key in inner.data]
+    if len(bodies) > 1:
+        text = f"'{bodies[0]}' and '{bodies[1]}' are two bodies"
+        findings.error(inner, "two-forms", text, at=bodies[1], key=True)
+    body: object = None
+    for key in bodies:
+        value = inner.must(key)
+        if key == "json":
+            body = value.data
+        else:
+            body = _hex(value, findings) if key == "hex" else str(value.data).encode()
+    given = ((name, inner.get(name)) for name in _ADDRESS)
+    attributes = {name: one.data for name, one in given if one is not None}
+    return Envelope(verb, attributes, body)
+
+
+def _hex(inner: Part, findings: Findings) -> bytes:
     try:
         return bytes.fromhex(inner.data)
     except ValueError:

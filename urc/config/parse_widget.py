@@ -60,6 +60,8 @@ def _port(part: Part) -> Port:
         unit=part.text("unit"),
         is_required=part.flag("required", default=True),
         description=part.text("description"),
+        is_held=part.flag("hold", default=False),
+        arguments=tuple(part.named("arguments")),
     )
 
 

@@ -165,10 +165,10 @@ class Findings:
             self.error(part, "bad-template", str(error), offset=error.offset)
             return None
 
-    def expression(self, part: Part) -> Template | None:
+    def expression(self, part: Part, *, allows_bytes: bool = False) -> Template | None:
         """Compile the expression at `part`, or report why it cannot be."""
         try:
-            return compile_expression(part.data)
+            return compile_expression(part.data, allows_bytes=allows_bytes)
         except ExpressionError as error:
             braces = "{{" in part.data
             hint = "an expression is written without braces" if braces else ""

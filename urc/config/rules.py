@@ -36,7 +36,9 @@ def _check_unused(sources: Sources, driver: Driver, uses: Uses, findings: Findin
                 "never-set",
                 f"nothing ever sets the signal {name!r}",
                 key=True,
-                hint=f"name a group of a reply or message (?P<{name}>…)",
+                hint=f"give that name to a field of a reply or message, such as (?P<{name}>…) in a"
+                f" 'regex', {{{name}}} in a 'pattern', or 'u16be {name}' in a 'struct'; or compute"
+                " it with 'value'",
             )
     for name, part in sources.driver.named("transports").items():
         if name not in uses.transports:
@@ -84,7 +86,8 @@ def _check_pace(part: Part, poll: Poll, driver: Part, findings: Findings) -> Non
     if poll.reply is None:
         return
     asked = driver.must("commands").must(poll.run) if poll.run else part
-    where: Part | None = asked.must("reply").get("timeout")
+    reply = asked.get("reply")
+    where: Part | None = reply.get("timeout") if reply else None
     seconds = poll.reply.timeout_s
     if where is None:
         timeouts = driver.must("transports").must(poll.transport).get("timeouts")

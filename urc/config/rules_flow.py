@@ -5,10 +5,14 @@ A rule speaks only where somebody has decided something: never about a default.
 
 from collections.abc import Iterator
 
+from urc.config.link_steps import steps_of
 from urc.config.part import Findings, Part, shown_duration
+from urc.config.rules_frames import check_frames_apart
+from urc.config.rules_motion import check_motion
+from urc.config.rules_traffic import check_traffic
 from urc.expressions import split_template
 from urc.model.driver import Driver, Poll, Reply, TransportSpec
-from urc.model.flow import SendStep, Step, WaitStep, all_steps
+from urc.model.flow import SendStep, Step, UntilStep, WaitStep, all_steps
 
 __all__ = ["check_flow"]
 
@@ -40,13 +44,16 @@ def check_flow(part: Part, driver: Driver, secrets: frozenset[str], findings: Fi
                 key=True,
                 hint="say what it 'requires', or what people 'confirm' when they take control",
             )
-        if command.reply is not None:
+        if command.reply is not None and "reply" in inner.data:
             _check_stages(inner.must("reply"), command.reply, command.transport, driver, findings)
         if command.verify is not None:
             _check_haste(inner.must("verify"), driver, name, findings)
     for inner, poll in zip(part.listed("polls"), driver.polls, strict=True):
         _check_poll(inner, poll, findings)
     _check_secrets(part, driver, secrets, findings)
+    check_traffic(part, driver, findings)
+    check_motion(part, driver, findings)
+    check_frames_apart(part, driver, findings)
 
 
 def _check_line(part: Part, spec: TransportSpec, findings: Findings) -> None:
@@ -59,7 +66,7 @@ def _check_line(part: Part, spec: TransportSpec, findings: Findings) -> None:
             f"the robot gives up after {shown_duration(watchdog_s)}, before it hears of this",
             hint="half of that leaves room for one that is lost",
         )
-    waits_s = sum(step.seconds for step in all_steps(spec.on_close) if isinstance(step, WaitStep))
+    waits_s = sum(_wait_s(step) for step in all_steps(spec.on_close))
     if waits_s > _GOOD_BYE_S:
         findings.warn(
             part.must("on_close"),
@@ -68,6 +75,12 @@ def _check_line(part: Part, spec: TransportSpec, findings: Findings) -> None:
             f" {shown_duration(_GOOD_BYE_S)} in all",
             key=True,
         )
+
+
+def _wait_s(step: Step) -> float:
+    if isinstance(step, UntilStep):
+        return step.timeout_s
+    return step.seconds if isinstance(step, WaitStep) else 0.0
 
 
 def _check_baud(part: Part, driver: Driver, spec: TransportSpec, findings: Findings) -> None:
@@ -147,7 +160,25 @@ def _check_poll(part: Part, poll: Poll, findings: Findings) -> None:
 
 
 def _check_secrets(part: Part, driver: Driver, secrets: frozenset[str], findings: Findings) -> None:
-    """Warn of steps that send a secret and do not keep it out of messages."""
+    """Warn of whatever sends a secret and does not keep it out of messages."""
+    asked = [
+        (inner.must("send"), driver.commands[name].send)
+        for name, inner in part.named("commands").items()
+    ]
+    asked += [
+        (inner.must("send"), poll.send)
+        for inner, poll in zip(part.listed("polls"), driver.polls, strict=True)
+        if "send" in inner.data
+    ]
+    for place, send in asked:
+        used = sorted(send.settings & secrets)
+        if used:
+            findings.warn(
+                place,
+                "secret-not-redacted",
+                f"the secret {used[0]!r} shows in the traffic of every request",
+                hint="send it once, in a step of 'on_connect' or of a sequence, with redact: true",
+            )
     for inner, step in _sends(part, driver):
         used = sorted(step.send.settings & secrets)
         if used and not step.is_secret:
@@ -161,7 +192,7 @@ def _check_secrets(part: Part, driver: Driver, secrets: frozenset[str], findings
 
 def _sends(part: Part, driver: Driver) -> Iterator[tuple[Part, SendStep]]:
     for name, inner in part.named("sequences").items():
-        yield from _sends_in(inner, driver.commands[name].steps)
+        yield from _sends_in(steps_of(inner), driver.commands[name].steps)
     for name, inner in part.named("transports").items():
         spec = driver.transports[name]
         for key, steps in (("on_connect", spec.on_connect), ("on_close", spec.on_close)):
@@ -174,6 +205,7 @@ def _sends_in(part: Part, steps: tuple[Step, ...]) -> Iterator[tuple[Part, SendS
         if isinstance(step, SendStep):
             yield inner, step
         for key, branch in (
+            ("repeat", getattr(step, "body", None)),
             ("then", getattr(step, "then", None)),
             ("else", getattr(step, "otherwise", None)),
         ):

@@ -3,12 +3,13 @@
 Imported only for a document that is broken: `jsonschema` costs 80 ms.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import islice
 from typing import Any, Final, NamedTuple
 
 from jsonschema import Draft202012Validator
 from jsonschema.exceptions import ValidationError
+from jsonschema.validators import extend
 from referencing import Registry, Resource
 from referencing.jsonschema import DRAFT202012
 
@@ -34,8 +35,6 @@ class _Error(NamedTuple):
 
 _Read = Callable[[str], Mapping[str, Any]]
 _Report = Callable[[Document, Path, _Error], list[Problem]]
-
-
 _PROBLEMS_MOST: Final = 200
 _EXPECTED: Final = {
     "string": "text",
@@ -46,6 +45,7 @@ _EXPECTED: Final = {
     "array": "a list",
     "null": "null",
 }
+_DELIMITERS: Final = ("LF", "CR", "CRLF", "NUL", "ETX")
 _OTHER_WORDS: Final = {
     "interval": ("every",),
     "period": ("every",),
@@ -58,6 +58,14 @@ _OTHER_WORDS: Final = {
     "delimiter": ("tx", "rx"),
     "pattern": ("regex", "match"),
     "value": ("default",),
+    "start": ("first",),
+    "begin": ("first", "start"),
+    "loop": ("repeat",),
+    "count": ("times",),
+    "sleep": ("wait",),
+    "delay": ("wait",),
+    "description": ("text",),
+    "message": ("text",),
     "license": ("licence",),
 }
 """What other tools call a key → what it is called here."""
@@ -78,20 +86,36 @@ def report(
     registry: Registry[Any] = Registry(  # type: ignore[call-arg]  # attrs' alias, unseen by mypy
         retrieve=lambda uri: Resource.from_contents(read(uri), DRAFT202012)
     )
-    validator = Draft202012Validator(schema, registry=registry)
+    validator = _Validator(schema, registry=registry)
     data = value if path else document.data
     problems: dict[Problem, int] = {}
+    said: set[tuple[str, int, str]] = set()  # a branch repeats what its schema says, with its hint
     for found in validator.iter_errors(data):
         where = (*path, *found.absolute_path)
         error = _error(found)
-        if not found.absolute_path and "properties" not in error.schema:
-            error = error._replace(schema=schema)  # a branch of the whole document's schema
         tell = _REPORTS.get(error.keyword, _other)
         for problem in tell(document, where, error):
-            problems.setdefault(problem, len(where))
+            what = problem.message if problem.code != "wrong-type" else ""
+            if (one := (problem.path, problem.column, what)) not in said:
+                said.add(one)
+                problems[problem] = len(where)
         if len(problems) >= _PROBLEMS_MOST:
             break
     return sorted(problems, key=lambda one: (-problems[one], one.line, one.column, one.path))
+
+
+def _branches(
+    validator: Any, condition: Any, instance: Any, schema: Mapping[str, Any]
+) -> Iterator[ValidationError]:
+    """Check ``then`` or ``else``; what is missing there is missing from what they belong to."""
+    branch = "then" if validator.evolve(schema=condition).is_valid(instance) else "else"
+    for error in validator.descend(instance, schema.get(branch, True), schema_path=branch):
+        if not error.path and "properties" in schema and "properties" not in error.schema:
+            error.schema = schema
+        yield error
+
+
+_Validator: Any = extend(Draft202012Validator, {"if": _branches})  # type: ignore[no-untyped-call]  # it has no types
 
 
 def _error(found: ValidationError) -> _Error:
@@ -189,7 +213,26 @@ def _wrong_type(document: Document, path: Path, error: _Error) -> list[Problem]:
         wanted = " or ".join(_EXPECTED[name] for name in types)
     message = f"expected {wanted}, found {_found(error.value)}"
     hint = _type_hint(document, path, error.value, types, is_duration=title == "duration")
+    if isinstance(error.value, str) and "object" in types and not _is_filled_in(document, path):
+        hint = _mapping_hint(error.value, error.schema) or hint
     return [document.problem(path, "wrong-type", message, hint=hint)]
+
+
+def _mapping_hint(text: str, schema: Mapping[str, Any]) -> str:
+    """Return the first example of a mapping, with `text` in it where it is a delimiter."""
+    example = next((one for one in schema.get("examples", ()) if isinstance(one, dict)), None)
+    if example is None or any(isinstance(one, (dict, list)) for one in example.values()):
+        return ""
+    if {"tx", "rx"} <= example.keys() and text.upper() in _DELIMITERS:
+        example = {**example, "tx": text.upper(), "rx": text.upper()}
+    pairs = (f"{key}: {_quoted(value)}" for key, value in example.items())
+    return f"write its keys, such as {{ {', '.join(pairs)} }}"
+
+
+def _quoted(value: object) -> str:
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    return f'"{value}"' if isinstance(value, str) and not value.isalnum() else str(value)
 
 
 def _type_hint(

@@ -8,25 +8,19 @@ from collections.abc import Mapping
 from typing import Final, Literal
 
 from urc.config.part import Findings, Part
-from urc.config.struct_numbers import (
-    NumberParser,
-    check_fits,
-    parse_enum,
-    parse_valid,
-    unknown_type,
-    written_constant,
-)
+from urc.config.struct_leaves import LeafParser, kind_of
+from urc.config.struct_numbers import check_fits, unknown_type, written_constant
 from urc.config.struct_scope import Scope
 from urc.config.struct_text import parse_content
 from urc.model.binary import (
     Extent,
     Item,
-    Number,
     Switch,
     case_key,
     fixed_size,
     least_size,
     number_of,
+    width_of,
 )
 
 __all__ = ["ItemParser", "Purpose"]
@@ -41,6 +35,8 @@ DEEPEST: Final = 16
 _NUMBER: Final = ("id", "type", "count", "if", "enum", "const", "valid", "scale", "offset", "value")
 _KEYS: Final[Mapping[str, tuple[str, ...]]] = {
     "number": _NUMBER,
+    "coded": _NUMBER,
+    "packed": ("id", "type", "count", "if", "enum", "valid", "scale", "offset", "order"),
     "bits": ("id", "type", "bits", "order", "if"),
     "bytes": ("id", "type", "size", "count", "if", "const", "pad", "until", "value"),
     "text": ("id", "type", "size", "count", "if", "const", "pad", "until", "value", "encoding"),
@@ -67,6 +63,7 @@ class ItemParser:
         self.purpose = purpose
         self.encoding = encoding
         self.scope = Scope(findings, purpose)
+        self.leaves = LeafParser(findings, enums, self.scope)
 
     def items(self, part: Part) -> Items:
         """Return the items of the list at `part`; what was reported is left out."""
@@ -130,9 +127,9 @@ class ItemParser:
         constant = written_constant(rest)
         if constant is None:
             self.scope.check_name(part, rest)
-            return Item("number", rest, number)
+            return Item(kind_of(number), rest, number)
         check_fits(part, number, constant, self.findings)
-        return Item("number", "", number, const=constant)
+        return Item(kind_of(number), "", number, const=constant)
 
     def _long(self, part: Part) -> Item | None:
         """Return an item that is a mapping."""
@@ -170,10 +167,13 @@ class ItemParser:
             return str(named.data)
         if named.data in self.types:
             return "struct"
-        if number_of(named.data) is None:
+        number = number_of(named.data)
+        if number is None:
+            if "count" in part.data and width_of(named.data) is not None:
+                return "packed"
             unknown_type(named, named.data, self.types, self.findings)
             return None
-        return "number"
+        return kind_of(number)
 
     def _of_kind(self, kind: str, part: Part) -> Item | None:
         name = part.text("id")
@@ -181,9 +181,11 @@ class ItemParser:
         if kind == "switch":
             return self._switch(part.must("switch"))
         if kind == "bits":
-            return self._bits(part, name)
-        if kind == "number":
-            return self._number(part, name)
+            return self.leaves.bits(part, name)
+        if kind in ("number", "coded"):
+            return self.leaves.number(part, name, self._extent(part.get("count")))
+        if kind == "packed":
+            return self.leaves.packed(part, name, self._extent(part.get("count")))
         size = self._extent(part.get("size"))
         times = self._extent(part.get("count"))
         if kind == "padding":
@@ -198,69 +200,12 @@ class ItemParser:
         start = Item("text" if kind == "text" else "bytes", name, size=size, times=times)
         return parse_content(part, start._replace(value=value), self.encoding, self.findings)
 
-    def _number(self, part: Part, name: str) -> Item:
-        parser = NumberParser(part, self.findings)
-        number = number_of(part.text("type"))
-        assert number is not None  # noqa: S101  # `_kind` has looked
-        return Item(
-            "number",
-            name,
-            number,
-            times=self._extent(part.get("count")),
-            const=parser.constant(number),
-            scale=parser.scale(),
-            offset=part.number("offset") or 0,
-            enum=parse_enum(part, number, self.enums, self.findings),
-            valid=parse_valid(part, self.findings),
-            value=self.scope.value(part.get("value")),
-        )
-
-    def _bits(self, part: Part, name: str) -> Item | None:
-        named = part.must("type")
-        number = number_of(named.data)
-        if number is None or number.kind != "integer" or number.is_signed:
-            text = f"bits lie in a whole number without a sign, not in {named.data!r}"
-            self.findings.error(named, "bad-item", text, hint="such as u8 or u16be")
-            return None
-        parts = [self._bit(inner) for inner in part.listed("bits")]
-        widths = sum(one.number.bits for one in parts)
-        if widths != number.bits:
-            self.findings.error(
-                part.must("bits"),
-                "wrong-size",
-                f"they take {widths} bits, and {named.data} has {number.bits}",
-                hint="give what is reserved its own { width: … }" if widths < number.bits else "",
-            )
-            return None
-        is_lsb_first = part.text("order", "msb") == "lsb"
-        return Item("bits", name, number, is_lsb_first=is_lsb_first, items=tuple(parts))
-
-    def _bit(self, part: Part) -> Item:
-        if isinstance(part.data, str):
-            self.scope.check_name(part, part.data)
-            return Item("number", part.data, Number("integer", 1))
-        parser = NumberParser(part, self.findings)
-        name = part.text("id")
-        self.scope.check_name(part.get("id") or part, name)
-        number = parser.width()
-        return Item(
-            "number",
-            name,
-            number,
-            const=parser.constant(number),
-            scale=parser.scale(),
-            offset=part.number("offset") or 0,
-            enum=parse_enum(part, number, self.enums, self.findings),
-            valid=parse_valid(part, self.findings),
-            value=self.scope.value(part.get("value")),
-        )
-
     def _struct(self, part: Part, item: Item) -> Item | None:
         items = self.types[part.text("type")]
         trim = part.integer("trim")
         if trim is not None:
             size_is_free = item.size is not None and item.size.kind != "fixed"
-            if not size_is_free or fixed_size(items) is None:
+            if not size_is_free or fixed_size(_without_rest(items)) is None:
                 self.findings.error(
                     part, "misplaced-key", "'trim' is for a fixed type in a window of another size",
                     at="trim", key=True, hint="say 'size: rest', or an item that is the size",
@@ -272,7 +217,7 @@ class ItemParser:
         return item._replace(items=items, trim=trim)
 
     def _array(self, part: Part, item: Item) -> Item | None:
-        if not item.id and item.kind != "struct":
+        if not item.id and item.kind not in ("struct", "packed"):
             text = "an array needs an 'id'"
             self.findings.error(part, "missing-key", text, key=True, hint="{ size: … } skips bytes")
             return None
@@ -280,6 +225,8 @@ class ItemParser:
             text = "'const' means nothing for an array"
             self.findings.error(part, "misplaced-key", text, at="const", key=True)
             return None
+        if item.kind == "packed":
+            return item
         if least_size((item._replace(times=None, condition=None),)) == 0:
             text = "each of its items has to take a byte at least"
             self.findings.error(part, "bad-item", text, at="count")
@@ -296,7 +243,7 @@ class ItemParser:
             return Extent("rest")
         prefix = number_of(part.data)
         if prefix is not None:
-            if prefix.kind == "integer" and not prefix.is_signed:
+            if prefix.kind in ("integer", "varint") and not prefix.is_signed:
                 return Extent("prefix", prefix=prefix)
             text = f"a size has no sign and no fraction, {part.data!r} has"
             self.findings.error(part, "bad-item", text)
@@ -338,7 +285,7 @@ class ItemParser:
     def _check_case(self, part: Part, subject: Item | None) -> None:
         """Report a case that the item can never choose."""
         key = case_key(part.name)
-        if subject is None or subject.kind != "number":
+        if subject is None or subject.kind not in ("number", "coded"):
             return
         words = [word for _, word in subject.enum]
         if isinstance(key, str) and subject.number.kind == "integer" and key not in words:
@@ -354,7 +301,13 @@ class ItemParser:
 
     def _check_sent(self, part: Part, item: Item) -> None:
         """Report what would be sent and has no value."""
-        if self.purpose != "send" or item.kind not in ("number", "bytes", "text"):
+        if self.purpose != "send" or item.kind not in (
+            "number",
+            "coded",
+            "packed",
+            "bytes",
+            "text",
+        ):
             return
         if not item.id and item.const is None and item.value is None:
             self.findings.error(
@@ -363,8 +316,16 @@ class ItemParser:
             )  # fmt: skip
 
 
+def _without_rest(items: Items) -> Items:
+    """Return the items but for a last one that takes whatever a longer window has."""
+    is_rest = bool(items) and items[-1].size is not None and items[-1].size.kind == "rest"
+    return items[:-1] if is_rest and items[-1].kind == "padding" else items
+
+
 _NOUNS: Final = {
     "number": "a number",
+    "coded": "a number",
+    "packed": "an array of bits",
     "bits": "bits",
     "bytes": "bytes",
     "text": "text",

@@ -5,7 +5,8 @@ from typing import Final
 
 from urc.config.part import Findings, Part
 from urc.config.suggest import did_you_mean
-from urc.model.binary import WORDS_OF_TYPES, Number, number_of
+from urc.config.values import fraction_of
+from urc.model.binary import WORDS_OF_TYPES, Number, number_of, width_of
 
 __all__ = [
     "NumberParser",
@@ -43,7 +44,9 @@ def unknown_type(
     part: Part, word: str, types: Iterable[str], findings: Findings, *, only_types: bool = False
 ) -> None:
     """Report a word that is no type."""
-    if number_of(f"{word}be") is not None:
+    if width_of(word) is not None and number_of(f"{word}be") is None:
+        hint = f"only arrays have numbers of {word[1:]} bits: {{ type: {word}, count: 16 }}"
+    elif number_of(f"{word}be") is not None:
         hint = f"say the order of its bytes: {word}be or {word}le"
     elif word[:-2] in ("u8", "i8"):
         hint = f"one byte has no order: {word[:-2]}"
@@ -104,6 +107,8 @@ class NumberParser:
     def scale(self) -> float:
         """Return ``scale``; 0 would make every number the same."""
         inner = self._part.get("scale")
+        if inner is not None and isinstance(inner.data, str):
+            return fraction_of(inner.data)
         if inner is not None and inner.data == 0:
             self._findings.error(inner, "zero-scale", "a scale of 0 cannot be undone")
             return 1
@@ -133,8 +138,8 @@ def parse_enum(part: Part, number: Number, enums: Mapping[str, Enum], findings: 
     inner = part.get("enum")
     if inner is None:
         return ()
-    if number.kind != "integer":
-        text = "'enum' means nothing for a number that is not whole"
+    if number.kind == "boolean":
+        text = "'enum' means nothing for true and false"
         findings.error(part, "misplaced-key", text, at="enum", key=True)
         return ()
     for key in ("scale", "offset"):
@@ -149,7 +154,7 @@ def parse_enum(part: Part, number: Number, enums: Mapping[str, Enum], findings: 
         return ()
     places = {} if is_named else {int(key, 0): one for key, one in inner.entries().items()}
     for raw, word in enum:
-        if not number.least <= raw <= number.most:
+        if number.kind != "float" and not number.least <= raw <= number.most:
             findings.error(
                 places.get(raw, inner),
                 "does-not-fit",

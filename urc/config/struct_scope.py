@@ -5,7 +5,7 @@ from typing import Literal
 
 from urc.config.part import Findings, Part
 from urc.config.suggest import did_you_mean
-from urc.expressions import Template
+from urc.expressions import COUNTERS, Template
 from urc.model.binary import FRAME_NAMES, Item, names_of, number_of, scope_of
 
 __all__ = ["Scope"]
@@ -78,16 +78,26 @@ class Scope:
             self.uses.append((part, expression))
             return expression
         for name in sorted(expression.names - self.known.keys() - FRAME_NAMES):
-            found = expression.source.find(name)
+            found = expression.source.find("seq" if name == COUNTERS else name)
             self._findings.error(
                 part,
                 "unknown-name",
                 f"{name!r} is no item before this one",
                 offset=max(found, 0),
                 length=len(name),
-                hint=did_you_mean(name, [*self.known, *FRAME_NAMES], "names"),
+                hint=self._hint(name),
             )
         return expression
+
+    def _hint(self, name: str) -> str:
+        if name in ("settings", COUNTERS) and self._purpose == "type":
+            return (
+                "a type knows its own items alone: write this item, with its 'value',"
+                " under send: struct: beside the type"
+            )
+        if name == "settings":
+            return "what a frame must hold by a setting is said in 'when', beside the struct"
+        return did_you_mean(name, [*self.known, *FRAME_NAMES], "names")
 
 
 def _argument(part: Part, name: str) -> Template:

@@ -1,11 +1,21 @@
 """Typed values in documents: does a default, an expected reading or a choice fit its type?"""
 
-from typing import Final
+from typing import Any, Final
 
 from urc.config.part import Findings, Part
-from urc.model.values import Value
+from urc.model.values import Reading, Value
 
-__all__ = ["check_range", "check_within", "fit", "fit_hint", "shown"]
+__all__ = [
+    "check_range",
+    "check_within",
+    "element_of",
+    "fit",
+    "fit_argument",
+    "fit_hint",
+    "fraction_of",
+    "given",
+    "shown",
+]
 
 _TYPE_WORDS: Final = {
     "integer": "a whole number",
@@ -19,11 +29,22 @@ def shown(value: object) -> str:
     """Return a value as a document writes it, for messages."""
     if value is None:
         return "nothing"
-    if isinstance(value, tuple):
+    if isinstance(value, (list, tuple)):
         return f"[{', '.join(map(shown, value))}]"
     if isinstance(value, bool):
         return "true" if value else "false"
     return repr(value)
+
+
+def fraction_of(text: str) -> float:
+    """Return what ``1/65536`` means; the text fits the schema's pattern."""
+    above, _, below = text.partition("/")
+    return int(above) / int(below)
+
+
+def given(data: Any) -> Reading:
+    """Return plain data of a document as a value: a list becomes a tuple."""
+    return tuple(data) if isinstance(data, list) else data
 
 
 def fit(value: Value, kind: str) -> Value:
@@ -42,6 +63,33 @@ def fit(value: Value, kind: str) -> Value:
         if kind == "integer" and (isinstance(value, int) or value.is_integer()):
             return int(value)
     raise ValueError(f"expected {_TYPE_WORDS[kind]}, found {shown(value)}")
+
+
+def fit_argument(value: Any, kind: str, of: str, size: int | None) -> tuple[Value, ...]:
+    """Return the values in what is given for an argument: its elements, or the one that it is.
+
+    Raises:
+        ValueError: it is of another type or size.
+    """
+    if kind != "array":
+        return (fit(value, kind),)
+    if not isinstance(value, (list, tuple)):
+        raise ValueError(f"expected a list, found {shown(value)}")
+    if size is not None and len(value) != size:
+        raise ValueError(f"expected {size} elements, found {len(value)}")
+    return tuple(fit(one, of) for one in value)
+
+
+def element_of(part: Part, kind: str, findings: Findings) -> str:
+    """Return the type of what an argument of type `kind` is made of: of an array, ``of``."""
+    if kind == "array":
+        return part.text("of", "number")
+    for key in ("of", "size"):
+        if key in part.data:
+            text = f"'{key}' means nothing for {kind}"
+            hint = "write type: array"
+            findings.error(part, "misplaced-key", text, at=key, key=True, hint=hint)
+    return kind
 
 
 def fit_hint(value: Value, kind: str) -> str:

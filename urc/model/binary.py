@@ -25,29 +25,51 @@ __all__ = [
     "least_size",
     "names_of",
     "number_of",
+    "packed_size",
     "scope_of",
+    "width_of",
 ]
 
 FRAME_NAMES: Final = frozenset(("_size", "_left"))
 """Names that expressions of a struct know beside its items: the bytes of the whole frame, and the
 bytes from the item's own first one to the end."""
 WORDS_OF_TYPES: Final = ("bytes", "text")
-_NUMBER = re.compile(r"(?:([ui])(8|16|24|32|40|48|56|64)|f(16|32|64))(be|le)?")
+_NUMBER = re.compile(r"(?:([ui]|bcd)(8|16|24|32|40|48|56|64)|f(16|32|64))(be|le)?")
+_SWAPPED = re.compile(r"([uif])(?:32(cdab|badc)|64(ghefcdab|badcfehg))")
+_SEPTETS = re.compile(r"([ui])(14|21|28|35|42|49|56|63)by7(be|le)")
+_WIDTH = re.compile(r"([ui])([1-9]|[1-5][0-9]|6[0-3])")
 
 
 class Number(NamedTuple):
     """How a number lies in its bytes, or in its bits."""
 
-    kind: Literal["integer", "float", "boolean"]
+    kind: Literal["integer", "float", "boolean", "varint", "zigzag", "bcd"]
     bits: int
-    """8 to 64 in steps of 8; 1 to 64 inside of ``bits:``."""
+    """8 to 64 in steps of 8; 1 to 64 inside of ``bits:`` and in packed arrays."""
     is_signed: bool = False
     endian: Literal["big", "little"] = "big"
+    are_words_swapped: bool = False
+    """Its words of 16 bits stand the other way round: the byte order is that of each word."""
+    is_by_seven: bool = False
+    """Each byte holds seven of its bits, and a zero in front of them."""
 
     @property
     def size(self) -> int:
-        """Bytes."""
-        return self.bits // 8
+        """Bytes; the least, where their number depends on the value."""
+        if self.is_by_seven:
+            return self.bits // 7
+        return 1 if self.is_variable else self.bits // 8
+
+    @property
+    def is_coded(self) -> bool:
+        """Whether it is no plain number of plain bytes."""
+        is_odd = self.is_variable or self.kind == "bcd"
+        return is_odd or self.are_words_swapped or self.is_by_seven
+
+    @property
+    def is_variable(self) -> bool:
+        """Whether large numbers take more bytes."""
+        return self.kind in ("varint", "zigzag")
 
     @property
     def least(self) -> int:
@@ -59,6 +81,8 @@ class Number(NamedTuple):
         """Largest whole number that it holds."""
         if self.kind == "boolean":
             return 1
+        if self.kind == "bcd":
+            return int(10 ** (self.bits // 4)) - 1
         return (1 << self.bits - self.is_signed) - 1
 
 
@@ -77,7 +101,10 @@ class Extent(NamedTuple):
 class Item(NamedTuple):
     """One part of a frame."""
 
-    kind: Literal["number", "bytes", "text", "padding", "bits", "struct", "switch"]
+    kind: Literal[
+        "number", "coded", "packed", "bytes", "text", "padding", "bits", "struct", "switch"
+    ]
+    """``coded`` are numbers that are no plain bytes, ``packed`` arrays that heed no bytes."""
     id: str = ""
     """Name of the field or argument; "" for what has none."""
     number: Number = Number("integer", 8)
@@ -132,14 +159,45 @@ def number_of(name: str) -> Number | None:
     """Return what ``u16be`` means; None when it is no number, or nobody says its byte order."""
     if name == "bool":
         return Number("boolean", 8)
+    if name in ("varint", "zigzag"):
+        return Number("zigzag" if name == "zigzag" else "varint", 64, name == "zigzag")
     found = _NUMBER.fullmatch(name)
     if found is None:
-        return None
+        return _odd_number(name)
     bits = int(found[2] or found[3])
     if (bits == 8) == bool(found[4]):
         return None
-    kind: Literal["integer", "float"] = "integer" if found[1] else "float"
-    return Number(kind, bits, found[1] != "u", "little" if found[4] == "le" else "big")
+    kind: Literal["integer", "float", "bcd"] = "integer" if found[1] else "float"
+    if found[1] == "bcd":
+        kind = "bcd"
+    return Number(kind, bits, found[1] not in ("u", "bcd"), "little" if found[4] == "le" else "big")
+
+
+def _odd_number(name: str) -> Number | None:
+    """Return what ``f32cdab`` or ``u14by7le`` means."""
+    found = _SWAPPED.fullmatch(name)
+    if found is not None:
+        letters: str = found[2] or found[3]
+        kind: Literal["integer", "float"] = "float" if found[1] == "f" else "integer"
+        endian: Literal["big", "little"] = "little" if letters.startswith("b") else "big"
+        # "badc" are the words in their order, each with its low byte first: turned round, little.
+        return Number(kind, 8 * len(letters), found[1] == "i", endian, are_words_swapped=True)
+    found = _SEPTETS.fullmatch(name)
+    if found is None:
+        return None
+    order: Literal["big", "little"] = "little" if found[3] == "le" else "big"
+    return Number("integer", int(found[2]), found[1] == "i", order, is_by_seven=True)
+
+
+def width_of(name: str) -> Number | None:
+    """Return what ``u11`` means, which only a packed array may be made of; None when nothing."""
+    found = _WIDTH.fullmatch(name)
+    return None if found is None else Number("integer", int(found[2]), found[1] == "i")
+
+
+def packed_size(number: Number, count: Extent) -> int:
+    """Return the bytes of a packed array."""
+    return number.bits * count.number // 8
 
 
 def case_key(text: str) -> int | str:
@@ -202,6 +260,8 @@ def fixed_size(items: tuple[Item, ...]) -> int | None:
 
 
 def _fixed(item: Item) -> int | None:
+    if item.kind == "coded" and item.number.is_variable:
+        return None
     extents = [extent for extent in (item.size, item.times) if extent is not None]
     if item.condition is not None or item.switch is not None or item.until:
         return None
@@ -221,8 +281,10 @@ def _least(item: Item) -> int:
         prefix = item.times.prefix.size if item.times.prefix else 0
         if item.times.kind != "fixed":
             return prefix
+        if item.kind == "packed":
+            return packed_size(item.number, item.times)
         return item.times.number * _least(item._replace(times=None))
-    if item.kind in ("number", "bits"):
+    if item.kind in ("number", "coded", "bits"):
         return item.number.size
     if item.size is not None:
         if item.size.kind == "fixed" and item.trim is None:

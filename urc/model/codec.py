@@ -8,29 +8,77 @@ Reading a frame gives *fields*: name → raw value. A field that is named like a
 whose name starts with ``_`` stays inside the document (conditions, correlation, command replies).
 """
 
+import json
 from collections.abc import Mapping
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 from urc.expressions import Template
-from urc.model.values import NOTHING, Conversion
+from urc.model.values import NOTHING, Conversion, Value
 from urc.patterns import Pattern
 
-__all__ = ["Envelope", "Payload", "ReadSpec", "WriteSpec"]
+__all__ = [
+    "NUMBERED",
+    "Collect",
+    "Envelope",
+    "Payload",
+    "ReadSpec",
+    "WriteSpec",
+    "size_of",
+    "traffic_of",
+]
 
 
 class Envelope(NamedTuple):
     """What goes over a transport that carries messages instead of bytes."""
 
     verb: str
-    """``publish``, ``call``, ``goal``, ``request`` …: what the transport is asked to do."""
+    """What the transport is asked to do (``publish``, ``call``, ``goal``, ``cancel``, ``request``),
+    or what it brings (``message``, ``response``, ``feedback``)."""
     attributes: Mapping[str, object] = NOTHING
-    """What addresses it: topic, type, method, path, headers, quality of service …"""
+    """What addresses it: topic, type, method, path, headers, quality of service … What is answered
+    has an ``id``, and its answer the same; that one says ``ok``, and why not as ``reason``."""
     body: object = None
     """JSON-like data, or bytes."""
 
 
+NUMBERED: Final = frozenset(("call", "goal", "request"))
+"""Verbs of envelopes that are answered by a ``response`` with the same ``id``."""
+
 Payload = bytes | Envelope
 """One frame without its framing."""
+
+
+def size_of(payload: Payload) -> int:
+    """Return how many bytes a payload takes, of an envelope about."""
+    if not isinstance(payload, Envelope):
+        return len(payload)
+    return 256 + (len(payload.body) if isinstance(payload.body, bytes) else 0)
+
+
+def traffic_of(payload: Payload) -> bytes:
+    """Return what is shown of a payload in the traffic: ``publish topic=/cmd_vel {"x":1}``."""
+    if not isinstance(payload, Envelope):
+        return payload
+    words = [f"{name}={value}" for name, value in payload.attributes.items() if value is not None]
+    head = " ".join((payload.verb, *words)).encode()
+    if payload.body is None:
+        return head
+    body = payload.body
+    text = body if isinstance(body, bytes) else json.dumps(body, default=repr).encode()
+    return head + b" " + text
+
+
+class Collect(NamedTuple):
+    """A value that is put together out of several frames."""
+
+    value: Template
+    """What each frame adds, over its fields: one value, or a list of them, or bytes."""
+    begin: Template | None = None
+    """Holds for the first frame of a new one."""
+    end: Template | None = None
+    """Holds for the last frame. Without it, the first frame of the next one ends it."""
+    most: int = 4096
+    """Values, or bytes, in all."""
 
 
 class ReadSpec(NamedTuple):
@@ -49,6 +97,12 @@ class ReadSpec(NamedTuple):
     """Expression over the converted fields; the frame is another one where it is not true."""
     lines: int | Pattern | None = None
     """The reply is that many frames, or all up to one that the pattern finds; joined by LF."""
+    topic: Template | None = None
+    """Over settings: where it comes from, on a transport that carries messages. None: anywhere."""
+    collects: Mapping[str, Collect] = NOTHING
+    """Signal → how it is put together; these names are the last of `fields`."""
+    listen: Mapping[str, Value] = NOTHING
+    """How `topic` is listened to: type, throttle in seconds, quality of service …"""
 
 
 class WriteSpec(NamedTuple):

@@ -1,7 +1,7 @@
 """A driver: what can be said to a robot, what it says back, and over which lines."""
 
 from collections.abc import Mapping
-from typing import Literal, NamedTuple
+from typing import Final, Literal, NamedTuple
 
 from urc.expressions import Template
 from urc.model.codec import ReadSpec, WriteSpec
@@ -14,14 +14,16 @@ from urc.model.flow import (
     Priority,
     Queue,
     Requirement,
+    Retry,
     Stage,
     Step,
     Verify,
 )
-from urc.model.values import NOTHING, Signal, Value
+from urc.model.values import NOTHING, ElementType, Reading, Signal, Value
 from urc.patterns import Pattern
 
 __all__ = [
+    "MOST_ELEMENTS",
     "Argument",
     "Backoff",
     "Command",
@@ -47,6 +49,10 @@ class FramingSpec(NamedTuple):
     """As parsed by the loader: for ``delimiter``, ``tx`` and ``rx`` as bytes."""
     max_bytes: int = 65536
     """Longest frame accepted; a longer one is dropped and counted."""
+    timeout_s: float | None = None
+    """Silence inside of a frame after which what there is of it is dropped; None: never."""
+    strips_ansi: bool = False
+    """Whether the escape sequences of a terminal are taken out of what comes."""
     sent: "FramingSpec | None" = None
     """Of what URC sends, where that is framed otherwise than what comes; None: the same."""
 
@@ -58,6 +64,8 @@ class Timeouts(NamedTuple):
     reply_s: float = 2.0
     idle_s: float | None = None
     """Close a line that has been silent this long; None = never."""
+    on_connect_s: float | None = None
+    """For all steps of ``on_connect``; None: each has its own end, and all of them none."""
 
 
 class Backoff(NamedTuple):
@@ -74,8 +82,9 @@ class TransportSpec(NamedTuple):
 
     name: str
     type: str
-    options: Mapping[str, ScalarOrTemplate] = NOTHING
-    """What the transport's own factory takes, e.g. ``host`` and ``port``."""
+    options: Mapping[str, object] = NOTHING
+    """What the transport's own factory takes, e.g. ``host`` and ``port``: plain values, templates
+    over settings, and lists and mappings of them."""
     connection: Literal["persistent", "per_request"] = "persistent"
     framing: FramingSpec = FramingSpec()
     encoding: str = "utf-8"
@@ -92,6 +101,8 @@ class TransportSpec(NamedTuple):
     """What is said before the line is closed in good order."""
     stale_after_s: float | None = None
     """Silence after which the line is told to be silent; None = never."""
+    via: str = ""
+    """Transport that it goes through; "": none."""
 
 
 class Reply(NamedTuple):
@@ -112,21 +123,31 @@ class Reply(NamedTuple):
     """How the answer is cut; None: as everything else on the line."""
 
 
+MOST_ELEMENTS: Final = 1024
+"""Of an array that is given to a command."""
+
+
 class Argument(NamedTuple):
     """A typed argument of a command."""
 
     name: str
-    type: Literal["integer", "number", "boolean", "string"] = "number"
+    type: Literal["integer", "number", "boolean", "string", "array"] = "number"
     title: str = ""
     unit: str = ""
     min: float | None = None
     max: float | None = None
     choices: tuple[Value, ...] = ()
-    default: Value = None
+    default: Reading = None
     is_required: bool = True
     allows_control: bool = False
     """Only for strings: control characters may pass (an argument can otherwise not end a frame)."""
     description: str = ""
+    of: ElementType = "number"
+    """Kind of the elements of an array, to each of which range and choices apply."""
+    size: int | None = None
+    """Elements of an array; None: any number up to `MOST_ELEMENTS`."""
+    confirm: Mapping[str, Confirm] = NOTHING
+    """Value, as it is written → the question before it is sent."""
 
 
 class Command(NamedTuple):
@@ -148,6 +169,8 @@ class Command(NamedTuple):
     """Doing it twice is the same as once."""
     retries: int = 0
     """How often it is sent again when no answer comes; 0 unless it is idempotent."""
+    retry: Retry = Retry()
+    """How long it waits before each of them."""
     hold: Hold | None = None
     confirm: Confirm | None = None
     requires: tuple[Requirement, ...] = ()
@@ -170,7 +193,7 @@ class Poll(NamedTuple):
     """Delay of the first one after the connection."""
     run: str = ""
     """Command whose `send` and `reply` these are; "" when they are the poll's own."""
-    arguments: Mapping[str, Value] = NOTHING
+    arguments: Mapping[str, Reading] = NOTHING
     """Of the command in `run`, defaults included."""
     when: Template | None = None
     """Asked only while it holds, over fresh signals and settings."""
@@ -184,6 +207,8 @@ class Message(NamedTuple):
     name: str
     transport: str
     read: ReadSpec
+    answer: WriteSpec | None = None
+    """What is sent back at once."""
 
 
 class Driver(NamedTuple):
@@ -194,3 +219,5 @@ class Driver(NamedTuple):
     commands: Mapping[str, Command] = NOTHING
     messages: Mapping[str, Message] = NOTHING
     polls: tuple[Poll, ...] = ()
+    discovery: tuple[str, ...] = ()
+    """Types of services by which such robots announce themselves: ``_rosbridge._tcp``."""

@@ -8,11 +8,12 @@ from typing import Literal, NamedTuple
 
 from urc.expressions import Template
 from urc.model.codec import ReadSpec, WriteSpec
-from urc.model.values import NOTHING, Value
+from urc.model.values import NOTHING, Reading, Value
 from urc.patterns import Pattern
 
 __all__ = [
     "MAX_STEPS",
+    "MAX_STEPS_DONE",
     "MAX_STEP_S",
     "Confirm",
     "ErrorReply",
@@ -25,19 +26,25 @@ __all__ = [
     "Priority",
     "PromptStep",
     "Queue",
+    "RepeatStep",
     "Requirement",
+    "Retry",
     "RunStep",
     "SendStep",
     "SetStep",
     "Stage",
     "Step",
+    "UntilStep",
     "Verify",
     "WaitStep",
     "all_steps",
+    "most_steps",
 ]
 
 MAX_STEPS = 200
 """Steps of one sequence, those in its branches included."""
+MAX_STEPS_DONE = 10_000
+"""Steps that one run may do, every round of every ``repeat`` counted."""
 MAX_STEP_S = 600.0
 """Longest wait of one step, in seconds."""
 
@@ -89,8 +96,13 @@ class Hold(NamedTuple):
 
     repeat_s: float
     """How often the newest values are sent, in seconds."""
-    release: Mapping[str, Value] = NOTHING
+    release: Mapping[str, Reading] = NOTHING
     """Arguments that stop the motion; those left out take their defaults."""
+    lease_s: float = 0.25
+    """How long the motion lasts when nothing is heard from whoever holds it: 0.1 to 1.0 s."""
+    watchdog_s: float | None = None
+    """How long the robot itself goes on after the last value, ``inf`` when it never stops by
+    itself; None: nobody has said. For the loader's rules alone."""
 
 
 class Confirm(NamedTuple):
@@ -98,6 +110,19 @@ class Confirm(NamedTuple):
 
     level: Literal["normal", "hazardous"] = "normal"
     text: str = ""
+    is_two_person: bool = False
+    """One person alone may not say yes: the engine refuses without a second name."""
+
+
+class Retry(NamedTuple):
+    """Waits before a request is sent again, doubling from `initial_s` to `max_s`, in seconds."""
+
+    initial_s: float = 0.0
+    max_s: float = 0.0
+
+    def wait_s(self, tries: int) -> float:
+        """Return the wait after `tries` unanswered ones, 1 or more."""
+        return min(self.initial_s * 2.0 ** min(tries - 1, 32), self.max_s)
 
 
 class Requirement(NamedTuple):
@@ -166,6 +191,29 @@ class WaitStep(NamedTuple):
     seconds: float
 
 
+class UntilStep(NamedTuple):
+    """Wait for a condition to come true."""
+
+    condition: Template
+    """Over fresh signals, settings and what earlier steps have read."""
+    timeout_s: float
+    otherwise: "tuple[Step, ...] | None" = None
+    text: str = ""
+
+
+class RepeatStep(NamedTuple):
+    """Do the same steps again and again, a bounded number of times."""
+
+    body: "tuple[Step, ...]"
+    times: int
+    """How often at most."""
+    until: Template | None = None
+    """Asked after each round: no further one when it is true. None: all rounds are done."""
+    otherwise: "tuple[Step, ...] | None" = None
+    """What to do when `until` is not true after the last round; None: fail."""
+    text: str = ""
+
+
 class RunStep(NamedTuple):
     """Run a command, or another sequence, and wait until it is done."""
 
@@ -193,7 +241,18 @@ class FailStep(NamedTuple):
     text: Template
 
 
-Step = SendStep | ExpectStep | PromptStep | WaitStep | RunStep | SetStep | IfStep | FailStep
+Step = (
+    SendStep
+    | ExpectStep
+    | PromptStep
+    | WaitStep
+    | UntilStep
+    | RepeatStep
+    | RunStep
+    | SetStep
+    | IfStep
+    | FailStep
+)
 
 
 def all_steps(steps: tuple[Step, ...]) -> Iterator[Step]:
@@ -203,5 +262,22 @@ def all_steps(steps: tuple[Step, ...]) -> Iterator[Step]:
         if isinstance(step, IfStep):
             yield from all_steps(step.then)
             yield from all_steps(step.otherwise)
-        elif isinstance(step, (ExpectStep, PromptStep)):
+        elif isinstance(step, (ExpectStep, PromptStep, UntilStep)):
             yield from all_steps(step.otherwise or ())
+        elif isinstance(step, RepeatStep):
+            yield from all_steps(step.body)
+            yield from all_steps(step.otherwise or ())
+
+
+def most_steps(steps: tuple[Step, ...]) -> int:
+    """Return how many steps one run can do at most, both branches of a choice counted."""
+    total = 0
+    for step in steps:
+        total += 1
+        if isinstance(step, RepeatStep):
+            total += step.times * most_steps(step.body) + most_steps(step.otherwise or ())
+        elif isinstance(step, IfStep):
+            total += most_steps(step.then) + most_steps(step.otherwise)
+        elif isinstance(step, (ExpectStep, PromptStep, UntilStep)):
+            total += most_steps(step.otherwise or ())
+    return total

@@ -14,6 +14,7 @@ __all__ = [
     "PLAIN_CHECKSUMS",
     "ChecksumSpec",
     "CrcSpec",
+    "EscapeSpec",
     "FoldSpec",
     "FrameLayout",
     "LengthSpec",
@@ -51,6 +52,8 @@ class FoldSpec(NamedTuple):
     """Bits of the result that are kept."""
     ored: int = 0
     """Bits of the result that are set, after the mask."""
+    is_odd_xored: bool = False
+    """A byte that is left over by numbers of 16 bits is put to the result by exclusive or."""
 
 
 class Window(NamedTuple):
@@ -70,6 +73,16 @@ class Salt(NamedTuple):
     is_big: bool = False
     table: Mapping[Any, bytes] = NOTHING
     """Number → bytes."""
+    otherwise: Literal["fault", "skip", "pass"] = "fault"
+    """What becomes of a frame whose number is not in the table: it is told and dropped, dropped
+    without a word, or taken with its checksum unchecked."""
+
+    def number(self, frame: bytes | bytearray) -> int | None:
+        """Return the number that chooses the row; None when the frame is too short."""
+        field = frame[self.offset : self.offset + self.size]
+        if len(field) < self.size:
+            return None
+        return int.from_bytes(field, "big" if self.is_big else "little")
 
 
 class ChecksumSpec(NamedTuple):
@@ -87,6 +100,8 @@ class ChecksumSpec(NamedTuple):
     """Whether the window spells, in hex digits, the bytes that are summed up."""
     closes: bool = False
     """Whether a wrong one ends the connection instead of the frame alone."""
+    before: bytes = b""
+    """Bytes that only the two ends know, fed to the checksum in front of the window."""
 
     @property
     def size(self) -> int:
@@ -106,6 +121,35 @@ class LengthSpec(NamedTuple):
     bits: int = 64
     """Lowest bits of the number that are the length; the others are the payload's."""
     spelling: Spelling = "raw"
+    is_counted: bool = False
+    """`size` digits say how many digits follow, and those are the number."""
+    until: bytes = b""
+    """What ends the number, which then has `size` digits at most."""
+    flag_at: int = -1
+    """Place of a byte that says whether the number is a length; -1: it always is."""
+    flag_mask: int = 0
+    """It is one where any of these bits is set; else the frame has `adjust` bytes."""
+
+    @property
+    def is_loose(self) -> bool:
+        """Whether its size is known from its own bytes alone."""
+        return self.is_counted or bool(self.until)
+
+
+class EscapeSpec(NamedTuple):
+    """How bytes that mean something to the framing are hidden in its frames."""
+
+    byte: int = 0
+    """Stands before a byte that is hidden."""
+    table: Mapping[Any, int] = NOTHING
+    """Byte that is hidden → byte that stands for it behind `byte`."""
+    xor: int | None = None
+    """Mask that made the table: whoever sends may hide other bytes, too."""
+    after: bytes = b""
+    """Behind this sequence `insert` is put in; `byte` and `table` then mean nothing."""
+    insert: int = 0
+    is_of_payload: bool = False
+    """Length and checksum count what is stuffed; otherwise, what it stands for."""
 
 
 class FrameLayout(NamedTuple):
@@ -121,6 +165,11 @@ class FrameLayout(NamedTuple):
     """Of the whole frame, where it is always the same."""
     length: LengthSpec | None = None
     checksum: ChecksumSpec | None = None
+    """The last one: what is sent carries it when all others stand."""
+    checksums: tuple[ChecksumSpec, ...] = ()
+    """Those before it."""
+    escape: EscapeSpec | None = None
+    """Stuffing of the payload alone."""
 
 
 def spelt_size(bits: int, spelling: Spelling) -> int:

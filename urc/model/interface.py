@@ -3,9 +3,18 @@
 from collections.abc import Mapping
 from typing import NamedTuple
 
-from urc.model.values import NOTHING
+from urc.model.values import NOTHING, Value
 
-__all__ = ["Grid", "Interface", "Slot", "WidgetUse"]
+__all__ = ["Given", "Grid", "Interface", "Slot", "WidgetUse"]
+
+
+class Given(NamedTuple):
+    """What an output of a widget gives to the arguments of its command."""
+
+    names: Mapping[str, str] = NOTHING
+    """Argument of the command → argument of the output, where they are not called the same."""
+    fixed: Mapping[str, Value] = NOTHING
+    """Argument of the command → value that it always has."""
 
 
 class WidgetUse(NamedTuple):
@@ -21,6 +30,8 @@ class WidgetUse(NamedTuple):
     options: Mapping[str, object] = NOTHING
     """Checked against the widget's own option schema, defaults filled in."""
     title: str = ""
+    given: Mapping[str, Given] = NOTHING
+    """Output of the widget → what goes where, for those that say so."""
 
 
 class Slot(NamedTuple):

@@ -15,6 +15,8 @@ class Hole(NamedTuple):
     name: str
     """Of the field; "" for one that is skipped."""
     kind: FieldKind
+    width: int = 0
+    """Characters that it always takes; 0: as many as belong to it."""
 
 
 JsonPath = tuple[str | int, ...]

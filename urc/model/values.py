@@ -103,6 +103,10 @@ class Signal(NamedTuple):
     """Which way its axes point."""
     formula: Template | None = None
     """What it is computed from, over other signals; None: frames set it."""
+    deadband: float = 0.0
+    """A change smaller than this is no news, in `unit`; of an array, when every element's is."""
+    debounce_s: float = 0.0
+    """A value that lasts shorter than this is no news, in seconds."""
 
 
 class Sample(NamedTuple):

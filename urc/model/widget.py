@@ -19,6 +19,10 @@ class Port(NamedTuple):
     """Unit it wants; "" takes any."""
     is_required: bool = True
     description: str = ""
+    is_held: bool = False
+    """Of an output: it is given by holding, so it may be bound to motion, and to nothing else."""
+    arguments: tuple[str, ...] = ()
+    """Of an output: names of the values that it gives along, each from -1 to 1."""
 
 
 class Widget(NamedTuple):

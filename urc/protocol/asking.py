@@ -7,21 +7,28 @@ from collections.abc import Mapping
 from functools import partial
 
 from urc.expressions import COUNTERS
-from urc.model.codec import Payload, ReadSpec, WriteSpec
-from urc.model.driver import Argument, Command, Driver, Poll, Reply
+from urc.model.codec import NUMBERED, Payload, ReadSpec, WriteSpec
+from urc.model.driver import Argument, Command, Driver, Message, Poll, Reply, TransportSpec
 from urc.model.flow import ErrorReply, ExpectStep, SendStep, Stage
 from urc.model.values import NOTHING
 from urc.patterns import Pattern
+from urc.protocol.answer import Answer, Matcher, Quick
+from urc.protocol.bounds import queue_limit_s
 from urc.protocol.encode import build_encode
-from urc.protocol.exchange import Answer, Ask, Matcher
+from urc.protocol.exchange import Ask
 from urc.protocol.fast_read import Taken, build_fast_read, prefix_of
 from urc.protocol.forms import CodecContext, Frame, build_reader
 from urc.protocol.framing import build_framing
 from urc.protocol.gate import RANKS, Bucket
+from urc.protocol.known import Known
 from urc.protocol.line import Line
+from urc.protocol.messages import Messages
+from urc.protocol.reacting import Collector, Replies, answering, collecting
 from urc.protocol.readings import Readings
 
 __all__ = ["Builder"]
+
+_BLANKS = b" \t\r\n\f\v\x1c\x1d\x1e\x1f"
 
 
 class Builder:
@@ -32,13 +39,44 @@ class Builder:
             be encoded.
     """
 
-    def __init__(self, driver: Driver, readings: Readings) -> None:
+    def __init__(self, driver: Driver, readings: Readings, known: Known) -> None:
         self._readings = readings
+        self._known = known
         self.lines: dict[str, Line] = {}
         for name, spec in driver.transports.items():
-            messages = [one.read for one in driver.messages.values() if one.transport == name]
+            messages = [one for one in driver.messages.values() if one.transport == name]
             context = CodecContext(spec.encoding, self._readings.settings)
-            self.lines[name] = Line(spec, [self._message(read, context) for read in messages])
+            matchers = [self._message(one.read, context) for one in messages]
+            if any(one.answer or one.read.collects for one in messages):
+                self._react(spec, messages, matchers, context)
+            else:
+                self.lines[name] = Line(spec, matchers)
+
+    def _react(
+        self,
+        spec: TransportSpec,
+        messages: list[Message],
+        matchers: list[Matcher],
+        context: CodecContext,
+    ) -> None:
+        """Make a line of which some messages are answered, or collected."""
+        replies, kept = Replies(), list[Collector]()
+        framing, name = build_framing(spec.framing), spec.name
+        for place, (one, matcher) in enumerate(zip(messages, matchers, strict=True)):
+            decode = matcher.decode
+            if one.read.collects:
+                collectors = {key: Collector(what) for key, what in one.read.collects.items()}
+                kept += collectors.values()
+                decode = collecting(collectors, self._readings.settings, decode)
+            if one.answer is not None:
+                encode = build_encode(one.answer, framing, context)
+                counts = COUNTERS in one.answer.names
+                counters = (lambda: self.lines[name].counters) if counts else None
+                decode = answering(encode, self._known.view, counters, replies, decode)
+            if decode is not matcher.decode:
+                matchers[place] = matcher._replace(decode=decode, make_fast=None)
+        line = self.lines[name] = Line(spec, matchers)
+        line.inbox.replies, line.inbox.collectors = replies, kept
 
     def command(self, command: Command) -> Ask:
         """Return what a command asks."""
@@ -50,6 +88,7 @@ class Builder:
             is_latest_only=command.is_latest_only,
             bucket=Bucket(command.rate_per_s) if command.rate_per_s else None,
             retries=command.retries if command.is_idempotent else 0,
+            retry=command.retry,
             is_motion=command.hold is not None,
         )
 
@@ -86,23 +125,46 @@ class Builder:
         context = CodecContext(line.spec.encoding, self._readings.settings)
         encode = build_encode(send, line.framing, context, arguments)
         has_counters = COUNTERS in send.names
+        is_numbered = send.options.get("verb") in NUMBERED
+        is_local = send.names <= arguments.keys()
         if reply is None:
-            return Ask(label, encode, has_counters=has_counters)
+            return Ask(
+                label,
+                encode,
+                has_counters=has_counters,
+                is_numbered=is_numbered,
+                is_local=is_local,
+                queue_s=queue_limit_s(line.spec, None),
+            )
         stages = (
             Stage(reply.read, reply.errors, reply.faults, reply.timeout_s),
             *reply.stages,
         )
+        answers = tuple(
+            self._answer(transport, one.read, one.errors, one.faults, one.timeout_s)
+            for one in stages
+        )
         return Ask(
             label,
             encode,
-            tuple(
-                self._answer(transport, one.read, one.errors, one.faults, one.timeout_s)
-                for one in stages
-            ),
+            answers,
             match=reply.match,
             framing=None if reply.framing is None else build_framing(reply.framing),
             has_counters=has_counters,
+            is_numbered=is_numbered,
+            is_local=is_local and reply.match is None,
+            queue_s=queue_limit_s(line.spec, answers[0].timeout_s),
+            quick=None if is_numbered else self._quick(reply, context),
+            starts=_starts(reply.read, context.encoding),
         )
+
+    def _quick(self, reply: Reply, context: CodecContext) -> Quick | None:
+        """Return what makes samples of a reply, or None where it may mean more than samples."""
+        read = reply.read
+        is_more = reply.errors or reply.faults or reply.stages or reply.match or reply.framing
+        if is_more or read.lines or any(name.startswith("_") for name in read.fields):
+            return None
+        return Messages([self._message(read, context)], context.encoding).take
 
     def _answer(
         self,
@@ -128,8 +190,20 @@ class Builder:
         def slow(payload: Payload, now: float) -> Taken | None:
             return matcher.take(Frame(payload, context.encoding), now)
 
-        make_fast = partial(build_fast_read, read, matcher.reader, self._readings, slow)
+        if read.topic is not None:
+            return matcher  # what is made for text alone knows no topics
+        make_fast = partial(
+            build_fast_read, read, matcher.reader, self._readings, slow, context.encoding
+        )
         return matcher._replace(make_fast=make_fast, prefix=prefix_of(read))
 
     def _matcher(self, read: ReadSpec, context: CodecContext) -> Matcher:
         return Matcher(build_reader(read, context), self._readings.decoder(read.fields))
+
+
+def _starts(read: ReadSpec, encoding: str) -> frozenset[int]:
+    """Return what frames of `read` may begin with: blanks, or its literal; nothing is anything."""
+    prefix = prefix_of(read)
+    if not prefix or encoding not in ("utf-8", "ascii", "latin-1"):
+        return frozenset()
+    return frozenset((prefix.encode(encoding)[0], *_BLANKS))

@@ -55,15 +55,19 @@ def _fold(spec: FoldSpec, is_big: bool) -> Compute:
     mask = full if spec.mask is None else spec.mask & full
     flip, minus = spec.complement == "ones", spec.complement == "twos"
     is_sum, size, order = spec.operation == "sum", spec.of // 8, "big" if is_big else "little"
+    is_odd_xored = spec.is_odd_xored
 
     def compute(data: bytes) -> int:
+        last = 0
+        if is_odd_xored and len(data) % size:
+            data, last = data[:-1], data[-1]
         numbers = data if size == 1 else _numbers(data, size, order)
         value = sum(numbers) if is_sum else reduce(operator.xor, numbers, 0)
         if flip:
             value = ~value
         elif minus:
             value = -value
-        return value & mask | spec.ored
+        return value & mask ^ last | spec.ored
 
     return compute
 
@@ -125,6 +129,8 @@ class Checksum:
     def check(self, frame: bytes) -> None:
         """Raise `BadFrame` unless the frame carries the right number."""
         place, window = self._place(frame), self._window(frame)
+        if window is None:
+            return
         found = frame[place : place + self.size]
         right = self._spelt(self._compute(window))
         if found == right or (self.spec.spelling[0] in "hH" and found.upper() == right.upper()):
@@ -139,7 +145,11 @@ class Checksum:
     def put(self, frame: bytearray) -> None:
         """Write the right number into its place; raise `BadFrame` when the frame has none."""
         place = self._place(frame)
-        right = self._spelt(self._compute(self._window(frame)))
+        window = self._window(frame)
+        if window is None:
+            number = self.spec.salt.number(frame)
+            raise BadFrame("no-salt", f"the salt of the checksum's table has no row {number}")
+        right = self._spelt(self._compute(window))
         frame[place : place + self.size] = right
 
     def _place(self, frame: bytes | bytearray) -> int:
@@ -148,8 +158,11 @@ class Checksum:
             raise BadFrame("short-frame", f"{len(frame)} bytes are too few to hold the checksum")
         return place
 
-    def _window(self, frame: bytes | bytearray) -> bytes:
-        """Return what is summed up: the checksum's own bytes count as zeros, the salt is added."""
+    def _window(self, frame: bytes | bytearray) -> bytes | None:
+        """Return what is summed up: the checksum's own bytes count as zeros, the salt is added.
+
+        None: nobody knows the salt, and the frame is taken as it is.
+        """
         window: Window = self.spec.over
         start, stop, _ = slice(window.start, window.stop).indices(len(frame))
         if start > stop:
@@ -161,7 +174,12 @@ class Checksum:
             data = data[: first - start] + bytes(last - first) + data[last - start :]
         if self.spec.is_from_hex:
             data = _from_hex(data)
-        return data if self._salt is None else data + self._salt(frame)
+        if self.spec.before:
+            data = self.spec.before + data
+        if self._salt is None:
+            return data
+        salt = self._salt(frame)
+        return None if salt is None else data + salt
 
     def _spelt(self, number: int) -> bytes:
         spec = self.spec
@@ -181,20 +199,21 @@ def _from_hex(digits: bytes) -> bytes:
         raise BadFrame("bad-checksum", "the checksum is taken over what is no hex digits") from None
 
 
-def _salter(salt: Salt) -> Callable[[bytes | bytearray], bytes] | None:
+def _salter(salt: Salt) -> Callable[[bytes | bytearray], bytes | None] | None:
     if salt.constant:
         constant = salt.constant
         return lambda _: constant
     if not salt.table:
         return None
 
-    def choose(frame: bytes | bytearray) -> bytes:
-        field = frame[salt.offset : salt.offset + salt.size]
-        number = int.from_bytes(field, "big" if salt.is_big else "little")
-        found = salt.table.get(number)
-        if found is None or len(field) < salt.size:
-            raise BadFrame("no-salt", f"the salt of the checksum's table has no row {number}")
-        return found
+    def choose(frame: bytes | bytearray) -> bytes | None:
+        number = salt.number(frame)
+        found = None if number is None else salt.table.get(number)
+        if found is not None or (number is not None and salt.otherwise == "pass"):
+            return found
+        # A frame without a code is dropped without a word: see `urc.protocol.framing.SKIPPED`.
+        code = "" if salt.otherwise == "skip" and number is not None else "no-salt"
+        raise BadFrame(code, f"the salt of the checksum's table has no row {number}")
 
     return choose
 

@@ -8,16 +8,26 @@ from typing import Final, NamedTuple
 
 from urc.expressions import ExpressionError
 from urc.model.driver import Command
-from urc.model.flow import Verify
-from urc.model.values import Value
+from urc.model.flow import Confirm, Verify
+from urc.model.values import Reading
 from urc.protocol.exchange import Exchange, LineEvent, Outcome
 from urc.protocol.known import Known
 from urc.protocol.steps import Sink
 
-__all__ = ["CommandRun", "Verifications", "why_not_allowed"]
+__all__ = [
+    "CommandRun",
+    "Plain",
+    "Verifications",
+    "is_guarded",
+    "questions",
+    "why_not_allowed",
+    "why_refused",
+]
 
 _MOST: Final = 256
 """Commands that may wait at a time for something to come true."""
+_BOTH: Final = 2
+"""People who must say yes where one is not enough."""
 
 
 def why_not_allowed(
@@ -31,6 +41,57 @@ def why_not_allowed(
         except ExpressionError as error:
             return f"{one.text} ({error})"
     return ""
+
+
+def questions(command: Command, values: Mapping[str, object]) -> tuple[Confirm, ...]:
+    """Return what people are asked before `command` is sent with these arguments.
+
+    Args:
+        command: as declared.
+        values: its arguments, defaults included; for an array, each of its elements counts.
+    """
+    asked = [] if command.confirm is None else [command.confirm]
+    for name, argument in command.arguments.items():
+        if argument.confirm:
+            value = values.get(name, argument.default)
+            elements = value if isinstance(value, (list, tuple)) else (value,)
+            asked += [
+                one for one in map(argument.confirm.get, map(_written, elements)) if one is not None
+            ]
+    return tuple(dict.fromkeys(asked))
+
+
+def is_guarded(command: Command) -> bool:
+    """Return whether `why_refused` may ever refuse it."""
+    asked = [one for argument in command.arguments.values() for one in argument.confirm.values()]
+    asked += [] if command.confirm is None else [command.confirm]
+    return bool(command.requires) or any(one.is_two_person for one in asked)
+
+
+def why_refused(
+    command: Command,
+    known: Known,
+    values: Mapping[str, object],
+    confirmed_by: tuple[str, ...],
+    now: float,
+) -> Outcome | None:
+    """Return why a command is not sent: what it requires, or who has not said yes to it."""
+    why_not = why_not_allowed(command, known, values, now)
+    if why_not:
+        return Outcome("not-allowed", why_not)
+    people = set(confirmed_by) - {""}
+    asked = next((one for one in questions(command, values) if one.is_two_person), None)
+    if asked is None or len(people) >= _BOTH:
+        return None
+    text = f"{asked.text}: two people must confirm {command.name}, and {len(people)} did"
+    return Outcome("not-confirmed", text)
+
+
+def _written(value: object) -> str:
+    """Return a value as a document writes it as a key."""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    return f"{value:g}" if isinstance(value, float) else str(value)
 
 
 class _Waiting(NamedTuple):
@@ -48,6 +109,11 @@ class Verifications:
         self._waiting: list[_Waiting] = []
         self.has_news = False
         """A reading came in, so it is worth to look."""
+
+    @property
+    def is_waiting(self) -> bool:
+        """Whether any waits."""
+        return bool(self._waiting)
 
     @property
     def is_full(self) -> bool:
@@ -93,13 +159,29 @@ class Verifications:
         return events
 
 
+class Plain:
+    """One run of a command that nothing verifies."""
+
+    __slots__ = ("_sink",)
+
+    def __init__(self, sink: Sink) -> None:
+        """Prepare; `sink` takes the outcome."""
+        self._sink = sink
+
+    def ended(self, exchange: Exchange, outcome: Outcome, now: float) -> list[LineEvent]:
+        """Tell the outcome."""
+        return self._sink(outcome, now)
+
+
 class CommandRun:
-    """One run of a command."""
+    """One run of a command that is verified."""
+
+    __slots__ = ("_verifications", "sink", "values", "verify")
 
     def __init__(
         self,
         verify: Verify | None,
-        values: Mapping[str, Value],
+        values: Mapping[str, Reading],
         sink: Sink,
         verifications: Verifications,
     ) -> None:

@@ -27,6 +27,7 @@ Convert = Callable[[object], Reading]
 
 _TRUE = frozenset(("1", "true", "on", "yes"))
 _FALSE = frozenset(("0", "false", "off", "no"))
+_BOTH = frozenset(("true", "false"))
 
 
 def build_converter(signal: Signal) -> Convert:
@@ -50,6 +51,8 @@ def build_raw(signal: Signal) -> Callable[[object], object]:
     back = build_inverse(conversion)
     if back is None:
         return lambda value: value
+    if signal.type == "boolean" and signal.states:
+        return lambda value: back(value if value is None else spelt(value))
     if signal.type != "array":
         return back
     return lambda value: [back(item) for item in value] if isinstance(value, tuple) else value
@@ -78,7 +81,11 @@ def _typed_converter(
     signal: Signal, kind: ElementType | str, *, rounds: bool
 ) -> Callable[[object], Value]:
     if signal.states:
-        return _states_converter(dict(signal.states), is_number=kind in ("integer", "number"))
+        states = dict(signal.states)
+        word_of = _states_converter(states, is_number=kind in ("integer", "number"))
+        if kind == "boolean" and _BOTH.issuperset(states.values()):
+            return lambda raw: _to_boolean(word_of(raw))  # the robot's own words for yes and no
+        return word_of
     if kind == "string":
         return _to_string
     if kind == "boolean":

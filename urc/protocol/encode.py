@@ -8,9 +8,9 @@ from collections.abc import Callable, Mapping
 from functools import partial
 
 from urc.expressions import ExpressionError, Template
-from urc.model.codec import WriteSpec
-from urc.model.driver import Argument, Command
-from urc.model.values import NOTHING, Value
+from urc.model.codec import Payload, WriteSpec
+from urc.model.driver import MOST_ELEMENTS, Argument, Command
+from urc.model.values import NOTHING, Reading, Value
 from urc.problems import UrcError, printable
 from urc.protocol.forms import CodecContext, NotWritable, build_writer
 from urc.protocol.framing import Framing, FramingError
@@ -18,8 +18,8 @@ from urc.protocol.generate import after_a_while
 
 __all__ = ["BadArgument", "Encode", "build_check", "build_encode", "check_arguments"]
 
-Encode = Callable[[Mapping[str, object]], bytes]
-"""Namespace → bytes on the wire, framing included. Raises `BadArgument`."""
+Encode = Callable[[Mapping[str, object]], Payload]
+"""Namespace → bytes on the wire, framing included, or an envelope. Raises `BadArgument`."""
 
 _LARGEST = 1e308
 """Not-a-number and infinity fail the comparison with it."""
@@ -38,12 +38,10 @@ def build_encode(
     """Return the function that writes `send` and frames it; constants are made once."""
     writer = build_writer(send, context)
 
-    def encode(namespace: Mapping[str, object]) -> bytes:
+    def encode(namespace: Mapping[str, object]) -> Payload:
         try:
             payload = writer.write(namespace)
-            if not isinstance(payload, bytes):
-                raise BadArgument("a message cannot go over a line of bytes")
-            return framing.encode(payload)
+            return framing.encode(payload) if isinstance(payload, bytes) else payload
         except (ExpressionError, FramingError, NotWritable) as error:
             raise BadArgument(str(error)) from None
 
@@ -62,11 +60,11 @@ def build_encode(
     return encode
 
 
-def build_check(command: Command) -> Callable[[Mapping[str, object]], dict[str, Value]]:
+def build_check(command: Command) -> Callable[[Mapping[str, object]], dict[str, Reading]]:
     """Return `check_arguments` for one command."""
     slow = partial(check_arguments, command)
 
-    def make() -> Callable[[Mapping[str, object]], dict[str, Value]]:
+    def make() -> Callable[[Mapping[str, object]], dict[str, Reading]]:
         from urc.protocol.fast_encode import build_fast_check
 
         return build_fast_check(command.arguments, slow)
@@ -74,13 +72,13 @@ def build_check(command: Command) -> Callable[[Mapping[str, object]], dict[str, 
     return after_a_while(slow, make)
 
 
-def check_arguments(command: Command, given: Mapping[str, object]) -> dict[str, Value]:
+def check_arguments(command: Command, given: Mapping[str, object]) -> dict[str, Reading]:
     """Return the arguments with defaults filled in, or raise `BadArgument` for the first fault."""
     for name in given:
         if name not in command.arguments:
             known = ", ".join(command.arguments) or "none"
             raise BadArgument(f"{command.name} has no argument {name!r}; it has: {known}")
-    values: dict[str, Value] = {}
+    values: dict[str, Reading] = {}
     for name, argument in command.arguments.items():
         if name in given:
             values[name] = _checked(argument, given[name])
@@ -91,7 +89,26 @@ def check_arguments(command: Command, given: Mapping[str, object]) -> dict[str, 
     return values
 
 
-def _checked(argument: Argument, value: object) -> Value:
+def _checked(argument: Argument, value: object) -> Reading:
+    return _elements(argument, value) if argument.type == "array" else _one(argument, value)
+
+
+def _elements(argument: Argument, value: object) -> tuple[Value, ...]:
+    """Return the elements of an array, each checked as a value of its own."""
+    name, wanted = argument.name, argument.size
+    if not isinstance(value, (list, tuple)):
+        raise BadArgument(f"{name}: a list is expected, found {_short(value)}")
+    if wanted is not None and len(value) != wanted:
+        raise BadArgument(f"{name}: {wanted} elements are expected, found {len(value)}")
+    if len(value) > MOST_ELEMENTS:
+        raise BadArgument(f"{name}: {MOST_ELEMENTS} elements are the most, found {len(value)}")
+    return tuple(
+        _one(argument._replace(name=f"{name}[{place}]", type=argument.of), element)
+        for place, element in enumerate(value)
+    )
+
+
+def _one(argument: Argument, value: object) -> Value:
     checked = _typed(argument, value)
     if argument.choices and checked not in argument.choices:
         choices = ", ".join(map(repr, argument.choices))

@@ -24,13 +24,23 @@ from collections.abc import Mapping
 from functools import partial
 
 from urc.expressions import COUNTERS
+from urc.model.codec import Payload
 from urc.model.driver import Command, Driver
-from urc.model.flow import Keepalive
-from urc.model.values import Value
+from urc.model.values import Reading, Value
+from urc.protocol.actions import build_program, programs_of_lines
+from urc.protocol.answer import Heard
 from urc.protocol.asking import Builder
-from urc.protocol.bounds import GOOD_BYE_S, lines_of
-from urc.protocol.commands import CommandRun, Verifications, why_not_allowed
-from urc.protocol.encode import BadArgument, build_check, check_arguments
+from urc.protocol.bounds import GOOD_BYE_S, calm_s, lines_of, needs_readings
+from urc.protocol.brief import briefs
+from urc.protocol.commands import (
+    CommandRun,
+    Plain,
+    Verifications,
+    is_guarded,
+    why_not_allowed,
+    why_refused,
+)
+from urc.protocol.encode import BadArgument, build_check
 from urc.protocol.events import (
     Close,
     Event,
@@ -42,13 +52,22 @@ from urc.protocol.events import (
     Samples,
     Send,
 )
-from urc.protocol.exchange import Ended, Exchange, Heard, Leaving, LineEvent, Outcome, expires_at
+from urc.protocol.exchange import (
+    Asked,
+    Ended,
+    Exchange,
+    Leaving,
+    LineEvent,
+    Outcome,
+    expires_at,
+)
 from urc.protocol.gate import Counters
 from urc.protocol.known import Known
 from urc.protocol.line import Line
+from urc.protocol.motions import Motions
 from urc.protocol.readings import Readings
-from urc.protocol.schedule import KeptAlive, PollState
-from urc.protocol.steps import Program, Runner, Sink, build_program
+from urc.protocol.schedule import Schedule
+from urc.protocol.steps import Runner, Sink
 from urc.protocol.times import soonest
 
 __all__ = ["Engine"]
@@ -63,20 +82,24 @@ class Engine:
     Args:
         driver: as loaded; its patterns and templates are compiled already.
         settings: value of every setting of the profile.
+        is_brief: take the short way where there is one; the long way does the same, in more steps.
 
     Raises:
         BadArgument: a constant frame contains its own delimiter, or cannot be encoded.
     """
 
-    def __init__(self, driver: Driver, settings: Mapping[str, Value]) -> None:
+    def __init__(
+        self, driver: Driver, settings: Mapping[str, Value], *, is_brief: bool = True
+    ) -> None:
         names: dict[str, object] = {"settings": dict(settings)}
         self.readings = Readings(driver.signals, names)
         self.known = Known(driver.signals, names)
-        builder = Builder(driver, self.readings)
+        builder = Builder(driver, self.readings, self.known)
         self.lines: Mapping[str, Line] = builder.lines
         self._all_lines = tuple(self.lines.values())
         self._commands = driver.commands
         self._checks = {name: build_check(one) for name, one in driver.commands.items()}
+        self._guarded = {name for name, one in driver.commands.items() if is_guarded(one)}
         self._asks = {
             name: builder.command(command)
             for name, command in driver.commands.items()
@@ -87,37 +110,21 @@ class Engine:
             for name, command in driver.commands.items()
             if command.steps
         }
-        self._greetings = self._of_lines(driver, builder, "on_connect")
-        self._good_byes = self._of_lines(driver, builder, "on_close")
-        self._polls = [
-            PollState(
-                poll,
-                builder.poll(poll, poll.name or f"polls.{place}"),
-                self.lines[poll.transport],
-                self.known,
-            )
-            for place, poll in enumerate(driver.polls)
-        ]
-        self._kept_alive = {
-            name: self._keeper(name, spec.keepalive, builder)
-            for name, spec in driver.transports.items()
-            if spec.keepalive is not None
-        }
+        self.motions = Motions(self._commands, self._checks, self._asks, self.lines, self.known)
+        self._is_brief = is_brief
+        self._brief = briefs(driver, self.lines, self._asks, self._checks) if is_brief else {}
+        self._greetings = programs_of_lines(driver, builder, "on_connect")
+        self._good_byes = programs_of_lines(driver, builder, "on_close")
+        self._schedule = Schedule(driver, builder, self.known)
         self._runners: list[Runner] = []
         self._verifications = Verifications(self.known)
+        has_scripts = self._programs or self._greetings or self._good_byes
+        is_timed = any(line.inbox.is_timed for line in self._all_lines)
+        self._calm_s = 0.0 if has_scripts or is_timed else calm_s(driver)
         self._is_begun = False
-
-    def _of_lines(self, driver: Driver, builder: Builder, key: str) -> dict[str, Program]:
-        return {
-            name: build_program(f"{name}.{key}", getattr(spec, key), frozenset((name,)), builder)
-            for name, spec in driver.transports.items()
-            if getattr(spec, key)
-        }
-
-    def _keeper(self, name: str, keepalive: Keepalive, builder: Builder) -> KeptAlive:
-        send = keepalive.send
-        ask = builder.plain(f"{name}.keepalive", name, send) if send is not None else None
-        return KeptAlive(keepalive, self.lines[name], ask, self.known)
+        self._is_timed = self._schedule.keeps_alive or self.readings.is_timed
+        self._is_watched = needs_readings(driver)
+        """Whether anything asks what the newest readings are."""
 
     # -- the verbs
 
@@ -126,14 +133,25 @@ class Engine:
         """When `tick` must be called at the latest; minus infinity before the first call."""
         if not self._is_begun:
             return float("-inf")
-        times = [line.deadline for line in self._all_lines]
-        times += [poll.due for poll in self._polls]
-        if self._kept_alive:
-            times += [one.deadline for one in self._kept_alive.values()]
-        if self._runners:
+        first: float | None = None
+        for line in self._all_lines:
+            time = line.deadline
+            if time is not None and (first is None or time < first):
+                first = time
+        time = self._schedule.next_poll
+        if time is not None and (first is None or time < first):
+            first = time
+        if self._is_timed or self._runners or self._verifications.is_waiting:
+            times = [first, self.readings.deadline, self._verifications.deadline]
+            times += self._schedule.next_words
             times += [runner.deadline for runner in self._runners]
-        times += (self.readings.deadline, self._verifications.deadline)
-        return soonest(times)
+            return soonest(times)
+        return first
+
+    @property
+    def calm_s(self) -> float:
+        """Nothing that comes in, and no command, makes a deadline that is nearer than this."""
+        return self._calm_s
 
     def start(self, transport: str, now: float) -> list[Event]:
         """Take note that `transport` is connected."""
@@ -142,16 +160,18 @@ class Engine:
         events = line.opened(now)
         greeting = self._greetings.get(transport)
         if greeting is None:
-            self._up(line, now)
+            self._schedule.up(line, now)
         else:
 
             def greeted(outcome: Outcome, now: float) -> list[LineEvent]:
                 if outcome.code:
                     return line.give_up(outcome.message, now)
-                self._up(line, now)
+                self._schedule.up(line, now)
                 return line.ready(now)
 
-            self._begin(Runner(self, greeting, greeted, privileged_on=transport))
+            limit_s = line.spec.timeouts.on_connect_s
+            ends_at = None if limit_s is None else now + limit_s
+            self._begin(Runner(self, greeting, greeted, transport, ends_at=ends_at))
         return self._settle(events, now) + self._ask(now)
 
     def closed(self, transport: str, reason: str, now: float) -> list[Event]:
@@ -161,32 +181,36 @@ class Engine:
         self._down(line, reason or "the robot hung up")
         return self._settle(events, now)
 
-    def receive(self, transport: str, data: bytes, now: float) -> list[Event]:
-        """Take bytes that came in on `transport`."""
-        return self._settle(self.lines[transport].receive(data, now), now)
+    def receive(self, transport: str, data: Payload, now: float) -> list[Event]:
+        """Take bytes or an envelope that came in on `transport`."""
+        line = self.lines[transport]
+        if self._is_brief and type(data) is bytes:
+            told = line.at_once(data, now)
+            if told is not None:
+                has_more = self._is_watched or self._runners or type(told[-1]) is Ended
+                return self._tell(told, now) if has_more else told  # type: ignore[return-value]
+        return self._settle(line.receive(data, now), now)
 
     def command(self, request: Request, now: float) -> list[Event]:
         """Run a command: queued, sent, answered by exactly one `Replied` or `Failed`."""
-
-        def told(outcome: Outcome, now: float) -> list[LineEvent]:
-            if outcome.code:
-                return [Failed(request.id, request.command, outcome.code, outcome.message)]
-            return [Replied(request.id, request.command, outcome.values)]
-
-        return self._settle(self.run(request.command, request.arguments, told, now), now)
+        brief = self._brief.get(request.command)
+        if brief is not None and not self._runners:
+            told = brief.send(request, now)
+            if told is not None:
+                return told
+        asked, people = Asked(request), request.confirmed_by
+        events = self.run(request.command, request.arguments, asked, now, confirmed_by=people)
+        return self._settle(events, now)
 
     def tick(self, now: float) -> list[Event]:
         """Do everything that is due at `now`."""
         if not self._is_begun:
             self._is_begun = True
-            for poll in self._polls:
-                if self.lines[poll.poll.transport].is_per_request:
-                    poll.begin(now)
+            self._schedule.begin(now)
         events: list[LineEvent] = []
         for line in self._all_lines:
             events += line.tick(now)
-        late = self.readings.tick(now)
-        if late:
+        if late := self.readings.tick(now):
             events.append(Samples("", tuple(late)))
         for runner in self._runners:
             if runner.deadline is not None and runner.deadline <= now:
@@ -199,28 +223,13 @@ class Engine:
     def finish(self, now: float) -> list[Event]:
         """Close every line in good order: each ends with a `Close`, after `GOOD_BYE_S` at most."""
         events: list[LineEvent] = []
-        for poll in self._polls:
-            poll.stop()
+        self._schedule.stop()
         for line in self.lines.values():
             if line.is_open and not line.is_per_request:
                 was_ready = line.is_ready
                 self._down(line, "the line is being closed")
                 events += line.leave(now) if was_ready else line.shut(now)
         return self._settle(events, now)
-
-    def release(self, command: str) -> bytes:
-        """Return the bytes that stop the motion of `command`, framing included.
-
-        Raises:
-            BadArgument: it is no motion, or cannot be written.
-        """
-        found = self._commands.get(command)
-        if found is None or found.hold is None:
-            raise BadArgument(f"{command!r} is no command with a release")
-        values = check_arguments(found, found.hold.release)
-        counters = self.lines[found.transport].counters
-        names = {**self.known.names, **values, COUNTERS: counters.draw()}
-        return self._asks[command].encode(names)
 
     # -- commands and sequences
 
@@ -232,6 +241,7 @@ class Engine:
         now: float,
         *,
         privileged_on: str = "",
+        confirmed_by: tuple[str, ...] = (),
     ) -> list[LineEvent]:
         """Run a command or sequence; its outcome goes to `sink`, exactly once."""
         found = self._commands.get(command)
@@ -243,23 +253,23 @@ class Engine:
             values = self._checks[command](arguments)
         except BadArgument as error:
             return sink(Outcome("bad-argument", str(error)), now)
-        if found.requires:
-            why_not = why_not_allowed(found, self.known, values, now)
-            if why_not:
-                return sink(Outcome("not-allowed", why_not), now)
+        if command in self._guarded:
+            refused = why_refused(found, self.known, values, confirmed_by, now)
+            if refused is not None:
+                return sink(refused, now)
         program = self._programs.get(command)
         if program is None:
             return self._send(found, values, sink, now, privileged_on)
         if any(runner.program is program for runner in self._runners):
             return sink(Outcome("busy", f"{command} is at work already"), now)
-        self._begin(Runner(self, program, sink, privileged_on=privileged_on))
+        self._begin(Runner(self, program, sink, privileged_on, confirmed_by))
         return []
 
     def _send(
-        self, command: Command, values: Mapping[str, Value], sink: Sink, now: float, on: str
+        self, command: Command, values: Mapping[str, Reading], sink: Sink, now: float, on: str
     ) -> list[LineEvent]:
         ask, line = self._asks[command.name], self.lines[command.transport]
-        names = {**self.known.names, **values}
+        names = values if ask.is_local else {**self.known.names, **values}
         try:
             data = ask.encode({**names, COUNTERS: Counters().draw()} if ask.has_counters else names)
         except BadArgument as error:
@@ -268,10 +278,13 @@ class Engine:
             return sink(Outcome("queue-full", "too many commands wait to be verified"), now)
         exchange = Exchange(
             ask,
-            CommandRun(command.verify, values, sink, self._verifications),
+            (sink if type(sink) is Asked else Plain(sink))
+            if command.verify is None
+            else CommandRun(command.verify, values, sink, self._verifications),
             names,
             None if ask.has_counters else data,
-            gives_up_at=expires_at(line.spec, ask, now),
+            expires_at(ask, now),
+        ).mark(
             is_privileged=on == command.transport,
             condition=partial(why_not_allowed, command, self.known, values)
             if command.requires
@@ -286,6 +299,15 @@ class Engine:
 
     # -- what follows from what
 
+    def _tell(self, told: list[LineEvent], now: float) -> list[Event]:
+        """Do what `_settle` does, for what `Line.at_once` returns."""
+        if type(told[-1]) is Ended or self._runners or self._verifications.is_waiting:
+            return self._settle(told, now)
+        for event in told:
+            if type(event) is Samples:
+                self.known.take(event.samples)
+        return told  # type: ignore[return-value]  # readings, faults, and the one answer
+
     def _settle(self, events: list[LineEvent], now: float) -> list[Event]:
         """Act upon the events meant for the engine; return those meant for the outside."""
         told: list[Event] = []
@@ -296,8 +318,11 @@ class Engine:
                 if kind in _PLAIN:
                     told.append(event)  # type: ignore[arg-type]  # these are meant for the outside
                 elif kind is Samples:
-                    self.known.take(event.samples)  # type: ignore[union-attr]  # they have them
-                    self._verifications.has_news = True
+                    if self._is_watched:
+                        self.known.take(event.samples)  # type: ignore[union-attr]  # they have them
+                        self._verifications.has_news = True
+                        for runner in self._runners:
+                            runner.look(now)
                     told.append(event)  # type: ignore[arg-type]  # as above
                 else:
                     told += self._outside(event, now)
@@ -326,12 +351,12 @@ class Engine:
         return pending
 
     def _outside(self, event: LineEvent, now: float) -> list[Event]:
+        if isinstance(event, Ended):
+            inner = event.exchange.owner.ended(event.exchange, event.outcome, now)
+            return [told for one in inner for told in self._outside(one, now)] if inner else []
         if type(event) in _PLAIN:
             return [event]  # type: ignore[list-item]  # these are meant for the outside
         match event:
-            case Ended(exchange, outcome):
-                inner = exchange.owner.ended(exchange, outcome, now)
-                return [told for one in inner for told in self._outside(one, now)] if inner else []
             case Heard(ear, offer):
                 if ear.owner is not None:
                     ear.owner.heard(ear, offer, now)
@@ -340,8 +365,9 @@ class Engine:
                 self._say_good_bye(self.lines[transport], now)
                 return []
             case Samples(_, samples):
-                self.known.take(samples)
-                self._verifications.has_news = True
+                if self._is_watched:
+                    self.known.take(samples)
+                    self._verifications.has_news = True
                 return [event]
             case Close(transport, reason):
                 self._down(self.lines[transport], reason or "the line was closed")
@@ -349,23 +375,11 @@ class Engine:
 
     def _say_good_bye(self, line: Line, now: float) -> None:
         name = line.spec.name
-        runner = Runner(
-            self,
-            self._good_byes[name],
-            lambda outcome, now: line.shut(now) if line.is_open else [],
-            privileged_on=name,
-        )
-        runner.ends_at = now + GOOD_BYE_S
-        self._begin(runner)
 
-    def _up(self, line: Line, now: float) -> None:
-        name = line.spec.name
-        if name in self._kept_alive:
-            self._kept_alive[name].forget()
-        if not line.is_per_request:
-            for poll in self._polls:
-                if poll.poll.transport == name:
-                    poll.begin(now)
+        def said(outcome: Outcome, now: float) -> list[LineEvent]:
+            return line.shut(now) if line.is_open else []
+
+        self._begin(Runner(self, self._good_byes[name], said, name, ends_at=now + GOOD_BYE_S))
 
     def _down(self, line: Line, reason: str) -> None:
         """Take note that a connection is over: nothing begun on it may go on upon the next one."""
@@ -374,22 +388,11 @@ class Engine:
             uses = name in runner.program.transports and not line.is_per_request
             if uses or runner.privileged_on == name:
                 runner.stop("disconnected", reason)
-        if not line.is_per_request:
-            for poll in self._polls:
-                if poll.poll.transport == name:
-                    poll.stop()
+        self._schedule.down(line)
 
     def _ask(self, now: float) -> list[Event]:
         """Submit the polls that are due, and what keeps lines alive."""
         told: list[Event] = []
-        for poll in self._polls:
-            if poll.due is not None and poll.due <= now:
-                told += self._settle(poll.ask(now), now)
-        for one in self._kept_alive.values() if self._kept_alive else ():
-            if one.deadline is not None and one.deadline <= now:
-
-                def run(command: str, one: KeptAlive = one) -> list[LineEvent]:
-                    return self.run(command, {}, one.done, now)
-
-                told += self._settle(one.speak(run, now), now)
+        for events in self._schedule.ask(self.run, now):
+            told += self._settle(events, now)
         return told

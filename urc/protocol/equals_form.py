@@ -1,14 +1,14 @@
-"""The form ``equals``: one text, and no field."""
+"""The plain forms: ``equals``, one text; ``raw``, the whole frame; ``any``, whatever comes."""
 
 from collections.abc import Mapping
 from typing import cast
 
 from urc.model.codec import Payload, ReadSpec
 from urc.model.values import NOTHING
-from urc.protocol.forms import CodecContext, Frame
+from urc.protocol.forms import CodecContext, Frame, NotWritable
 from urc.protocol.texts import encoded
 
-__all__ = ["EqualsReader"]
+__all__ = ["AnyReader", "EqualsReader", "RawReader"]
 
 
 class EqualsReader:
@@ -24,3 +24,37 @@ class EqualsReader:
     def write(self, fields: Mapping[str, object]) -> Payload:
         """Return that frame."""
         return self._payload
+
+
+class AnyReader:
+    """Takes every frame: the answer to a request of which nothing is wanted but that it came."""
+
+    def __init__(self, spec: ReadSpec, context: CodecContext) -> None:
+        """There is nothing to declare."""
+
+    def read(self, frame: Frame) -> Mapping[str, object] | None:
+        """Return no fields."""
+        return NOTHING
+
+    def write(self, fields: Mapping[str, object]) -> Payload:
+        """Return an empty frame."""
+        return b""
+
+
+class RawReader:
+    """Takes every frame of bytes, as one field."""
+
+    def __init__(self, spec: ReadSpec, context: CodecContext) -> None:
+        self._field = cast("str", spec.options["field"])
+
+    def read(self, frame: Frame) -> Mapping[str, object] | None:
+        """Return the frame's bytes; None where a message carries none."""
+        payload = frame.payload
+        return {self._field: payload} if isinstance(payload, bytes) else None
+
+    def write(self, fields: Mapping[str, object]) -> Payload:
+        """Return the bytes of the field; raise `NotWritable` when it holds none."""
+        value = fields.get(self._field)
+        if not isinstance(value, bytes):
+            raise NotWritable(f"{self._field}: bytes expected, found {value!r}")
+        return value

@@ -3,7 +3,8 @@
 from collections.abc import Mapping
 from typing import NamedTuple
 
-from urc.model.values import NOTHING, Reading, Sample, Value
+from urc.model.codec import Payload
+from urc.model.values import NOTHING, Reading, Sample
 
 __all__ = ["Close", "Event", "Failed", "Fault", "Open", "Replied", "Request", "Samples", "Send"]
 
@@ -13,7 +14,9 @@ class Request(NamedTuple):
 
     id: int
     command: str
-    arguments: Mapping[str, Value] = NOTHING
+    arguments: Mapping[str, Reading] = NOTHING
+    confirmed_by: tuple[str, ...] = ()
+    """Who said yes to the question before it, who asks for it among them."""
 
 
 class Open(NamedTuple):
@@ -23,10 +26,10 @@ class Open(NamedTuple):
 
 
 class Send(NamedTuple):
-    """Hand these bytes to the transport, framing included."""
+    """Hand these bytes, framing included, or this envelope to the transport."""
 
     transport: str
-    data: bytes
+    data: Payload
     is_secret: bool = False
     """Its text must not be shown or logged."""
 
@@ -40,7 +43,7 @@ class Close(NamedTuple):
 
 
 class Samples(NamedTuple):
-    """Readings out of one frame, in the order of the frame, then what is computed from them."""
+    """Readings out of frames that came in one go: in their order, each with what it computes."""
 
     transport: str
     """"" when no frame brought them: time alone began an alarm."""
@@ -62,7 +65,8 @@ class Failed(NamedTuple):
     command: str
     code: str
     """``timed-out``, ``refused``, ``disconnected``, ``bad-argument``, ``queue-full``,
-    ``unknown-command``, ``superseded``, ``not-allowed``, ``not-verified``, ``busy``, ``failed``."""
+    ``unknown-command``, ``superseded``, ``not-allowed``, ``not-confirmed``,
+    ``not-verified``, ``busy``, ``failed``."""
     message: str
 
 

@@ -9,15 +9,16 @@ import ast
 from collections.abc import Callable, Mapping
 from typing import Final
 
-from urc.expressions import Template
+from urc.expressions import Template, spelt
+from urc.model.codec import Payload
 from urc.model.driver import Argument
-from urc.model.values import Value
+from urc.model.values import Reading
 from urc.protocol.framing import DelimiterFraming, Framing
 from urc.protocol.generate import function_of
 
-__all__ = ["build_fast_check", "build_fast_encode"]
+__all__ = ["build_fast_check", "build_fast_encode", "build_fast_write"]
 
-Encode = Callable[[Mapping[str, object]], bytes]
+Encode = Callable[[Mapping[str, object]], Payload]
 
 _OPERATORS: Final[Mapping[str, ast.operator]] = {
     "_add": ast.Add(),
@@ -50,34 +51,92 @@ def build_fast_encode(
     kinds = {name: arguments[name].type for name in names if name in arguments}
     if not names or len(kinds) != len(names) or not {*kinds.values()} <= {"number", "integer"}:
         return None
+    variables = {name: f"v{place}" for place, name in enumerate(names)}
+    text = _text_of(template, kinds, variables, framing.tx, encoding)
+    if text is None:
+        return None
+    lines = [f"    v{place} = ns[{name!r}]" for place, name in enumerate(names)]
+    checks = [_check(f"v{place}", kinds[name]) for place, name in enumerate(names)]
+    lines += [*_written(checks, text, encoding), "    return slow(ns)"]
+    scope = {
+        "ArithmeticError": ArithmeticError, "float": float, "int": int, "slow": slow,
+        "spelt": spelt, "type": type,
+    }  # fmt: skip
+    return function_of("encode", "ns", lines, scope)
+
+
+def build_fast_write(
+    template: Template, arguments: Mapping[str, Argument], framing: Framing, encoding: str
+) -> Callable[[Mapping[str, object]], bytes | None] | None:
+    """Return given arguments → bytes on the wire, or None for what the two above must look at.
+
+    None as well where there is no such function: it is both of them in one.
+    """
+    if type(framing) is not DelimiterFraming or framing.seal is not None or not template.names:
+        return None
+    kinds = {name: one.type for name, one in arguments.items()}
+    if not template.names <= kinds.keys() or not {*kinds.values()} <= {"number", "integer"}:
+        return None
+    variables = {name: f"v{place}" for place, name in enumerate(arguments)}
+    text = _text_of(template, kinds, variables, framing.tx, encoding)
+    if text is None or any(one.choices for one in arguments.values()):
+        return None
+    lines = [f"    if len(given) != {len(arguments)}:", "        return None", "    try:"]
+    lines += [f"        {variable} = given[{name!r}]" for name, variable in variables.items()]
+    lines += ["    except KeyError:", "        return None"]
+    checks = [_range(variables[name], one) for name, one in arguments.items()]
+    checks += [
+        # Larger whole numbers are computed with otherwise.
+        f"-4611686018427387904 < {variable} < 4611686018427387904"
+        for name, variable in variables.items()
+        if not _is_small(arguments[name])
+    ]
+    lines += [*_written(checks, text, encoding), "    return None"]
+    scope = {
+        "ArithmeticError": ArithmeticError, "KeyError": KeyError, "float": float, "int": int,
+        "len": len, "spelt": spelt, "type": type,
+    }  # fmt: skip
+    return function_of("write", "given", lines, scope)
+
+
+def _is_small(argument: Argument) -> bool:
+    low, high = argument.min, argument.max
+    return low is not None and high is not None and low > -(2**62) and high < 2**62
+
+
+def _text_of(
+    template: Template,
+    kinds: Mapping[str, str],
+    variables: Mapping[str, str],
+    tx: bytes,
+    encoding: str,
+) -> str | None:
+    """Return the format string of a frame as source text, or None where it needs more than that."""
+    whole = frozenset(variables[name] for name, kind in kinds.items() if kind == "integer")
     try:
-        variables = {name: f"v{place}" for place, name in enumerate(names)}
-        pieces = _pieces(ast.parse(template.python, mode="eval").body, variables)
-        tail = _tail(pieces, framing.tx, encoding)
+        pieces = _pieces(ast.parse(template.python, mode="eval").body, variables, whole)
+        tail = _tail(pieces, tx, encoding)
     except (_Unsupported, UnicodeError):
         return None
     if tail:
         pieces.append(ast.Constant(tail))
-    text = ast.unparse(ast.fix_missing_locations(ast.JoinedStr(pieces)))
-    lines = [f"    v{place} = ns[{name!r}]" for place, name in enumerate(names)]
-    checks = [_check(f"v{place}", kinds[name]) for place, name in enumerate(names)]
-    lines += [
+    return ast.unparse(ast.fix_missing_locations(ast.JoinedStr(pieces)))
+
+
+def _written(checks: list[str], text: str, encoding: str) -> list[str]:
+    """Return the lines that write `text` where all of `checks` hold."""
+    return [
         f"    if {' and '.join(checks)}:",
         "        try:",
         f"            return {text}.encode({encoding!r})",
         "        except ArithmeticError:",
         "            pass",
-        "    return slow(ns)",
     ]
-    scope = {
-        "ArithmeticError": ArithmeticError, "float": float, "int": int, "slow": slow, "type": type,
-    }  # fmt: skip
-    return function_of("encode", "ns", lines, scope)
 
 
 def build_fast_check(
-    arguments: Mapping[str, Argument], slow: Callable[[Mapping[str, object]], dict[str, Value]]
-) -> Callable[[Mapping[str, object]], dict[str, Value]]:
+    arguments: Mapping[str, Argument], slow: Callable[[Mapping[str, object]], dict[str, Reading]]
+) -> Callable[[Mapping[str, object]], dict[str, Reading]]:
     """Return the check of a command's arguments; `slow` where one is left out, or no number."""
     kinds = {one.type for one in arguments.values()}
     if not arguments or kinds - {"number", "integer"}:
@@ -87,13 +146,7 @@ def build_fast_check(
     lines = [f"    if len(given) == {len(arguments)}:", "        try:"]
     lines += [f"            v{place} = given[{name!r}]" for place, name in enumerate(arguments)]
     lines += ["        except KeyError:", "            return slow(given)"]
-    checks = []
-    for place, one in enumerate(arguments.values()):
-        low = -_LARGEST if one.min is None else one.min
-        high = _LARGEST if one.max is None else one.max
-        whole = f"type(v{place}) is int"
-        kind = whole if one.type == "integer" else f"(type(v{place}) is float or {whole})"
-        checks.append(f"{kind} and {low!r} <= v{place} <= {high!r}")
+    checks = [_range(f"v{place}", one) for place, one in enumerate(arguments.values())]
     values = ", ".join(f"{name!r}: v{place}" for place, name in enumerate(arguments))
     lines += [f"        if {' and '.join(checks)}:", f"            return {{{values}}}"]
     lines.append("    return slow(given)")
@@ -101,6 +154,15 @@ def build_fast_check(
         "KeyError": KeyError, "float": float, "int": int, "len": len, "slow": slow, "type": type,
     }  # fmt: skip
     return function_of("check", "given", lines, scope)
+
+
+def _range(variable: str, argument: Argument) -> str:
+    """Return the check that a variable is a value of the argument."""
+    low = -_LARGEST if argument.min is None else argument.min
+    high = _LARGEST if argument.max is None else argument.max
+    whole = f"type({variable}) is int"
+    kind = whole if argument.type == "integer" else f"(type({variable}) is float or {whole})"
+    return f"{kind} and {low!r} <= {variable} <= {high!r}"
 
 
 def _check(variable: str, kind: str) -> str:
@@ -121,13 +183,13 @@ def _tail(pieces: list[ast.expr], tx: bytes, encoding: str) -> str:
     return tail
 
 
-def _pieces(node: ast.expr, variables: Mapping[str, str]) -> list[ast.expr]:
+def _pieces(node: ast.expr, variables: Mapping[str, str], whole: frozenset[str]) -> list[ast.expr]:
     """Return the parts of a format string: texts, and numbers put into them."""
     if isinstance(node, ast.Constant) and isinstance(node.value, str):
         return [node]
     if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
         if node.func.id == "_join":
-            return [piece for part in node.args for piece in _pieces(part, variables)]
+            return [piece for part in node.args for piece in _pieces(part, variables, whole)]
         if node.func.id == "_filter_fixed" and len(node.args) == 2:
             subject, digits = node.args
             if isinstance(digits, ast.Constant) and type(digits.value) is int:
@@ -135,7 +197,10 @@ def _pieces(node: ast.expr, variables: Mapping[str, str]) -> list[ast.expr]:
                     raise _Unsupported
                 form = ast.JoinedStr([ast.Constant(f".{digits.value}f")])
                 return [ast.FormattedValue(_number(subject, variables), -1, form)]
-    return [ast.FormattedValue(_number(node, variables), -1, None)]
+    number = _number(node, variables)
+    if not (isinstance(number, ast.Name) and number.id in whole):
+        number = ast.Call(ast.Name("spelt"), [number], [])
+    return [ast.FormattedValue(number, -1, None)]
 
 
 def _number(node: ast.expr, variables: Mapping[str, str]) -> ast.expr:

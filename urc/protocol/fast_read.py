@@ -20,13 +20,23 @@ from urc.protocol.readings import Readings
 if TYPE_CHECKING:
     from urc.protocol.json_paths import JsonReader
 
-__all__ = ["FastRead", "Slow", "Taken", "build_fast_read", "prefix_of"]
+__all__ = [
+    "FastRead",
+    "Slow",
+    "Taken",
+    "Value",
+    "build_fast_read",
+    "finish",
+    "of_json_type",
+    "prefix_of",
+    "value_of",
+]
 
 Taken = tuple[list[Sample], Sequence[str]]
 Slow = Callable[[Payload, float], "Taken | None"]
 """A frame and the time → samples and refused values, or None for another frame."""
-FastRead = Callable[[str, float, Payload], "Taken | None"]
-"""The same, with the text of the frame at hand."""
+FastRead = Callable[[bytes, float], "Taken | None"]
+"""The same, of bytes alone."""
 
 
 _WHOLE: Final = "(type({r}) is int and -9223372036854775808 <= {r} <= 9223372036854775807)"
@@ -37,7 +47,7 @@ _JSON_TYPES: Final = {
 }
 
 
-class _Value(NamedTuple):
+class Value(NamedTuple):
     """How one field becomes a sample, in source text."""
 
     signal: Signal
@@ -52,18 +62,27 @@ class _Value(NamedTuple):
 
 
 def build_fast_read(
-    spec: ReadSpec, reader: Reader, readings: Readings, slow: Slow
+    spec: ReadSpec, reader: Reader, readings: Readings, slow: Slow, encoding: str = "utf-8"
 ) -> FastRead | None:
     """Return the function for frames of `spec`, or None where only `slow` can read them."""
-    if spec.conversions or spec.sets or spec.when or spec.lines:
+    if spec.conversions or spec.sets or spec.when or spec.lines or spec.collects:
         return None
     if spec.form == "regex":
-        return _of_regex(cast("Pattern", spec.options["pattern"]), readings, slow)
+        return _of_regex(cast("Pattern", spec.options["pattern"]), encoding, readings, slow)
     if spec.form == "pattern":
         holes = cast("tuple[Hole, ...]", spec.options["holes"])
-        return _of_pattern(holes, cast("str", spec.options["tail"]), readings, slow)
+        if any(hole.width for hole in holes):
+            return None
+        return _of_pattern(holes, cast("str", spec.options["tail"]), encoding, readings, slow)
+    if spec.form == "struct":
+        from urc.protocol.fast_struct import build_fast_struct
+
+        return build_fast_struct(spec, encoding, readings, slow)
     if spec.form == "json":
-        return _of_json(spec, cast("JsonReader", reader), readings, slow)
+        from urc.protocol.fast_json import build_fast_json
+
+        plan = cast("JsonReader", reader).plan
+        return None if plan is None else build_fast_json(spec, plan, readings, slow)
     return None
 
 
@@ -80,83 +99,67 @@ def prefix_of(spec: ReadSpec) -> str:
     return ""
 
 
-def _of_regex(pattern: Pattern, readings: Readings, slow: Slow) -> FastRead | None:
+def _of_regex(pattern: Pattern, encoding: str, readings: Readings, slow: Slow) -> FastRead | None:
     if pattern.match is None:
         return None
-    values: dict[str, _Value] = {}
+    values: dict[str, Value] = {}
     for name in pattern.groups:
         if name.startswith("_"):
             continue
-        value = _value(readings.signals[name], "text", is_plain_group(pattern, name))
+        value = value_of(readings.signals[name], "text", is_plain_group(pattern, name))
         if value is None:
             return None
         values[name] = value
-    lines = ["    found = match(text)", "    if found is None:", "        return None"]
+    lines = [
+        "    try:",
+        f"        text = payload.decode({encoding!r})",
+        "    except UnicodeDecodeError:",
+        "        return slow(payload, now)",
+        "    found = match(text)",
+        "    if found is None:",
+        "        return None",
+    ]
     raws = [f"r{place}" for place in range(len(values))]
     places = [pattern.places[name] for name in values]
     if len(values) == 1:
         lines.append(f"    r0 = found[{places[0]}]")
     elif values:
         lines.append(f"    {', '.join(raws)} = found.group({', '.join(map(str, places))})")
-    return _finish(list(values.values()), raws, lines, readings, {"match": pattern.match}, slow)
+    scope = {"match": pattern.match, "UnicodeDecodeError": UnicodeDecodeError}
+    return finish(list(values.values()), raws, lines, readings, scope, slow)
 
 
-def _of_json(
-    spec: ReadSpec, reader: "JsonReader", readings: Readings, slow: Slow
-) -> FastRead | None:
-    """Return the function for documents in which every field is there and of its type."""
-    if reader.pick is None:
-        return None
-    names = [name for name in spec.fields if not name.startswith("_")]
-    values: list[_Value] = []
-    for name in names:
-        value = _value(readings.signals[name], "json", True)
-        if value is None:
-            return None
-        values.append(value)
-    lines = ["    try:", "        found = pick(payload)"]
-    raws = [f"r{place}" for place in range(len(values))]
-    lines += [f"        {raw} = found[{name!r}]" for raw, name in zip(raws, names, strict=True)]
-    lines += ["    except Otherwise:", "        return slow(payload, now)"]
-    checks = [
-        _JSON_TYPES[one.signal.type].format(r=raw) for one, raw in zip(values, raws, strict=True)
-    ]
-    lines += [
-        f"    if not ({' and '.join(checks or ['True'])}):",
-        "        return slow(payload, now)",
-    ]
-    from msgspec import DecodeError
-
-    # No such field, none at all, another structure, no document: the closures know which.
-    otherwise = (DecodeError, KeyError, TypeError, UnicodeError, RecursionError)
-    scope = {"pick": reader.pick, "Otherwise": otherwise, "type": type, "str": str}
-    return _finish(values, raws, lines, readings, scope, slow)
+def of_json_type(type_name: str, raw: str) -> str:
+    """Return the check that a raw value is one of the type, and no larger than it may be."""
+    return _JSON_TYPES[type_name].format(r=raw)
 
 
 def _of_pattern(
-    holes: tuple[Hole, ...], tail: str, readings: Readings, slow: Slow
+    holes: tuple[Hole, ...], tail: str, encoding: str, readings: Readings, slow: Slow
 ) -> FastRead | None:
     """Return the function for a pattern whose words are either fields or literals."""
     words = _words(holes, tail)
-    if words is None:
+    kinds = {word.kind for word in words or () if isinstance(word, Hole)}
+    if words is None or "hex" in kinds or encoding not in ("utf-8", "ascii", "latin-1"):
         return None
-    lines = ["    parts = text.split(' ')"]
-    checks = [f"len(parts) == {len(words)}"]
-    checks += [
-        f"parts[{place}] == {word!r}" for place, word in enumerate(words) if isinstance(word, str)
-    ]
-    checks.append("text.isascii()")
-    kinds = {word.kind for word in words if isinstance(word, Hole)}
-    if "hex" in kinds:
-        return None
+    checks = ["payload.isascii()", f"len(parts) == {len(words)}"]
+    lines = ["    parts = payload.split(b' ')"]
+    literals: dict[int, str | bytes] = {
+        place: word.encode(encoding) for place, word in enumerate(words) if isinstance(word, str)
+    }
     if "word" in kinds:
-        checks.append("text.isprintable()")
+        # Only what is kept as text must be made into text.
+        lines = ["    if not payload.isascii():", "        return slow(payload, now)"]
+        lines += ["    text = payload.decode()", "    parts = text.split(' ')"]
+        literals = {place: word for place, word in enumerate(words) if isinstance(word, str)}
+        checks[0] = "text.isprintable()"
+    checks += [f"parts[{place}] == {word!r}" for place, word in literals.items()]
     if "integer" in kinds:
-        checks.append("len(text) <= 400")  # as many digits as the pattern itself takes
+        checks.append("len(payload) <= 400")  # as many digits as the pattern itself takes
     if kinds - {"word"}:
-        checks.append("'_' not in text")
+        checks.append("95 not in payload")  # an underscore, which only Python's numbers take
     lines += [f"    if not ({' and '.join(checks)}):", "        return slow(payload, now)"]
-    values: list[_Value] = []
+    values: list[Value] = []
     raws: list[str] = []
     skipped: list[str] = []
     for place, word in enumerate(words):
@@ -165,12 +168,12 @@ def _of_pattern(
         if not word.name or word.name.startswith("_"):
             skipped.append(_skipped(word.kind, f"parts[{place}]"))
             continue
-        value = _value(readings.signals[word.name], word.kind, True)
+        value = value_of(readings.signals[word.name], word.kind, True)
         if value is None:
             return None
         values.append(value)
         raws.append(f"parts[{place}]")
-    return _finish(values, raws, lines, readings, {"len": len}, slow, skipped)
+    return finish(values, raws, lines, readings, {"len": len}, slow, skipped)
 
 
 def _words(holes: tuple[Hole, ...], tail: str) -> list[str | Hole] | None:
@@ -193,9 +196,11 @@ def _skipped(kind: FieldKind, raw: str) -> str:
     return {"integer": f"int({raw})", "number": f"float({raw})"}.get(kind, f"{raw}[0]")
 
 
-def _value(signal: Signal, kind: str, is_plain: bool) -> _Value | None:
+def value_of(signal: Signal, kind: str, is_plain: bool) -> Value | None:
     """Return how raw text of a field becomes a value of `signal`; None when that is not simple."""
     conversion = signal.conversion
+    if signal.deadband or signal.debounce_s:
+        return None
     if conversion.base or conversion.not_available or conversion.points or conversion.states:
         return None
     raw_checks = () if is_plain else ("{r}.isascii()", "'_' not in {r}")
@@ -204,7 +209,7 @@ def _value(signal: Signal, kind: str, is_plain: bool) -> _Value | None:
     if signal.type == "string":
         if kind not in ("text", "word", "json"):
             return None
-        return _Value(signal, "", (), ("{r}",) if kind == "word" else ())
+        return Value(signal, "", (), ("{r}",) if kind == "word" else ())
     if signal.type == "integer" and conversion.polynomial:
         return None
     if kind == "json":
@@ -228,7 +233,7 @@ def _value(signal: Signal, kind: str, is_plain: bool) -> _Value | None:
     elif high is not None:
         checks = (f"{{v}} <= {high!r}",)
     is_finite = signal.type == "integer" or (low is not None and high is not None)
-    return _Value(signal, expression, checks, raw_checks, is_finite)
+    return Value(signal, expression, checks, raw_checks, is_finite)
 
 
 def _scaled(coefficients: tuple[float, ...], number: str) -> str | None:
@@ -245,8 +250,8 @@ def _scaled(coefficients: tuple[float, ...], number: str) -> str | None:
     return f"({number} + {round(shift)}) / {divisor}" if shift else f"{number} / {divisor}"
 
 
-def _finish(
-    values: Sequence[_Value],
+def finish(
+    values: Sequence[Value],
     raws: Sequence[str],
     lines: list[str],
     readings: Readings,
@@ -261,11 +266,15 @@ def _finish(
         "IndexError": IndexError,
     }  # fmt: skip
     tried = [f"        {one}" for one in skipped]
-    tried += [
-        f"        v{place} = {(one.convert or '{r}').format(r=raws[place])}"
-        for place, one in enumerate(values)
+    names_of_values: list[str] = []
+    for place, one in enumerate(values):
+        is_as_it_is = one.convert in ("", "{r}") and raws[place].isidentifier()
+        names_of_values.append(raws[place] if is_as_it_is else f"v{place}")
+        if not is_as_it_is:
+            tried.append(f"        v{place} = {(one.convert or '{r}').format(r=raws[place])}")
+    open_ended = [
+        name for name, one in zip(names_of_values, values, strict=True) if not one.is_finite
     ]
-    open_ended = [f"v{place}" for place, one in enumerate(values) if not one.is_finite]
     if open_ended:
         # Nothing times infinity or not-a-number is zero.
         tried.append(f"        is_finite = ({' + '.join(open_ended)}) * 0 == 0")
@@ -280,18 +289,18 @@ def _finish(
     checks = ["is_finite"] if open_ended else []
     for place, (one, raw) in enumerate(zip(values, raws, strict=True)):
         checks += [check.format(r=raw) for check in one.raw_checks]
-        checks += [check.format(v=f"v{place}") for check in one.checks]
+        checks += [check.format(v=names_of_values[place]) for check in one.checks]
         if not one.convert:
-            checks.append(f"v{place} is not None")
+            checks.append(f"{names_of_values[place]} is not None")
     if checks:
         lines += [f"    if not ({' and '.join(checks)}):", "        return slow(payload, now)"]
     samples = []
     for place, one in enumerate(values):
-        name, alarm = one.signal.name, "''"
+        name, alarm, value = one.signal.name, "''", names_of_values[place]
         if readings.judges(name):
             names["alarm"] = readings.alarm
-            alarm = f"alarm({name!r}, v{place}, now)"
-        samples.append(f"new(Sample, ({name!r}, v{place}, now, {alarm}))")
+            alarm = f"alarm({name!r}, {value}, now)"
+        samples.append(f"new(Sample, ({name!r}, {value}, now, {alarm}))")
     lines.append(f"    samples = [{', '.join(samples)}]")
     if any(readings.keeps(one.signal.name) for one in values):
         names["follow"] = readings.follow
@@ -299,4 +308,4 @@ def _finish(
         lines.append("    return samples, refused")
     else:
         lines.append("    return samples, ()")
-    return function_of("read", "text, now, payload", lines, names)
+    return function_of("read", "payload, now", lines, names)

@@ -43,7 +43,7 @@ class NotWritable(UrcError):
 class Frame:
     """One frame as it came in; its text is decoded once, and only when somebody wants it."""
 
-    __slots__ = ("_text", "encoding", "fault", "payload", "was_text_wanted")
+    __slots__ = ("_text", "encoding", "fault", "payload", "topic", "was_text_wanted")
 
     fault: str
     """Why a reader that knew it could not take it; unset when there was none."""
@@ -54,6 +54,8 @@ class Frame:
         self.payload = payload
         self.encoding = encoding
         self._text: str | None = None
+        self.topic: str | None = None
+        """Where it comes from, on a transport that carries messages."""
         # The fault is set when there is one: a line makes thousands of frames a second.
 
     @property
@@ -106,6 +108,10 @@ class Writer(Protocol):
 def build_reader(spec: ReadSpec, context: CodecContext) -> Reader:
     """Return the reader that `spec` declares."""
     reader: Reader = READERS[spec.form].load()(spec, context)
+    if spec.topic is not None:
+        from urc.protocol.topics import TopicReader
+
+        reader = TopicReader(reader, spec, context)
     if not (spec.conversions or spec.sets or spec.when):
         return reader
     from urc.protocol.shaped import ShapedReader
@@ -130,6 +136,8 @@ READERS = Table(
         "xml": "urc.protocol.xml_form:XmlReader",
         "equals": "urc.protocol.equals_form:EqualsReader",
         "struct": "urc.protocol.struct_form:StructReader",
+        "any": "urc.protocol.equals_form:AnyReader",
+        "raw": "urc.protocol.equals_form:RawReader",
     },
 )
 WRITERS = Table(
@@ -140,5 +148,6 @@ WRITERS = Table(
         "bytes": "urc.protocol.hex_form:BytesWriter",
         "json": "urc.protocol.json_text_form:JsonWriter",
         "struct": "urc.protocol.struct_form:StructWriter",
+        "envelope": "urc.protocol.envelope_form:EnvelopeWriter",
     },
 )

@@ -8,8 +8,10 @@ from typing import Literal
 from urc.model.framing import FrameLayout, LengthSpec
 from urc.protocol.checksums import BadFrame, Checksum
 from urc.protocol.open_source import generate_open
+from urc.protocol.spelt_length import SpeltLength
+from urc.protocol.stuffing import Stuffing
 
-__all__ = ["BadFrame", "LengthField", "Seal"]
+__all__ = ["BadFrame", "LengthField", "Seal", "length_of"]
 
 
 class Seal:
@@ -17,19 +19,26 @@ class Seal:
 
     def __init__(self, layout: FrameLayout) -> None:
         self.layout = layout
-        self.length = LengthField(layout.length) if layout.length else None
-        self._checksum = Checksum(layout.checksum) if layout.checksum else None
-        self.open = generate_open(layout, self._open)
+        self.length = length_of(layout.length) if layout.length else None
+        self._loose = self.length if isinstance(self.length, SpeltLength) else None
+        specs = (*layout.checksums, *((layout.checksum,) if layout.checksum else ()))
+        self._checksums = tuple(Checksum(one) for one in specs)
+        self._stuffing = Stuffing(layout.escape) if layout.escape else None
+        is_plain = not layout.checksums and layout.escape is None and self._loose is None
+        self.open = generate_open(layout, self._open) if is_plain else self._open
         """Frame → payload; raises `BadFrame` when the checksum is wrong or lacks its place."""
 
     def _open(self, frame: bytes) -> bytes:
         """Return the payload; raise `BadFrame` when the checksum is wrong or lacks its place."""
-        if self._checksum is not None:
-            self._checksum.check(frame)
+        for checksum in self._checksums:
+            checksum.check(frame)
         head, stop = self.layout.head, len(frame) - self.layout.tail
+        if self._loose is not None:
+            head = self._loose.head(frame)
         if stop < head:
             raise BadFrame("short-frame", f"{len(frame)} bytes are too few for this kind of frame")
-        return frame[head:stop]
+        payload = frame[head:stop]
+        return payload if self._stuffing is None else self._stuffing.unstuff(payload)
 
     def close(self, payload: bytes) -> bytes:
         """Return the frame around `payload`; raise `BadFrame` when there can be none.
@@ -37,7 +46,12 @@ class Seal:
         Bytes that neither the payload nor the layout names are zeros.
         """
         layout = self.layout
-        frame = bytearray(layout.head) + payload + bytes(layout.tail)
+        if self._stuffing is not None:
+            payload = self._stuffing.stuff(payload)
+        head = bytes(layout.head)
+        if self._loose is not None:
+            head += self._loose.before(payload, layout.tail)
+        frame = bytearray(head) + payload + bytes(layout.tail)
         if layout.size is not None and len(frame) != layout.size:
             wanted = layout.size - layout.head - layout.tail
             raise BadFrame(
@@ -48,11 +62,16 @@ class Seal:
             frame[: len(start)] = start
         if end:
             frame[len(frame) - len(end) :] = end
-        if self.length is not None:
+        if isinstance(self.length, LengthField):
             self.length.put(frame, len(frame) - layout.tail)
-        if self._checksum is not None:
-            self._checksum.put(frame)
+        for checksum in self._checksums:
+            checksum.put(frame)
         return bytes(frame)
+
+
+def length_of(spec: LengthSpec) -> "LengthField | SpeltLength":
+    """Return the field of that kind."""
+    return SpeltLength(spec) if spec.is_loose else LengthField(spec)
 
 
 class LengthField:
@@ -60,14 +79,16 @@ class LengthField:
 
     def __init__(self, spec: LengthSpec) -> None:
         self._spec = spec
-        self.end = spec.offset + spec.size
+        self.end = max(spec.offset + spec.size, spec.flag_at + 1)
         """How many bytes of a frame must be there to read it."""
         self._mask = (1 << min(spec.bits, 8 * spec.size)) - 1
 
     def total(self, data: bytes | bytearray, at: int) -> int:
         """Return the size of the frame at `at`; negative when the field is no number."""
         spec = self._spec
-        field = data[at + spec.offset : at + self.end]
+        if spec.flag_at >= 0 and not data[at + spec.flag_at] & spec.flag_mask:
+            return spec.adjust
+        field = data[at + spec.offset : at + spec.offset + spec.size]
         if spec.spelling == "raw":
             number = int.from_bytes(field, "big" if spec.is_big else "little") & self._mask
         else:
@@ -88,7 +109,12 @@ class LengthField:
         """
         spec = self._spec
         number, left = divmod(len(frame) - spec.adjust, spec.unit)
-        place = slice(spec.offset, self.end)
+        place = slice(spec.offset, spec.offset + spec.size)
+        if self.end <= stop and spec.flag_at >= 0 and not frame[spec.flag_at] & spec.flag_mask:
+            if number or left:
+                text = f"a frame without the flag has {spec.adjust} bytes, found {len(frame)}"
+                raise BadFrame("wrong-size", text)
+            return  # what stands there is the payload's
         if left:
             raise BadFrame("wrong-size", f"the frame is counted in {spec.unit} bytes; {left} over")
         if self.end > stop or number < 0:
@@ -100,8 +126,8 @@ class LengthField:
             kept = int.from_bytes(frame[place], order) & ~self._mask
             frame[place] = (kept | number).to_bytes(spec.size, order)
             return
-        digits = b"%0*d" if spec.spelling == "dec" else b"%0*x"
-        text = digits % (spec.size, number)
-        if len(text) > spec.size:
+        form = b"%0*d" if spec.spelling == "dec" else b"%0*x"
+        digits = form % (spec.size, number)
+        if len(digits) > spec.size:
             raise BadFrame("wrong-size", f"the length field cannot say {number}")
-        frame[place] = text.upper() if spec.spelling == "HEX" else text
+        frame[place] = digits.upper() if spec.spelling == "HEX" else digits

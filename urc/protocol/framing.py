@@ -18,6 +18,7 @@ from urc.model.driver import FramingSpec
 from urc.model.framing import FrameLayout
 from urc.problems import UrcError
 from urc.protocol.frame import BadFrame, Seal
+from urc.protocol.stream import Credit, Stream
 from urc.registry import Table
 
 __all__ = [
@@ -26,8 +27,10 @@ __all__ = [
     "Decoder",
     "DelimiterDecoder",
     "FrameFault",
+    "SKIPPED",
     "Framing",
     "FramingError",
+    "Open",
     "Stream",
     "StreamDecoder",
     "build_framing",
@@ -50,27 +53,6 @@ class FrameFault(NamedTuple):
     """Whether the connection is to be given up."""
 
 
-class Stream:
-    """The bytes of one connection that no frame has taken yet."""
-
-    __slots__ = ("at", "data")
-
-    def __init__(self, data: bytearray | None = None) -> None:
-        self.data = bytearray() if data is None else data
-        self.at = 0
-        """Where the bytes begin that are not taken yet."""
-
-    def __len__(self) -> int:
-        return len(self.data) - self.at
-
-    def push(self, data: bytes) -> None:
-        """Add bytes at the end, and let go of those that are taken."""
-        if self.at:
-            del self.data[: self.at]
-            self.at = 0
-        self.data += data
-
-
 class Decoder(Protocol):
     """Cuts one stream. Made anew for each connection, so nothing stale survives."""
 
@@ -90,6 +72,12 @@ class Decoder(Protocol):
 
     def next(self, now: float = 0.0) -> bytes | FrameFault | None:
         """Return one frame or fault and take it off the stream; None when none is complete."""
+
+    def whole(self, data: bytes) -> bytes | None:
+        """Return the payload of `data`, if it is one good frame and nothing is held back.
+
+        That is as good as `push` and `next` with it; None leaves it to them.
+        """
 
     def tick(self, now: float) -> list[bytes | FrameFault]:
         """Return the frames that the silence until `now` has completed."""
@@ -111,50 +99,15 @@ class Framing(Protocol):
 def build_framing(spec: FramingSpec) -> Framing:
     """Return the framing that `spec` declares."""
     framing: Framing = FRAMINGS[spec.type].load()(spec)
-    return framing if spec.sent is None else TwoFramings(build_framing(spec.sent), framing)
+    if spec.timeout_s is not None or spec.strips_ansi:
+        from urc.protocol.framings.patient import PatientFraming
 
+        framing = PatientFraming(framing, spec.timeout_s, spec.strips_ansi)
+    if spec.sent is None:
+        return framing
+    from urc.protocol.framings.paired import TwoFramings
 
-class TwoFramings(NamedTuple):
-    """What is sent is framed otherwise than what comes."""
-
-    sent: Framing
-    received: Framing
-
-    def encode(self, payload: bytes) -> bytes:
-        """Return the bytes of one frame, or raise `FramingError`."""
-        return self.sent.encode(payload)
-
-    def decoder(self, stream: Stream | None = None) -> Decoder:
-        """Return a fresh decoder."""
-        return self.received.decoder(stream)
-
-    def reversed(self) -> "TwoFramings":
-        """Return the same framings seen from the other end of the line."""
-        return TwoFramings(self.received.reversed(), self.sent.reversed())
-
-
-class Credit:
-    """How many bytes may be looked at a second time: a few for each that the stream moves on.
-
-    So all work together is at most `RATE` + 1 times the bytes of the stream, and `MOST` once.
-    """
-
-    RATE: Final = 8
-    MOST: Final = 1 << 16
-
-    def __init__(self) -> None:
-        self._left = self.MOST
-
-    def earn(self, count: int) -> None:
-        """Take note that the stream has moved on by `count` bytes."""
-        self._left = min(self.MOST, self._left + self.RATE * count)
-
-    def spend(self, count: int) -> bool:
-        """Return whether `count` bytes may be looked at again, and take them off."""
-        if self._left < count:
-            return False
-        self._left -= count
-        return True
+    return TwoFramings(build_framing(spec.sent), framing)
 
 
 class StreamDecoder:
@@ -165,6 +118,8 @@ class StreamDecoder:
         self._max_bytes = max_bytes
         self._is_lost = False
         """Whether the bytes since the last frame were none: that is told once."""
+        self._is_case = False
+        """Whether a `switch` chooses anew behind each frame."""
 
     @property
     def pending(self) -> int:
@@ -196,9 +151,30 @@ class StreamDecoder:
         """Return the frames that silence has completed: none."""
         return []
 
+    def whole(self, data: bytes) -> bytes | None:
+        """Return the payload of a single frame, or None: `next` finds out."""
+        return None
+
+    def ahead(self) -> list[bytes]:
+        """Return whole frames that there are, if several, and leave them where they are.
+
+        Nothing where each must be looked at by itself; `skip` takes those that were used.
+        """
+        return []
+
+    def skip(self, count: int, size: int) -> None:
+        """Take the first `count` frames of `ahead`, whose payloads have `size` bytes in all."""
+
     def restart(self) -> None:
         """Forget what was seen of the stream: one case of a `switch` has a frame begin here."""
         self._is_lost = False
+        self._is_case = True
+
+    def _refused(self, error: BadFrame) -> FrameFault | None:
+        """Return the fault of a frame that was cut, or None when nobody wants to know of it."""
+        if error.code == SKIPPED and not self._is_case:
+            return None
+        return FrameFault(error.code, str(error), error.closes)
 
     def _skip(self, count: int) -> FrameFault | None:
         """Let go of bytes that begin no frame; return a fault for the first of their run."""
@@ -217,6 +193,8 @@ class StreamDecoder:
         return FrameFault(code, message, closes)
 
 
+SKIPPED: Final = ""
+"""Code of a frame that is to be dropped without a word; only a `switch` sees it."""
 Open = Callable[[bytes], bytes]
 
 
@@ -246,8 +224,12 @@ class DelimiterFraming(NamedTuple):
     seal: Seal | None = None
 
     @classmethod
-    def from_spec(cls, spec: FramingSpec) -> "DelimiterFraming":
+    def from_spec(cls, spec: FramingSpec) -> "Framing":
         """Return the framing for options ``tx`` and ``rx``, both bytes."""
+        if "escape" in spec.options:
+            from urc.protocol.framings.escaped import EscapedFraming
+
+            return EscapedFraming.from_spec(spec)
         tx, rx = cast("bytes", spec.options["tx"]), cast("bytes", spec.options["rx"])
         return cls(tx, rx, spec.max_bytes, seal_of(spec))
 
@@ -303,7 +285,7 @@ class DelimiterDecoder(StreamDecoder):
     def next(self, now: float = 0.0) -> bytes | FrameFault | None:
         """Return one frame or fault, or None when there is none yet."""
         stream, delimiter = self._stream, self._delimiter
-        while True:
+        while stream.at < len(stream.data):
             start = stream.at
             most = len(stream.data)
             if self._credit is not None:
@@ -320,15 +302,50 @@ class DelimiterDecoder(StreamDecoder):
             elif end - start > self._max_bytes:
                 return self._too_long()
             elif end > start or not self._skips_empty:
-                return self._opened(bytes(stream.data[start:end]))
+                frame = self._opened(bytes(stream.data[start:end]))
+                if frame is not None:
+                    return frame
+        return None
 
-    def _opened(self, frame: bytes) -> bytes | FrameFault:
+    def whole(self, data: bytes) -> bytes | None:
+        """Return the payload of a single frame, unless it needs a closer look."""
+        stream, end = self._stream, data.find(self._delimiter)
+        if end + len(self._delimiter) != len(data) or not 0 <= end <= self._max_bytes:
+            return None
+        if stream.at != len(stream.data) or self._credit or self._is_skipping:
+            return None
+        if self._open is None:
+            return data[:end] if end or not self._skips_empty else None
+        try:
+            return self._open(data[:end])
+        except BadFrame:
+            return None  # it is told by `next`
+
+    def ahead(self) -> list[bytes]:
+        """Return whole frames, unless they are unwrapped, skipped or too long."""
+        stream, delimiter = self._stream, self._delimiter
+        if self._open or self._credit or self._is_skipping or self._skips_empty:
+            return []
+        first = stream.data.find(delimiter, stream.at + self._searched)
+        if first < 0 or stream.data.find(delimiter, first + len(delimiter)) < 0:
+            return []
+        frames = bytes(memoryview(stream.data)[stream.at :]).split(delimiter)
+        frames.pop()
+        return frames if max(map(len, frames)) <= self._max_bytes else []
+
+    def skip(self, count: int, size: int) -> None:
+        """Take frames, and the delimiters behind them."""
+        if count:
+            self._stream.at += size + count * len(self._delimiter)
+            self._searched = 0
+
+    def _opened(self, frame: bytes) -> bytes | FrameFault | None:
         if self._open is None:
             return frame
         try:
             return self._open(frame)
         except BadFrame as error:
-            return FrameFault(error.code, str(error), error.closes)
+            return self._refused(error)
 
     def _wait(self, credit: Credit | None) -> FrameFault | None:
         """Keep what may yet become a frame."""

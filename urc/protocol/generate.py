@@ -2,9 +2,11 @@
 
 Floor 3. Whatever stands in the source is written by the modules that call `function_of`, out of
 names of their own and `repr()` of constants; nothing of a document gets into it in any other way.
-The source is registered with `linecache`, so that a traceback shows the generated line.
+The source is registered with `linecache` for as long as the function lives, so that a traceback
+shows the generated line.
 """
 
+import weakref
 from collections.abc import Callable, Mapping, Sequence
 from itertools import count
 from typing import Any, Final, TypeVar
@@ -37,6 +39,8 @@ def function_of(
     exec(compile(source, file, "exec"), made)  # noqa: S102  # see the module's own words
     linecache.cache[file] = (len(source), None, source.splitlines(keepends=True), file)
     function: Callable[..., Any] = made[name]
+    # With its engine goes the function, and with the function its source.
+    weakref.finalize(function, linecache.cache.pop, file, None).atexit = False
     return function
 
 

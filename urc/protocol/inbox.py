@@ -8,17 +8,23 @@ from collections.abc import Sequence
 from urc.model.driver import TransportSpec
 from urc.model.values import Sample
 from urc.patterns import Pattern
-from urc.protocol.events import Event, Fault, Samples
-from urc.protocol.exchange import Ear, Fields, Heard, LineEvent, Matcher, Offer
+from urc.protocol.answer import Ear, Fields, Heard, Matcher, Offer, Quick
+from urc.protocol.events import Fault, Samples, Send
+from urc.protocol.exchange import LineEvent
+from urc.protocol.flights import Flight
 from urc.protocol.forms import BadText, Frame
-from urc.protocol.framing import Decoder, Framing, Stream
+from urc.protocol.framing import Decoder, Framing, Stream, StreamDecoder
 from urc.protocol.messages import Messages
+from urc.protocol.reacting import Collector, Replies
 from urc.protocol.secrets import Secrets
 
 __all__ = ["Inbox"]
 
+new = tuple.__new__
+"""Makes a named tuple without the detour through its class: this is done for every frame."""
 _SHOWN_BYTES = 20
 """Of a frame that nothing matches."""
+_NO_MATCH = "nothing declared matches "
 
 
 class Inbox:
@@ -26,50 +32,78 @@ class Inbox:
 
     def __init__(self, spec: TransportSpec, framing: Framing, messages: list[Matcher]) -> None:
         self._spec = spec
-        self._framing = self._cut_by = framing
+        self._name = spec.name
+        self._framing = framing
         self.messages = Messages(messages, spec.encoding)
         self._stream = Stream()
-        self.decoder: Decoder = framing.decoder(self._stream)
+        self._cut(framing)
         self.secrets = Secrets()
+        self.replies = Replies()
+        """What messages are answered with, until it is told."""
+        self.collectors: list[Collector] = []
+        """What messages put together, to be forgotten with the connection."""
         self._ears: list[Ear] = []
         self._prompt: tuple[Pattern, Ear] | None = None
+        self.is_listening = False
+        """Whether anybody waits for a frame or a prompt."""
+        self._stray: tuple[float, str] = (float("-inf"), "")
 
     def reset(self, *, is_new: bool) -> None:
         """Forget a connection. Its secrets are kept until there `is_new` one, for late messages."""
         self._stream = Stream()
-        self._cut_by = self._framing
-        self.decoder = self._framing.decoder(self._stream)
+        self._cut(self._framing)
         self._ears.clear()
         self._prompt = None
+        self.is_listening = False
+        self.replies.clear()
+        for one in self.collectors:
+            one.forget()
         if is_new:
             self.secrets = Secrets()
 
     def cut_by(self, framing: Framing) -> None:
         """Let `framing` cut what comes next, beginning with what is left of the stream."""
         if framing is not self._cut_by:
-            self._cut_by = framing
-            self.decoder = framing.decoder(self._stream)
+            self._cut(framing)
 
     @property
-    def is_recut(self) -> bool:
-        """Whether another framing than the line's own cuts the stream."""
-        return self._cut_by is not self._framing
+    def has_more(self) -> bool:
+        """Whether bytes are left that may be frames."""
+        return self._stream.at < len(self._stream.data)
+
+    def _cut(self, framing: Framing) -> None:
+        self._cut_by = framing
+        self.decoder: Decoder = framing.decoder(self._stream)
+        self.is_timed = getattr(type(self.decoder), "deadline", None) is not StreamDecoder.deadline
+        """Whether time alone may complete a frame."""
 
     def tell(self, frame: Frame, now: float) -> list[LineEvent]:
         """Return what a frame says that answers no request."""
         heard = self._listeners(frame, now)
         told = self.message(frame, now)
         if heard is None and told is None:
-            return [self._unknown(frame)]
+            fault = self._unknown(frame)
+            self._stray = (now, fault.message)
+            return [fault]
         return [*(heard or ()), *(told or ())]
+
+    def came_since(self, since: float) -> str:
+        """Return what to add to "it did not come": what came in its place; "" for nothing."""
+        time_s, text = self._stray
+        if time_s < since:
+            return ""
+        shown = text.removeprefix(_NO_MATCH)
+        return f"; {shown} came, which is no answer" if shown != text else f"; {text}"
 
     def listen(self, ear: Ear) -> None:
         """Let `ear` have the frames that answer no request."""
         self._ears.append(ear)
+        self.is_listening = True
 
     def look_for(self, pattern: Pattern, ear: Ear) -> list[LineEvent]:
         """Let `ear` have the text that `pattern` finds after the last whole frame."""
         self._prompt = (pattern, ear)
+        self.is_listening = True
         return self.look()
 
     def unlisten(self, ear: Ear) -> None:
@@ -77,6 +111,7 @@ class Inbox:
         self._ears = [one for one in self._ears if one is not ear]
         if self._prompt is not None and self._prompt[1] is ear:
             self._prompt = None
+        self.is_listening = bool(self._ears) or self._prompt is not None
 
     @property
     def is_prompted(self) -> bool:
@@ -93,21 +128,60 @@ class Inbox:
         if not text or pattern.search(text) is None:
             return []
         stream.at = len(stream.data)
-        self.decoder = self._cut_by.decoder(stream)
+        self._cut(self._cut_by)
         self._prompt = None
+        self.is_listening = bool(self._ears)
         return [Heard(ear, Offer({}))]
 
     def message(self, frame: Frame, now: float) -> list[LineEvent] | None:
         """Return what a declared message makes of the frame, or None when it is none."""
         taken = self.messages.take(frame.payload, now, frame)
-        return None if taken is None else list(self._told(*taken))
+        return None if taken is None else self.told(*taken)
 
     def quick(self, payload: bytes, now: float) -> list[LineEvent] | None:
         """Do what `tell` does with most frames: nobody listens, and it is a message."""
         if self._ears:
             return None
         taken = self.messages.take(payload, now)
-        return None if taken is None else list(self._told(*taken))
+        return None if taken is None else self.told(*taken)
+
+    def rush(self, flights: Sequence[Flight], now: float) -> list[LineEvent]:
+        """Take messages off the front of the stream, as many as come before anything else.
+
+        Their readings are told together. Whatever is no message, or may be somebody's answer, is
+        left in the stream, to be looked at by itself.
+        """
+        decoder = self.decoder
+        if self._ears or self._prompt is not None or not isinstance(decoder, StreamDecoder):
+            return []
+        quick: Quick | None = None
+        starts: frozenset[int] = frozenset()
+        if flights:
+            quick, starts = flights[0].quick, flights[0].exchange.ask.starts
+            if quick is None or len(flights) > 1 or flights[0].is_late:
+                return []
+        events: list[LineEvent] = []
+        samples: list[Sample] = []
+        frames, count, told = decoder.ahead(), 0, 0
+        take = self.messages.take
+        alone, length = self.messages.alone
+        for frame in frames:
+            may_answer = quick is not None and (not (starts and frame) or frame[0] in starts)
+            if may_answer and quick and quick(frame, now) is not None:
+                break
+            only = alone.get(frame[:length])
+            taken = take(frame, now) if only is None else only(frame, now)
+            if taken is None:
+                break
+            count += 1
+            samples += taken[0]
+            if taken[1]:
+                events += self.told(samples, taken[1])
+                samples, told = [], count
+        if count > told:
+            events += self.told(samples, ())
+        decoder.skip(count, sum(map(len, frames[:count])))
+        return events
 
     def _listeners(self, frame: Frame, now: float) -> list[LineEvent] | None:
         for ear in self._ears:
@@ -132,30 +206,41 @@ class Inbox:
         fault = getattr(frame, "fault", "")
         if fault:
             return Fault(self._spec.name, "bad-value", self.secrets.hide(fault))
+        if frame.topic is not None:
+            where = f"nothing declared matches what came on {frame.topic!r}"
+            return Fault(self._spec.name, "no-match", self.secrets.hide(where))
         was_text_wanted = getattr(frame, "was_text_wanted", False)
         try:
             text = self.secrets.hide(frame.text)
         except BadText as error:
             if was_text_wanted:
                 return Fault(self._spec.name, "bad-text", str(error))
-            return Fault(
-                self._spec.name, "no-match", f"nothing declared matches {self._in_hex(frame)}"
-            )
+            return Fault(self._spec.name, "no-match", f"{_NO_MATCH}{self._in_hex(frame)}")
         shown = text if len(text) <= 60 else text[:57] + "..."
-        return Fault(self._spec.name, "no-match", f"nothing declared matches {shown!r}")
+        return Fault(self._spec.name, "no-match", f"{_NO_MATCH}{shown!r}")
 
     def samples(
         self, matcher: Matcher, found: Fields, now: float
-    ) -> tuple[list[Event], list[Sample]]:
+    ) -> tuple[list[LineEvent], list[Sample]]:
         """Return what to tell of a frame's fields, and the readings among them."""
         samples, refused = matcher.decode(found, now)
-        return self._told(samples, refused), samples
+        return self.told(samples, refused), samples
 
-    def _told(self, samples: list[Sample], refused: Sequence[str]) -> list[Event]:
-        # A good frame without values is told of, too: it shows that the line lives.
-        is_good = bool(samples) or not refused
-        events: list[Event] = [Samples(self._spec.name, tuple(samples))] if is_good else []
-        events += [Fault(self._spec.name, "bad-value", line) for line in refused]
+    def told(self, samples: list[Sample], refused: Sequence[str]) -> list[LineEvent]:
+        """Return what to tell of readings, and of values that are none.
+
+        A good frame without values is told of, too: it shows that the line lives.
+        """
+        if not refused and not self.replies:
+            return [new(Samples, (self._name, tuple(samples)))]
+        name = self._spec.name
+        events: list[LineEvent] = []
+        if samples or not refused:
+            events.append(Samples(name, tuple(samples)))
+        events += [Fault(name, "bad-value", line) for line in refused]
+        if self.replies:
+            events += [Send(name, data) for data in self.replies]
+            self.replies.clear()
         return events
 
     def _in_hex(self, frame: Frame) -> str:

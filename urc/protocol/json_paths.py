@@ -16,7 +16,7 @@ import msgspec
 from urc.model.codec import Envelope, Payload, ReadSpec
 from urc.model.text import JsonPath
 from urc.protocol.forms import CodecContext, Frame, NotWritable
-from urc.protocol.json_types import build_pick
+from urc.protocol.json_types import build_pick, plan_of
 
 __all__ = ["JsonReader"]
 
@@ -38,7 +38,8 @@ class JsonReader:
             **{name: _searcher(path) for name, path in others.items()},
         }
         self._is_utf8 = context.encoding in ("utf-8", "ascii")
-        self.pick = build_pick(self._paths) if self._is_utf8 and not others else None
+        self.plan = plan_of(self._paths) if self._is_utf8 and not others else None
+        self.pick = None if self.plan is None else build_pick(self.plan)
         self._encoding = context.encoding
 
     def read(self, frame: Frame) -> Mapping[str, object] | None:

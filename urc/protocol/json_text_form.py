@@ -5,14 +5,15 @@ from collections.abc import Mapping
 from typing import Any
 
 from urc.expressions import Template
-from urc.model.codec import Payload, WriteSpec
+from urc.model.codec import Envelope, Payload, WriteSpec
 from urc.protocol.forms import BadText, CodecContext, Frame, NotWritable
+from urc.protocol.texts import counter_in
 
-__all__ = ["JsonWriter"]
+__all__ = ["JsonWriter", "filled", "matches"]
 
 
 class JsonWriter:
-    """Writes a value as compact JSON; reads back the leaves that are plain names."""
+    """Writes a value as compact JSON; reads back the leaves that are plain names or counters."""
 
     def __init__(self, spec: WriteSpec, context: CodecContext) -> None:
         self._tree: Any = spec.options["tree"]
@@ -25,53 +26,67 @@ class JsonWriter:
 
     def write(self, namespace: Mapping[str, object]) -> Payload:
         """Return the JSON text; raise `NotWritable` or `ExpressionError`."""
-        value = _filled(self._tree, namespace)
         try:
-            return self._encode(value).encode(self._encoding)
-        except TypeError as error:
-            raise NotWritable(f"this cannot be written as JSON: {error}") from None
+            return self._text(filled(self._tree, namespace)).encode(self._encoding)
         except UnicodeEncodeError as error:
             wrong = error.object[error.start]
             raise NotWritable(f"{wrong!r} cannot be written in {self._encoding}") from None
+
+    def _text(self, value: object) -> str:
+        try:
+            return self._encode(value)
+        except TypeError as error:
+            raise NotWritable(f"this cannot be written as JSON: {error}") from None
         except ValueError:
             raise NotWritable("JSON has no infinite number and no not-a-number") from None
 
+    def value(self, namespace: Mapping[str, object]) -> object:
+        """Return what `write` writes, as data; raise `NotWritable` or `ExpressionError`."""
+        value = filled(self._tree, namespace)
+        self._text(value)
+        return value
+
     def read(self, frame: Frame) -> Mapping[str, object] | None:
         """Return the values in the places of plain names, or None when the rest differs."""
+        payload = frame.payload
         try:
-            value = json.loads(frame.text)
+            value = payload.body if isinstance(payload, Envelope) else json.loads(frame.text)
         except (BadText, ValueError, RecursionError):
             return None
         found: dict[str, object] = {}
-        return found if _matches(self._tree, value, found) else None
+        return found if matches(self._tree, value, found) else None
 
 
-def _filled(tree: Any, namespace: Mapping[str, object]) -> Any:
+def filled(tree: Any, namespace: Mapping[str, object]) -> Any:
+    """Return `tree` with the values of its templates."""
     if isinstance(tree, Template):
         return tree.evaluate(namespace)
     if isinstance(tree, dict):
-        return {name: _filled(inner, namespace) for name, inner in tree.items()}
+        return {name: filled(inner, namespace) for name, inner in tree.items()}
     if isinstance(tree, list):
-        return [_filled(inner, namespace) for inner in tree]
+        return [filled(inner, namespace) for inner in tree]
     return tree
 
 
-def _matches(tree: Any, value: Any, found: dict[str, object]) -> bool:
+def matches(tree: Any, value: Any, found: dict[str, object]) -> bool:
+    """Return whether `value` is what `tree` gives; plain names' values are put into `found`."""
     if isinstance(tree, Template):
         name = tree.source.strip().removeprefix("{{").removesuffix("}}").strip()
         if name.isidentifier() and name in tree.names:
             found[name] = value
+        elif counter := counter_in(name):
+            found[f"seq.{counter}"] = value
         return True
     if isinstance(tree, dict):
         return (
             isinstance(value, dict)
             and tree.keys() == value.keys()
-            and all(_matches(inner, value[name], found) for name, inner in tree.items())
+            and all(matches(inner, value[name], found) for name, inner in tree.items())
         )
     if isinstance(tree, list):
         return (
             isinstance(value, list)
             and len(tree) == len(value)
-            and all(_matches(*pair, found) for pair in zip(tree, value, strict=True))
+            and all(matches(*pair, found) for pair in zip(tree, value, strict=True))
         )
     return type(tree) is type(value) and tree == value

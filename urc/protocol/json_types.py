@@ -5,14 +5,14 @@ Floor 3, private to `urc.protocol.json_paths`.
 
 from collections.abc import Callable, Iterator, Mapping
 from itertools import count
-from typing import Any
+from typing import Any, NamedTuple
 
 import msgspec
 
 from urc.model.text import JsonPath
 from urc.protocol.generate import function_of
 
-__all__ = ["build_pick"]
+__all__ = ["Plan", "Want", "build_pick", "plan_of"]
 
 _LISTS_TO = 64
 """Places of a list up to which it is decoded by type; longer ones are mostly not wanted."""
@@ -46,36 +46,89 @@ class _Shape:
         )
 
 
-class _Want:
+class Want:
     """Which fields are at a place, and which steps lead on from it."""
 
-    def __init__(self) -> None:
+    def __init__(self, shape: _Shape) -> None:
+        self.shape = shape
+        """What is at the place."""
         self.fields: list[str] = []
-        self.steps: dict[str | int, _Want] = {}
+        self.steps: dict[str | int, Want] = {}
 
 
-def build_pick(paths: Mapping[str, JsonPath]) -> Callable[[bytes], dict[str, object] | None] | None:
-    """Return bytes → fields found, or None where types cannot say what the paths want.
+class Plan(NamedTuple):
+    """How the fields of some paths are taken out of a document."""
 
-    The function raises `msgspec.DecodeError` for a document of another structure.
-    """
-    shape, want = _Shape(), _Want()
+    decode: Callable[[bytes], Any]
+    """Raises `msgspec.DecodeError` for a document of another structure."""
+    want: Want
+
+    def access(self, want: Want, step: str | int) -> str:
+        """Return what leads from a place by `step`, in source text."""
+        if isinstance(step, int):
+            return f"[{step}]"
+        return f".f{list(want.shape.names).index(step)}"
+
+    def picking(self, variable: str, begin: Callable[[str], str]) -> Iterator[str]:
+        """Yield lines that take the fields out of `variable`, as far as they are there.
+
+        Args:
+            variable: holds what was decoded.
+            begin: returns what stands before the value of a field; "" for none that is wanted.
+        """
+        yield from self._picking(self.want, variable, "    ", begin)
+
+    def _picking(
+        self, want: Want, variable: str, indent: str, begin: Callable[[str], str]
+    ) -> Iterator[str]:
+        for field in want.fields:
+            if begin(field):
+                yield f"{indent}{begin(field)}{variable}"
+        for place, (step, inner) in enumerate(want.steps.items()):
+            name = f"{variable}_{place}"
+            if isinstance(step, str):
+                yield f"{indent}{name} = {variable}{self.access(want, step)}"
+                is_there = f"{name} is not UNSET"
+                more = f" and {name} is not None" if inner.steps else ""
+                yield f"{indent}if {is_there}{more}:"
+                yield f"{indent}    pass"
+                yield from self._picking(inner, name, indent + "    ", begin)
+            else:
+                yield f"{indent}if len({variable}) > {step}:"
+                yield f"{indent}    {name} = {variable}[{step}]"
+                more = f"if {name} is not None:" if inner.steps else "if True:"
+                yield f"{indent}    {more}"
+                yield f"{indent}        pass"
+                yield from self._picking(inner, name, indent + "        ", begin)
+
+
+def plan_of(paths: Mapping[str, JsonPath]) -> Plan | None:
+    """Return the plan, or None where types cannot say what the paths want."""
+    shape = _Shape()
+    want = Want(shape)
     for name, path in paths.items():
         at, wanted = shape, want
         for step in path:
             if isinstance(step, int) and step > _LISTS_TO:
                 return None
             at = at.below(step)
-            wanted = wanted.steps.setdefault(step, _Want())
+            wanted = wanted.steps.setdefault(step, Want(at))
         at.is_leaf = True
         wanted.fields.append(name)
     if not shape.names or not shape.is_plain():
         return None
-    decoder = msgspec.json.Decoder(_type_of(shape, count()))
+    return Plan(msgspec.json.Decoder(_type_of(shape, count())).decode, want)
+
+
+def build_pick(plan: Plan) -> Callable[[bytes], dict[str, object] | None]:
+    """Return bytes → fields found.
+
+    The function raises `msgspec.DecodeError` for a document of another structure.
+    """
     lines = ["    v = decode(data)", "    found = {}"]
-    lines += _picking(want, shape, "v", "    ")
+    lines += plan.picking("v", "found[{!r}] = ".format)
     lines.append("    return found or None")
-    scope = {"decode": decoder.decode, "UNSET": msgspec.UNSET, "len": len}
+    scope = {"decode": plan.decode, "UNSET": msgspec.UNSET, "len": len}
     return function_of("pick", "data", lines, scope)
 
 
@@ -92,29 +145,3 @@ def _type_of(shape: _Shape, numbers: Iterator[int]) -> Any:
         fields.append((f"f{place}", kind, msgspec.UNSET))
     names = {f"f{place}": name for place, name in enumerate(shape.names)}
     return msgspec.defstruct(f"Part{next(numbers)}", fields, rename=names, gc=False)
-
-
-def _picking(want: _Want, shape: _Shape, variable: str, indent: str) -> Iterator[str]:
-    for field in want.fields:
-        yield f"{indent}found[{field!r}] = {variable}"
-    for place, (step, inner) in enumerate(want.steps.items()):
-        name = f"{variable}_{place}"
-        below = shape.below(step)
-        if isinstance(step, str):
-            attribute = f"f{list(shape.names).index(step)}"
-            yield f"{indent}{name} = {variable}.{attribute}"
-            is_there = f"{name} is not UNSET"
-            yield (
-                f"{indent}if {is_there} and {name} is not None:"
-                if inner.steps
-                else (f"{indent}if {is_there}:")
-            )
-            yield from _picking(inner, below, name, indent + "    ")
-        else:
-            yield f"{indent}if len({variable}) > {step}:"
-            yield f"{indent}    {name} = {variable}[{step}]"
-            if inner.steps:
-                yield f"{indent}    if {name} is not None:"
-                yield from _picking(inner, below, name, indent + "        ")
-            else:
-                yield from _picking(inner, below, name, indent + "    ")

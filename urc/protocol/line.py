@@ -13,75 +13,50 @@ first: one with a correlation takes its own answer only; of the others only the 
 since answers come in order (what is real-time has an order of its own). After an answer is overdue
 its flight stays as *late* for one more reply time: a frame for it is dropped, not taken for the
 answer of the next request, and meanwhile nothing is sent that it could be mistaken for. A line that
-misses `MISSES_UNTIL_CLOSED` answers in a row is given up and opened afresh.
+misses `urc.protocol.answering.MISSES_UNTIL_CLOSED` answers in a row is given up and opened afresh.
 """
 
-from typing import Literal
-
+from urc.model.codec import Envelope, Payload, traffic_of
 from urc.model.driver import TransportSpec
+from urc.model.values import Reading
+from urc.protocol.answer import Heard, Matcher
+from urc.protocol.answering import Answering
 from urc.protocol.encode import BadArgument
-from urc.protocol.events import Close, Fault, Open, Send
-from urc.protocol.exchange import (
-    DONE,
-    Ended,
-    Exchange,
-    Flight,
-    Heard,
-    Leaving,
-    LineEvent,
-    Matcher,
-    Offer,
-    Outcome,
-    expires_at,
-)
-from urc.protocol.flights import Flights
+from urc.protocol.events import Fault, Open, Send
+from urc.protocol.exchange import DONE, Asked, Ended, Exchange, LineEvent, Outcome
+from urc.protocol.flights import Flight
 from urc.protocol.forms import Frame
-from urc.protocol.framing import FrameFault, Framing, build_framing
-from urc.protocol.gate import Counters
-from urc.protocol.inbox import Inbox
-from urc.protocol.outbox import Outbox, counted
+from urc.protocol.framing import FrameFault, Framing
+from urc.protocol.outbox import counted
 from urc.protocol.times import soonest
 
 __all__ = ["Line"]
 
-MISSES_UNTIL_CLOSED = 3
 MOST_IN_FLIGHT = 256
 """Requests that wait for answers, late and real-time ones included."""
 
 
-class Line:
+class Line(Answering):
     """The conversation on one transport."""
 
     def __init__(self, spec: TransportSpec, messages: list[Matcher]) -> None:
-        self.spec = spec
-        self.is_per_request = spec.connection == "per_request"
-        """Whether each request brings its own connection."""
-        self.framing: Framing = build_framing(spec.framing)
-        self.state: Literal["closed", "opening", "open"] = "closed"
-        self.is_ready = False
-        """Whether anybody may talk here; else only those who make it so, or say good-bye."""
-        self.last_sent = float("-inf")
-        self.counters = Counters()
-        self._flights = Flights()
-        self._outbox = Outbox(spec, self._flights)
-        self.inbox = Inbox(spec, self.framing, messages)
-        self.is_behind = False
-        """Whether something that came in waits for `go_on`."""
+        super().__init__(spec, messages)
+        self._gap_s = spec.min_gap_s
         self.is_scripted = False
         """Whether a sequence is at work, which may wait for the next frame."""
-        self._is_leaving = False
-        self._misses = 0
-        self._silent_at: float | None = None
-
-    @property
-    def is_open(self) -> bool:
-        """Whether the transport is connected."""
-        return self.state == "open"
+        self._may_recut = False
+        """Whether an answer has ever brought its own framing."""
+        self._number = 0
+        """Of the last envelope whose answer carries it; never used twice."""
 
     @property
     def deadline(self) -> float | None:
         """When `tick` has something to do, or None."""
-        times = [self._flights.deadline, self.inbox.decoder.deadline, self._silent_at]
+        flights = self._flights
+        due = None if not flights else flights[0].due if len(flights) == 1 else flights.deadline
+        if not (self._outbox or self._silent_at or self.inbox.is_timed):
+            return due
+        times = [due, self.inbox.decoder.deadline, self._silent_at]
         if self._outbox:
             times += [exchange.gives_up_at for exchange in self._outbox]
             if self.state != "opening":
@@ -94,89 +69,6 @@ class Line:
         if not (self._flights or self._outbox):
             return False
         return self._flights.has(label) or self._outbox.has(label)
-
-    # -- the connection
-
-    def opened(self, now: float) -> list[LineEvent]:
-        """Take note that the transport is connected, with nothing received on it yet."""
-        events = self._lose("the line was connected anew") if self.state == "open" else []
-        self._reset("open")
-        self.last_sent = now
-        self._hear(now)
-        self.is_ready = not self.spec.on_connect
-        return events + self._pump(now)
-
-    def ready(self, now: float) -> list[LineEvent]:
-        """Let everybody talk: the connection is as it must be."""
-        self.is_ready = True
-        return self._pump(now)
-
-    def closed(self, reason: str, now: float) -> list[LineEvent]:
-        """Take note that the transport is not connected (any more)."""
-        if self.state == "closed":
-            return []
-        events: list[LineEvent] = []
-        was_open, pending = self.state == "open", self.inbox.decoder.pending
-        if was_open and pending:
-            text = f"the connection ended in the middle of a frame ({pending} bytes)"
-            events.append(Fault(self.spec.name, "cut-frame", text))
-        events += self._lose(reason or "the robot hung up")
-        return events + self._pump(now)
-
-    def give_up(self, reason: str, now: float) -> list[LineEvent]:
-        """Close the connection for a reason; what waits for it fails."""
-        if self.state == "closed":
-            return []
-        reason = self.inbox.secrets.hide(reason)
-        events = self._lose(reason)
-        events.append(Close(self.spec.name, reason))
-        return events + self._pump(now)
-
-    def leave(self, now: float) -> list[LineEvent]:
-        """Begin to close in good order: say good-bye where that is declared, else close at once."""
-        if self.state != "open":
-            return []
-        if self.spec.on_close:
-            lost = self._lost()
-            self.is_ready, self._is_leaving = False, True
-            return [*_disconnected(lost, "the line is being closed"), Leaving(self.spec.name)]
-        return self.shut(now)
-
-    def shut(self, now: float) -> list[LineEvent]:
-        """Close after the good-bye."""
-        events = self._lose("the line was closed")
-        return [*events, Close(self.spec.name), *self._pump(now)]
-
-    def _lose(self, reason: str) -> list[LineEvent]:
-        """Forget the connection; fail what it was for."""
-        lost = self._lost()
-        for exchange in tuple(self._outbox):
-            if exchange.is_privileged:
-                self._outbox.remove(exchange)
-        self._reset("closed")
-        return _disconnected(lost, self.inbox.secrets.hide(reason))
-
-    def _lost(self) -> list[Exchange]:
-        """Take out the requests that end with this connection."""
-        lost = self._flights.drain()
-        if not self.is_per_request:
-            return lost + self._outbox.drain()
-        if not (self.is_ready or self._is_leaving):
-            for exchange in list(self._outbox)[:1]:  # it could not be made usable for this one
-                self._outbox.remove(exchange)
-                lost.append(exchange)
-        return lost
-
-    def _reset(self, state: Literal["closed", "open"]) -> None:
-        self.state = state
-        self.is_ready = self._is_leaving = False
-        self._flights.clear()
-        self.inbox.reset(is_new=state == "open")
-        self._misses = 0
-        self._silent_at = None
-        self.is_behind = False
-        if state == "open":
-            self.counters = Counters()
 
     # -- sending
 
@@ -195,6 +87,22 @@ class Line:
         gone = self._outbox.take(exchange)
         events: list[LineEvent] = [] if gone is None else [Ended(*gone)]
         return events + self._pump(now)
+
+    def is_idle(self, now: float) -> bool:
+        """Whether a persistent line is usable, with nothing under way: `send_idle` may be used."""
+        outbox = self._outbox
+        is_free = self.is_ready and not (self._flights or outbox or self.is_per_request)
+        return is_free and now >= outbox.next_send
+
+    def send_idle(self, exchange: Exchange, now: float) -> None:
+        """Do what `submit` does on a line that `is_idle`, with a request that is simple.
+
+        The caller tells that its data is sent, and what ends with that.
+        """
+        self.last_sent = exchange.sent_at = now
+        self._outbox.next_send = now + self._gap_s
+        if exchange.ask.answers:
+            self._flights.append(Flight(exchange, now))
 
     def _refusal(self, exchange: Exchange) -> str:
         if exchange.is_privileged:
@@ -231,9 +139,10 @@ class Line:
 
     def _send(self, exchange: Exchange, now: float) -> list[LineEvent]:
         ask = exchange.ask
-        why_not = exchange.condition(now) if exchange.condition is not None else ""
-        if why_not:
-            return [Ended(exchange, Outcome("not-allowed", why_not))]
+        if exchange.condition is not None:
+            why_not = exchange.condition(now)
+            if why_not:
+                return [Ended(exchange, Outcome("not-allowed", why_not))]
         data = exchange.data
         if data is None:
             try:
@@ -241,36 +150,75 @@ class Line:
             except BadArgument as error:
                 return [Ended(exchange, Outcome("bad-argument", str(error)))]
         if exchange.is_secret:
-            self.inbox.secrets.add(data, self.spec.encoding)
+            self.inbox.secrets.add(traffic_of(data), self.spec.encoding)
+        number = None
+        if isinstance(data, Envelope) and ask.is_numbered:
+            number = self._number = self._number + 1
+            data = data._replace(attributes={**data.attributes, "id": number})
         self.last_sent = exchange.sent_at = now
         self._outbox.sent(exchange, now)
         sent: list[LineEvent] = [Send(self.spec.name, data, exchange.is_secret)]
         if not ask.answers:
-            return [*sent, Ended(exchange, DONE)]
-        self._flights.append(Flight(exchange, now))
+            sent.append(Ended(exchange, DONE))
+            return sent
+        if ask.framing is not None:
+            self._may_recut = True
+        flight = Flight(exchange, now)
+        flight.number = number
+        self._flights.append(flight)
         return sent
 
     # -- receiving
 
-    def receive(self, data: bytes, now: float) -> list[LineEvent]:
-        """Take bytes from the transport."""
+    def receive(self, data: Payload, now: float) -> list[LineEvent]:
+        """Take bytes or an envelope from the transport."""
         if self.state != "open":
             return []
         if self.spec.stale_after_s is not None:
             self._hear(now)
-        self.inbox.cut_by(self._framing_for())
+        if isinstance(data, Envelope):
+            told = self._envelope(data, now)
+            self.is_behind = self.is_open and bool(told)
+            return told
+        if self._may_recut:
+            self.inbox.cut_by(self._framing_for())
         self.inbox.decoder.push(data, now)
         return self.go_on(now)
+
+    def at_once(self, data: bytes, now: float) -> list[LineEvent] | None:
+        """Do what `receive` does with one whole frame of readings while nothing else is going on.
+
+        Returns:
+            What `receive` would, or None, with nothing done, where it may be anything else.
+        """
+        if self.state != "open" or self._may_recut or self.is_scripted or self._outbox:
+            return None
+        inbox, flights = self.inbox, self._flights
+        if self.is_per_request or self.is_behind or inbox.is_listening:
+            return None
+        payload = inbox.decoder.whole(data)
+        if payload is None:
+            return None
+        if flights:
+            told = self._quick(flights[0], payload, now) if len(flights) == 1 else None
+        else:
+            told = inbox.quick(payload, now)
+        if told is None:
+            return None
+        if self.spec.stale_after_s is not None:
+            self._hear(now)
+        return told
 
     def go_on(self, now: float) -> list[LineEvent]:
         """Look at what came in, up to something that a sequence may have waited for.
 
         What follows it may be for the next step: that step is to listen first.
         """
-        events: list[LineEvent] = []
         inbox = self.inbox
+        events: list[LineEvent] = []
+        may_rush = not (self.is_scripted or self._may_recut)
         while self.state == "open":
-            if self._flights or inbox.is_recut:
+            if self._may_recut:
                 inbox.cut_by(self._framing_for())
             frame = inbox.decoder.next(now)
             if frame is None:
@@ -280,6 +228,8 @@ class Line:
             if self.is_scripted and any(isinstance(event, (Heard, Ended)) for event in told):
                 self.is_behind = self.state == "open"
                 return events
+            if may_rush and inbox.has_more:
+                events += inbox.rush(self._flights, now)
         # What waits may depend on what has just come in: that is to be known before it is sent.
         self.is_behind = bool(events) and bool(self._outbox)
         if inbox.is_prompted:
@@ -309,16 +259,16 @@ class Line:
             events.append(Fault(self.spec.name, "silent", text))
         return events + self._pump(now)
 
-    def _hear(self, now: float) -> None:
-        if self.spec.stale_after_s is not None:
-            self._silent_at = now + self.spec.stale_after_s
-
     def _frame(self, cut: bytes | FrameFault, now: float) -> list[LineEvent]:
         if isinstance(cut, FrameFault):
             fault = Fault(self.spec.name, cut.code, cut.message)
             return [fault, *self.give_up(cut.message, now)] if cut.closes else [fault]
         if not self._flights:
             told = self.inbox.quick(cut, now)
+            if told is not None:
+                return told
+        elif len(self._flights) == 1:
+            told = self._quick(self._flights[0], cut, now)
             if told is not None:
                 return told
         frame = Frame(cut, self.spec.encoding)
@@ -332,62 +282,28 @@ class Line:
                 return self._answer(*answered, now)
         return self.inbox.tell(frame, now)
 
-    def _answer(self, flight: Flight, offer: Offer, now: float) -> list[LineEvent]:
-        exchange = flight.exchange
-        events: list[LineEvent] = self.inbox.dropped(offer) if offer.dropped else []
-        if offer.fields is None and not offer.refusal:
-            return events  # more is to come
-        if flight.is_late:
-            if exchange not in self._outbox:
-                return [*events, self._late(flight)]
-            # It is as good as the answer to the same request, sent again.
-            self._outbox.remove(exchange)
-            flight.is_late = False
+    def _quick(self, flight: Flight, payload: bytes, now: float) -> list[LineEvent] | None:
+        """Do what is done with most frames, or return None for all others.
+
+        Only one request is in flight, its answer is a frame of readings, and here it is, or a
+        message.
+        """
+        quick = flight.quick
+        if quick is None or flight.is_late:
+            return None
+        taken = quick(payload, now)
+        if taken is None:
+            return self.inbox.quick(payload, now)
         self._misses = 0
-        if offer.fields is None:
-            outcome = Outcome("refused", self.inbox.secrets.hide(offer.refusal))
+        samples, refused = taken
+        events = self.inbox.told(samples, refused)
+        values: dict[str, Reading] = {}
+        for sample in samples:
+            values[sample[0]] = sample[1]
+        self._flights.clear()
+        owner = flight.exchange.owner
+        if type(owner) is Asked and not self.is_scripted:
+            events.append(owner.replied(values))
         else:
-            told, samples = self.inbox.samples(flight.ear.answer.matcher, offer.fields, now)
-            events += told
-            flight.take(offer.fields, samples)
-            if flight.next_stage(now):
-                return events
-            outcome = Outcome(values=flight.values)
-        self._flights.remove(flight)
-        events.append(Ended(exchange, outcome))
-        # One connection, one request: the next one waits for a connection of its own.
+            events.append(Ended(flight.exchange, Outcome("", "", values)))
         return events + self.leave(now) if self.is_per_request and self.is_ready else events
-
-    def _late(self, flight: Flight) -> Fault:
-        self._flights.remove(flight)
-        text = f"the answer to {flight.exchange.ask.label} came too late and was dropped"
-        return Fault(self.spec.name, "late-reply", text)
-
-    # -- answers that do not come
-
-    def _overdue(self, flight: Flight, now: float) -> list[LineEvent]:
-        if flight not in self._flights:
-            return []  # the line was given up for another one
-        if flight.is_late:
-            self._flights.remove(flight)
-            return []
-        exchange, reply_s = flight.exchange, flight.ear.answer.timeout_s
-        text = f"no answer to {exchange.ask.label} within {reply_s:g} s"
-        events: list[LineEvent] = [Fault(self.spec.name, "reply-timeout", text)]
-        flight.is_late = True
-        flight.due = now + reply_s
-        if exchange.tries_left and flight.stage == 0:
-            exchange.tries_left -= 1
-            exchange.gives_up_at = expires_at(self.spec, exchange.ask, flight.due)
-            self._outbox.put_back(exchange)
-            return events + self.give_up(text, now) if self.is_per_request else events
-        events.append(Ended(exchange, Outcome("timed-out", text)))
-        self._misses += not exchange.ask.is_miss_harmless
-        if self.is_per_request or self._misses >= MISSES_UNTIL_CLOSED:
-            events += self.give_up(text, now)
-        return events
-
-
-def _disconnected(lost: list[Exchange], reason: str) -> list[LineEvent]:
-    outcome = Outcome("disconnected", reason)
-    return [Ended(exchange, outcome) for exchange in lost]

@@ -4,11 +4,11 @@ Floor 3, pure. The first one declared that takes a frame has it. A frame is offe
 whose literal beginning it has: most drivers have many messages, and a frame is one of them.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Final
 
 from urc.model.codec import Payload
-from urc.protocol.exchange import Matcher
+from urc.protocol.answer import Matcher
 from urc.protocol.fast_read import FastRead, Taken
 from urc.protocol.forms import Frame
 
@@ -16,8 +16,7 @@ __all__ = ["WARM_AFTER", "Messages"]
 
 WARM_AFTER: Final = 30
 """Frames after which functions are made: a test of a document is over before that."""
-
-_BLANKS = frozenset(" \t\r\n\f\v\x1c\x1d\x1e\x1f")
+_BLANKS = frozenset(blank.encode() for blank in ("", *" \t\r\n\f\v\x1c\x1d\x1e\x1f"))
 
 
 class Messages:
@@ -29,6 +28,19 @@ class Messages:
         self._frames = 0
         self._table: _Table | None = None
 
+    @property
+    def declared(self) -> tuple[Matcher, ...]:
+        """What was declared, in the order of the document."""
+        return self._all
+
+    @property
+    def alone(self) -> tuple[Mapping[bytes, FastRead], int]:
+        """Beginnings of frames that one message alone may take, with its function; their length."""
+        table = self._table
+        if table is None:
+            return {}, 0
+        return table.only, table.length
+
     def take(self, payload: Payload, now: float, frame: Frame | None = None) -> Taken | None:
         """Return what a frame says, or None when it is none of the messages.
 
@@ -39,33 +51,40 @@ class Messages:
                 and could not take it.
         """
         table = self._table
+        if table is not None and type(payload) is bytes:
+            only = table.only.get(payload[: table.length])
+            if only is not None:
+                taken = only(payload, now)
+                if taken or frame is None:
+                    return taken
+        return self._other(payload, now, frame)
+
+    def _other(self, payload: Payload, now: float, frame: Frame | None) -> Taken | None:
+        """Do what `take` does where it is not one message alone that may take the frame."""
+        table = self._table
         if table is None:
             self._frames += 1
             if self._frames == WARM_AFTER:
-                self._table = _Table(self._all)
+                self._table = _Table(self._all, self._encoding)
             return self._any(self._all, payload, now, frame)
-        if not table.needs_text or not isinstance(payload, bytes):
+        if type(payload) is not bytes:
             return self._any(self._all, payload, now, frame)
-        try:
-            text = payload.decode(self._encoding)
-        except UnicodeDecodeError:
-            return self._any(self._all, payload, now, frame)
-        head = text[: table.length]
-        only = table.only.get(head)
-        if only is not None:
-            return only(text, now, payload)
+        head = payload[: table.length]
+        if head in table.only:
+            return self._any(self._all, payload, now, frame)  # for what is to be said of it
         candidates = table.by_head.get(head)
         if candidates is None:
             # Blanks before the text are nobody's literal, but some forms take them.
-            candidates = table.every if text[:1] in _BLANKS else table.others
+            candidates = table.every if head[:1] in _BLANKS else table.others
         for place, (_, fast) in enumerate(candidates):
             if fast is None:
                 rest = [one for one, _ in candidates[place:]]
                 return self._any(rest, payload, now, frame)
-            taken = fast(text, now, payload)
+            taken = fast(payload, now)
             if taken is not None:
                 return taken
-        return None
+        # Once more, for what is to be said of it.
+        return None if frame is None else self._any(self._all, payload, now, frame)
 
     def _any(
         self, candidates: Sequence[Matcher], payload: Payload, now: float, frame: Frame | None
@@ -85,17 +104,24 @@ _Row = tuple[Matcher, FastRead | None]
 class _Table:
     """What is made once it pays: a function for each message, found by how a frame begins."""
 
-    def __init__(self, messages: Sequence[Matcher]) -> None:
+    def __init__(self, messages: Sequence[Matcher], encoding: str) -> None:
         rows: list[_Row] = [(one, one.make_fast() if one.make_fast else None) for one in messages]
-        prefixes = [one.prefix for one in messages if one.prefix]
-        self.length = min(map(len, prefixes), default=0)
-        """Characters of a head."""
+        # Elsewhere a text may begin with a mark, or in more ways than one.
+        has_heads = encoding in ("utf-8", "ascii", "latin-1")
+        starts = [one.prefix.encode(encoding) if has_heads else b"" for one in messages]
+        self.length = min((len(start) for start in starts if start), default=0)
+        """Bytes of a head."""
         self.every = tuple(rows)
-        self.others = tuple(row for row in rows if not row[0].prefix)
+        self.others = tuple(row for row, start in zip(rows, starts, strict=True) if not start)
         """Those of which it is not known how their frames begin."""
+        heads = dict.fromkeys(start[: self.length] for start in starts if start)
         self.by_head = {
-            head: tuple(row for row in rows if not row[0].prefix or row[0].prefix.startswith(head))
-            for head in dict.fromkeys(prefix[: self.length] for prefix in prefixes)
+            head: tuple(
+                row
+                for row, start in zip(rows, starts, strict=True)
+                if not start or start.startswith(head)
+            )
+            for head in heads
         }
         self.only = {
             head: found[0][1]
@@ -103,4 +129,5 @@ class _Table:
             if len(found) == 1 and found[0][1] is not None
         }
         """Where one message alone can be meant: its function."""
-        self.needs_text = any(one.prefix or fast for one, fast in rows)
+        if len(rows) == 1 and rows[0][1] is not None and not heads:
+            self.only[b""] = rows[0][1]

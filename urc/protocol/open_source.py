@@ -44,7 +44,13 @@ def generate_open(layout: FrameLayout, slow: Open) -> Open:
 def _is_common(spec: ChecksumSpec) -> bool:
     stop = spec.over.stop
     is_before = stop is not None and stop <= spec.at < 0 <= spec.over.start
-    return is_before and spec.spelling == "raw" and spec.bits in (8, 16, 32) and spec.salt == Salt()
+    return (
+        is_before
+        and spec.spelling == "raw"
+        and spec.bits in (8, 16, 32)
+        and spec.salt == Salt()
+        and not spec.before
+    )
 
 
 def _computed(spec: ChecksumSpec, scope: dict[str, object]) -> str:

@@ -4,6 +4,7 @@ Floor 3, pure. See `urc.protocol.line` for the theory of operation.
 """
 
 from urc.expressions import COUNTERS
+from urc.model.codec import Payload
 from urc.model.driver import TransportSpec
 from urc.protocol.exchange import Exchange, Outcome
 from urc.protocol.flights import Flights
@@ -15,14 +16,15 @@ __all__ = ["Outbox", "counted"]
 class Outbox(Waiting[Exchange]):
     """The queue of one line, with its shortest gap and its limit of requests in flight."""
 
-    __slots__ = ("_flights", "_limit", "_next_send", "_spec")
+    __slots__ = ("_flights", "_limit", "_spec", "next_send")
 
     def __init__(self, spec: TransportSpec, flights: Flights) -> None:
         super().__init__(spec.queue.depth)
         self._spec = spec
         self._flights = flights
         self._limit = spec.queue.in_flight if spec.connection == "persistent" else 1
-        self._next_send = float("-inf")
+        self.next_send = float("-inf")
+        """Before this time the shortest gap since the last request is not over."""
 
     def take(self, exchange: Exchange) -> tuple[Exchange, Outcome] | None:
         """Take a request; return the one that had to make room, and what becomes of it."""
@@ -40,7 +42,7 @@ class Outbox(Waiting[Exchange]):
 
     def sent(self, exchange: Exchange, now: float) -> None:
         """Count a request that goes out now."""
-        self._next_send = now + self._spec.min_gap_s
+        self.next_send = now + self._spec.min_gap_s
         if exchange.ask.bucket is not None:
             exchange.ask.bucket.take(now)
 
@@ -61,12 +63,12 @@ class Outbox(Waiting[Exchange]):
                 continue
             if is_wary and _may_be_mistaken(exchange):
                 continue
-            return None if is_full or now < self._next_send else exchange
+            return None if is_full or now < self.next_send else exchange
         return None
 
     def is_free(self, exchange: Exchange, now: float) -> bool:
         """Return whether `exchange` may be sent at once, past an empty queue."""
-        return not (self or self._flights or now < self._next_send or _free_at(exchange) > now)
+        return not (self or self._flights or now < self.next_send or _free_at(exchange) > now)
 
     def wants_line(self, now: float) -> bool:
         """Return whether something could go if there were a connection."""
@@ -78,7 +80,7 @@ class Outbox(Waiting[Exchange]):
             return None
         is_wary = self._flights.is_wary
         times = [
-            max(self._next_send, _free_at(exchange))
+            max(self.next_send, _free_at(exchange))
             for exchange in self
             if (is_ready or exchange.is_privileged) and not (is_wary and _may_be_mistaken(exchange))
         ]
@@ -87,16 +89,16 @@ class Outbox(Waiting[Exchange]):
 
 def _may_be_mistaken(exchange: Exchange) -> bool:
     """Return whether an answer that comes late could be taken for the one to this."""
-    return bool(exchange.ask.answers) and exchange.ask.match is None
+    return bool(exchange.ask.answers) and exchange.ask.is_in_order
 
 
 def _free_at(exchange: Exchange) -> float:
-    """Return when its rate lets it go."""
+    """Return when its rate lets it go, and the wait before it is sent again."""
     bucket = exchange.ask.bucket
-    return float("-inf") if bucket is None else bucket.free_at
+    return exchange.waits_until if bucket is None else max(bucket.free_at, exchange.waits_until)
 
 
-def counted(exchange: Exchange, counters: Counters) -> bytes:
+def counted(exchange: Exchange, counters: Counters) -> Payload:
     """Make a frame with the next numbers of its counters; sent again, it keeps them.
 
     Raises:

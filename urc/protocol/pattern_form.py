@@ -33,6 +33,11 @@ CASTS: Final[Mapping[FieldKind, Callable[[str], object]]] = {
     "text": str,
     "rest": str,
 }
+_WHOLE: Final[Mapping[FieldKind, Callable[[str], object]]] = {
+    kind: re.compile(source).fullmatch
+    for kind, source in _SOURCES.items()
+    if kind in ("integer", "number", "hex")
+}
 _FILLERS: Final[Mapping[FieldKind, object]] = {"integer": 0, "number": 0, "hex": 0, "word": "x"}
 
 
@@ -42,12 +47,18 @@ class PatternReader:
     def __init__(self, spec: ReadSpec, context: CodecContext) -> None:
         self._holes = cast("tuple[Hole, ...]", spec.options["holes"])
         self._tail = cast("str", spec.options["tail"])
-        self._match = re.compile(pattern_source(self._holes, self._tail)).match
+        self._start = _start(self._holes, self._tail)
+        """What the text begins with, blanks aside; "" where that is not known."""
+        self._match: Callable[[str], re.Match[str] | None] | None = None
+        """Made when first used: a driver has many patterns, and a test needs one or two."""
         self._casts = [
-            (place, hole.name, CASTS[hole.kind])
+            (place, hole.name, _cast_of(hole))
             for place, hole in enumerate(self._holes, 1)
             if hole.name
         ]
+        self._words = _words(self._holes, self._tail)
+        """Its words, where it is made of nothing else: they need no expression of their own."""
+        self._has_widths = any(hole.width for hole in self._holes)
         self._encoding = context.encoding
 
     def read(self, frame: Frame) -> Mapping[str, object] | None:
@@ -55,17 +66,29 @@ class PatternReader:
         return self._read(frame.text)
 
     def _read(self, text: str) -> dict[str, object] | None:
-        found = self._match(text)
+        if self._start and not text.lstrip().startswith(self._start):
+            return None
+        if self._words is not None:
+            return _by_words(self._words, text.split())
+        match = self._match
+        if match is None:
+            match = self._match = re.compile(pattern_source(self._holes, self._tail)).match
+        found = match(text)
         if found is None:
             return None
-        return {name: cast_to(found[place]) for place, name, cast_to in self._casts}
+        if not self._has_widths:
+            return {name: cast_to(found[place]) for place, name, cast_to in self._casts}
+        try:
+            return {name: cast_to(found[place]) for place, name, cast_to in self._casts}
+        except ValueError:  # there is something else in a column
+            return None
 
     def write(self, fields: Mapping[str, object]) -> Payload:
         """Return the pattern with `fields` in its holes."""
         pieces = []
         for hole in self._holes:
             value = fields.get(hole.name) if hole.name else None
-            if value is None:
+            if value is None and not hole.width:
                 value = _FILLERS.get(hole.kind, "")
             pieces += [hole.before, _written(value, hole)]
         text = "".join((*pieces, self._tail))
@@ -76,14 +99,62 @@ class PatternReader:
         return encoded(text, self._encoding)
 
 
+def _words(holes: tuple[Hole, ...], tail: str) -> list[str | Hole] | None:
+    """Return the literal words and the holes, or None when a hole is only a part of a word."""
+    words: list[str | Hole] = []
+    for place, hole in enumerate(holes):
+        before = hole.before.lstrip() if place == 0 else hole.before
+        if hole.width or hole.kind in ("text", "rest") or (before and before[-1] != " "):
+            return None
+        if place and before[:1] != " ":
+            return None
+        words += [*before.split(), hole]
+    if holes and tail and tail[0] != " ":
+        return None
+    if not holes:
+        return None
+    # Several blanks in a row, or other ones than the space, are meant as they are written.
+    literals = [holes[0].before.lstrip(), *(hole.before for hole in holes[1:]), tail]
+    is_plain = all(" ".join(text.split()) == text.strip(" ") for text in literals)
+    is_single = not any("  " in text for text in literals)
+    return [*words, *tail.split()] if is_plain and is_single else None
+
+
+def _by_words(words: list[str | Hole], found: list[str]) -> dict[str, object] | None:
+    """Return the fields of a text that is made of these words, or None when it is another one."""
+    if len(found) != len(words):
+        return None
+    fields: dict[str, object] = {}
+    for word, text in zip(words, found, strict=True):
+        if isinstance(word, str):
+            if word != text:
+                return None
+            continue
+        if word.kind != "word" and _WHOLE[word.kind](text) is None:
+            return None
+        if word.name:
+            fields[word.name] = CASTS[word.kind](text)
+    return fields
+
+
+def _start(holes: tuple[Hole, ...], tail: str) -> str:
+    """Return the first literal word of a pattern, "" where it begins otherwise."""
+    if holes and holes[0].width:
+        return ""
+    return (holes[0].before if holes else tail).lstrip().partition(" ")[0]
+
+
 def pattern_source(holes: tuple[Hole, ...], tail: str) -> str:
     """Return the regular expression of a pattern, with a group for each hole."""
     befores = [hole.before for hole in holes]
-    pieces = [rf"[{_BLANK}]*+"]
+    pieces = [] if holes and holes[0].width else [rf"[{_BLANK}]*+"]
     for place, hole in enumerate(holes):
         before = hole.before.lstrip() if place == 0 else hole.before
         after = (*befores[place + 1 :], tail)[0]
-        pieces += [_literal(before), f"({_field(hole.kind, after)})"]
+        if hole.width:
+            pieces += [re.escape(hole.before), rf"([^\r\n]{{{hole.width}}})"]
+        else:
+            pieces += [_literal(before), f"({_field(hole.kind, after)})"]
     end = "" if holes and holes[-1].kind in ("text", "rest") and not tail else rf"[{_BLANK}]*+"
     return "".join(pieces) + _literal(tail if holes else tail.lstrip()) + end + r"\Z"
 
@@ -102,7 +173,28 @@ def _field(kind: FieldKind, after: str) -> str:
     return rf"[^{stop}]*+" if stop else r"(?s:.*+)"
 
 
+def _cast_of(hole: Hole) -> Callable[[str], object]:
+    """Return the function from text to value; a column that is empty has none."""
+    cast_to = CASTS[hole.kind]
+    if not hole.width:
+        return cast_to
+
+    def column(text: str) -> object:
+        inner = text.strip()
+        if hole.kind in ("word", "text"):
+            return inner or None
+        if not inner.isascii() or "_" in inner:
+            raise ValueError(text)  # Python's own numbers take more than robots mean
+        return cast_to(inner) if inner else None
+
+    return column
+
+
 def _written(value: object, hole: Hole) -> str:
+    if hole.width:
+        text = _written(value, hole._replace(width=0))
+        is_text = hole.kind in ("word", "text")
+        return text.ljust(hole.width) if is_text else text.rjust(hole.width)
     if hole.kind == "hex" and isinstance(value, int) and not isinstance(value, bool):
         return f"{value:X}"
     return field_text(value)

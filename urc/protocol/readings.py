@@ -12,6 +12,7 @@ from urc.model.values import NOTHING, Alarm, Limits, Reading, Sample, Signal
 from urc.protocol.convert import BadValue
 from urc.protocol.decode import Convert, build_converter
 from urc.protocol.limits import Judge
+from urc.protocol.steady import Steady
 
 __all__ = ["Decode", "Readings"]
 
@@ -45,6 +46,9 @@ class Readings:
         self._judges = {
             name: Judge(one.limits) for name, one in signals.items() if one.limits != Limits()
         }
+        self._steady = {
+            name: Steady(one) for name, one in signals.items() if one.deadband or one.debounce_s
+        }
         self._timed = tuple(name for name in self._judges if signals[name].limits.for_s > 0)
         self._last: dict[str, Sample] = {}
         """Newest sample of each input of a formula, and of each signal in `_timed`."""
@@ -72,7 +76,10 @@ class Readings:
                 except BadValue as error:
                     refused.append(f"{name}: {error}")
                 else:
-                    samples.append(Sample(name, value, now, self.alarm(name, value, now)))
+                    sample = Sample(name, value, now, self.alarm(name, value, now))
+                    told = self._told(sample, now) if self._steady else sample
+                    if told is not None:
+                        samples.append(told)
             if self._kept:
                 self.follow(samples, refused, now)
             return samples, refused
@@ -97,16 +104,29 @@ class Readings:
         return name in self._kept
 
     @property
+    def is_timed(self) -> bool:
+        """Whether time alone can make news."""
+        return bool(self._timed or self._steady)
+
+    @property
     def deadline(self) -> float | None:
-        """When `tick` may begin an alarm; None when only a reading can."""
-        if not self._timed:
+        """When `tick` may have news; None when only a reading can."""
+        if not self._timed and not self._steady:
             return None
         times = [self._judges[name].deadline for name in self._timed]
+        times += [one.deadline for one in self._steady.values()]
         return min((time for time in times if time is not None), default=None)
 
     def tick(self, now: float) -> list[Sample]:
-        """Return the newest sample of each signal whose alarm begins by `now`, as old as it is."""
-        samples = []
+        """Return what time alone has made news by `now`, each sample as old as it is.
+
+        The newest one of each signal whose alarm begins, and those that have lasted long enough.
+        """
+        samples: list[Sample] = []
+        if self._steady:
+            settled = (one.tick(now) for one in self._steady.values())
+            samples += [sample for sample in settled if sample is not None]
+            self.follow(samples, [], now)
         for name in self._timed:
             due = self._judges[name].deadline
             if due is not None and due <= now:
@@ -130,10 +150,17 @@ class Readings:
             except (BadValue, ExpressionError) as error:
                 refused.append(f"{computed.name}: {error}")
                 continue
+            if sample is not None and self._steady:
+                sample = self._told(sample, now)
             if sample is not None:
                 samples.append(sample)
                 self._keep(sample)
                 changed.add(computed.name)
+
+    def _told(self, sample: Sample, now: float) -> Sample | None:
+        """Return what is told of a reading; None when it is no news yet."""
+        steady = self._steady.get(sample.signal)
+        return sample if steady is None else steady.take(sample, now)
 
     def _keep(self, sample: Sample) -> None:
         if sample.signal in self._kept:

@@ -3,19 +3,25 @@
 Floor 3, pure.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from functools import partial
 
 from urc.expressions import COUNTERS
-from urc.model.driver import Poll
+from urc.model.driver import Driver, Poll
 from urc.model.flow import Keepalive
+from urc.protocol.asking import Builder
 from urc.protocol.encode import BadArgument
 from urc.protocol.events import Fault
 from urc.protocol.exchange import Ask, Exchange, LineEvent, Outcome, expires_at
 from urc.protocol.gate import Counters
 from urc.protocol.known import Known
 from urc.protocol.line import Line
+from urc.protocol.steps import Sink
 
-__all__ = ["KeptAlive", "PollState"]
+__all__ = ["KeptAlive", "PollState", "Schedule"]
+
+Run = Callable[[str, Mapping[str, object], Sink, float], list[LineEvent]]
+"""Runs a command: its name, its arguments, who has the outcome, and the time."""
 
 
 class PollState:
@@ -130,6 +136,84 @@ class KeptAlive:
         return []
 
 
+class Schedule:
+    """All polls of one driver, and what keeps its lines alive."""
+
+    def __init__(self, driver: Driver, builder: Builder, known: Known) -> None:
+        self._lines = builder.lines
+        self._polls = [
+            PollState(poll, builder.poll(poll, poll.name), self._lines[poll.transport], known)
+            for poll in driver.polls
+        ]
+        self._kept_alive: dict[str, KeptAlive] = {}
+        for name, spec in driver.transports.items():
+            if spec.keepalive is not None:
+                send = spec.keepalive.send
+                ask = builder.plain(f"{name}.keepalive", name, send) if send else None
+                self._kept_alive[name] = KeptAlive(spec.keepalive, self._lines[name], ask, known)
+
+    @property
+    def keeps_alive(self) -> bool:
+        """Whether any line is kept alive."""
+        return bool(self._kept_alive)
+
+    @property
+    def next_poll(self) -> float | None:
+        """When the next poll is due."""
+        first: float | None = None
+        for poll in self._polls:
+            due = poll.due
+            if due is not None and (first is None or due < first):
+                first = due
+        return first
+
+    @property
+    def next_words(self) -> list[float | None]:
+        """When each line is spoken to at the latest, to keep it alive."""
+        return [one.deadline for one in self._kept_alive.values()]
+
+    def begin(self, now: float) -> None:
+        """Begin the polls that bring their own connections."""
+        for poll in self._polls:
+            if self._lines[poll.poll.transport].is_per_request:
+                poll.begin(now)
+
+    def up(self, line: Line, now: float) -> None:
+        """Take note that a line is usable."""
+        name = line.spec.name
+        if name in self._kept_alive:
+            self._kept_alive[name].forget()
+        if not line.is_per_request:
+            for poll in self._polls:
+                if poll.poll.transport == name:
+                    poll.begin(now)
+
+    def down(self, line: Line) -> None:
+        """Take note that a line is not usable any more."""
+        if not line.is_per_request:
+            for poll in self._polls:
+                if poll.poll.transport == line.spec.name:
+                    poll.stop()
+
+    def stop(self) -> None:
+        """Poll no more."""
+        for poll in self._polls:
+            poll.stop()
+
+    def ask(self, run: Run, now: float) -> Iterator[list[LineEvent]]:
+        """Submit what is due, one after the other: what comes of one is settled before the next."""
+        for poll in self._polls:
+            if poll.due is not None and poll.due <= now:
+                yield poll.ask(now)
+        for one in self._kept_alive.values():
+            if one.deadline is not None and one.deadline <= now:
+                yield one.speak(partial(_run_for, run, one, now), now)
+
+
+def _run_for(run: Run, one: KeptAlive, now: float, command: str) -> list[LineEvent]:
+    return run(command, {}, one.done, now)
+
+
 def _submit(
     line: Line, ask: Ask, owner: PollState | KeptAlive, names: Mapping[str, object], now: float
 ) -> list[LineEvent]:
@@ -142,6 +226,6 @@ def _submit(
         owner,
         names,
         None if ask.has_counters else data,
-        gives_up_at=expires_at(line.spec, ask, now),
+        expires_at(ask, now),
     )
     return line.submit(exchange, now)

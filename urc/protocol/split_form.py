@@ -19,6 +19,8 @@ class SplitReader:
         self._names = cast("tuple[str, ...]", options["names"])
         self._has_more = bool(options["has_more"])
         self._strip = cast("str | None", options["strip"])
+        self._tail = cast("str", options.get("tail", ""))
+        """Of the last part and all behind it; "" for none."""
         self._encoding = context.encoding
 
     def read(self, frame: Frame) -> Mapping[str, object] | None:
@@ -27,6 +29,8 @@ class SplitReader:
 
     def _read(self, text: str) -> dict[str, object] | None:
         parts, names, strip = text.split(self._by), self._names, self._strip
+        if self._tail:
+            return self._with_tail(parts)
         if len(parts) < len(names) or (len(parts) > len(names) and not self._has_more):
             return None
         return {
@@ -35,10 +39,27 @@ class SplitReader:
             if name
         }
 
+    def _with_tail(self, parts: list[str]) -> dict[str, object] | None:
+        """Return the parts; those from the last name on are one list."""
+        first, strip = len(self._names) - 1, self._strip
+        if len(parts) < first:
+            return None
+        values = [part.strip(strip) or None for part in parts]
+        found: dict[str, object] = {
+            name: value for name, value in zip(self._names[:-1], values, strict=False) if name
+        }
+        found[self._tail] = values[first:]
+        return found
+
     def write(self, fields: Mapping[str, object]) -> Payload:
         """Return the parts in their places; one that is not given is empty, or a dash."""
         filler = "" if self._by else "-"
-        parts = [field_text(fields.get(name)) or filler for name in self._names]
+        names = self._names[:-1] if self._tail else self._names
+        parts = [field_text(fields.get(name)) or filler for name in names]
+        more = fields.get(self._tail) if self._tail else None
+        if more is not None:
+            listed = more if isinstance(more, (list, tuple)) else [more]
+            parts += [field_text(one) or filler for one in listed]
         text = (self._by or " ").join(parts)
         wrong = written_differently(fields, self._read(text))
         if wrong:
@@ -54,6 +75,9 @@ class KeyvalueReader:
         self._pairs = cast("str", options["pairs"])
         self._separator = cast("str", options["separator"])
         self._names = dict(cast("Mapping[str, str]", options["keys"]))
+        self._first = cast("tuple[str, ...]", options.get("first", ()))
+        """Of the parts in front that are no pairs."""
+        self._strip = cast("str | None", options.get("strip"))
         self._encoding = context.encoding
 
     def read(self, frame: Frame) -> Mapping[str, object] | None:
@@ -61,22 +85,40 @@ class KeyvalueReader:
         return self._read(frame.text)
 
     def _read(self, text: str) -> dict[str, object] | None:
-        names, separator = self._names, self._separator
+        names, separator, strip = self._names, self._separator, self._strip
         found: dict[str, object] = {}
-        for pair in text.split(self._pairs):
+        pairs = text.split(self._pairs)
+        if self._first:
+            bare = self._bare(pairs)
+            if bare is None:
+                return None
+            found |= bare
+        for pair in pairs:
             key, between, value = pair.partition(separator)
             if between:
-                name = names.get(key.strip())
+                name = names.get(key.strip(strip))
                 if name is not None:
-                    found[name] = value.strip() or None
+                    found[name] = value.strip(strip) or None
         return found or None
+
+    def _bare(self, pairs: list[str]) -> dict[str, object] | None:
+        """Return the parts in front, and take them off; None when there are pairs there."""
+        parts = [part for part in pairs if part.strip(self._strip)]
+        front = parts[: len(self._first)]
+        if len(front) < len(self._first) or any(self._separator in part for part in front):
+            return None
+        pairs[:] = parts[len(front) :]
+        named = zip(self._first, front, strict=True)
+        return {name: part.strip(self._strip) for name, part in named if name}
 
     def write(self, fields: Mapping[str, object]) -> Payload:
         """Return the pairs of the fields given."""
         keys = {name: key for key, name in self._names.items()}
         texts = {keys[name]: field_text(value) for name, value in fields.items() if name in keys}
-        text = self._pairs.join(key + self._separator + value for key, value in texts.items())
+        pairs = [field_text(fields.get(name)) or "-" for name in self._first]
+        pairs += [key + self._separator + value for key, value in texts.items()]
+        text = self._pairs.join(pairs)
         wrong = written_differently(fields, self._read(text))
-        if wrong or not texts:
+        if wrong or not pairs:
             raise NotWritable(f"{wrong or 'nothing'} cannot be a pair of {text!r}")
         return encoded(text, self._encoding)

@@ -9,29 +9,29 @@ from typing import Any
 
 from urc.protocol.generate import function_of
 
-__all__ = ["Lines"]
+__all__ = ["BUILTINS", "Lines"]
 
-_BUILTINS = {"bytes": bytes, "int": int, "len": len, "round": round, "type": type}
+BUILTINS = {"bytes": bytes, "int": int, "len": len, "round": round, "type": type}
 
 
 class Lines:
     """A function under construction."""
 
     def __init__(self) -> None:
-        self.scope: dict[str, Any] = dict(_BUILTINS)
+        self.scope: dict[str, Any] = dict(BUILTINS)
         """What the function sees beside its argument."""
-        self._lines: list[str] = []
+        self.lines: list[str] = []
 
     def bind(self, word: str, value: object) -> str:
         """Return a name, made of `word`, under which the function sees `value`."""
-        name = f"_{word}{len(self.scope) - len(_BUILTINS)}"
+        name = f"_{word}{len(self.scope) - len(BUILTINS)}"
         self.scope[name] = value
         return name
 
     def add(self, line: str, depth: int = 1) -> None:
         """Add a line, indented `depth` times."""
-        self._lines.append("    " * depth + line)
+        self.lines.append("    " * depth + line)
 
     def compile(self, name: str, argument: str) -> Callable[[Any], Any]:
         """Return the function."""
-        return function_of(name, argument, self._lines, self.scope)
+        return function_of(name, argument, self.lines, self.scope)

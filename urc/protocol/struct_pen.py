@@ -5,12 +5,12 @@ Floor 3, pure.
 
 from typing import Any, NamedTuple
 
-from urc.expressions import Template
+from urc.expressions import ExpressionError, Template
 from urc.model.binary import Item, Number
 from urc.protocol.forms import NotWritable
 from urc.protocol.struct_value import number_reader, number_writer, raw_of
 
-__all__ = ["GAP", "LARGEST_FRAME", "Gap", "Pen", "Scope"]
+__all__ = ["GAP", "LARGEST_FRAME", "Gap", "Pen", "Scope", "evaluate", "solved"]
 
 Scope = dict[str, Any]
 LARGEST_FRAME = 1 << 20
@@ -47,6 +47,14 @@ class Pen:
             raise NotWritable(f"the frame would have more than {LARGEST_FRAME} bytes")
         self.bytes += data
 
+    def insert(self, at: int, data: bytes, scope: Scope) -> None:
+        """Put bytes in front of what is there from `at` on; what waits to be filled moves along."""
+        self.bytes[at:at] = data
+        self.late = [(_moved(gap, at, len(data)), one, inner) for gap, one, inner in self.late]
+        for name, value in scope.items():
+            if isinstance(value, Gap):
+                scope[name] = _moved(value, at, len(data))
+
     def fill(self, gap: Gap, value: object) -> None:
         """Write `value` into a gap."""
         raw = raw_of(gap.item)(value)
@@ -57,3 +65,25 @@ class Pen:
             mask = (1 << gap.item.number.bits) - 1
             raw = number_reader(container)(bytes(self.bytes), gap.at) | (raw & mask) << gap.shift
         self.bytes[gap.at : end] = number_writer(container, gap.item.id)(raw)
+
+
+def _moved(gap: Gap, at: int, by: int) -> Gap:
+    return gap._replace(at=gap.at + by) if gap.at >= at else gap
+
+
+def evaluate(template: Template, scope: Scope) -> Any:
+    """Return the value of an expression over a scope; raise `NotWritable`."""
+    try:
+        return template.evaluate(scope)
+    except ExpressionError as error:
+        raise NotWritable(str(error)) from None
+
+
+def solved(expression: Template, only: str, number: int, name: str) -> int:
+    """Return the value of the one name in `expression` for which it gives `number`."""
+    at_zero = evaluate(expression, {only: 0})
+    slope = evaluate(expression, {only: 1}) - at_zero
+    solution = round((number - at_zero) / slope) if slope else 0
+    if evaluate(expression, {only: solution}) != number:
+        raise NotWritable(f"{name}: no {only!r} makes {expression.source!r} equal {number}")
+    return solution

@@ -15,6 +15,14 @@ from typing import Any
 from urc.expressions import ExpressionError, Template
 from urc.model.binary import FRAME_NAMES, Extent, Item, Switch, joined_name, least_size
 from urc.protocol.forms import BadItem
+from urc.protocol.struct_coded import (
+    FAULT,
+    OtherFrame,
+    coded_reader,
+    coded_step,
+    note,
+    packed_step,
+)
 from urc.protocol.struct_value import (
     format_of,
     meaning_of,
@@ -43,13 +51,6 @@ Amount = Callable[[bytes, int, int, Out], tuple[int, int]]
 
 BitPart = tuple[Item, int, int, int, Callable[[Any], Any]]
 """A part of ``bits``: shift, mask, sign bit or 0, and meaning."""
-
-FAULT = ""
-"""No item is called that: `out` keeps the first fault there."""
-
-
-class OtherFrame(Exception):
-    """These bytes are another frame."""
 
 
 def read_frame(steps: tuple[Step, ...], data: object) -> Mapping[str, object] | None:
@@ -111,13 +112,6 @@ def _conditional(step: Step, condition: Template) -> Step:
     return conditional
 
 
-def _note(out: Out, name: str, meaning: Callable[[Any], Any], raw: Any) -> None:
-    try:
-        out[name] = meaning(raw)
-    except BadItem as error:
-        out.setdefault(FAULT, error)
-
-
 def _number_step(item: Item, encoding: str) -> Step:
     read, size, meaning = number_reader(item.number), item.number.size, meaning_of(item)
     const, name = const_of(item), item.id
@@ -131,7 +125,7 @@ def _number_step(item: Item, encoding: str) -> Step:
         if const is not None and raw != const:
             raise OtherFrame
         if has_meaning:
-            _note(out, name, meaning, raw)
+            note(out, name, meaning, raw)
         return after
 
     return step
@@ -161,7 +155,7 @@ def _bits_step(item: Item, encoding: str) -> Step:
                 if raw != part.const:
                     raise OtherFrame
             elif part.id:
-                _note(out, part.id, meaning, raw)
+                note(out, part.id, meaning, raw)
         return after
 
     return step
@@ -201,7 +195,7 @@ def _text_step(item: Item, encoding: str) -> Step:
             if raw != const:
                 raise OtherFrame
         elif name:
-            _note(out, name, meaning, raw)
+            note(out, name, meaning, raw)
         return after
 
     return step
@@ -244,19 +238,15 @@ def build_amount(extent: Extent | None, name: str) -> Amount:
 
 def _prefix_amount(extent: Extent) -> Amount:
     assert extent.prefix is not None  # noqa: S101  # the caller has looked
-    read, size = number_reader(extent.prefix), extent.prefix.size
-
-    def amount(data: bytes, at: int, end: int, out: Out) -> tuple[int, int]:
-        if at + size > end:
-            raise OtherFrame
-        return read(data, at), at + size
-
-    return amount
+    read = coded_reader(extent.prefix)
+    return lambda data, at, end, out: read(data, at, end)
 
 
 def _array_step(item: Item, count: Extent, encoding: str) -> Step:
     """Read items one after another; each takes a byte at least, so that the frame bounds them."""
     single = item._replace(times=None)
+    if item.kind == "packed":
+        return packed_step(single, count)
     if item.kind == "number" and format_of(item.number):
         return _numbers_step(single, count)
     amount, name, least = build_amount(count, item.id), item.id, max(1, least_size((single,)))
@@ -306,7 +296,7 @@ def _numbers_step(item: Item, count: Extent) -> Step:
         if name and is_plain:
             out[name] = raws
         elif name:
-            _note(out, name, lambda raws: [meaning(raw) for raw in raws], raws)
+            note(out, name, lambda raws: [meaning(raw) for raw in raws], raws)
         return after
 
     return numbers
@@ -380,6 +370,7 @@ def _switch_step(item: Item, encoding: str) -> Step:
 
 _STEPS: dict[str, Callable[[Item, str], Step]] = {
     "number": _number_step,
+    "coded": lambda item, encoding: coded_step(item),
     "bits": _bits_step,
     "bytes": _text_step,
     "text": _text_step,

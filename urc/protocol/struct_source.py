@@ -14,7 +14,7 @@ from urc.protocol.struct_read import FAULT, OtherFrame, build_step, const_of
 from urc.protocol.struct_runs import Leaf, Run, runs_of
 from urc.protocol.struct_value import divisor_of, format_of, meaning_of, not_valid, text_of_bytes
 
-__all__ = ["generate_read"]
+__all__ = ["add_fixed", "generate_read"]
 
 Read = Callable[[Frame], Mapping[str, object] | None]
 
@@ -29,10 +29,13 @@ def generate_read(items: tuple[Item, ...], encoding: str) -> Read:
     source.add("data = frame.payload")
     has_open_end = bool(items) and _is_open_end(items[-1])
     parts = list(runs_of(items[:-1] if has_open_end else items))
-    if all(isinstance(part, Run) for part in parts):
-        _add_fixed(
-            source, [part for part in parts if isinstance(part, Run)], encoding, has_open_end
-        )
+    fixed = add_fixed(source, items, encoding, "data")
+    if fixed is not None:
+        lines, fields = fixed
+        for line in lines:
+            source.add(line)
+        pairs = [f"{name!r}: {expression}" for name, expression in fields.items()]
+        source.add(f"return {{{', '.join(pairs)}}}")
     else:
         _add_mixed(source, parts, encoding, has_open_end)
     read: Read = source.compile("read_struct", "frame")
@@ -44,31 +47,49 @@ def _is_open_end(item: Item) -> bool:
     return item.kind == "padding" and is_rest and item.condition is None and item.times is None
 
 
-def _add_fixed(source: Lines, runs: list[Run], encoding: str, has_open_end: bool) -> None:
-    """Everything has its place: one look at the length, then no more than unpacking."""
+def add_fixed(
+    source: Lines, items: tuple[Item, ...], encoding: str, data: str
+) -> tuple[list[str], dict[str, str]] | None:
+    """Add the unpacking of a frame in which everything has its place, or nothing where it has not.
+
+    Args:
+        source: the function, which returns None where the frame is another one.
+        items: of the frame.
+        encoding: of texts that name none.
+        data: the variable that holds the frame.
+
+    Returns:
+        The lines that go on from there, and field → expression, valid behind these lines.
+    """
+    has_open_end = bool(items) and _is_open_end(items[-1])
+    parts = list(runs_of(items[:-1] if has_open_end else items))
+    runs = [part for part in parts if isinstance(part, Run)]
+    if len(runs) < len(parts):
+        return None
     size = sum(run.struct.size for run in runs)
     # A message of another transport is a tuple of three: only there the length is not enough.
-    kind = "type(data) is not bytes or " if size <= 3 else ""
-    source.add(f"if {kind}len(data) {'<' if has_open_end else '!='} {size}: return None")
+    kind = f"type({data}) is not bytes or " if size <= 3 else ""
+    source.add(f"if {kind}len({data}) {'<' if has_open_end else '!='} {size}: return None")
     lines: list[str] = []
     fields: list[str] = []
     at = 0
     for place, run in enumerate(runs):
-        _add_unpack(source, run, place, str(at))
+        _add_unpack(source, run, place, f"{data}, {at}" if at else data)
         at += run.struct.size
         for number, leaf in enumerate(run.leaves):
             names = _variables(place, number, leaf)
             _add_leaf(source, leaf, names, encoding, lines, fields)
-    for line in lines:
-        source.add(line)
-    source.add(f"return {{{', '.join(fields)}}}")
+    # Each is ``'name': expression``; what is in a name is no blank and no colon.
+    return lines, {
+        name.strip("'\""): value for name, _, value in (field.partition(": ") for field in fields)
+    }
 
 
 def _variables(place: int, number: int, leaf: Leaf) -> list[str]:
     return [f"v{place}_{number}_{index}" for index in range(leaf.values)]
 
 
-def _add_unpack(source: Lines, run: Run, place: int, at: str) -> None:
+def _add_unpack(source: Lines, run: Run, place: int, where: str) -> None:
     """Add the unpacking of a run, and the look at its constants."""
     names = [
         name for number, leaf in enumerate(run.leaves) for name in _variables(place, number, leaf)
@@ -76,7 +97,7 @@ def _add_unpack(source: Lines, run: Run, place: int, at: str) -> None:
     if not names:
         return
     unpack = source.bind("unpack", run.struct.unpack_from)
-    source.add(f"{', '.join(names)}, = {unpack}(data{'' if at == '0' else f', {at}'})")
+    source.add(f"{', '.join(names)}, = {unpack}({where})")
     for number, leaf in enumerate(run.leaves):
         item = leaf.item
         (name, *_) = _variables(place, number, leaf) or ("",)
@@ -112,7 +133,7 @@ def _add_leaf(
     elif item.kind in ("text", "bytes"):
         value = names[0]
         if item.kind == "text":
-            text = source.bind("text", text_of_bytes(item._replace(id=leaf.name), encoding))
+            text = source.bind("text", text_of_bytes(item, encoding))
             lines.append(f"{value} = {text}({value})")
         fields.append(f"{leaf.name!r}: {value}")
     elif item.times is not None:
@@ -128,7 +149,7 @@ def _add_array(
     item = leaf.item
     values = ", ".join(names)
     if item.enum or item.valid is not None:
-        meaning = source.bind("meaning", meaning_of(item._replace(id=leaf.name)))
+        meaning = source.bind("meaning", meaning_of(item))
         lines.append(f"{names[0]} = [{meaning}(raw) for raw in ({values},)]")
         fields.append(f"{leaf.name!r}: {names[0]}")
     else:
@@ -177,7 +198,7 @@ def _add_mixed(source: Lines, parts: list[Run | Item], encoding: str, has_open_e
             source.add("return None", 2)
             continue
         source.add(f"if end - at < {part.struct.size}: return None")
-        _add_unpack(source, part, place, "at")
+        _add_unpack(source, part, place, "data, at")
         source.add(f"at += {part.struct.size}")
         for number, leaf in enumerate(part.leaves):
             lines: list[str] = []

@@ -9,7 +9,7 @@ expressions over the size of the whole frame (`Pen.late`).
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
-from urc.expressions import ExpressionError, Template
+from urc.expressions import Template
 from urc.model.binary import (
     FRAME_NAMES,
     Extent,
@@ -22,7 +22,8 @@ from urc.model.binary import (
     names_of,
 )
 from urc.protocol.forms import NotWritable
-from urc.protocol.struct_pen import GAP, LARGEST_FRAME, Gap, Pen, Scope
+from urc.protocol.struct_coded import coded_writer, packed_writer
+from urc.protocol.struct_pen import GAP, LARGEST_FRAME, Gap, Pen, Scope, evaluate, solved
 from urc.protocol.struct_read import bit_parts, const_of
 from urc.protocol.struct_value import (
     bytes_of_text,
@@ -69,15 +70,8 @@ def write_frame(steps: tuple[WriteStep, ...], namespace: Mapping[str, object]) -
     size = len(pen.bytes)
     for gap, template, known in pen.late:
         frame = {"_size": size, "_left": size - gap.at}
-        pen.fill(gap, _evaluate(template, {**known, **frame}))
+        pen.fill(gap, evaluate(template, {**known, **frame}))
     return bytes(pen.bytes)
-
-
-def _evaluate(template: Template, scope: Scope) -> Any:
-    try:
-        return template.evaluate(scope)
-    except ExpressionError as error:
-        raise NotWritable(str(error)) from None
 
 
 def _build(item: Item, rules: Rules) -> WriteStep:
@@ -96,7 +90,7 @@ def _conditional(step: WriteStep, item: Item, condition: Template, rules: Rules)
 
     def conditional(pen: Pen, scope: Scope) -> None:
         if is_known:
-            is_there = _evaluate(condition, scope)
+            is_there = evaluate(condition, scope)
         else:
             is_there = any(scope.get(name) is not None for name in names)
         if is_there:
@@ -108,7 +102,7 @@ def _conditional(step: WriteStep, item: Item, condition: Template, rules: Rules)
 def _given(item: Item, scope: Scope, rules: Rules, zero: object) -> Any:
     """Return the value of `item`: computed, given, or zero."""
     if item.value is not None:
-        return _evaluate(item.value, scope)
+        return evaluate(item.value, scope)
     value = scope.get(item.id) if item.id else None
     if value is not None:
         return value
@@ -153,6 +147,15 @@ def _number_step(item: Item, rules: Rules) -> WriteStep:
             pen.put(blank)
 
         return leave_gap
+    raw_number = _raw_number(item, rules)
+    return lambda pen, scope: pen.put(write(raw_number(scope)))
+
+
+def _coded_step(item: Item, rules: Rules) -> WriteStep:
+    write = coded_writer(item.number, item.id)
+    if item.const is not None:
+        constant = write(int(item.const))
+        return lambda pen, scope: pen.put(constant)
     raw_number = _raw_number(item, rules)
     return lambda pen, scope: pen.put(write(raw_number(scope)))
 
@@ -222,7 +225,7 @@ def _finisher(item: Item, rules: Rules) -> Callable[[Pen, Scope, Any], None]:
 def _put_size(pen: Pen, scope: Scope, extent: Extent, number: int, name: str, rules: Rules) -> None:
     """Say `number` where the reader will look for it, or check what was said."""
     if extent.prefix is not None:
-        pen.put(number_writer(extent.prefix, name)(fitting(extent.prefix, number, name)))
+        pen.put(coded_writer(extent.prefix, name)(int(fitting(extent.prefix, number, name))))
     elif extent.kind == "fixed":
         if number != extent.number:
             raise NotWritable(f"{name}: expected {extent.number} items, found {number}")
@@ -230,21 +233,11 @@ def _put_size(pen: Pen, scope: Scope, extent: Extent, number: int, name: str, ru
         (only, *others) = extent.expression.names or ("",)
         gap = scope.pop(GAP + only, None)
         if gap is not None and not others:
-            scope[only] = _solved(extent.expression, only, number, name)
+            scope[only] = solved(extent.expression, only, number, name)
             pen.fill(gap, scope[only])
-        elif _evaluate(extent.expression, scope) != number:
+        elif evaluate(extent.expression, scope) != number:
             wanted = f"{extent.expression.source.strip()!r} says otherwise"
             raise NotWritable(f"{name}: it is {number} long, but {wanted}")
-
-
-def _solved(expression: Template, only: str, number: int, name: str) -> int:
-    """Return the value of the one name in `expression` for which it gives `number`."""
-    at_zero = _evaluate(expression, {only: 0})
-    slope = _evaluate(expression, {only: 1}) - at_zero
-    solution = round((number - at_zero) / slope) if slope else 0
-    if _evaluate(expression, {only: solution}) != number:
-        raise NotWritable(f"{name}: no {only!r} makes {expression.source!r} equal {number}")
-    return solution
 
 
 def _padding_step(item: Item, rules: Rules) -> WriteStep:
@@ -256,7 +249,7 @@ def _padding_step(item: Item, rules: Rules) -> WriteStep:
     expression = item.size.expression
 
     def pad(pen: Pen, scope: Scope) -> None:
-        number = 0 if expression is None else _evaluate(expression, scope)
+        number = 0 if expression is None else evaluate(expression, scope)
         if not isinstance(number, int) or not 0 <= number <= LARGEST_FRAME:
             raise NotWritable(f"padding: {number!r} is no size")
         pen.put(bytes((item.pad,)) * number)
@@ -265,6 +258,9 @@ def _padding_step(item: Item, rules: Rules) -> WriteStep:
 
 
 def _array_step(item: Item, count: Extent, rules: Rules) -> WriteStep:
+    if item.kind == "packed":
+        pack = packed_writer(item._replace(times=None), count)
+        return lambda pen, scope: pen.put(pack(scope, rules.is_lenient))
     if item.kind == "struct" and not item.id:
         return _records_step(item, count, rules)
     name, single = item.id or "an array", item._replace(times=None, value=None)
@@ -296,7 +292,8 @@ def _records_step(item: Item, count: Extent, rules: Rules) -> WriteStep:
 
     There is one for each case whose fields are all given; without a switch, there is one in all.
     """
-    body = _struct_step(item._replace(times=None), rules)
+    own = rules._replace(derived={**rules.derived, **derived_sizes(item.items)})
+    body = _struct_step(item._replace(times=None), own)
     switches = [one for one in item.items if one.switch is not None]
     switch = switches[0].switch if switches else None
     cases = [(key, frozenset(names_of(inner))) for key, inner in switch.cases] if switch else []
@@ -337,7 +334,8 @@ def _struct_step(item: Item, rules: Rules) -> WriteStep:
 def _windowed(body: WriteStep, item: Item, size: Extent, rules: Rules) -> WriteStep:
     """Write a struct, and what its window needs: its size in front of it, no trimmed bytes."""
     full, name = least_size(item.items), item.id or "a struct"
-    gap = bytes(size.prefix.size) if size.prefix else b""
+    is_variable = size.prefix is not None and size.prefix.is_variable
+    gap = bytes(size.prefix.size) if size.prefix and not is_variable else b""
 
     def windowed(pen: Pen, scope: Scope) -> None:
         pen.put(gap)
@@ -350,6 +348,8 @@ def _windowed(body: WriteStep, item: Item, size: Extent, rules: Rules) -> WriteS
         if size.kind == "fixed":
             if number != size.number:
                 raise NotWritable(f"{name}: it has {number} bytes, its size is {size.number}")
+        elif size.prefix is not None and is_variable:
+            pen.insert(start, coded_writer(size.prefix, name)(number), scope)
         elif size.prefix is not None:
             pen.fill(_prefix_gap(start, size.prefix, name), number)
         else:
@@ -371,7 +371,7 @@ def _switch_step(item: Item, rules: Rules) -> WriteStep:
     otherwise = None if default is None else tuple(_build(one, rules) for one in default)
 
     def step(pen: Pen, scope: Scope) -> None:
-        key = _evaluate(switch.by, scope)
+        key = evaluate(switch.by, scope)
         steps = cases.get(key, otherwise) if isinstance(key, (int, float, str)) else otherwise
         if steps is None:
             raise NotWritable(f"no case for {switch.by.source.strip()} = {key!r}")
@@ -384,6 +384,7 @@ def _switch_step(item: Item, rules: Rules) -> WriteStep:
 _ZEROS: dict[str, Any] = {"struct": {}, "text": "", "bytes": b""}
 _STEPS: dict[str, Callable[[Item, Rules], WriteStep]] = {
     "number": _number_step,
+    "coded": _coded_step,
     "bits": _bits_step,
     "bytes": _text_step,
     "text": _text_step,

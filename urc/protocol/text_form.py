@@ -14,7 +14,7 @@ __all__ = ["TextWriter"]
 
 _NAME = re.compile(
     r"\s*([A-Za-z_][A-Za-z0-9_]*)\s*"
-    r"(?:\|\s*(?:fixed|round|int|float|string|pad|trim)\s*(?:\([^()]*\))?\s*)*"
+    r"(?:\|\s*(?:fixed|round|int|float|string|pad|trim|join)\s*(?:\([^()]*\))?\s*)*"
 )
 """What a name may go through and still be read back: nothing but its way of being written."""
 

@@ -14,7 +14,7 @@ from urc.model.values import Reading, Signal, Value
 from urc.protocol.convert import BadValue, short
 
 __all__ = ["MAX_BYTES", "MAX_ELEMENTS", "array_converter", "bytes_converter", "bytes_text"]
-__all__ += ["object_converter"]
+__all__ += ["elements_of", "object_converter"]
 
 MAX_ELEMENTS = 65536
 """Elements of one array."""
@@ -33,7 +33,7 @@ def array_converter(
     def convert(raw: object) -> Reading:
         if raw is None:
             return None
-        items = _items(raw)
+        items = elements_of(raw)
         if wanted is not None and len(items) != wanted:
             raise BadValue(f"{len(items)} elements, {wanted} are expected")
         if len(items) > MAX_ELEMENTS:
@@ -49,7 +49,8 @@ def array_converter(
     return convert
 
 
-def _items(raw: object) -> list[object] | tuple[object, ...]:
+def elements_of(raw: object) -> list[object] | tuple[object, ...]:
+    """Return the elements in a list, in bytes, or in text between blanks, commas or semicolons."""
     if isinstance(raw, (list, tuple)):
         return raw
     if isinstance(raw, (bytes, bytearray)):

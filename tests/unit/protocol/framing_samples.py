@@ -1,7 +1,8 @@
 """Frames of public documents, for each framing: declared as in a document, byte for byte."""
 
-from typing import Any, NamedTuple
+from typing import Any
 
+from tests.unit.protocol.framing_samples_sized import SIZED, Sample, wire
 from urc.config.parse_framing import parse_framing
 from urc.config.part import Findings, Part
 from urc.model.driver import FramingSpec
@@ -9,6 +10,8 @@ from urc.problems import to_text
 from urc.protocol.framing import FRAMINGS, Framing, build_framing
 from urc.registry import Catalog, Table
 from urc.source import parse_document
+
+__all__ = ["SAMPLES", "Sample", "framing", "spec", "wire"]
 
 CATALOG = Catalog(transports=Table("none", {}), framings=FRAMINGS)
 
@@ -27,20 +30,6 @@ def spec(text: str, encoding: str = "latin-1") -> FramingSpec:
 def framing(text: str) -> Framing:
     """Return the framing that a document declares with `text`."""
     return build_framing(spec(text))
-
-
-class Sample(NamedTuple):
-    """One framing, bytes of it, and the payloads in them."""
-
-    name: str
-    text: str
-    wire: bytes
-    payloads: list[bytes]
-    source: str
-
-
-def wire(text: str) -> bytes:
-    return bytes.fromhex(text)
 
 
 MAVLINK = (
@@ -65,6 +54,7 @@ ARM = wire("fd 20 00 00 00 ff be 4c 00 00 00 00 80 3f" + "00" * 24 + "90 01 01 0
 CONTROL = wire("fd 0b 00 00 00 ff be 45 00 00 f4 01 00 00 f4 01 00 00 00 00 01 8a 24")
 
 SAMPLES = [
+    *SIZED,
     Sample(
         "delimiter",
         "{ type: delimiter, tx: CRLF, rx: CRLF }",
@@ -273,6 +263,108 @@ SAMPLES = [
         "{ type: fixed, size: 6, start: STX, end: ETX, checksum: { algorithm: xor8, as: dec } }",
         b"\x02A065\x03",
         [b"A"],
+        "-",
+    ),
+    Sample(
+        "xbee, escaped",
+        "{ type: length, start: 0x7E, length: { offset: 1, size: 2, adjust: 4 },"
+        " checksum: { algorithm: { fold: sum, complement: ones } },"
+        " escape: { byte: 0x7D, xor: 0x20, bytes: [0x11, 0x13] } }",
+        wire("7E 00 02 23 7D 31 CB 7E 00 02 23 7D 31 CB"),
+        [wire("23 11"), wire("23 11")],
+        "Digi XBee, API operating mode 2",
+    ),
+    Sample(
+        "ppp",
+        "{ type: brackets, open: 0x7E, close: 0x7E, escape: { byte: 0x7D, xor: 0x20 },"
+        " checksum: { algorithm: crc16-ibm-sdlc, endian: little } }",
+        wire("7E 313233343536373839 6E90 7E 7E 7D5D 7D5E 02 D5 7E"),
+        [b"123456789", wire("7D 7E")],
+        "RFC 1662",
+    ),
+    Sample(
+        "slip, written out",
+        "{ type: delimiter, tx: 0xC0, rx: 0xC0,"
+        ' escape: { byte: 0xDB, table: { "0xC0": 0xDC, "0xDB": 0xDD } } }',
+        wire("01 DB DC 02 C0 DB DD 03 C0"),
+        [wire("01 C0 02"), wire("DB 03")],
+        "RFC 1055",
+    ),
+    Sample(
+        "garmin",
+        "{ type: brackets, open: DLE, close: [DLE, ETX], escape: { byte: DLE, double: true },"
+        " checksum: { algorithm: lrc } }",
+        wire("10 FE 00 02 10 03  10 06 02 10 10 00 E8 10 03  10 06 02 FE 00 FA 10 03"),
+        [wire("FE 00"), wire("06 02 10 00"), wire("06 02 FE 00")],
+        "Garmin device interface: product request, acknowledgements",
+    ),
+    Sample(
+        "tsip",
+        "{ type: brackets, open: DLE, close: [DLE, ETX], escape: { byte: DLE, double: true } }",
+        wire("10 1F 10 03 10 8E 10 10 03 10 03"),
+        [wire("1F"), wire("8E 10 03")],
+        "Trimble standard interface protocol",
+    ),
+    Sample(
+        "dle etx alone",
+        "{ type: delimiter, tx: [DLE, ETX], rx: [DLE, ETX], escape: { byte: DLE, double: true } }",
+        wire("41 10 10 03 10 03 42 10 03"),
+        [wire("41 10 03"), b"B"],
+        "-",
+    ),
+    Sample(
+        "dynamixel 2, stuffed",
+        "{ type: length, start: [0xFF, 0xFF, 0xFD, 0x00],"
+        " length: { offset: 5, size: 2, endian: little, adjust: 7 },"
+        " escape: { after: [0xFF, 0xFF, 0xFD], insert: 0xFD, of: payload },"
+        " checksum: { algorithm: crc16-umts, over: frame, endian: little } }",
+        wire("FF FF FD 00 01 0C 00 03 74 00 FF FF FD FD 00 00 00 C8 D3")
+        + wire("FF FF FD 00 01 03 00 01 19 4E"),
+        [wire("01 0C 00 03 74 00 FF FF FD 00 00 00"), wire("01 03 00 01")],
+        "Dynamixel protocol 2.0, byte stuffing",
+    ),
+    Sample(
+        "min",
+        "{ type: length, start: [0xAA, 0xAA, 0xAA], end: 0x55,"
+        " length: { offset: 4, size: 1, adjust: 10 }, payload: { from: 3, to: -5 },"
+        " escape: { after: [0xAA, 0xAA], insert: 0x55 },"
+        " checksum: { algorithm: crc32, over: payload } }",
+        wire("AA AA AA 01 02 AA AA 55 F8 97 72 82 55"),
+        [wire("01 02 AA AA")],
+        "MIN: microcontroller interconnect network 2.0",
+    ),
+    Sample(
+        "two checksums",
+        "{ type: length, start: 0xA5, length: { offset: 1, size: 2, endian: little, adjust: 9 },"
+        " payload: { from: 3, to: -2 }, checksum: ["
+        "{ algorithm: { width: 8, poly: 0x31, init: 0xFF, refin: true, refout: true },"
+        " over: { from: 0, to: 4 }, at: 4 },"
+        " { algorithm: crc16-mcrf4xx, over: frame, endian: little }] }",
+        wire("A5 02 00 07 0F 01 02 AA BB 78 82"),
+        [wire("07 0F 01 02 AA BB")],
+        "RoboMaster referee system: header with CRC-8, frame with CRC-16",
+    ),
+    Sample(
+        "two checksums at the end",
+        "{ type: length, start: 0x02, length: { offset: 1, size: 1, adjust: 5 }, end: 0x03,"
+        " checksum: [{ algorithm: xor8 }, { algorithm: sum8, over: { from: 1 } }] }",
+        wire("02 02 41 42 03 88 03"),
+        [b"AB"],
+        "-",
+    ),
+    Sample(
+        "unknown kinds of frames",
+        MAVLINK.replace("endian: little, table", "endian: little, else: skip, table"),
+        HEARTBEAT + ARM,
+        [HEARTBEAT[2:-2], ARM[2:-2]],
+        "MAVLink 2",
+    ),
+    Sample(
+        "lines, and stuffed frames between them",
+        '{ type: switch, cases: [{ first: "$", framing: { type: delimiter, tx: LF, rx: LF } }],'
+        " else: { type: slip, max: 100 } }",
+        b"$A,1\n" + wire("01 02 C0") + b"$B\n$C\n" + wire("24 25 C0")[1:] + wire("DB DC C0"),
+        [b"$A,1", wire("01 02"), b"$B", b"$C", b"%", wire("C0")],
         "-",
     ),
 ]

@@ -192,3 +192,13 @@ def test_signal_refuses(signal: Signal, raw: object, message: str) -> None:
 def test_signal_gives_a_raw_value(signal: Signal, value: object, raw: object) -> None:
     """What the emulated robot puts into a frame."""
     assert build_raw(signal)(value) == raw
+
+
+def test_a_robot_has_words_of_its_own_for_true_and_false() -> None:
+    """In both directions; any other word is a fault."""
+    signal = Signal("stable", "boolean", states=(("S", "true"), ("D", "false")))
+    convert, back = build_converter(signal), build_raw(signal)
+    assert [convert("S"), convert("D"), convert(None)] == [True, False, None]
+    assert [back(True), back(False)] == ["S", "D"]
+    with pytest.raises(BadValue, match="none of the states"):
+        convert("X")

@@ -39,7 +39,7 @@ def reply(pattern: str, *errors: str) -> Reply:
     return Reply(regex(pattern), tuple(map(compile_pattern, errors)))
 
 
-POLL = Poll("", "wire", 1.0, text("bat?"), reply(r"^(?P<battery>\d+)$"))
+POLL = Poll("polls.0", "wire", 1.0, text("bat?"), reply(r"^(?P<battery>\d+)$"))
 
 
 def engine(connection: str = "persistent", *polls: Poll, **wire: object) -> Engine:
@@ -282,5 +282,5 @@ def test_an_alarm_ends_only_past_its_hysteresis() -> None:
 
 def test_a_good_answer_without_values_shows_that_the_line_lives() -> None:
     """A robot may answer a poll with nothing but "pong"."""
-    ping = Poll("", "wire", 1.0, text("ping"), reply("^pong$"))
+    ping = Poll("polls.1", "wire", 1.0, text("ping"), reply("^pong$"))
     assert opened(ping).receive("wire", b"pong\n", 0.1) == [Samples("wire", ())]

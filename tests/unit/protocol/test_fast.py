@@ -11,8 +11,8 @@ from urc.expressions import compile_template
 from urc.model.codec import Payload
 from urc.model.driver import Argument, Command, FramingSpec
 from urc.model.values import Conversion, Limits, Signal
+from urc.protocol.answer import Matcher
 from urc.protocol.encode import BadArgument, build_check, build_encode, check_arguments
-from urc.protocol.exchange import Matcher
 from urc.protocol.fast_encode import build_fast_encode
 from urc.protocol.fast_read import Taken, build_fast_read, prefix_of
 from urc.protocol.forms import CodecContext, Frame, build_reader
@@ -131,7 +131,7 @@ def test_function_and_closures_agree(form: str, lines: list[str]) -> None:
     for now, line in enumerate(lines):
         payload = line.encode()
         expected = oracle.take(Frame(payload, "utf-8"), float(now))
-        found = fast(line, float(now), payload)
+        found = fast(payload, float(now))
         assert plain(found) == plain(expected), line
 
 

@@ -95,9 +95,9 @@ def test_a_command_whose_purpose_does_not_come_true_has_failed() -> None:
 def test_release_gives_the_bytes_that_stop_the_motion() -> None:
     """Whatever it requires, and whether there is a connection or not."""
     talk = Dialogue(GUARDED)
-    assert talk.engine.release("drive") == b"DRIVE 0\n"
+    assert talk.engine.motions.stop_frame("drive") == b"DRIVE 0\n"
     with pytest.raises(BadArgument):
-        talk.engine.release("pause")
+        talk.engine.motions.stop_frame("pause")
 
 
 def test_text_of_the_robot_equals_a_number_only_when_it_is_that_number() -> None:

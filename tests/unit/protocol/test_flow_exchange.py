@@ -248,3 +248,29 @@ messages: { mode: { regex: '^MODE (?P<mode>\\w+)$' } }
             talk.raw(data[start : start + size])
         assert talk.values == {"mode": "two", "a": "AB\nD"}
         assert talk.outcomes == {1: "done"}
+
+
+def test_a_request_that_times_out_says_what_came_in_place_of_the_answer() -> None:
+    """A pattern that is nearly right is the most frequent fault of a new driver."""
+    talk = Dialogue(
+        """
+commands:
+  home: { send: HOME, reply: { regex: '^HOMED$' } }
+  wait: { send: WAIT, reply: { regex: '^DONE$' } }
+sequences: { dock: [{ expect: '^DOCKED$' }] }
+"""
+    ).connect()
+    talk.says("earlier")
+    talk.at(0.1).run("home")
+    talk.says("OK")
+    talk.at(0.6)
+    assert talk.messages[-1] == "no answer to home within 0.5 s; 'OK' came, which is no answer"
+    talk.at(2.0).run("wait")
+    talk.at(2.5)
+    assert talk.messages[-1] == "no answer to wait within 0.5 s"
+    talk.at(4.0).run("dock")
+    talk.says("DOCKING")
+    talk.at(4.5)
+    assert talk.messages[-1] == (
+        "dock.0: what it expects did not come within 0.5 s; 'DOCKING' came, which is no answer"
+    )

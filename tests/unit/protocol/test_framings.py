@@ -317,11 +317,15 @@ def test_mid_sentence_start_is_one_fault() -> None:
 
 
 HOLDS_LENGTH = (
+    "thorlabs apt",
     "ubx",
     "dynamixel 1 ping",
     "dynamixel 2 ping",
     "flags beside the length",
     "nmea and ubx",
+    "dynamixel 2, stuffed",
+    "min",
+    "two checksums",
 )
 A_FEW = settings(max_examples=examples(25), deadline=None)
 """For each of some thirty samples."""

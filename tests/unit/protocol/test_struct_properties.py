@@ -3,14 +3,14 @@
 import linecache
 import struct
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Literal
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.effort import examples
 from urc.expressions import compile_expression
-from urc.model.binary import Extent, Item, Number, Switch, joined_name
+from urc.model.binary import Extent, Item, Number, Switch, joined_name, number_of
 from urc.model.codec import Envelope, ReadSpec
 from urc.protocol.forms import BadItem, CodecContext, Frame, NotWritable
 from urc.protocol.struct_form import StructReader
@@ -23,10 +23,32 @@ Declared = tuple[tuple[Item, ...], st.SearchStrategy[dict[str, Any]]]
 """Items, and values that fit them."""
 
 SIZES = (8, 16, 24, 32, 40, 48, 56, 64)
-endians = st.sampled_from(["big", "little"])
-prefixes = st.builds(Number, st.just("integer"), st.sampled_from([8, 16]), st.just(False), endians)
-integers = st.builds(Number, st.just("integer"), st.sampled_from(SIZES), st.booleans(), endians)
-floats = st.builds(Number, st.just("float"), st.sampled_from([16, 32, 64]), st.just(True), endians)
+BOTH_ENDS: list[Literal["big", "little"]] = ["big", "little"]
+endians = st.sampled_from(BOTH_ENDS)
+
+
+def plain_numbers(kind: str, sizes: tuple[int, ...], *signed: bool) -> st.SearchStrategy[Number]:
+    """Plain numbers: Hypothesis would fill in the odd orders of bytes as well."""
+    parts = st.tuples(st.sampled_from(sizes), st.sampled_from(signed), endians)
+    return parts.map(lambda one: Number(kind, *one))  # type: ignore[arg-type]
+
+
+prefixes = plain_numbers("integer", (8, 16), False)
+integers = plain_numbers("integer", SIZES, False, True)
+floats = plain_numbers("float", (16, 32, 64), True)
+ODD_ORDERS = [
+    *(
+        f"{kind}{order}"
+        for kind in "ui"
+        for order in ("32cdab", "32badc", "64ghefcdab", "64badcfehg")
+    ),
+    *(
+        f"{kind}{bits}by7{end}"
+        for kind in "ui"
+        for bits in (14, 21, 35, 63)
+        for end in ("be", "le")
+    ),
+]
 texts = st.text(st.characters(codec="utf-8", exclude_characters="\0 ", exclude_categories=["Cs"]))
 
 
@@ -71,6 +93,31 @@ def number_items(draw: st.DrawFn, name: str) -> Declared:
         item = item._replace(scale=scale, offset=offset)
         return (item,), st.fixed_dictionaries({name: values.map(scaled(scale, offset))})
     return (item,), st.fixed_dictionaries({name: values})
+
+
+@st.composite
+def coded_items(draw: st.DrawFn, name: str) -> Declared:
+    """Numbers of as many bytes as they need, of decimal digits, and of any width."""
+    kind = draw(st.sampled_from(["varint", "zigzag", "bcd", "packed", "odd", "odd float"]))
+    if kind == "packed":
+        number = Number("integer", draw(st.integers(1, 63)), draw(st.booleans()))
+        count = 8 * draw(st.integers(1, 2))
+        item = Item("packed", name, number, times=Extent("fixed", count))
+        item = item._replace(is_lsb_first=draw(st.booleans()))
+        values = st.lists(whole(number), min_size=count, max_size=count)
+        return (item,), st.fixed_dictionaries({name: values})
+    if kind.startswith("odd"):
+        floating = ["f32cdab", "f32badc", "f64ghefcdab", "f64badcfehg"]
+        odd = number_of(draw(st.sampled_from(ODD_ORDERS if kind == "odd" else floating)))
+        assert odd is not None
+        width: Any = odd.bits
+        floats_of = st.floats(width=width, allow_nan=False)
+        given = {name: whole(odd) if kind == "odd" else floats_of}
+        return (Item("coded", name, odd),), st.fixed_dictionaries(given)
+    number = Number("bcd", draw(st.sampled_from(SIZES)), False, draw(endians))
+    if kind != "bcd":
+        number = Number("zigzag" if kind == "zigzag" else "varint", 64, kind == "zigzag")
+    return (Item("coded", name, number),), st.fixed_dictionaries({name: whole(number)})
 
 
 def scaled(scale: float, offset: float) -> Callable[[int], float]:
@@ -163,7 +210,8 @@ def nested_items(draw: st.DrawFn, name: str, depth: int) -> Declared:
         named = values.map(lambda found: {joined_name(name, key): found[key] for key in found})
         return (Item("struct", name, items=inner),), named
     if way == "window":
-        size = Extent("prefix", prefix=Number("integer", 16))
+        numbers = st.sampled_from([Number("integer", 16), Number("varint", 64)])
+        size = Extent("prefix", prefix=draw(numbers))
         return (Item("struct", items=inner, size=size),), values
     if way == "array":
         first = Item("number", "first", Number("integer", 8))
@@ -192,6 +240,7 @@ def declarations(draw: st.DrawFn, prefix: str = "", depth: int = 0) -> Declared:
     for place in range(draw(st.integers(1, 5 if depth == 0 else 2))):
         name = f"{prefix}v{place}"
         kinds = [number_items(name), number_items(name), bit_items(name), text_items(name)]
+        kinds.append(coded_items(name))
         if depth < 2:
             kinds.append(nested_items(name, depth))
         if draw(st.integers(0, 6)) == 0:

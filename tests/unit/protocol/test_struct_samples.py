@@ -211,7 +211,72 @@ OTHERS = [
         {"time": 10, "lights": [{"id": 1, "x": 1.0, "y": 2.0}, {"id": 2, "x": 0.0, "y": -1.0}]},
     ),
 ]  # fmt: skip
-SAMPLES = [*CREATE_2, *REMREGS, *MAVLINK, *OTHERS]
+CODED = [
+    Sample(
+        "channels of eleven bits, the lowest first",
+        "struct: [u8 0x0F, { id: channels, type: u11, count: 16, order: lsb }, u8 flags, u8 0]",
+        "0F E0031FF8C0073EF0810F7CE0031FF8C0073EF0810F7C 00 00",
+        {"channels": [992] * 16, "flags": 0},
+    ),
+    Sample(
+        "numbers of twelve bits, with signs, the highest first",
+        "struct: [{ id: axes, type: i12, count: 2, scale: 1/16 }]",
+        "FFF010",
+        {"axes": [-1 / 16, 1.0]},
+    ),
+    Sample(
+        "Protocol Buffers' varints: 150 and 300",
+        "struct: [varint a, { id: b, type: varint, valid: { max: 300 } }, varint 1]",
+        "9601 AC02 01",
+        {"a": 150, "b": 300},
+    ),
+    Sample(
+        "Protocol Buffers' zigzag: the smallest and the largest",
+        "struct: [{ id: a, type: zigzag, count: 2 }]",
+        "FFFFFFFFFFFFFFFFFF01 FEFFFFFFFFFFFFFFFF01",
+        {"a": [-(1 << 63), (1 << 63) - 1]},
+    ),
+    Sample(
+        "decimal digits",
+        "struct: [bcd16be a, { id: b, type: bcd24le, scale: 0.01 }, bcd8 59]",
+        "1234 563412 59",
+        {"a": 1234, "b": 1234.56},
+    ),
+    Sample(
+        "words of 16 bits the other way round, as registers of Modbus have them",
+        "struct: [f32cdab a, u32badc b, i64ghefcdab c, { id: d, type: f32cdab, count: 2 }]",
+        "0000 3FC0 3412 7856 FFFE FFFF FFFF FFFF 0000 3F80 0000 4000",
+        {"a": 1.5, "b": 0x12345678, "c": -2, "d": [1.0, 2.0]},
+    ),
+    Sample(
+        "seven bits in each byte, as MIDI and Firmata have them",
+        "struct: [u14by7le a, i21by7be b, u8 c]",
+        "7F07 7F7F7E 01",
+        {"a": 1023, "b": -2, "c": 1},
+    ),
+    Sample(
+        "a text and a window with a varint in front",
+        "types: { point: [zigzag x, u16be y] }\n"
+        "struct: [{ id: name, type: text, size: varint },"
+        " { id: at, type: point, size: varint }, u8 z]",
+        "02 6869 03 03 0001 07",
+        {"name": "hi", "at_x": -2, "at_y": 1, "z": 7},
+    ),
+    Sample(
+        "a fixed-point number, and words for a float",
+        "struct: [{ id: q, type: i32be, scale: 1/65536 },"
+        " { id: mode, type: f64be, enum: { '7': running } }]",
+        "FFFE8000 401C000000000000",
+        {"q": -1.5, "mode": "running"},
+    ),
+    Sample(
+        "half a float, three bytes, seconds since 1970",
+        "struct: [f16be a, u24le b, u64le time, { id: name, type: text, until: NUL }]",
+        "3C00 010203 00CA9A3B00000000 616200",
+        {"a": 1.0, "b": 0x030201, "time": 1_000_000_000, "name": "ab"},
+    ),
+]
+SAMPLES = [*CREATE_2, *REMREGS, *MAVLINK, *OTHERS, *CODED]
 
 
 @pytest.mark.parametrize("sample", SAMPLES, ids=lambda one: one.name)

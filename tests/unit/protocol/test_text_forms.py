@@ -32,7 +32,26 @@ JSON = """json: { a: b.c, d: "e[1].f", g: h, k: "e[0].f", q: '"x y".z' }"""
 SEARCH = 'json: { top: "max(x)", second: "x[1]" }'
 XML = 'xml: { a: s/b/@l, m: "s/m[2]" }'
 
+TAIL = "split: { by: ',', fields: [_kind, null, 'joints...'] }"
+FIRST = "keyvalue: { pairs: ' ', separator: '=', first: [_kind, state], fields: { a: bat } }"
+QUOTED = """keyvalue: { pairs: ',', separator: ':', strip: '" ', fields: { a: bat } }"""
+COLUMNS = 'pattern: "X{v:number:6}{i:integer:3} {t:text:4};{h:hex:2}"'
+
 READS = [
+    (TAIL, b"J,x,1, 2,,3", {"_kind": "J", "joints": ["1", "2", None, "3"]}),
+    (TAIL, b"J,x", {"_kind": "J", "joints": []}),
+    (TAIL, b"J", None),
+    (FIRST, b"STATUS OK a=1 b=2", {"_kind": "STATUS", "state": "OK", "bat": "1"}),
+    (FIRST, b" STATUS  OK ", {"_kind": "STATUS", "state": "OK"}),
+    (FIRST, b"STATUS a=1", None),
+    (FIRST, b"STATUS", None),
+    (QUOTED, b'"a" : "1 x", "b":2', {"bat": "1 x"}),
+    (COLUMNS, b"X  12.5 -3 ab  ;ff", {"v": 12.5, "i": -3, "t": "ab", "h": 255}),
+    (COLUMNS, b"X-12.50100 abcd;0A", {"v": -12.5, "i": 100, "t": "abcd", "h": 10}),
+    (COLUMNS, b"X           ;  ", None),
+    (COLUMNS, b"X              ;  ", {"v": None, "i": None, "t": None, "h": None}),
+    (COLUMNS, b"X  1x.5 -3 ab  ;ff", None),
+    (COLUMNS, b"X  1_25 -3 ab  ;ff", None),
     (PATTERN, b"BAT 12.5 3", {"v": 12.5, "i": 3}),
     (PATTERN, b" BAT  -1e3\t+3 \r", {"v": -1000.0, "i": 3}),
     (PATTERN, b"BAT .5 3", {"v": 0.5, "i": 3}),
@@ -115,6 +134,9 @@ def test_an_unusable_field_says_why_and_spoils_what_rests_on_it() -> None:
 
 
 WRITES = [
+    (TAIL, {"_kind": "J", "joints": [1, 2.5]}, b"J,,1,2.5"),
+    (FIRST, {"_kind": "S", "state": "OK", "bat": 3}, b"S OK a=3"),
+    (COLUMNS, {"v": 1.25, "i": -3, "t": "ab", "h": 255}, b"X  1.25 -3 ab  ;FF"),
     (PATTERN, {"v": 1.25, "i": 3}, b"BAT 1.25 3"),
     (PATTERN, {"v": 2, "i": -3}, b"BAT 2 -3"),
     (PATTERN, {}, b"BAT 0 0"),

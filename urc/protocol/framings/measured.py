@@ -13,9 +13,11 @@ from urc.model.driver import FramingSpec
 from urc.model.framing import FrameLayout
 from urc.protocol.frame import BadFrame, Seal
 from urc.protocol.framing import (
+    SKIPPED,
     Credit,
     Decoder,
     FrameFault,
+    Framing,
     Stream,
     StreamDecoder,
     seal_of,
@@ -32,8 +34,12 @@ class MeasuredFraming(NamedTuple):
     max_bytes: int
 
     @classmethod
-    def from_spec(cls, spec: FramingSpec) -> "MeasuredFraming":
+    def from_spec(cls, spec: FramingSpec) -> Framing:
         """Return the framing for the option ``layout``."""
+        if "escape" in spec.options:
+            from urc.protocol.framings.escaped import EscapedFraming
+
+            return EscapedFraming.from_spec(spec)
         return cls(seal_of(spec) or Seal(FrameLayout()), spec.max_bytes)
 
     def encode(self, payload: bytes) -> bytes:
@@ -60,9 +66,26 @@ class _MeasuredDecoder(StreamDecoder):
         parts = (layout.head + layout.tail, self._header + layout.tail, len(layout.start))
         self._least = max(*parts, 1)
         self._credit = Credit()
+        size = self._size or 0
+        self._plain = (
+            0 if self._start or self._end or not self._least <= size <= max_bytes else size
+        )
+        """Size of every frame, if there is nothing to look at before it is opened; else 0."""
 
     def next(self, now: float = 0.0) -> bytes | FrameFault | None:
         stream, data = self._stream, self._stream.data
+        if self._plain:
+            end = stream.at + self._plain
+            if len(data) < end:
+                return None
+            try:
+                payload = self._seal.open(bytes(data[stream.at : end]))
+            except BadFrame:
+                pass  # it is told below
+            else:
+                stream.at, self._is_lost = end, False
+                self._credit.earn(self._plain)
+                return payload
         while True:
             fault = self._to_start()
             if fault is not None:
@@ -71,6 +94,8 @@ class _MeasuredDecoder(StreamDecoder):
             if there < len(self._start) or there < self._header or not there:
                 return None
             size = self._size or (self._length.total(data, at) if self._length else 0)
+            if size is None:
+                return self._endless(there)
             if not self._least <= size <= self._max_bytes:
                 fault = self._bad_length(size)
             elif there < size:
@@ -83,6 +108,37 @@ class _MeasuredDecoder(StreamDecoder):
                     return frame
             if fault is not None:
                 return fault
+
+    def whole(self, data: bytes) -> bytes | None:
+        """Return the payload of a single frame of the only size."""
+        stream = self._stream
+        if len(data) != self._plain or stream.at != len(stream.data):
+            return None
+        if self._is_lost or not self._credit.is_full:
+            return None  # a good frame changes that
+        try:
+            return self._seal.open(data)
+        except BadFrame:
+            return None  # it is told by `next`
+
+    def ahead(self) -> list[bytes]:
+        """Return the payloads of whole frames of one size, up to one that cannot be opened."""
+        stream, size = self._stream, self._plain
+        payloads: list[bytes] = []
+        if size and len(stream) >= 2 * size:
+            data, unwrap = bytes(stream.data), self._seal.open
+            try:
+                for at in range(stream.at, len(data) - size + 1, size):
+                    payloads.append(unwrap(data[at : at + size]))
+            except BadFrame:
+                pass  # it is told when its turn comes
+        return payloads
+
+    def skip(self, count: int, size: int) -> None:
+        """Take frames."""
+        if count:
+            self._move(count * self._plain)
+            self._is_lost = False
 
     def _to_start(self) -> FrameFault | None:
         """Go to the next start bytes, or to what may become them."""
@@ -101,6 +157,9 @@ class _MeasuredDecoder(StreamDecoder):
         try:
             payload = self._seal.open(frame)
         except BadFrame as error:
+            if error.code == SKIPPED:
+                self._move(len(frame))
+                return self._refused(error)
             affordable = self._credit.spend(len(frame))
             self._move(1 if affordable else len(frame))
             return self._lost(error.code, str(error), closes=error.closes)
@@ -115,6 +174,10 @@ class _MeasuredDecoder(StreamDecoder):
     def _move(self, count: int) -> None:
         self._credit.earn(count)
         self._stream.at += count
+
+    def _endless(self, there: int) -> FrameFault | None:
+        """Wait for the rest of a number that says its own size."""
+        return self._bad_length(there) if there >= self._max_bytes else None
 
     def _bad_length(self, size: int) -> FrameFault | None:
         self._move(1)

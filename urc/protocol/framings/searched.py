@@ -11,14 +11,16 @@ from urc.protocol.framing import (
     Decoder,
     DelimiterDecoder,
     FrameFault,
+    Framing,
     FramingError,
+    Open,
     Stream,
     StreamDecoder,
     seal_of,
     sealed,
 )
 
-__all__ = ["BracketsFraming", "RegexFraming"]
+__all__ = ["BracketsDecoder", "BracketsFraming", "RegexFraming"]
 
 Search = Callable[[bytes | bytearray, int], Any]
 """Data and where to begin → a match of `re` or RE2, or None."""
@@ -149,7 +151,9 @@ class _RegexDecoder(StreamDecoder):
             try:
                 return frame if self._seal is None else self._seal.open(frame)
             except BadFrame as error:
-                return FrameFault(error.code, str(error), error.closes)
+                fault = self._refused(error)
+            if fault is not None:
+                return fault
         return None
 
     def _wait(self) -> FrameFault | None:
@@ -172,8 +176,12 @@ class BracketsFraming(NamedTuple):
     max_bytes: int
 
     @classmethod
-    def from_spec(cls, spec: FramingSpec) -> "BracketsFraming":
+    def from_spec(cls, spec: FramingSpec) -> Framing:
         """Return the framing for the option ``layout``, with its start and end."""
+        if "escape" in spec.options:
+            from urc.protocol.framings.escaped import EscapedFraming
+
+            return EscapedFraming.from_spec(spec)
         return cls(seal_of(spec) or Seal(FrameLayout()), spec.max_bytes)
 
     def encode(self, payload: bytes) -> bytes:
@@ -190,26 +198,33 @@ class BracketsFraming(NamedTuple):
 
     def decoder(self, stream: Stream | None = None) -> Decoder:
         """Return a fresh decoder."""
-        return _BracketsDecoder(stream, self.seal, self.max_bytes)
+        layout = self.seal.layout
+        return BracketsDecoder(stream, layout.start, layout.end, self.seal.open, self.max_bytes)
 
     def reversed(self) -> "BracketsFraming":
         """Return the same framing seen from the other end of the line."""
         return self
 
 
-class _BracketsDecoder(StreamDecoder):
-    def __init__(self, stream: Stream | None, seal: Seal, max_bytes: int) -> None:
+class BracketsDecoder(StreamDecoder):
+    """Remembers how far it has searched for the closing mark."""
+
+    def __init__(
+        self, stream: Stream | None, start: bytes, end: bytes, opened: Open, max_bytes: int
+    ) -> None:
         super().__init__(stream, max_bytes)
-        self._seal = seal
-        self._open, self._close = seal.layout.start, seal.layout.end
+        self._opened = opened
+        self._open, self._close = start, end
         self._searched = 0
         """How many bytes of the stream are known to have no closing mark; 0: none is opened."""
 
     def restart(self) -> None:
+        """Let a frame of a `switch` begin here."""
         super().restart()
         self._searched = 0
 
     def next(self, now: float = 0.0) -> bytes | FrameFault | None:
+        """Return one frame or fault, or None when there is none yet."""
         stream, data = self._stream, self._stream.data
         while True:
             if not self._searched:
@@ -276,6 +291,6 @@ class _BracketsDecoder(StreamDecoder):
             return self._too_long()
         self._is_lost = False
         try:
-            return self._seal.open(frame)
+            return self._opened(frame)
         except BadFrame as error:
-            return FrameFault(error.code, str(error), error.closes)
+            return self._refused(error)

@@ -84,7 +84,7 @@ class _WholeDecoder(StreamDecoder):
         try:
             return frame if self._seal is None else self._seal.open(frame)
         except BadFrame as error:
-            return FrameFault(error.code, str(error), error.closes)
+            return self._refused(error)
 
 
 class _IdleDecoder(_WholeDecoder):

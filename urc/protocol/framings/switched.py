@@ -10,6 +10,7 @@ from typing import NamedTuple, cast
 
 from urc.model.driver import FramingSpec
 from urc.protocol.framing import (
+    SKIPPED,
     Decoder,
     FrameFault,
     Framing,
@@ -27,16 +28,25 @@ class SwitchFraming(NamedTuple):
 
     cases: tuple[tuple[bytes, Framing], ...]
     max_bytes: int
+    otherwise: Framing | None = None
+    """Of frames that begin as no case does; None: there are none such."""
+    is_robot: bool = False
+    """Whether this is the emulated robot's end of the line."""
 
     @classmethod
     def from_spec(cls, spec: FramingSpec) -> "SwitchFraming":
         """Return the framing for the option ``cases``: pairs of first bytes and `FramingSpec`."""
         cases = cast("tuple[tuple[bytes, FramingSpec], ...]", spec.options["cases"])
-        return cls(tuple((first, build_framing(one)) for first, one in cases), spec.max_bytes)
+        other = cast("FramingSpec | None", spec.options.get("otherwise"))
+        built = tuple((first, build_framing(one)) for first, one in cases)
+        return cls(built, spec.max_bytes, None if other is None else build_framing(other))
 
     def encode(self, payload: bytes) -> bytes:
         """Return the frame of the first case that begins as it must with this payload."""
         refused = ""
+        other = self.otherwise if self.is_robot and _is_text(payload) else None
+        if other is not None and not any(payload.startswith(first) for first, _ in self.cases):
+            return other.encode(payload)
         for first, framing in self.cases:
             try:
                 frame = framing.encode(payload)
@@ -45,24 +55,46 @@ class SwitchFraming(NamedTuple):
                 continue
             if frame.startswith(first):
                 return frame
+        if self.otherwise is not None:
+            frame = self.otherwise.encode(payload)
+            if not any(frame.startswith(first) for first, _ in self.cases):
+                return frame
+            refused = "a frame that begins as a case of the framing does would be taken for one"
         raise FramingError(refused or f"no case of the framing begins as {payload[:40]!r} does")
 
     def decoder(self, stream: Stream | None = None) -> Decoder:
         """Return a fresh decoder."""
         shared = Stream() if stream is None else stream
         cases = [(first, framing.decoder(shared)) for first, framing in self.cases]
-        return _SwitchDecoder(shared, cast("list[tuple[bytes, StreamDecoder]]", cases))
+        other = None if self.otherwise is None else self.otherwise.decoder(shared)
+        return _SwitchDecoder(
+            shared,
+            cast("list[tuple[bytes, StreamDecoder]]", cases),
+            cast("StreamDecoder | None", other),
+        )
 
     def reversed(self) -> "SwitchFraming":
         """Return the same framing seen from the other end of the line."""
         cases = tuple((first, framing.reversed()) for first, framing in self.cases)
-        return self._replace(cases=cases)
+        other = None if self.otherwise is None else self.otherwise.reversed()
+        return self._replace(cases=cases, otherwise=other, is_robot=not self.is_robot)
+
+
+def _is_text(payload: bytes) -> bool:
+    """Guess which frames of an emulated robot are lines of text among binary ones."""
+    return payload.isascii() and payload.decode("ascii").isprintable()
 
 
 class _SwitchDecoder(StreamDecoder):
-    def __init__(self, stream: Stream, cases: list[tuple[bytes, StreamDecoder]]) -> None:
+    def __init__(
+        self,
+        stream: Stream,
+        cases: list[tuple[bytes, StreamDecoder]],
+        other: StreamDecoder | None,
+    ) -> None:
         super().__init__(stream, 0)
         self._cases = cases
+        self._other = other
         self._any = re.compile(b"|".join(re.escape(first) for first, _ in cases))
         self._longest = max(len(first) for first, _ in cases)
         self._active: StreamDecoder | None = None
@@ -109,11 +141,17 @@ class _SwitchDecoder(StreamDecoder):
         if isinstance(found, bytes):
             self._is_lost = False
             return found
+        if found.code == SKIPPED:
+            self._is_lost = False
+            return found if self._is_case else None
         return self._lost(*found[:2], closes=found.closes)
 
     def _choose(self) -> FrameFault | None:
         """Choose the case of the frame at the front, and go there."""
         stream = self._stream
+        if self._other is not None:
+            self._choose_here(self._other)
+            return None
         found = self._any.search(stream.data, stream.at)
         if found is None:
             # What may be the beginning of a case is kept.
@@ -128,6 +166,17 @@ class _SwitchDecoder(StreamDecoder):
             self._active = next(one for first, one in self._cases if data.startswith(first, place))
             self._active.restart()
         return fault
+
+    def _choose_here(self, other: StreamDecoder) -> None:
+        """Choose the case of the frame that begins with the next byte: `other` when it is none."""
+        stream = self._stream
+        front = bytes(stream.data[stream.at : stream.at + self._longest])
+        chosen = next((one for first, one in self._cases if front.startswith(first)), None)
+        if chosen is None and not self._may_begin(front):
+            chosen = other
+        if chosen is not None:
+            self._active = chosen
+            chosen.restart()
 
     def _may_begin(self, data: bytes) -> bool:
         return any(first.startswith(data) for first, _ in self._cases)

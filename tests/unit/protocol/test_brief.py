@@ -1,0 +1,183 @@
+"""The short way through the engine: whatever is said, it tells what the long way tells."""
+
+from collections.abc import Callable, Sequence
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tests.dialogue import driver_of
+from tests.effort import examples
+from urc.model.driver import Driver
+from urc.protocol.engine import Engine
+from urc.protocol.events import Event, Replied, Request, Samples, Send
+from urc.protocol.messages import WARM_AFTER
+
+TEXT = """
+signals:
+  volts: { min: 0, max: 60, limits: { low: 20 } }
+  x: {}
+  twice: { value: x * 2 }
+  mode: { type: string }
+messages:
+  bat: { pattern: "BAT {volts:number}" }
+  mode: { pattern: "MODE {mode:word}" }
+commands:
+  drive:
+    send: "VEL {{ (v * 1000) | fixed(1) }} {{ n }}"
+    args: { v: { min: -1, max: 1 }, n: { type: integer, default: 3 } }
+    reply: { pattern: "POS {x:number}" }
+  say: { send: "SAY {{ v }}", args: { v: { type: number } } }
+  list: { send: list, reply: { pattern: "POS {x:number}", lines: 2 } }
+  try: { send: try, reply: { pattern: "BAT {volts:number}", errors: ["^ERR"] } }
+  twice: { send: twice, reply: { pattern: "POS {x:number}" }, retries: 1, idempotent: true }
+  go: { send: go, reply: { pattern: "POS {x:number}" }, verify: { expr: x > 1, within: 1s } }
+  only: { send: only, requires: [{ expr: x > 0, else: it must stand }] }
+sequences:
+  both: { steps: [{ run: list }, { run: drive, args: { v: 0.5 } }] }
+"""
+POLLED = "polls: [{ send: POLL, reply: { pattern: 'POS {x:number}' }, every: 300ms }]\n"
+CALM = "\n".join(
+    line for line in TEXT.splitlines() if not line.startswith(("sequences", "  both", "  go"))
+)
+"""Without what may be due at once."""
+GAP = "wire: min_gap: 100ms\n"
+BINARY = """
+transports:
+  wire:
+    type: tcp
+    host: robot
+    port: 1
+    framing: { type: fixed, size: 4, checksum: { algorithm: xor8 } }
+signals: { volts: { max: 200 }, x: {} }
+messages:
+  one: { struct: [u8 1, u8 volts, u8 x] }
+  two: { struct: [u8 2, u8 x, u8 volts] }
+commands:
+  drive: { send: { hex: "03 00 00" }, reply: { struct: [u8 3, u8 x, u8 0] } }
+  say: { send: { hex: "04 00 00" } }
+"""
+DOCUMENTS = {
+    "plain": TEXT,
+    "polled": TEXT + POLLED,
+    "calm": f"{CALM}\n{POLLED}",
+    "gap": TEXT + GAP,
+    "binary": BINARY,
+}
+DRIVERS = {name: driver_of(text) for name, text in DOCUMENTS.items()}
+
+Deed = Callable[[Engine, float], Sequence[Event]]
+
+
+def commanded(name: str, arguments: dict[str, float]) -> Deed:
+    return lambda engine, now: engine.command(Request(7, name, arguments), now)
+
+
+def heard(data: bytes) -> Deed:
+    return lambda engine, now: engine.receive("wire", data, now)
+
+
+def ticked(engine: Engine, now: float) -> Sequence[Event]:
+    return engine.tick(now)
+
+
+def closed(engine: Engine, now: float) -> Sequence[Event]:
+    return [*engine.closed("wire", "cable", now), *engine.start("wire", now)]
+
+
+arguments = st.sampled_from(
+    [
+        {},
+        {"v": 0.5},
+        {"v": 0.5, "n": 4},
+        {"v": 1, "n": 4},
+        {"v": 2.0, "n": 4},
+        {"v": float("nan")},
+        {"v": 0.5, "n": 2**70},
+        {"v": 0.1, "n": 1.5},
+        {"v": True, "n": 1},
+    ]
+)
+names = st.sampled_from([*DRIVERS["plain"].commands, "nobody"])
+LINES = b"POS 1.5\n|POS 2\nBAT 30\n|BAT 12\n|BAT 99\n|POS nan\n|POS 1_0\n|ERR 3\n|MODE a\n|?\n"
+LINES += b"|\n|POS 4\nPO|S 5\n"
+FRAMES = b"\1\5\6\2|\2\5\6\1|\3\7\0\4|\3\7\0\5|\1\xff\6\xf8|\1\5|\6\2|\1\5\6\2\2\5\6\1"
+chunks = st.sampled_from([*LINES.split(b"|"), *FRAMES.split(b"|")])
+deeds = st.lists(
+    st.tuples(
+        st.one_of(
+            st.builds(commanded, names, arguments),
+            st.builds(heard, chunks),
+            st.sampled_from([ticked, closed]),
+        ),
+        st.sampled_from([0.0, 0.0, 0.05, 0.3, 0.6]),
+    ),
+    max_size=25,
+)
+
+
+def warm(driver: Driver, *, is_brief: bool) -> Engine:
+    """Return an engine that has made its functions."""
+    engine = Engine(driver, {}, is_brief=is_brief)
+    engine.tick(0.0)
+    engine.start("wire", 0.0)
+    is_text = "mode" in driver.signals
+    for _ in range(WARM_AFTER + 2):
+        engine.command(Request(1, "drive", {"v": 0.25, "n": 1} if is_text else {}), 0.0)
+        for data in (b"POS 1\n", b"BAT 30\n") if is_text else (b"\3\7\0\4",):
+            engine.receive("wire", data, 0.0)
+    return engine
+
+
+@pytest.mark.parametrize("name", DRIVERS)
+@settings(max_examples=examples(600), deadline=None)
+@given(deeds=deeds)
+def test_short_way_tells_what_the_long_way_tells(
+    name: str, deeds: Sequence[tuple[Deed, float]]
+) -> None:
+    """The same events, in the same order, and the same deadline after each of them."""
+    short, long = (warm(DRIVERS[name], is_brief=is_brief) for is_brief in (True, False))
+    now = 1.0
+    for deed, wait_s in deeds:
+        now += wait_s
+        assert [*deed(short, now)] == [*deed(long, now)]
+        assert short.deadline == long.deadline
+
+
+@pytest.mark.parametrize("name", DRIVERS)
+@settings(max_examples=examples(300), deadline=None)
+@given(deeds=deeds)
+def test_no_deadline_comes_nearer_than_the_calm(
+    name: str, deeds: Sequence[tuple[Deed, float]]
+) -> None:
+    """So whoever has set an alarm for before that need not look again after each frame."""
+    engine, now = warm(DRIVERS[name], is_brief=True), 1.0
+    for deed, wait_s in deeds:
+        now += wait_s
+        before = engine.deadline
+        deed(engine, now)
+        after = engine.deadline
+        if deed in (ticked, closed) or after is None:
+            continue
+        assert after >= min(now + engine.calm_s, float("inf") if before is None else before)
+
+
+def test_plain_driver_is_calm() -> None:
+    """A driver of commands and messages alone has no deadline before its shortest answer's."""
+    driver = driver_of(
+        "signals: { x: {} }\ncommands: { ask: { send: a, reply: { pattern: 'POS {x:number}' } } }"
+    )
+    assert Engine(driver, {}).calm_s == 0.5
+    assert Engine(DRIVERS["calm"], {}).calm_s == 0.3  # its poll
+    assert Engine(DRIVERS["gap"], {}).calm_s == 0.0
+
+
+def test_command_that_the_short_way_takes_is_sent_and_answered() -> None:
+    """One `Send`, then the readings and the reply."""
+    engine = warm(DRIVERS["plain"], is_brief=True)
+    sent = engine.command(Request(2, "drive", {"v": 0.5, "n": 4}), 2.0)
+    assert sent == [Send("wire", b"VEL 500.0 4\n")]
+    samples, reply = engine.receive("wire", b"POS 7.5\n", 2.1)
+    assert isinstance(samples, Samples)
+    assert [(one.signal, one.value) for one in samples.samples] == [("x", 7.5), ("twice", 15.0)]
+    assert reply == Replied(2, "drive", {"x": 7.5, "twice": 15.0})

@@ -1,0 +1,160 @@
+"""Filters that take apart what one field of a frame holds: tables, spelt numbers, packed numbers.
+
+Floor 1, private to `urc._filters`. Each is total over what documents can hold, linear in what it is
+given, and gives no more than `MAX_PARTS` values: it returns them or raises TypeError or ValueError
+with words for a person.
+"""
+
+import struct
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Final
+
+from urc._bytes import NUMBERS
+
+__all__ = ["CUT_FILTERS"]
+
+MAX_PARTS: Final = 65536
+_FLOATS: Final = {16: "e", 32: "f", 64: "d"}
+_MOST_BITS: Final = 64
+
+
+def _short(value: object) -> str:
+    text = repr(value)
+    return text if len(text) <= 40 else text[:37] + "..."
+
+
+def _list(value: object) -> Sequence[Any]:
+    if isinstance(value, (list, tuple)):
+        return value
+    raise TypeError(f"a list is expected, found {_short(value)}")
+
+
+def _text(value: object) -> str:
+    if isinstance(value, str):
+        return value
+    raise TypeError(f"text is expected, found {_short(value)}")
+
+
+def _whole(value: object, what: str, least: int, most: int) -> int:
+    if isinstance(value, int) and not isinstance(value, bool) and least <= value <= most:
+        return value
+    raise ValueError(f"{what} is a whole number from {least} to {most}, found {_short(value)}")
+
+
+def _column(value: Any, key: Any, between: Any = None) -> list[Any]:
+    """Return one part of every row: by its name, by its place, or by its place in a text."""
+    rows = _list(value)
+    if between is not None:
+        if not _text(between):
+            raise ValueError("'column' needs something to cut the rows at")
+        rows = [_text(row).split(between) for row in rows if row]
+    found = []
+    for row in rows:
+        if (isinstance(row, Mapping) and key in row) or _is_place(row, key):
+            found.append(row[key])
+        else:
+            raise ValueError(f"the row {_short(row)} has no part {_short(key)}")
+    return found
+
+
+def _is_place(row: Any, key: Any) -> bool:
+    is_row = isinstance(row, (list, tuple)) and isinstance(key, int) and not isinstance(key, bool)
+    return is_row and -len(row) <= key < len(row)
+
+
+def _cut(value: Any, start: Any, stop: Any = None) -> list[Any]:
+    """Return the part from `start` up to `stop` of every text or list in a list."""
+    begin = _whole(start, "a place", -MAX_PARTS, MAX_PARTS)
+    end = None if stop is None else _whole(stop, "a place", -MAX_PARTS, MAX_PARTS)
+    for row in _list(value):
+        if not isinstance(row, (str, list, tuple)):
+            raise TypeError(f"{_short(row)} has no parts in a row")
+    return [row[begin:end] for row in value]
+
+
+def _digits(value: Any, width: Any, base: Any, zero: Any = 48) -> list[int]:
+    """Return the numbers that are spelt with `width` characters each, the highest digit first."""
+    text, size = _text(value), _whole(width, "a width", 1, 16)
+    radix = _whole(base, "a base", 2, 256)
+    first = ord(zero) if isinstance(zero, str) and len(zero) == 1 else zero
+    least = _whole(first, "the code of the digit zero", 0, 0x10FFFF)
+    if len(text) % size:
+        raise ValueError(f"{len(text)} characters are no numbers of {size} each")
+    numbers, number = [], 0
+    for place, char in enumerate(text, 1):
+        digit = ord(char) - least
+        if not 0 <= digit < radix:
+            raise ValueError(f"{char!r} is no digit of base {radix}")
+        number = number * radix + digit
+        if place % size == 0:
+            numbers.append(number)
+            number = 0
+    return numbers
+
+
+def _signed(value: Any, bits: Any) -> int:
+    """Return the number that is meant by `bits` bits in two's complement."""
+    size = _whole(bits, "the bits", 1, _MOST_BITS)
+    number = _whole(value, "the number", 0, (1 << size) - 1)
+    return number - (1 << size) if number >> size - 1 else number
+
+
+def _layout(name: Any) -> tuple[str, int, Any]:
+    if isinstance(name, str) and name in NUMBERS:
+        return NUMBERS[name]
+    raise ValueError(f"a type such as 'u16le' is expected, found {_short(name)}")
+
+
+def _bytes(value: Any) -> bytes:
+    if isinstance(value, bytes):
+        return value
+    raise TypeError(f"bytes are expected, as 'hexbytes' gives them; found {_short(value)}")
+
+
+def _unpack(value: Any, name: Any, at: Any = 0) -> int | float:
+    """Return the number of that type at a place of the bytes."""
+    kind, bits, order = _layout(name)
+    data, place = _bytes(value), _whole(at, "a place", 0, MAX_PARTS)
+    piece = data[place : place + bits // 8]
+    if len(piece) < bits // 8:
+        raise ValueError(f"{len(data)} bytes have no {name!r} at {place}")
+    if kind == "f":
+        number: float = struct.unpack((">" if order == "big" else "<") + _FLOATS[bits], piece)[0]
+        return number
+    return int.from_bytes(piece, order, signed=kind == "i")
+
+
+def _numbers(value: Any, name: Any) -> list[int | float]:
+    """Return all numbers of that type that the bytes hold, one behind the other."""
+    size = _layout(name)[1] // 8
+    data = _bytes(value)
+    if len(data) % size:
+        raise ValueError(f"{len(data)} bytes are no numbers of {size} each")
+    if len(data) > MAX_PARTS:
+        raise ValueError(f"there are more than {MAX_PARTS} bytes")
+    return [_unpack(data, name, place) for place in range(0, len(data), size)]
+
+
+def _hexdigits(value: Any) -> str:
+    return _bytes(value).hex().upper()
+
+
+def _ramp(value: Any, step: Any, count: Any) -> list[float]:
+    """Return `count` numbers, the first of which is the subject, each by `step` above the last."""
+    for one in (value, step):
+        if not isinstance(one, (int, float)):
+            raise TypeError(f"a number is expected, found {_short(one)}")
+    return [value + place * step for place in range(_whole(count, "a number of steps", 0, 8192))]
+
+
+CUT_FILTERS: Final[dict[str, tuple[Callable[..., Any], tuple[int, int]]]] = {
+    "column": (_column, (1, 2)),
+    "cut": (_cut, (1, 2)),
+    "digits": (_digits, (2, 3)),
+    "hexdigits": (_hexdigits, (0, 0)),
+    "numbers": (_numbers, (1, 1)),
+    "ramp": (_ramp, (2, 2)),
+    "signed": (_signed, (1, 1)),
+    "unpack": (_unpack, (1, 2)),
+}
+"""Filter → function, and the least and most arguments behind its subject."""

@@ -1,0 +1,25 @@
+"""Where URC keeps what belongs to this user on this machine."""
+
+import os
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+
+__all__ = ["data_folder"]
+
+
+def data_folder(environ: Mapping[str, str] = os.environ) -> Path:
+    """Return the folder of URC's own data; it need not exist yet.
+
+    ``URC_DATA_DIR`` names another one. Else it is where the system wants such things: under
+    ``XDG_DATA_HOME`` or ``~/.local/share``, ``~/Library/Application Support`` or ``LOCALAPPDATA``.
+    """
+    if named := environ.get("URC_DATA_DIR"):
+        return Path(named).expanduser()
+    if sys.platform == "win32":
+        base = environ.get("LOCALAPPDATA") or str(Path.home() / "AppData" / "Local")
+    elif sys.platform == "darwin":
+        base = str(Path.home() / "Library" / "Application Support")
+    else:
+        base = environ.get("XDG_DATA_HOME") or str(Path.home() / ".local" / "share")
+    return Path(base) / "urc"

@@ -1,0 +1,388 @@
+r"""Regular expressions of documents: matched in linear time, or refused.
+
+Floor 1, private to `urc.patterns` and `urc._lists`. The dialect is RE2's: no look-around, no
+back-references, ``$`` is the very end, ``\d`` is ASCII. A pattern that `_is_linear` proves harmless
+runs on `re`, which is ten times faster on short lines; any other one runs on RE2. Where RE2 has no
+wheel, such a pattern is refused.
+
+Theory of operation: backtracking costs more than linear time only when the same characters can be
+shared out between two parts of a pattern in many ways. So every repeat must be over one set of
+characters, that set must share nothing with what may come next, alternatives must differ in their
+first character, and the pattern must be anchored at the start.
+"""
+
+import re
+import warnings
+from collections.abc import Callable, Mapping
+from re import _constants, _parser  # type: ignore[attr-defined]  # no public door to the syntax tree
+from typing import Any, Final, Protocol
+
+from urc.problems import UrcError
+
+__all__ = [
+    "Pattern",
+    "PatternError",
+    "can_be_empty",
+    "compile_pattern",
+    "example",
+    "is_plain_group",
+    "literal_prefix",
+]
+
+MAX_SOURCE: Final = 1024
+MAX_REPEAT: Final = 1000
+"""RE2's own limit on ``{n}``."""
+
+_OTHER = 128
+"""Stands for every character outside ASCII."""
+_ALL = frozenset(range(129))
+_DIGITS = frozenset(range(48, 58))
+_SPACES = frozenset(b" \t\n\r\f\v")
+_WORD = _DIGITS | frozenset(range(65, 91)) | frozenset(range(97, 123)) | {95}
+_CATEGORIES: dict[Any, frozenset[int]] = {
+    _constants.CATEGORY_DIGIT: _DIGITS,
+    _constants.CATEGORY_NOT_DIGIT: _ALL - _DIGITS,
+    _constants.CATEGORY_SPACE: _SPACES,
+    _constants.CATEGORY_NOT_SPACE: _ALL - _SPACES,
+    _constants.CATEGORY_WORD: _WORD,
+    _constants.CATEGORY_NOT_WORD: _ALL - _WORD,
+}
+_REFUSED: dict[Any, str] = {
+    _constants.ASSERT: "look-ahead and look-behind",
+    _constants.ASSERT_NOT: "look-ahead and look-behind",
+    _constants.GROUPREF: "back-references",
+    _constants.GROUPREF_EXISTS: "conditional groups",
+    _constants.ATOMIC_GROUP: "atomic groups",
+    _constants.POSSESSIVE_REPEAT: "possessive repeats",
+}
+
+
+class PatternError(UrcError):
+    """A pattern that cannot be used; `offset` is the 0-based character of the fault."""
+
+    def __init__(self, message: str, offset: int = 0) -> None:
+        super().__init__(message)
+        self.offset = offset
+
+
+class _Match(Protocol):
+    def groupdict(self) -> dict[str, str | None]: ...
+
+
+class Pattern:
+    """A compiled pattern. Equal when its source is; safe to share."""
+
+    __slots__ = ("_search", "groups", "is_proven", "source")
+
+    def __init__(self, source: str, groups: tuple[str, ...], search: Any, is_proven: bool) -> None:
+        self.source = source
+        """As written in the document."""
+        self.groups = groups
+        """Names of its groups, in order."""
+        self.is_proven = is_proven
+        """Whether it runs on `re`; RE2 otherwise."""
+        self._search = search
+
+    @property
+    def places(self) -> Mapping[str, int]:
+        """Name of a group → its number."""
+        tree = _parser.parse(self.source, re.ASCII)
+        return dict(tree.state.groupdict)
+
+    @property
+    def match(self) -> Callable[[str], "re.Match[str] | None"] | None:
+        """The compiled matcher of a pattern that is proven; None for one that runs on RE2."""
+        return self._search if self.is_proven else None
+
+    def search(self, text: str) -> Mapping[str, str | None] | None:
+        """Return the named groups of the first match in `text`, or None."""
+        found: _Match | None = self._search(text)
+        return None if found is None else found.groupdict()
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Pattern) and other.source == self.source
+
+    def __hash__(self) -> int:
+        return hash(self.source)
+
+    def __repr__(self) -> str:
+        return f"Pattern({self.source!r})"
+
+
+def compile_pattern(text: str) -> Pattern:
+    """Compile a pattern.
+
+    Raises:
+        PatternError: no pattern, one that uses what the dialect lacks, or needs an absent RE2.
+    """
+    if len(text) > MAX_SOURCE:
+        raise PatternError(f"a pattern has at most {MAX_SOURCE} characters, found {len(text)}")
+    try:
+        with warnings.catch_warnings():
+            # Python means to read "[[", "--", "&&" in a class in another way one day.
+            warnings.simplefilter("error", FutureWarning)
+            tree = _parser.parse(text, re.ASCII)
+    except FutureWarning as error:
+        words = str(error).lower()
+        raise PatternError(f"{words}: write a backslash before it: {text!r}") from None
+    except re.error as error:
+        raise PatternError(f"not a pattern: {error.msg}", error.pos or 0) from None
+    except (RecursionError, OverflowError):
+        raise PatternError("the pattern is nested too deeply or repeats too often") from None
+    _check_dialect(tree, text)
+    names = tree.state.groupdict
+    groups = tuple(sorted(names, key=names.__getitem__))
+    if _is_linear(tree, text):
+        ends_there = tree[-1] == (_constants.AT, _constants.AT_END)
+        source = text[:-1] + r"\Z" if ends_there else text
+        return Pattern(text, groups, re.compile(source, re.ASCII).match, True)
+    return Pattern(text, groups, _re2_search(text), False)
+
+
+def example(pattern: Pattern, groups: Mapping[str, str]) -> str:
+    """Return a short text made after `pattern`, with `groups` in the places of its named groups.
+
+    What is optional is left out unless a given group is in it; a class of characters gives its
+    first printable one. Whether the pattern really takes the text is the caller's to check.
+    """
+    tree = _parser.parse(pattern.source, re.ASCII)
+    names = {number: name for name, number in tree.state.groupdict.items()}
+    return _example(tree, names, groups)
+
+
+def literal_prefix(pattern: Pattern) -> str:
+    """Return the text with which everything begins that a proven pattern takes."""
+    if not pattern.is_proven:
+        return ""
+    prefix = ""
+    for operation, argument in list(_parser.parse(pattern.source, re.ASCII))[1:]:
+        if operation is not _constants.LITERAL:
+            break
+        prefix += chr(argument)
+    return prefix
+
+
+def is_plain_group(pattern: Pattern, name: str) -> bool:
+    """Return whether a group can hold neither ``_`` nor anything outside ASCII."""
+    tree = _parser.parse(pattern.source, re.ASCII)
+    found = _alphabet(tree, tree.state.groupdict[name])
+    return found is not None and not found & {_OTHER, ord("_")}
+
+
+def can_be_empty(pattern: Pattern, name: str) -> bool:
+    """Return whether a group can take part in a match and hold no character."""
+    tree = _parser.parse(pattern.source, re.ASCII)
+    return bool(_least_width(tree, tree.state.groupdict[name]) == 0)
+
+
+def _least_width(tree: Any, number: int) -> int | None:
+    """Return the fewest characters that the group can hold, or None when it is not in `tree`."""
+    for operation, argument in tree:
+        if operation is _constants.SUBPATTERN and argument[0] == number:
+            return int(argument[3].getwidth()[0])
+        for part in _parts(operation, argument):
+            found = _least_width(part, number)
+            if found is not None:
+                return found
+    return None
+
+
+def _alphabet(tree: Any, number: int) -> frozenset[int] | None:
+    """Return every character that the group can hold, or None when it is not in `tree`."""
+    for operation, argument in tree:
+        if operation is _constants.SUBPATTERN and argument[0] == number:
+            return _letters(argument[3])
+        for part in _parts(operation, argument):
+            found = _alphabet(part, number)
+            if found is not None:
+                return found
+    return None
+
+
+def _letters(tree: Any) -> frozenset[int]:
+    letters: frozenset[int] = frozenset()
+    for operation, argument in tree:
+        parts = _parts(operation, argument)
+        if parts:
+            letters = letters.union(*map(_letters, parts))
+        elif operation is not _constants.AT:
+            letters |= _characters(operation, argument) or _ALL
+    return letters
+
+
+def _example(tree: Any, names: Mapping[int, str], groups: Mapping[str, str]) -> str:
+    pieces: list[str] = []
+    for operation, argument in tree:
+        if operation is _constants.SUBPATTERN:
+            name = names.get(argument[0], "")
+            inner = _example(argument[3], names, groups)
+            pieces.append(groups.get(name, inner) if name else inner)
+        elif operation is _constants.BRANCH:
+            chosen = [part for part in argument[1] if _mentions(part, names, groups)]
+            pieces.append(_example((chosen or argument[1])[0], names, groups))
+        elif operation in (_constants.MAX_REPEAT, _constants.MIN_REPEAT):
+            low, _, inner = argument
+            times = max(low, int(_mentions(inner, names, groups)))
+            pieces.append(_example(inner, names, groups) * times)
+        elif operation is _constants.LITERAL:
+            pieces.append(chr(argument))
+        elif operation is not _constants.AT:
+            pieces.append(_first_printable(_characters(operation, argument)))
+    return "".join(pieces)
+
+
+def _mentions(tree: Any, names: Mapping[int, str], groups: Mapping[str, str]) -> bool:
+    """Return whether one of `groups` stands in `tree`."""
+    for operation, argument in tree:
+        if operation is _constants.SUBPATTERN and names.get(argument[0], "") in groups:
+            return True
+        if any(_mentions(part, names, groups) for part in _parts(operation, argument)):
+            return True
+    return False
+
+
+def _first_printable(characters: frozenset[int] | None) -> str:
+    wanted = characters or _ALL
+    printable = (code for code in (*range(48, 58), *range(97, 123), *range(32, 127)))
+    return chr(next((code for code in printable if code in wanted), min(wanted, default=63)))
+
+
+def _check_dialect(tree: Any, text: str) -> None:
+    for operation, argument in tree:
+        if operation in _REFUSED:
+            raise PatternError(f"{_REFUSED[operation]} are not part of the language: {text!r}")
+        if operation in (_constants.MAX_REPEAT, _constants.MIN_REPEAT):
+            low, high, _ = argument
+            if max(low, 0 if high is _constants.MAXREPEAT else high) > MAX_REPEAT:
+                raise PatternError(f"a repeat goes up to {MAX_REPEAT}: {text!r}")
+        for part in _parts(operation, argument):
+            _check_dialect(part, text)
+
+
+def _parts(operation: Any, argument: Any) -> list[Any]:
+    """Return the sequences inside one node."""
+    if operation is _constants.SUBPATTERN:
+        return [argument[3]]
+    if operation in (_constants.MAX_REPEAT, _constants.MIN_REPEAT):
+        return [argument[2]]
+    return list(argument[1]) if operation is _constants.BRANCH else []
+
+
+def _re2_search(text: str) -> Any:
+    try:
+        import re2
+    except ImportError:
+        raise PatternError(
+            "this pattern needs the package google-re2, which is not installed here: start it with"
+            f" '^' and let no repeat run into what follows it: {text!r}"
+        ) from None
+    options = re2.Options()
+    options.log_errors = False
+    options.max_mem = 1 << 23
+    try:
+        return re2.compile(text, options).search
+    except re2.error as error:
+        reason = error.args[0] if error.args else "unknown"
+        words = reason.decode("utf-8", "replace") if isinstance(reason, bytes) else str(reason)
+        raise PatternError(f"not a pattern of this language (RE2): {words}") from None
+
+
+class _NotProven(Exception):
+    """Raised at the first part that the proof does not cover; the pattern may still be harmless."""
+
+
+def _is_linear(tree: Any, text: str) -> bool:
+    items = list(tree)
+    if not items or items[0] != (_constants.AT, _constants.AT_BEGINNING):
+        return False
+    ends = [place for place, item in enumerate(items) if item == (_constants.AT, _constants.AT_END)]
+    if ends and (ends != [len(items) - 1] or not text.endswith("$")):
+        return False
+    if tree.state.flags & ~(re.ASCII | re.UNICODE):
+        return False
+    try:
+        _first_of(items[1 : ends[0] if ends else None], frozenset())
+    except _NotProven:
+        return False
+    return True
+
+
+def _first_of(items: list[Any], follow: frozenset[int]) -> frozenset[int]:
+    """Return which characters may come first in `items` followed by `follow`; check each item.
+
+    Walks from the end, so that at every item it is known what may come after it.
+    """
+    for operation, argument in reversed(items):
+        follow = _first_of_item(operation, argument, follow)
+    return follow
+
+
+def _first_of_item(operation: Any, argument: Any, follow: frozenset[int]) -> frozenset[int]:
+    characters = _characters(operation, argument)
+    if characters is not None:
+        return characters
+    if operation is _constants.SUBPATTERN:
+        _, add_flags, remove_flags, inner = argument
+        if add_flags or remove_flags:
+            raise _NotProven
+        return _first_of(list(inner), follow)
+    if operation is _constants.BRANCH:
+        return _first_of_branch(argument[1], follow)
+    if operation in (_constants.MAX_REPEAT, _constants.MIN_REPEAT):
+        return _first_of_repeat(argument, follow)
+    raise _NotProven
+
+
+def _first_of_branch(alternatives: Any, follow: frozenset[int]) -> frozenset[int]:
+    union: frozenset[int] = frozenset()
+    for alternative in alternatives:
+        first = _first_of(list(alternative), follow)
+        if not alternative or union & first:
+            raise _NotProven
+        union |= first
+    return union
+
+
+def _first_of_repeat(argument: Any, follow: frozenset[int]) -> frozenset[int]:
+    low, high, inner = argument
+    items = list(inner)
+    one = _characters(*items[0]) if len(items) == 1 else None
+    if low == high and all(_characters(*item) is not None for item in items):
+        return (_characters(*items[0]) or follow) if low and items else follow
+    if one is None and items and items[0][0] is _constants.SUBPATTERN and len(items) == 1:
+        group = list(items[0][1][3])
+        one = _characters(*group[0]) if len(group) == 1 else None
+    if one is None:
+        if high != 1:
+            raise _NotProven
+        one = _first_of(items, follow)
+        if any(item[0] in (_constants.MAX_REPEAT, _constants.MIN_REPEAT) for item in items[:1]):
+            raise _NotProven
+    if one & follow:
+        raise _NotProven
+    return one if low else one | follow
+
+
+def _characters(operation: Any, argument: Any) -> frozenset[int] | None:
+    """Return the set of characters that one single-character item takes, else None."""
+    if operation is _constants.LITERAL:
+        return frozenset((min(argument, _OTHER),))
+    if operation is _constants.NOT_LITERAL:
+        return _ALL - {argument} if argument < _OTHER else _ALL
+    if operation is _constants.ANY:
+        return _ALL - {10}
+    if operation is not _constants.IN:
+        return None
+    union: set[int] = set()
+    is_negated = False
+    for kind, value in argument:
+        if kind is _constants.NEGATE:
+            is_negated = True
+        elif kind is _constants.LITERAL:
+            union.add(min(value, _OTHER))
+        elif kind is _constants.RANGE:
+            union.update(range(min(value[0], _OTHER), min(value[1], _OTHER) + 1))
+        else:
+            union |= _CATEGORIES[value]
+    # A class that names some characters outside ASCII and is negated still takes all the others.
+    return (_ALL - (union - {_OTHER})) if is_negated else frozenset(union)

@@ -1,0 +1,54 @@
+"""The forms of what goes over a transport that carries messages: publish, call, goal, request.
+
+An envelope has an address, whose values may be templates, and a body in one of the other forms.
+"""
+
+from collections.abc import Iterable
+from typing import Final
+
+from urc.config.form_json_text import compiled_tree, placed_templates, templates_in
+from urc.config.forms import FormContext, body_form
+from urc.config.part import Findings, Part
+from urc.expressions import Template
+from urc.model.codec import WriteSpec
+
+__all__ = ["parse_write", "templates"]
+
+_BODY: Final = "body"
+
+
+def parse_write(part: Part, findings: Findings, context: FormContext) -> WriteSpec | None:
+    """Return the envelope at `part`, whose key is its verb."""
+    body = body_form(part)
+    spec = body[1].parse_write(body[0], findings, context) if body else None
+    before = len(findings.problems)
+    attributes = {
+        name: compiled_tree(inner, findings)
+        for name, inner in part.entries().items()
+        if body is None or inner.path != body[0].path
+    }
+    if (body and spec is None) or len(findings.problems) > before:
+        return None
+    if part.name == "request":
+        attributes.setdefault("method", "GET" if spec is None else "POST")
+    found = list(templates_in(attributes))
+    names = [one.names for one in found] + ([spec.names] if spec else [])
+    settings = [one.settings for one in found] + ([spec.settings] if spec else [])
+    return WriteSpec(
+        "envelope",
+        {"verb": part.name, "attributes": attributes, _BODY: spec},
+        frozenset[str]().union(*names),
+        frozenset[str]().union(*settings),
+    )
+
+
+def templates(part: Part, spec: WriteSpec) -> Iterable[tuple[Part, Template]]:
+    """Return every template in it, with its place."""
+    attributes = spec.options.get("attributes")
+    if isinstance(attributes, dict):
+        for name, tree in attributes.items():
+            if name in part.data:
+                yield from placed_templates(part.must(name), tree)
+    body, written = body_form(part), spec.options.get(_BODY)
+    if body and isinstance(written, WriteSpec):
+        yield from body[1].templates(body[0], written)

@@ -1,0 +1,158 @@
+"""Rules about motion: what a held command must know of the robot, and what its line must carry.
+
+The robot's own watchdog is the last one left when this machine loses its power, so that a driver
+has to say what it is. A value that contradicts it is an error: the motion would stutter, or go on
+for longer than the lease says. The others are warnings.
+"""
+
+import math
+from collections.abc import Iterator
+from typing import Final, cast
+
+from urc.config.part import Findings, Part, shown_duration
+from urc.expressions import Template, split_template
+from urc.model.binary import Item, least_size
+from urc.model.codec import WriteSpec
+from urc.model.driver import Command, Driver, TransportSpec
+from urc.model.flow import Hold
+from urc.model.framing import FrameLayout
+
+__all__ = ["check_motion", "least_frame_bytes"]
+
+LONG_LEASE_S: Final = 0.5
+_BITS_OF_A_BYTE: Final = 10
+"""On a serial line: start and stop bit included."""
+_ROUNDING: Final = 1.000001
+
+
+def check_motion(part: Part, driver: Driver, findings: Findings) -> None:
+    """Add what is to be said about the held commands of the driver at `part`."""
+    held = [
+        (inner.must("hold"), driver.commands[name], hold)
+        for name, inner in part.named("commands").items()
+        if (hold := driver.commands[name].hold) is not None
+    ]
+    for inner, command, hold in held:
+        _check_watchdog(inner, command, hold, findings)
+        _check_lease(inner, hold, findings)
+    for name, spec in driver.transports.items():
+        on_line = [one for one in held if one[1].transport == name]
+        if on_line:
+            _check_baud(on_line, spec, findings)
+    if held and not any(_notices(spec, driver) for spec in driver.transports.values()):
+        findings.warn(
+            held[0][0],
+            "unnoticed-loss",
+            "nothing tells when the robot has gone: no line says how long it may be silent,"
+            " and nothing is asked",
+            key=True,
+            hint="write stale_after: beside its transport, or poll something that it answers",
+        )
+
+
+def _check_watchdog(part: Part, command: Command, hold: Hold, findings: Findings) -> None:
+    watchdog_s = hold.watchdog_s
+    if watchdog_s is None:
+        findings.warn(
+            part,
+            "unknown-watchdog",
+            f"nobody says how long the robot itself goes on after the last {command.name!r}",
+            key=True,
+            hint="write watchdog: with the time in its manual, or watchdog: none when it never"
+            " stops by itself",
+        )
+        return
+    if hold.lease_s >= watchdog_s:
+        findings.error(
+            part.get("lease") or part.must("watchdog"),
+            "lease-too-long",
+            f"the lease is {shown_duration(hold.lease_s)}, and the robot stops by itself after"
+            f" {shown_duration(watchdog_s)}",
+            hint="make 'lease' shorter than 'watchdog': the lease is to stop it first",
+        )
+    if hold.repeat_s >= watchdog_s:
+        findings.error(
+            part.must("repeat"),
+            "repeat-too-slow",
+            f"it is repeated every {shown_duration(hold.repeat_s)}, and the robot stops by itself"
+            f" after {shown_duration(watchdog_s)}: it would stutter",
+            hint="repeat it three times within the watchdog, so that one may be lost",
+        )
+
+
+def _check_lease(part: Part, hold: Hold, findings: Findings) -> None:
+    if hold.lease_s > LONG_LEASE_S:
+        findings.warn(
+            part.must("lease"),
+            "long-lease",
+            f"the robot moves on for {shown_duration(hold.lease_s)} when its driver is gone",
+            hint=f"{shown_duration(0.25)} is usual, and {shown_duration(LONG_LEASE_S)} is much",
+        )
+
+
+def _check_baud(
+    held: list[tuple[Part, Command, Hold]], spec: TransportSpec, findings: Findings
+) -> None:
+    """Report motion that needs more bytes than a serial line carries, at the very least."""
+    baud = spec.options.get("baud")
+    if isinstance(baud, bool) or not isinstance(baud, (int, float)) or baud <= 0:
+        return
+    bits_per_s = sum(
+        least_frame_bytes(command.send, spec) * _BITS_OF_A_BYTE / hold.repeat_s
+        for _, command, hold in held
+    )
+    if bits_per_s <= baud * _ROUNDING:
+        return
+    part, command, _ = min(held, key=lambda one: one[2].repeat_s)
+    what = f"{command.name!r} needs" if len(held) == 1 else f"the {len(held)} held commands need"
+    findings.error(
+        part.must("repeat"),
+        "line-too-slow",
+        f"{what} {bits_per_s:.0f} bit/s at the least, and the line carries {baud:g}",
+        hint=f"repeat less often: every {_bearable_ms(bits_per_s / baud, held)}ms and slower",
+    )
+
+
+def _bearable_ms(excess: float, held: list[tuple[Part, Command, Hold]]) -> int:
+    """Return the repeat at which the line would be full, were all slowed down alike."""
+    return math.ceil(min(hold.repeat_s for _, _, hold in held) * excess * 1000 - 1e-6)
+
+
+def _notices(spec: TransportSpec, driver: Driver) -> bool:
+    """Return whether a robot that says nothing any more is noticed on a line."""
+    if spec.stale_after_s is not None or spec.timeouts.idle_s is not None:
+        return True
+    asked = [poll for poll in driver.polls if poll.transport == spec.name]
+    if any(poll.reply is not None for poll in asked):
+        return True
+    keepalive = spec.keepalive
+    command = driver.commands.get(keepalive.run) if keepalive is not None else None
+    return command is not None and command.reply is not None
+
+
+def least_frame_bytes(send: WriteSpec, spec: TransportSpec) -> int:
+    """Return the bytes of a frame at the least, what its framing adds included.
+
+    What is known only with the values counts one byte, and what a framing stuffs counts nothing.
+    """
+    return max(1, sum(_payload_bytes(send))) + _around(spec)
+
+
+def _payload_bytes(send: WriteSpec) -> Iterator[int]:
+    if send.form == "struct":
+        yield least_size(cast("tuple[Item, ...]", send.options["items"]))
+    for piece in cast("tuple[object, ...]", send.options.get("pieces", ())):
+        yield len(piece) if isinstance(piece, bytes) else 1
+    template = send.options.get("template")
+    if isinstance(template, Template):
+        parts = split_template(template.source)
+        yield sum(len(text) if expression is None else 1 for _, text, expression in parts)
+
+
+def _around(spec: TransportSpec) -> int:
+    framing = spec.framing.sent or spec.framing
+    layout = framing.options.get("layout")
+    if isinstance(layout, FrameLayout):
+        return layout.head + layout.tail
+    tx = framing.options.get("tx")
+    return len(tx) if isinstance(tx, bytes) else 0

@@ -1,0 +1,166 @@
+"""Rules about what a line carries: motion that must wait, and talk that is too fast or too slow.
+
+All are warnings, and speak only where somebody has decided something: never about a default.
+"""
+
+from collections.abc import Iterator, Mapping
+
+from urc.config.part import Findings, Part, shown_duration
+from urc.expressions import Template
+from urc.model.driver import Command, Driver, TransportSpec
+
+__all__ = ["check_traffic"]
+
+
+def check_traffic(part: Part, driver: Driver, findings: Findings) -> None:
+    """Add the warnings about the lines and the motion of the driver at `part`."""
+    for name, inner in part.named("commands").items():
+        command = driver.commands[name]
+        spec = driver.transports.get(command.transport)
+        if command.hold is not None and spec is not None:
+            _check_waiting(inner.must("hold"), command, spec, driver, findings)
+            _check_pace(inner.must("hold"), command, spec, findings)
+            _check_kept(inner.must("send"), command, findings)
+    for inner, poll in zip(part.listed("polls"), driver.polls, strict=True):
+        rate = driver.commands[poll.run].rate_per_s if poll.run in driver.commands else None
+        if rate is not None and 1 / poll.every_s > rate:
+            findings.warn(
+                inner.must("every"),
+                "too-many-polls",
+                f"it is asked {1 / poll.every_s:g} times a second, and {poll.run!r} may be sent"
+                f" {rate:g} times",
+                hint="poll more slowly, or raise its 'rate_limit'",
+            )
+    _check_ports(part, driver, findings)
+    for name, inner in part.named("transports").items():
+        _check_silence(inner, driver.transports[name], driver, findings)
+
+
+def _check_ports(part: Part, driver: Driver, findings: Findings) -> None:
+    """Warn of two lines that listen on one port of this machine."""
+    seen: dict[tuple[str, str, str], str] = {}
+    for name, inner in part.named("transports").items():
+        options = driver.transports[name].options
+        key = "listen" if "listen" in options else "port"
+        if key not in options or (key == "port" and options.get("mode") != "listen"):
+            continue
+        kind = "udp" if driver.transports[name].type == "udp" else "tcp"
+        port, address = options[key], options.get("bind", "")
+        place = (kind, _written(port), _written(address))
+        if place in seen:
+            findings.warn(
+                inner.must(key),
+                "same-port",
+                f"{seen[place]!r} listens on {place[1]}, too, and only one of them can",
+                hint="give each its own, or send both over one line and tell the messages apart",
+            )
+        seen.setdefault(place, name)
+
+
+def _written(value: object) -> str:
+    return value.source if isinstance(value, Template) else str(value)
+
+
+def _check_waiting(
+    part: Part, command: Command, spec: TransportSpec, driver: Driver, findings: Findings
+) -> None:
+    """Warn of motion that would wait until the answer to something else has come."""
+    if command.priority == "realtime":
+        return
+    if spec.connection == "persistent" and spec.queue.in_flight > 1:
+        return
+    others = sorted(_answered_s(spec, driver), key=lambda one: -one[1])
+    if not others:
+        return
+    name, longest_s = others[0]
+    findings.warn(
+        part,
+        "motion-waits",
+        f"while the answer to {name!r} is awaited, for up to {shown_duration(longest_s)},"
+        f" {command.name!r} must wait, and so must its release",
+        key=True,
+        hint=_way_out(command, spec),
+    )
+
+
+def _check_kept(part: Part, command: Command, findings: Findings) -> None:
+    """Report motion that a broker would keep, or say again."""
+    attributes = command.send.options.get("attributes")
+    if not isinstance(attributes, Mapping):
+        return
+    kept = [("retain", "is kept for whoever comes later")] if attributes.get("retain") else []
+    kept += [("qos", "is said again until it is acknowledged")] if attributes.get("qos") else []
+    for key, what in kept:
+        findings.error(
+            part.must("publish"),
+            "motion-kept",
+            f"{command.name!r} moves the robot, and with this {key} it {what}",
+            at=key,
+            key=True,
+            hint=f"take '{key}' away: motion that comes late moves a robot that nobody drives",
+        )
+
+
+def _way_out(command: Command, spec: TransportSpec) -> str:
+    if spec.connection != "persistent":
+        return "make the connection persistent, and write priority: realtime beside 'hold'"
+    if command.is_latest_only or command.rate_per_s is not None:
+        return "write priority: realtime beside 'hold', in place of 'coalesce' and 'rate_limit'"
+    return "write priority: realtime beside 'hold'"
+
+
+def _answered_s(spec: TransportSpec, driver: Driver) -> Iterator[tuple[str, float]]:
+    """Yield what is answered on a line, and how long that may take."""
+    asked = [(one.name, one.transport, one.reply) for one in driver.commands.values()]
+    asked += [(one.run or one.name, one.transport, one.reply) for one in driver.polls]
+    for name, transport, reply in asked:
+        if transport == spec.name and reply is not None:
+            seconds = [reply.timeout_s, *(one.timeout_s for one in reply.stages)]
+            reply_s = spec.timeouts.reply_s
+            yield name, sum(reply_s if one is None else one for one in seconds)
+
+
+def _check_pace(part: Part, command: Command, spec: TransportSpec, findings: Findings) -> None:
+    """Warn of a hold whose values come faster than they may be sent."""
+    if command.hold is None:
+        return
+    repeat_s = command.hold.repeat_s
+    for limit_s, what in (
+        (spec.min_gap_s if command.priority != "realtime" else 0.0, "the line's 'min_gap'"),
+        (1 / command.rate_per_s if command.rate_per_s else 0.0, "its 'rate_limit'"),
+    ):
+        if limit_s > repeat_s * 1.001:  # 1/20 s and 50 ms are the same
+            findings.warn(
+                part.must("repeat"),
+                "held-back",
+                f"it is repeated every {shown_duration(repeat_s)}, and {what} lets it go every"
+                f" {shown_duration(limit_s)}",
+                hint="make 'repeat' as long as that, or longer",
+            )
+
+
+def _check_silence(part: Part, spec: TransportSpec, driver: Driver, findings: Findings) -> None:
+    """Warn of a line that counts as silent, or is closed, between two questions."""
+    if any(one.transport == spec.name for one in driver.messages.values()):
+        return  # the robot talks by itself, nobody knows how often
+    periods = [poll.every_s for poll in driver.polls if poll.transport == spec.name and poll.reply]
+    keepalive = spec.keepalive
+    if keepalive is not None:
+        command = driver.commands.get(keepalive.run)
+        if command is not None and command.reply is not None:
+            periods.append(keepalive.every_s)
+    if not periods:
+        return
+    timeouts = part.get("timeouts")
+    for place, key, limit_s, what in (
+        (timeouts, "idle", spec.timeouts.idle_s, "is closed"),
+        (part, "stale_after", spec.stale_after_s, "counts as silent"),
+    ):
+        if place is not None and limit_s is not None and limit_s <= min(periods):
+            findings.warn(
+                place.must(key),
+                "slow-keepalive",
+                f"the line {what} after {shown_duration(limit_s)}, and the robot is asked every"
+                f" {shown_duration(min(periods))} only",
+                hint="make it two of those periods or more, so that one answer may be lost",
+            )

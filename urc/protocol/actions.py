@@ -1,0 +1,264 @@
+"""What each kind of step does: `Step` → the function that a `Runner` calls.
+
+Floor 3, pure. See `urc.protocol.steps` for the theory of operation.
+"""
+
+from collections.abc import Iterator, Mapping
+from typing import Literal
+
+from urc.expressions import COUNTERS, ExpressionError, Template
+from urc.model.driver import Driver
+from urc.model.flow import (
+    ExpectStep,
+    FailStep,
+    IfStep,
+    PromptStep,
+    RepeatStep,
+    RunStep,
+    SendStep,
+    SetStep,
+    Step,
+    UntilStep,
+    WaitStep,
+)
+from urc.model.values import Value
+from urc.protocol.answer import Answer, Ear, Matcher
+from urc.protocol.asking import Builder
+from urc.protocol.encode import BadArgument
+from urc.protocol.events import Samples
+from urc.protocol.exchange import Ask, Exchange, LineEvent, expires_at
+from urc.protocol.forms import Frame, NotWritable
+from urc.protocol.gate import Counters
+from urc.protocol.steps import Action, Program, Runner
+
+__all__ = ["build_program", "programs_of_lines"]
+
+
+def build_program(
+    label: str, steps: tuple[Step, ...], transports: frozenset[str], builder: Builder
+) -> Program:
+    """Compile a sequence."""
+    return Program(label, _actions(label, steps, builder), transports)
+
+
+def programs_of_lines(
+    driver: Driver, builder: Builder, key: Literal["on_connect", "on_close"]
+) -> dict[str, Program]:
+    """Compile what is said first, or last, on each line that has something to say."""
+    return {
+        name: build_program(f"{name}.{key}", getattr(spec, key), frozenset((name,)), builder)
+        for name, spec in driver.transports.items()
+        if getattr(spec, key)
+    }
+
+
+def _actions(label: str, steps: tuple[Step, ...], builder: Builder) -> tuple[Action, ...]:
+    return tuple(_action(f"{label}.{place}", step, builder) for place, step in enumerate(steps))
+
+
+def _action(label: str, step: Step, builder: Builder) -> Action:
+    match step:
+        case SendStep():
+            return _sending(builder.step(label, step), step)
+        case ExpectStep() | PromptStep():
+            return _expecting(label, step, builder)
+        case WaitStep(seconds):
+            return lambda runner, now: _slept(runner, now + seconds)
+        case UntilStep():
+            return _awaiting(label, step, builder)
+        case RepeatStep():
+            return _repeating(label, step, builder)
+        case RunStep():
+            return _running(step)
+        case SetStep():
+            return _setting(step)
+        case IfStep():
+            then = _actions(f"{label}.then", step.then, builder)
+            otherwise = _actions(f"{label}.else", step.otherwise, builder)
+            return lambda runner, now: _chosen(runner, now, step.condition, then, otherwise)
+        case FailStep(text):
+            return lambda runner, now: _failed(runner, now, text)
+
+
+def _slept(runner: Runner, due: float) -> list[LineEvent]:
+    runner.sleep(due)
+    return []
+
+
+def _chosen(
+    runner: Runner,
+    now: float,
+    condition: Template,
+    then: tuple[Action, ...],
+    otherwise: tuple[Action, ...],
+) -> list[LineEvent]:
+    holds = runner.host.known.holds(condition, now, runner.variables)
+    runner.push(iter(then if holds else otherwise))
+    return []
+
+
+def _awaiting(label: str, step: UntilStep, builder: Builder) -> Action:
+    otherwise = _otherwise(label, step.otherwise, builder)
+    text = step.text or (
+        f"{label}: {step.condition.source!r} did not come true within {step.timeout_s:g} s"
+    )
+
+    def wait(runner: Runner, now: float) -> list[LineEvent]:
+        runner.wait_for(step.condition, now + step.timeout_s, otherwise, text)
+        runner.look(now)
+        return []
+
+    return wait
+
+
+def _repeating(label: str, step: RepeatStep, builder: Builder) -> Action:
+    body = _actions(f"{label}.repeat", step.body, builder)
+    otherwise = _otherwise(label, step.otherwise, builder)
+    until = step.until
+    text = step.text or f"{label}: it was not done after {step.times} rounds"
+
+    def rounds(is_done: list[bool]) -> Iterator[Action]:
+        def look(runner: Runner, now: float) -> list[LineEvent]:
+            if until is not None:
+                is_done.append(runner.host.known.holds(until, now, runner.variables))
+            return []
+
+        for _ in range(step.times):
+            yield from body
+            yield look
+            if is_done and is_done.pop():
+                return
+        if until is not None:
+            yield _give_up
+
+    def _give_up(runner: Runner, now: float) -> list[LineEvent]:
+        if otherwise is None:
+            runner.stop("failed", text)
+        else:
+            runner.push(iter(otherwise))
+        return []
+
+    def repeat(runner: Runner, now: float) -> list[LineEvent]:
+        runner.push(rounds([]))
+        return []
+
+    return repeat
+
+
+def _otherwise(
+    label: str, steps: tuple[Step, ...] | None, builder: Builder
+) -> tuple[Action, ...] | None:
+    return None if steps is None else _actions(f"{label}.else", steps, builder)
+
+
+def _failed(runner: Runner, now: float, text: Template) -> list[LineEvent]:
+    try:
+        runner.stop("failed", text.render(runner.names(now)))
+    except ExpressionError as error:
+        runner.stop("failed", str(error))
+    return []
+
+
+def _sending(ask: Ask, step: SendStep) -> Action:
+    names = step.send.names - {COUNTERS}
+
+    def send(runner: Runner, now: float) -> list[LineEvent]:
+        line = runner.host.lines[step.transport]
+        view = runner.names(now)
+        namespace = {name: view[name] for name in names if name in view}
+        try:
+            data = ask.encode({**namespace, COUNTERS: Counters().draw()})
+        except BadArgument as error:
+            why = "it cannot be written with what is known" if step.is_secret else str(error)
+            runner.stop("bad-argument", f"{ask.label}: {why}")
+            return []
+        exchange = Exchange(
+            ask,
+            runner,
+            namespace,
+            None if ask.has_counters else data,
+            expires_at(ask, now),
+        ).mark(
+            is_privileged=runner.privileged_on == step.transport,
+            is_secret=step.is_secret,
+        )
+        runner.begin()
+        return line.submit(exchange, now)
+
+    return send
+
+
+def _expecting(label: str, step: ExpectStep | PromptStep, builder: Builder) -> Action:
+    answer = builder.expected(step) if isinstance(step, ExpectStep) else _prompted(step, builder)
+    otherwise = _otherwise(label, step.otherwise, builder)
+    text = step.text or f"{label}: what it expects did not come within {answer.timeout_s:g} s"
+
+    def expect(runner: Runner, now: float) -> list[LineEvent]:
+        line = runner.host.lines[step.transport]
+        if not line.is_open:
+            runner.stop("disconnected", "the robot is not connected")
+            return []
+        ear = Ear(answer, runner)
+        runner.listen(line, ear, now, now + answer.timeout_s, otherwise, text)
+        if isinstance(step, PromptStep):
+            return line.inbox.look_for(step.pattern, ear)
+        line.inbox.listen(ear)
+        return []
+
+    return expect
+
+
+def _prompted(step: PromptStep, builder: Builder) -> Answer:
+    timeout_s = builder.reply_s(step.transport) if step.timeout_s is None else step.timeout_s
+    return Answer(Matcher(_Nothing(), lambda fields, now: ([], [])), timeout_s)
+
+
+class _Nothing:
+    """Reads no frame: a prompt is none."""
+
+    def read(self, frame: Frame) -> None:
+        return None
+
+    def write(self, fields: Mapping[str, object]) -> bytes:
+        raise NotWritable("a prompt is no frame")
+
+
+def _running(step: RunStep) -> Action:
+    def run(runner: Runner, now: float) -> list[LineEvent]:
+        view = runner.names(now)
+        try:
+            arguments = {name: _value(one, view) for name, one in step.arguments.items()}
+        except ExpressionError as error:
+            runner.stop("bad-argument", str(error))
+            return []
+        runner.begin()
+        return runner.host.run(
+            step.command,
+            arguments,
+            runner.done,
+            now,
+            privileged_on=runner.privileged_on,
+            confirmed_by=runner.confirmed_by,
+        )
+
+    return run
+
+
+def _setting(step: SetStep) -> Action:
+    def put(runner: Runner, now: float) -> list[LineEvent]:
+        view = runner.names(now)
+        try:
+            values = {name: _value(one, view) for name, one in step.values.items()}
+        except ExpressionError as error:
+            runner.stop("failed", str(error))
+            return []
+        samples, refused = runner.host.readings.put(values, now)
+        if refused:
+            runner.stop("failed", refused[0])
+        return [Samples("", tuple(samples))] if samples else []
+
+    return put
+
+
+def _value(value: Template | Value, names: Mapping[str, object]) -> object:
+    return value.evaluate(names) if isinstance(value, Template) else value

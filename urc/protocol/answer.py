@@ -1,0 +1,192 @@
+"""What an answer is, and how its frames are collected.
+
+Floor 3, pure. A `Matcher` reads one kind of frame, an `Answer` is what a request waits for, and an
+`Ear` collects the frames of one answer: the transport's conversation (`urc.protocol.line`) offers
+it each frame that comes in.
+"""
+
+from collections.abc import Callable, Mapping
+from typing import Final, NamedTuple, Protocol
+
+from urc.expressions import ExpressionError, Template, text_of
+from urc.model.codec import traffic_of
+from urc.patterns import Pattern
+from urc.protocol.fast_read import FastRead, Taken
+from urc.protocol.forms import BadItem, BadText, Frame, Reader
+from urc.protocol.readings import Decode
+
+__all__ = ["Answer", "Ear", "Fields", "Heard", "Listening", "Matcher", "Offer", "Quick", "shown"]
+
+Fields = Mapping[str, object]
+"""What a frame says: name → raw value."""
+
+_MOST_COLLECTED: Final = 1 << 20
+"""Bytes that a reply of several frames may have."""
+
+
+class Matcher(NamedTuple):
+    """A reader and what becomes of its fields."""
+
+    reader: Reader
+    decode: Decode
+    make_fast: Callable[[], FastRead | None] | None = None
+    """Makes a function that does both in one, for text."""
+    prefix: str = ""
+    """What the text of its frames begins with, blanks aside; "" when that is not known."""
+
+    def take(self, frame: Frame, now: float) -> Taken | None:
+        """Return samples and refused values, or None when the frame is another one."""
+        found = self.read(frame)
+        return None if found is None else self.decode(found, now)
+
+    def read(self, frame: Frame) -> Fields | None:
+        """Return the fields, or None when the frame is another one or no text at all."""
+        try:
+            return self.reader.read(frame)
+        except BadItem as error:
+            frame.fault = str(error)
+            return None
+        except BadText:
+            return None
+
+
+Quick = Callable[[bytes, float], "Taken | None"]
+"""A frame and the time → samples and refused values, or None when it is another one."""
+
+
+class Answer(NamedTuple):
+    """What one answer looks like, compiled."""
+
+    matcher: Matcher
+    timeout_s: float
+    errors: tuple[Pattern, ...] = ()
+    faults: tuple[tuple[Matcher, Template | None], ...] = ()
+    lines: int | Pattern | None = None
+
+
+class Offer(NamedTuple):
+    """What an ear made of a frame."""
+
+    fields: Fields | None = None
+    """Of a whole answer; None: more is to come, or it is a refusal."""
+    refusal: str = ""
+    """Why the robot refused, for people."""
+    dropped: str = ""
+    """What was collected before and belongs to no answer, for people."""
+
+
+_MORE: Final = Offer()
+
+
+class Ear:
+    """Collects the frames of one answer."""
+
+    __slots__ = ("_lines", "_size", "answer", "owner")
+
+    def __init__(self, answer: Answer, owner: "Listening | None" = None) -> None:
+        self.answer = answer
+        self.owner = owner
+        self._lines: list[bytes] = []
+        self._size = 0
+
+    def offer(self, frame: Frame, is_mine: Callable[[Fields], bool] | None = None) -> Offer | None:
+        """Return what the frame means here, or None when it is no part of the answer.
+
+        Args:
+            frame: as it came in.
+            is_mine: tells by its fields whether an answer is the one waited for.
+        """
+        refused = self._refusal(frame, is_mine)
+        if refused is not None:
+            return refused
+        if self.answer.lines is not None:
+            return self._collect(frame, self.answer.lines)
+        found = self.answer.matcher.read(frame)
+        if found is None or (is_mine is not None and not is_mine(found)):
+            return None
+        return Offer(found)
+
+    def _refusal(self, frame: Frame, is_mine: Callable[[Fields], bool] | None) -> Offer | None:
+        """Return why the robot refused; what names nobody is for whoever waits longest."""
+        for matcher, text in self.answer.faults:  # first: they say more
+            fields = matcher.read(frame)
+            if fields is not None and (is_mine is None or not fields or is_mine(fields)):
+                if _lacks(text, fields) and self.answer.matcher.read(frame) is not None:
+                    continue  # a good answer has some of these fields, too, but not the reason
+                return Offer(refusal=_told(text, fields, frame))
+        for pattern in self.answer.errors:
+            groups = _search(pattern, frame)
+            if groups is not None and (is_mine is None or not groups or is_mine(groups)):
+                return Offer(refusal=f"the robot answered {shown(frame)}")
+        return None
+
+    def _collect(self, frame: Frame, lines: int | Pattern) -> Offer | None:
+        payload = frame.payload
+        if not isinstance(payload, bytes):
+            return None
+        self._lines.append(payload)
+        self._size += len(payload) + 1
+        if self._size > _MOST_COLLECTED:
+            return self._drop(len(self._lines), "it has too many lines")
+        if isinstance(lines, int):
+            if len(self._lines) < lines:
+                return _MORE
+        elif _search(lines, frame) is None:
+            return _MORE
+        found = self.answer.matcher.read(Frame(b"\n".join(self._lines), frame.encoding))
+        if found is not None:
+            self._lines, self._size = [], 0
+            return Offer(found)
+        # A stray line in front of a counted reply must not shift it for ever.
+        return self._drop(1 if isinstance(lines, int) else len(self._lines), "nothing matches it")
+
+    def _drop(self, count: int, why: str) -> Offer:
+        gone, self._lines = self._lines[:count], self._lines[count:]
+        self._size = sum(len(line) + 1 for line in self._lines)
+        return Offer(dropped=f"{len(gone)} lines of a reply were dropped: {why}")
+
+
+class Listening(Protocol):
+    """Who put out an ear."""
+
+    def heard(self, ear: Ear, offer: Offer, now: float) -> None:
+        """Take what came."""
+
+
+class Heard(NamedTuple):
+    """Inside the engine: what somebody listened for has come."""
+
+    ear: "Ear"
+    offer: "Offer"
+
+
+def _search(pattern: Pattern, frame: Frame) -> Mapping[str, str | None] | None:
+    try:
+        return pattern.search(frame.text)
+    except BadText:
+        return None
+
+
+def _lacks(text: Template | None, fields: Fields) -> bool:
+    """Return whether the words for people need what the frame has not."""
+    return text is not None and not text.names <= {*fields, "settings"}
+
+
+def _told(text: Template | None, fields: Fields, frame: Frame) -> str:
+    if text is not None:
+        try:
+            return text_of(text.evaluate(fields))
+        except ExpressionError as error:
+            return f"the robot refused; {error}"
+    return f"the robot answered {shown(frame)}"
+
+
+def shown(frame: Frame) -> str:
+    """Return a frame in messages for people: its text, or its first bytes."""
+    try:
+        return repr(frame.text[:80])
+    except BadText:
+        payload = frame.payload
+        if isinstance(payload, bytes):
+            return payload[:40].hex(" ")
+        return traffic_of(payload)[:80].decode("utf-8", "replace")

@@ -1,0 +1,78 @@
+"""The forms of what goes over a transport that carries messages: publish, call, goal, request.
+
+Floor 3, pure. An envelope is an address (attributes) and a body. The body is written by one of the
+other forms; JSON stays data, because such transports have an encoding of their own.
+"""
+
+from collections.abc import Mapping
+from typing import Any, Final, cast
+
+from urc.expressions import Template, text_of
+from urc.model.codec import Envelope, Payload, WriteSpec
+from urc.protocol.forms import CodecContext, Frame, Writer, build_writer
+from urc.protocol.json_text_form import JsonWriter, filled
+
+__all__ = ["EnvelopeWriter"]
+
+
+_ADDRESS: Final = ("topic", "service", "action", "method", "path", "query")
+"""What tells an envelope from another one; the rest says how it goes there."""
+_TEXTS: Final = ("query", "headers")
+"""Mappings whose values are text on the wire."""
+
+
+class EnvelopeWriter:
+    """Writes an envelope; reads one back into the values of the names in it."""
+
+    def __init__(self, spec: WriteSpec, context: CodecContext) -> None:
+        self._verb = cast("str", spec.options["verb"])
+        self._attributes = cast("Mapping[str, Any]", spec.options["attributes"])
+        body = cast("WriteSpec | None", spec.options["body"])
+        self._body: Writer | None = None if body is None else build_writer(body, context)
+        self._context = context
+
+    def write(self, namespace: Mapping[str, object]) -> Payload:
+        """Return the envelope; raise `NotWritable` or `ExpressionError`."""
+        attributes = filled(dict(self._attributes), namespace)
+        for name in _TEXTS:
+            if name in attributes:
+                values = attributes[name].items()
+                attributes[name] = {key: text_of(value) for key, value in values}
+        if isinstance(self._body, JsonWriter):
+            return Envelope(self._verb, attributes, self._body.value(namespace))
+        return Envelope(self._verb, attributes, self._body and self._body.write(namespace))
+
+    def read(self, frame: Frame) -> Mapping[str, object] | None:
+        """Return the names' values, or None when the envelope is another one."""
+        envelope = frame.payload
+        if not isinstance(envelope, Envelope) or envelope.verb != self._verb:
+            return None
+        found: dict[str, object] = {}
+        for name in _ADDRESS:
+            if name in self._attributes and not self._is_here(
+                self._attributes[name], envelope.attributes.get(name), found
+            ):
+                return None
+        if self._body is None:
+            return found
+        body = envelope.body
+        said = self._body.read(
+            Frame(body if isinstance(body, bytes) else envelope, self._context.encoding)
+        )
+        return None if said is None else {**found, **said}
+
+    def _is_here(self, tree: Any, value: Any, found: dict[str, object]) -> bool:
+        """Return whether `value` is what `tree` gives; the names in it are put into `found`."""
+        if isinstance(tree, Mapping):
+            if not isinstance(value, Mapping) or tree.keys() != value.keys():
+                return False
+            return all(self._is_here(inner, value[name], found) for name, inner in tree.items())
+        if not isinstance(tree, Template):
+            return text_of(tree) == text_of(value)
+        if tree.names <= {"settings"}:
+            return text_of(tree.evaluate({"settings": self._context.settings})) == text_of(value)
+        written = WriteSpec("text", {"template": tree}, tree.names, tree.settings)
+        text = Frame(text_of(value).encode(), "utf-8")
+        said = build_writer(written, self._context._replace(encoding="utf-8")).read(text)
+        found.update(said or {})
+        return said is not None

@@ -1,0 +1,79 @@
+"""One function made for one kind of binary frame: bytes → samples.
+
+Floor 3, pure. As in `urc.protocol.fast_read`: it takes the case that happens, and turns to the
+closures at anything else, such as a value that is not valid. Frames of which not every item has its
+fixed place have no such function.
+"""
+
+from typing import cast
+
+from urc.model.binary import Item
+from urc.model.codec import ReadSpec
+from urc.protocol.fast_read import FastRead, Slow, Value, finish, of_json_type, value_of
+from urc.protocol.forms import BadItem
+from urc.protocol.readings import Readings
+from urc.protocol.struct_lines import BUILTINS, Lines
+from urc.protocol.struct_source import add_fixed
+from urc.protocol.struct_value import not_valid
+
+__all__ = ["build_fast_struct"]
+
+
+def build_fast_struct(
+    spec: ReadSpec, encoding: str, readings: Readings, slow: Slow
+) -> FastRead | None:
+    """Return the function for frames of `spec`, or None where only `slow` can read them."""
+    items = cast("tuple[Item, ...]", spec.options["items"])
+    source = Lines()
+    source.scope |= {"not_valid": not_valid, "BadItem": BadItem}
+    late = add_fixed(source, items, encoding, "payload")
+    if late is None:
+        return None
+    lines, fields = late
+    numbers = {item.id: item for item in _numbers(items)}
+    raws: list[str] = []
+    values: list[Value] = []
+    checks: list[str] = []
+    for name, expression in fields.items():
+        if name.startswith("_"):
+            continue
+        value = value_of(readings.signals[name], "json", True)
+        if value is None:
+            return None
+        raw = f"r{len(values)}"
+        lines.append(f"{raw} = {expression}")
+        if not _is_sure(numbers.get(name), value):
+            checks.append(of_json_type(value.signal.type, raw))
+        elif value.signal.type == "number":
+            value = value._replace(is_finite=True)
+        raws.append(raw)
+        values.append(value)
+    head = source.lines
+    body = ["    try:", *(f"        {line}" for line in lines or ["pass"])]
+    body += ["    except (BadItem, ValueError):", "        return slow(payload, now)"]
+    if checks:
+        body += [f"    if not ({' and '.join(checks)}):", "        return slow(payload, now)"]
+    scope = {**BUILTINS, **source.scope, "str": str}
+    return finish(values, raws, [*head, *body], readings, scope, slow)
+
+
+def _numbers(items: tuple[Item, ...]) -> list[Item]:
+    """Return the whole numbers of the outermost level that are nothing but scaled."""
+    return [
+        item
+        for item in items
+        if item.kind == "number"
+        and item.number.kind == "integer"
+        and item.number.bits <= 48
+        and item.times is None
+        and not item.enum
+    ]
+
+
+def _is_sure(item: Item | None, value: Value) -> bool:
+    """Return whether the item can only be a finite number of the signal's type."""
+    if item is None:
+        return False
+    if value.signal.type == "number":
+        return abs(item.scale) < 1e200 and abs(item.offset) < 1e200
+    return value.signal.type == "integer" and item.scale == 1 and item.offset == 0

@@ -1,0 +1,160 @@
+"""What any framing may have besides: an end to its patience, and an eye for terminals.
+
+Theory of operation. A frame that has begun and does not go on holds up all that follows: a length
+read wrongly may ask for bytes that never come. With a timeout, the silence behind the newest byte
+ends the wait: what began the frame is given up byte by byte, and the frames in what is left are
+told. Escape sequences of terminals are taken out before anything is cut, so that neither marks nor
+texts are torn by them.
+"""
+
+import re
+from typing import Final, NamedTuple
+
+from urc.protocol.framing import (
+    SKIPPED,
+    Decoder,
+    DelimiterFraming,
+    FrameFault,
+    Framing,
+    Stream,
+)
+
+__all__ = ["PatientFraming"]
+
+_SEQUENCE: Final = re.compile(
+    rb"\x1b(?:\[[0-?]{0,64}[ -/]{0,8}[@-~]|\][^\x07\x1b]{0,256}(?:\x07|\x1b\\)"
+    rb"|[ -/]{0,8}[0-Z\\^-~])"
+)
+"""ECMA-48: a control sequence, a command to the terminal such as its title, a single escape."""
+_MOST_TRIES: Final = 4096
+"""How often another begin of a frame is looked for; each may look at all that is left."""
+_LONGEST: Final = 300
+"""Bytes of a sequence that is waited for."""
+
+
+class PatientFraming(NamedTuple):
+    """A framing, with a timeout inside of its frames, or without the colours of a terminal."""
+
+    framing: Framing
+    timeout_s: float | None
+    strips_ansi: bool
+
+    def encode(self, payload: bytes) -> bytes:
+        """Return the bytes of one frame, or raise `FramingError`."""
+        return self.framing.encode(payload)
+
+    def decoder(self, stream: Stream | None = None) -> Decoder:
+        """Return a fresh decoder."""
+        return _PatientDecoder(Stream() if stream is None else stream, self)
+
+    def reversed(self) -> "PatientFraming":
+        """Return the same framing seen from the other end of the line."""
+        return self._replace(framing=self.framing.reversed())
+
+
+class _PatientDecoder:
+    """Passes bytes on, and looks at the clock."""
+
+    def __init__(self, stream: Stream, framing: PatientFraming) -> None:
+        self._stream = stream
+        self._framing = framing
+        self._decoder = framing.framing.decoder(stream)
+        self._newest: float | None = None
+        """When the newest byte came; None when there was none."""
+        self._told: list[bytes | FrameFault] = []
+        """Frames and faults that the silence has brought to light."""
+        self._held = b""
+        """The begin of an escape sequence."""
+
+    @property
+    def pending(self) -> int:
+        """Bytes held back."""
+        return self._decoder.pending + len(self._held)
+
+    @property
+    def deadline(self) -> float | None:
+        """When patience ends, or what the framing itself waits for."""
+        if self._told:
+            return float("-inf")
+        own, timeout = self._decoder.deadline, self._framing.timeout_s
+        if timeout is None or not self.pending or self._newest is None:
+            return own
+        ends = self._newest + timeout
+        return ends if own is None else min(own, ends)
+
+    def feed(self, data: bytes, now: float = 0.0) -> list[bytes | FrameFault]:
+        """Take bytes and return the frames that are now complete, in order."""
+        self.push(data, now)
+        frames: list[bytes | FrameFault] = []
+        while (frame := self.next(now)) is not None:
+            frames.append(frame)
+        return frames
+
+    def push(self, data: bytes, now: float = 0.0) -> None:
+        """Take bytes, to be cut by `next`."""
+        self._give_up(now)
+        if self._framing.strips_ansi:
+            data = self._stripped(data)
+        self._decoder.push(data, now)
+        self._newest = now
+
+    def next(self, now: float = 0.0) -> bytes | FrameFault | None:
+        """Return one frame or fault, or None when there is none yet."""
+        if self._newest is None and len(self._stream):
+            self._newest = now  # what another decoder has left
+        if self._told:
+            return self._told.pop(0)
+        return self._decoder.next(now)
+
+    def whole(self, data: bytes) -> bytes | None:
+        """Return None: silence and escape sequences must be looked at each time."""
+        return None
+
+    def tick(self, now: float) -> list[bytes | FrameFault]:
+        """Return the frames that the silence until `now` has completed, or brought to light."""
+        frames = self._decoder.tick(now)
+        self._give_up(now)
+        told, self._told = self._told, []
+        return told + frames
+
+    def _give_up(self, now: float) -> None:
+        """Drop what began a frame and did not go on; note the frames behind it."""
+        timeout, stream = self._framing.timeout_s, self._stream
+        if timeout is None or self._newest is None or now < self._newest + timeout:
+            return
+        self._held = b""
+        self._newest = None
+        is_lost, left = False, _MOST_TRIES
+        while len(stream):
+            before = stream.at
+            found = self._decoder.next(now) if is_lost else None
+            if isinstance(found, bytes):
+                self._told.append(found)
+                continue
+            if found is None:
+                left -= 1
+                if not left or isinstance(self._framing.framing, DelimiterFraming):
+                    before = len(stream.data)  # there is no begin that could be looked for
+                # Nothing more is to come, so what is held back here is no frame.
+                stream.at = min(max(before + 1, stream.at), len(stream.data))
+                if not is_lost:
+                    text = f"a frame began and did not go on for {timeout:g} s; dropped"
+                    self._told.append(FrameFault("frame-timeout", text))
+                is_lost = True
+                self._decoder = self._framing.framing.decoder(stream)
+            elif found.code == SKIPPED and stream.at == before:
+                stream.at += 1
+
+    def _stripped(self, data: bytes) -> bytes:
+        whole = self._held + data
+        self._held = b""
+        if b"\x1b" not in whole:
+            return whole
+        text = _SEQUENCE.sub(b"", whole)
+        place = text.find(b"\x1b")
+        if place < 0:
+            return text
+        if len(text) - place <= _LONGEST:
+            self._held = text[place:]
+            return text[:place]
+        return text.replace(b"\x1b", b"")

@@ -1,0 +1,104 @@
+"""Frames of motion: what moves a robot for as long as it is held, and what stops it.
+
+Floor 3, pure. These frames do not go through the queue of their line: whoever owns the wire writes
+the newest one, and the stop before anything else. All that a command must fulfil before it is sent,
+a frame of motion must fulfil, too.
+"""
+
+from collections.abc import Callable, Mapping
+
+from urc.expressions import COUNTERS
+from urc.model.codec import Payload
+from urc.model.driver import Command
+from urc.model.values import Reading
+from urc.problems import UrcError
+from urc.protocol.commands import is_guarded, why_refused
+from urc.protocol.encode import BadArgument, check_arguments
+from urc.protocol.exchange import Ask
+from urc.protocol.known import Known
+from urc.protocol.line import Line
+
+__all__ = ["Motions", "NotNow"]
+
+Check = Callable[[Mapping[str, object]], dict[str, Reading]]
+
+
+class NotNow(UrcError):
+    """Motion that is not allowed now; the message says why."""
+
+
+class Motions:
+    """The held commands of one driver."""
+
+    def __init__(
+        self,
+        commands: Mapping[str, Command],
+        checks: Mapping[str, Check],
+        asks: Mapping[str, Ask],
+        lines: Mapping[str, Line],
+        known: Known,
+    ) -> None:
+        """Take what the engine has built of the commands; nothing is copied."""
+        self._held = {name: one for name, one in commands.items() if one.hold is not None}
+        self._guarded = {name for name, one in self._held.items() if is_guarded(one)}
+        self._checks = checks
+        self._asks = asks
+        self._lines = lines
+        self._known = known
+
+    def stop_frame(self, command: str) -> Payload:
+        """Return what stops the motion of `command`: bytes, framing included, or an envelope.
+
+        It depends on nothing that the robot says, and on no connection.
+
+        Raises:
+            BadArgument: it is no motion, or cannot be written.
+        """
+        found = self._found(command)
+        hold = found.hold
+        values = check_arguments(found, {} if hold is None else hold.release)
+        counters = self._lines[found.transport].counters
+        names = {**self._known.names, **values, COUNTERS: counters.draw()}
+        return self._asks[command].encode(names)
+
+    def motion_frame(
+        self,
+        command: str,
+        arguments: Mapping[str, object],
+        now: float,
+        confirmed_by: tuple[str, ...] = (),
+    ) -> Payload:
+        """Return the frame of `command` with these arguments, as it is to be written now.
+
+        Args:
+            command: one with `hold`.
+            arguments: by name; those left out take their defaults.
+            now: the time, for what the command requires of fresh signals.
+            confirmed_by: people who said yes to it, where two must.
+
+        Raises:
+            BadArgument: it is no motion, or an argument is not as declared.
+            NotNow: the line is not ready, what it requires does not hold, or nobody confirmed it.
+        """
+        found = self._found(command)
+        values = self._checks[command](arguments)
+        line, ask = self._lines[found.transport], self._asks[command]
+        if not (line.is_open and line.is_ready):
+            raise NotNow("the robot is not connected")
+        if command in self._guarded:
+            refused = why_refused(found, self._known, values, confirmed_by, now)
+            if refused is not None:
+                raise NotNow(refused.message)
+        names = values if ask.is_local else {**self._known.names, **values}
+        if not ask.has_counters:
+            return ask.encode(names)
+        draw = line.counters.draw()
+        data = ask.encode({**names, COUNTERS: draw})
+        line.counters.count(draw)
+        return data
+
+    def _found(self, command: str) -> Command:
+        found = self._held.get(command)
+        if found is None:
+            raise BadArgument(f"{command!r} is no command with a release")
+        return found

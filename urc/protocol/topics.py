@@ -1,0 +1,127 @@
+"""Topics: what a driver listens to on a transport that carries messages.
+
+Floor 3, pure. A topic may have wildcards as in MQTT (version 5.0, section 4.7): ``+`` stands for
+one level, ``#`` at the end for all that follow.
+"""
+
+import re
+from collections.abc import Callable, Iterator, Mapping
+
+from urc.expressions import ExpressionError
+from urc.model.codec import Envelope, Payload, ReadSpec
+from urc.model.driver import Driver, Reply
+from urc.model.flow import ExpectStep, all_steps
+from urc.model.values import Value
+from urc.problems import UrcError
+from urc.protocol.forms import CodecContext, Frame, NotWritable, Reader
+
+__all__ = ["TopicReader", "frame_of", "listened", "matches", "topic_of"]
+
+FEEDBACK = "/feedback"
+"""What follows the name of an action in the topic of its feedback."""
+
+
+class TopicReader:
+    """Reads by another form what comes on one topic; a wildcard's topic is the field ``_topic``."""
+
+    def __init__(self, reader: Reader, spec: ReadSpec, context: CodecContext) -> None:
+        self._reader = reader
+        self._topic = topic_of(spec, context.settings)
+        self._fits = matches(self._topic)
+        self._is_plain = not _WILD.search(self._topic)
+
+    def read(self, frame: Frame) -> Mapping[str, object] | None:
+        """Return the fields, or None when the frame is of another topic, or another one."""
+        topic = frame.topic
+        if topic != self._topic if self._is_plain else topic is None or not self._fits(topic):
+            return None
+        found = self._reader.read(frame)
+        return found if found is None or self._is_plain else {**found, "_topic": topic}
+
+    def write(self, fields: Mapping[str, object]) -> Payload:
+        """Return the message that would be read as `fields`; raise `NotWritable`."""
+        topic = str(fields.get("_topic") or _WILD.sub("x", self._topic))
+        if not self._fits(topic):
+            raise NotWritable(f"{topic!r} is not a topic of {self._topic!r}")
+        body = self._reader.write({name: raw for name, raw in fields.items() if name != "_topic"})
+        return Envelope("message", {"topic": topic}, body)
+
+
+_WILD = re.compile(r"(?<![^/])[+#](?![^/])")
+
+
+def matches(topic: str) -> Callable[[str], bool]:
+    """Return the function that tells whether a name is one of `topic`, wildcards included."""
+    if not _WILD.search(topic):
+        return lambda name: name == topic
+    levels = topic.split("/")
+    is_open = levels[-1] == "#"
+    fixed = levels[:-1] if is_open else levels
+
+    def fits(name: str) -> bool:
+        found = name.split("/")
+        if len(found) < len(fixed) or (len(found) > len(fixed) and not is_open):
+            return False
+        return all(want in ("+", has) for want, has in zip(fixed, found, strict=False))
+
+    return fits
+
+
+def topic_of(spec: ReadSpec, settings: Mapping[str, object]) -> str:
+    """Return the topic of a frame; raise `UrcError` when its template fails."""
+    try:
+        return "" if spec.topic is None else str(spec.topic.evaluate({"settings": settings}))
+    except ExpressionError as error:
+        raise UrcError(f"a topic: {error}") from None
+
+
+def frame_of(payload: Payload, encoding: str) -> Frame:
+    """Return what came in as a frame: bytes that an envelope carries are its payload."""
+    if not isinstance(payload, Envelope):
+        return Frame(payload, encoding)
+    attributes, body = payload.attributes, payload.body
+    topic = attributes.get("topic")
+    if payload.verb == "feedback" and topic is None:
+        topic = f"{attributes.get('action')}{FEEDBACK}"
+    frame = Frame(body if isinstance(body, bytes) else payload, encoding)
+    frame.topic = None if topic is None else str(topic)
+    return frame
+
+
+def listened(
+    driver: Driver, transport: str, settings: Mapping[str, object]
+) -> dict[str, Mapping[str, Value]]:
+    """Return topic → how it is listened to, for all that a driver reads on a transport.
+
+    Of two that listen to one topic, the first says how, and the other adds what it left out.
+    """
+    topics: dict[str, dict[str, Value]] = {}
+    for read in _reads(driver, transport):
+        if read.topic is not None:
+            mine = topics.setdefault(topic_of(read, settings), {})
+            for name, value in read.listen.items():
+                mine.setdefault(name, value)
+    return dict(topics)
+
+
+def _reads(driver: Driver, transport: str) -> Iterator[ReadSpec]:
+    for message in driver.messages.values():
+        if message.transport == transport:
+            yield message.read
+    replies = [(one.transport, one.reply) for one in driver.commands.values()]
+    replies += [(one.transport, one.reply) for one in driver.polls]
+    for name, reply in replies:
+        if name == transport and reply is not None:
+            yield from _of_reply(reply)
+    scripts = [spec.on_connect + spec.on_close for spec in driver.transports.values()]
+    scripts += [command.steps for command in driver.commands.values()]
+    for script in scripts:
+        for step in all_steps(script):
+            if isinstance(step, ExpectStep) and step.transport == transport:
+                yield step.read
+
+
+def _of_reply(reply: Reply) -> Iterator[ReadSpec]:
+    yield reply.read
+    yield from (stage.read for stage in reply.stages)
+    yield from (fault.read for fault in reply.faults)
