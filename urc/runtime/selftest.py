@@ -1,35 +1,29 @@
 """Runs the tests that a document carries, on the same engine that drives the robot.
 
 Floor 4, no I/O and no asyncio: `urc validate` runs these without a robot, a network or a secret.
+
+A test says what happens in one instant, or step by step on a clock of its own. In an instant the
+driver does nothing by itself; step by step it is whole, but for the polls that no test names.
 """
 
-import math
-from collections.abc import Iterator, Mapping
-from typing import NamedTuple
+from collections.abc import Mapping
+from typing import Final, NamedTuple
 
-from urc.config.values import shown
-from urc.model.driver import Driver, TransportSpec
-from urc.model.profile import DocumentTest, Fed, Profile, Setting, pieces_of
+from urc.model.driver import Driver
+from urc.model.profile import DialogueStep, DocumentTest, Profile, Setting, pieces_of
 from urc.model.values import Value
 from urc.problems import Problem, UrcError
 from urc.protocol.alone import alone
-from urc.protocol.engine import Engine
-from urc.protocol.events import Close, Event, Failed, Fault, Open, Request, Samples, Send
-from urc.protocol.framing import FramingError, build_framing
-from urc.runtime.coverage import Exercised, Listener
+from urc.protocol.events import Failed
+from urc.runtime.remedy import Remedy
+from urc.runtime.trial import Exercised, Trial
+from urc.runtime.verdicts import check_bytes, check_reply, check_values, first
 
 __all__ = ["Outcome", "exercise", "run_tests", "sample_settings"]
 
-_SAMPLE: dict[str, Value] = {"host": "127.0.0.1", "port": 1, "integer": 0, "number": 0.0}
-_ROUNDS = 16
+_SAMPLE: Final[Mapping[str, Value]] = {"host": "127.0.0.1", "port": 1, "integer": 0, "number": 0.0}
+_ROUNDS: Final = 16
 """How many deadlines a test lets pass while it waits for the failure that it declares."""
-_SINGLE = 1e-7
-"""Numbers of four bytes are exact to this share of themselves."""
-_SHOWN = 3
-"""Failures told of one test."""
-_SHOWN_BYTES = 48
-_BEFORE_BYTES = 16
-"""Of a long frame: bytes shown, and how many of them before the first difference."""
 
 
 class Outcome(NamedTuple):
@@ -39,6 +33,12 @@ class Outcome(NamedTuple):
     """A finding for each one that failed."""
     exercised: frozenset[Exercised]
     """The commands, polls and messages that were used, whether the test passed or not."""
+
+
+class _Complaint(NamedTuple):
+    text: str
+    step: int | None = None
+    """Its place among the steps, from 0; None: the test has none."""
 
 
 def run_tests(profile: Profile) -> list[Problem]:
@@ -51,11 +51,9 @@ def exercise(profile: Profile) -> Outcome:
     settings = sample_settings(profile.settings)
     problems = []
     used: set[Exercised] = set()
-    listener = Listener(profile.driver, settings)
     for test in profile.tests:
-        used |= listener.exercised(test)
-        complaint = _run(profile.driver, {**settings, **test.settings}, test)
-        if complaint:
+        complaint = _run(profile.driver, {**settings, **test.settings}, test, used)
+        if complaint.text:
             problems.append(_problem(profile, test, complaint))
     return Outcome(problems, frozenset(used))
 
@@ -75,66 +73,68 @@ def sample_settings(settings: Mapping[str, Setting]) -> dict[str, Value]:
     return values
 
 
-def _problem(profile: Profile, test: DocumentTest, complaint: str) -> Problem:
+def _problem(profile: Profile, test: DocumentTest, complaint: _Complaint) -> Problem:
+    place: DocumentTest | DialogueStep = test
+    what = f"test {test.name!r}"
+    if complaint.step is not None:
+        place = test.steps[complaint.step]
+        what += f", step {complaint.step + 1}"
     return Problem(
         "test-failed",
-        f"test {test.name!r}: {complaint}",
+        f"{what}: {complaint.text}",
         test.file or profile.file,
-        line=test.line,
-        column=test.column,
+        line=place.line,
+        column=place.column,
         path="tests",
-        source=test.source,
+        source=place.source,
     )
 
 
-class _Trial:
-    """An engine under test, and everything that it said."""
-
-    def __init__(self, engine: Engine) -> None:
-        self.engine = engine
-        self.samples: dict[str, object] = {}
-        self.sent: dict[str, bytes] = {}
-        self.failures: list[str] = []
-
-    def perform(self, events: list[Event], now: float) -> None:
-        """Do what a link would do, with a transport that always connects."""
-        for event in events:
-            match event:
-                case Open(transport):
-                    self.perform(self.engine.start(transport, now), now)
-                case Send(transport, data):
-                    self.sent[transport] = self.sent.get(transport, b"") + data
-                case Samples(_, samples):
-                    self.samples.update((sample.signal, sample.value) for sample in samples)
-                case Fault(_, code, message) | Failed(_, _, code, message):
-                    self.failures.append(f"{code}: {message}")
-                case Close(_, reason) if reason:
-                    self.failures.append(f"closed: {reason}")
-
-
-def _run(driver: Driver, settings: Mapping[str, Value], test: DocumentTest) -> str:
-    """Return what is wrong, or "" when the test passes."""
-    if not (test.expect or test.sent or test.fails is not None):
-        return "it checks nothing; say what it should 'expect', what is 'sent' or how it 'fails'"
+def _run(
+    driver: Driver, settings: Mapping[str, Value], test: DocumentTest, used: set[Exercised]
+) -> _Complaint:
+    """Return what is wrong, with no text when the test passes; add what it exercises to `used`."""
+    used |= _asked(driver, test)
     try:
-        trial = _Trial(Engine(_narrowed(driver, test), settings))
-        _converse(trial, driver, test)
+        trial = Trial(_narrowed(driver, test), settings, driver.polls)
     except UrcError as error:
-        return str(error)
-    if test.fails is None:
-        complaints = _first(trial.failures)
-    else:
-        complaints = _check_failure(trial, test.fails)
-    complaints += _check_values(trial, test)
-    complaints += _check_bytes(trial, driver, test)
-    return "; ".join(complaints)
+        return _Complaint(str(error))
+    try:
+        if test.steps:
+            return _in_steps(trial, test)
+        return _Complaint("; ".join(_in_an_instant(trial, test)))
+    except UrcError as error:
+        return _Complaint(str(error))
+    finally:
+        used |= trial.used
+
+
+def _asked(driver: Driver, test: DocumentTest) -> set[Exercised]:
+    """Return what a test in one instant asks, whether it gets there or not."""
+    asked: set[Exercised] = set()
+    if isinstance(test.reply_to, int):
+        poll = driver.polls[test.reply_to]
+        asked.add(("poll", poll.name))
+        if poll.run:
+            asked.add(("command", poll.run))
+    for command in (test.run, test.reply_to):
+        if isinstance(command, str):
+            asked.add(("command", command))
+    return asked
 
 
 def _narrowed(driver: Driver, test: DocumentTest) -> Driver:
-    """Return the driver with only the poll that the test is about, due at once.
+    """Return the driver with only the polls that the test is about.
 
-    A test that asks nothing is about what the robot says, and about the steps of its connections.
+    In one instant they are due at once. A test that asks nothing is about what the robot says, and
+    about the steps of its connections.
     """
+    if test.steps:
+        polls = tuple(poll for poll in driver.polls if poll.name in test.polls)
+        narrowed = driver._replace(polls=polls)
+        if not test.is_ready:
+            return narrowed
+        return alone(narrowed, keeps_conditions=True)._replace(polls=polls)
     polls = (driver.polls[test.reply_to],) if isinstance(test.reply_to, int) else ()
     narrowed = driver._replace(polls=polls)
     if test.run is None and test.reply_to is None:
@@ -142,106 +142,122 @@ def _narrowed(driver: Driver, test: DocumentTest) -> Driver:
     return alone(narrowed, keeps_conditions=test.fails is not None)
 
 
-def _converse(trial: _Trial, driver: Driver, test: DocumentTest) -> None:
-    """Connect, ask, and feed the answer, all in one instant."""
-    trial.perform(trial.engine.tick(0.0), 0.0)
-    for name, spec in driver.transports.items():
-        if spec.connection == "persistent":
-            trial.perform(trial.engine.start(name, 0.0), 0.0)
+# -- in one instant
+
+
+def _in_an_instant(trial: Trial, test: DocumentTest) -> list[str]:
+    """Connect, ask, and feed the answer; return what is wrong."""
+    if not (test.expect or test.sent or test.fails is not None):
+        return ["it checks nothing; say what it should 'expect', what is 'sent' or how it 'fails'"]
+    trial.begin()
     command = test.run or (test.reply_to if isinstance(test.reply_to, str) else None)
     if command is not None:
-        trial.perform(trial.engine.command(Request(1, command, test.arguments), 0.0), 0.0)
+        trial.run(command, test.arguments)
     for name, fed in test.feed.items():
         for piece in pieces_of(fed):
-            data = _encoded(piece, driver.transports[name])
-            trial.perform(trial.engine.receive(name, data, 0.0), 0.0)
+            trial.feed(name, piece)
+    trial.fall_silent()
+    if test.fails is None:
+        complaints = first(trial.failures)
+    else:
+        complaints = _check_failure(trial, test.fails)
+    complaints += check_values(trial, test.expect, Remedy(trial, in_steps=False))
+    complaints += check_bytes(trial, trial.driver, test.sent)
+    return complaints
 
 
-def _check_failure(trial: _Trial, expected: str) -> list[str]:
+def _check_failure(trial: Trial, expected: str) -> list[str]:
     """Let time pass until the failure that the test declares, and complain if it never comes."""
     for _ in range(_ROUNDS):
         if any(expected in failure for failure in trial.failures):
             return []
-        deadline = trial.engine.deadline
-        if deadline is None:
+        if not trial.pass_to_deadline():
             break
-        trial.perform(trial.engine.tick(deadline), deadline)
-    found = "; ".join(_first(trial.failures)) or "nothing failed"
+    found = "; ".join(first(trial.failures)) or "nothing failed"
     return [f"it should fail with {expected!r}, but {found}"]
 
 
-def _first(failures: list[str]) -> list[str]:
-    more = len(failures) - _SHOWN
-    return [*failures[:_SHOWN], f"and {more} more"] if more > 0 else list(failures)
+# -- step by step
 
 
-def _check_values(trial: _Trial, test: DocumentTest) -> Iterator[str]:
-    for name, expected in test.expect.items():
-        if name not in trial.samples:
-            yield f"{name}: expected {shown(expected)}, but nothing set it"
-        elif not _is_same(trial.samples[name], expected):
-            yield f"{name}: expected {shown(expected)}, found {shown(trial.samples[name])}"
-
-
-def _check_bytes(trial: _Trial, driver: Driver, test: DocumentTest) -> Iterator[str]:
-    for name, text in test.sent.items():
-        spec = driver.transports[name]
-        try:
-            wanted = _framed(text, spec)
-        except UrcError as error:
-            yield str(error)
-            continue
-        found = trial.sent.get(name, b"")
-        if found != wanted:
-            yield _difference(name, wanted, found)
-
-
-def _framed(text: Fed, spec: TransportSpec) -> bytes:
-    """Return every byte on the wire: bytes are that already, text is a frame's payload."""
-    if isinstance(text, bytes):
-        return text
-    payload = _encoded(text, spec)
+def _in_steps(trial: Trial, test: DocumentTest) -> _Complaint:
+    """Do every step up to the first one that does not hold."""
+    place = 0
     try:
-        return build_framing(spec.framing).encode(payload)
-    except FramingError as error:
-        raise UrcError(f"{spec.name}: {error}") from error
+        trial.begin()
+        trial.wait(0.0)
+        for place, step in enumerate(test.steps):
+            is_action = _is_action(step)
+            if is_action and trial.failures:
+                return _Complaint(_unexpected(trial), place - 1 if place else 0)
+            if is_action:
+                trial.forget()
+                _act(trial, step)
+            complaints = list(_check(trial, step))
+            if complaints:
+                return _Complaint("; ".join(complaints), place)
+    except UrcError as error:
+        return _Complaint(str(error), place)
+    return _Complaint(_unexpected(trial) if trial.failures else "", place)
 
 
-def _encoded(text: Fed, spec: TransportSpec) -> bytes:
-    if isinstance(text, bytes):
-        return text
-    try:
-        return text.encode(spec.encoding)
-    except UnicodeEncodeError as error:
-        wrong = text[error.start : error.end]
-        raise UrcError(f"{spec.name}: {wrong!r} cannot be written in {spec.encoding}") from error
+def _is_action(step: DialogueStep) -> bool:
+    happens = (step.feed, step.run, step.connects, step.closes, step.leaves)
+    return any(happens) or step.wait_s is not None
 
 
-def _is_same(found: object, expected: object) -> bool:
-    """Compare as a person would: 42 is 42.0, but true is not 1, and a third is not exact."""
-    if isinstance(found, tuple) and isinstance(expected, tuple):
-        return len(found) == len(expected) and all(map(_is_same, found, expected))
-    if isinstance(found, bool) != isinstance(expected, bool):
-        return False
-    if isinstance(found, float) and isinstance(expected, (int, float)):
-        return math.isclose(found, expected, rel_tol=_SINGLE, abs_tol=1e-12)
-    return found == expected
+def _unexpected(trial: Trial) -> str:
+    return f"{'; '.join(first(trial.failures))} (where that is meant, say so by 'fails')"
 
 
-def _difference(transport: str, wanted: bytes, found: bytes) -> str:
-    """Return both sides in hex and text around the first byte at which they differ."""
-    at = next((i for i, (a, b) in enumerate(zip(wanted, found, strict=False)) if a != b), None)
-    offset = min(len(wanted), len(found)) if at is None else at
-    start = max(0, offset - _BEFORE_BYTES) if max(len(wanted), len(found)) > _SHOWN_BYTES else 0
-    sides = f"expected {_bytes_shown(wanted, start)}, found {_bytes_shown(found, start)}"
-    return f"{transport}: at byte {offset}, {sides}"
+def _act(trial: Trial, step: DialogueStep) -> None:
+    if step.connects:
+        trial.connect(step.connects)
+    if step.closes:
+        trial.close(step.closes)
+    if step.leaves:
+        trial.leave()
+    if step.run:
+        trial.run(step.run, step.arguments)
+    for name, fed in step.feed.items():
+        for piece in pieces_of(fed):
+            if not trial.engine.lines[name].is_open:
+                raise UrcError(f"{name} is not connected: what is fed to it goes nowhere")
+            trial.feed(name, piece)
+    trial.wait(step.wait_s or 0.0)
 
 
-def _bytes_shown(data: bytes, start: int) -> str:
-    """Return what stands from `start`, with dots where something is left out."""
-    if not data:
-        return "nothing"
-    part = data[start : start + _SHOWN_BYTES]
-    before, after = "… " if start else "", " …" if start + len(part) < len(data) else ""
-    text = part.decode("ascii", "backslashreplace")
-    return f"{before}{text!r} ({part.hex(' ')}){after}"
+def _check(trial: Trial, step: DialogueStep) -> list[str]:
+    """Return what does not hold after a step."""
+    complaints: list[str] = []
+    if step.fails:
+        complaints += _check_told(trial, step)
+    if step.reply is not None:
+        failed = [text for text in trial.failures if not step.fails]
+        complaints += first(failed)
+        complaints += check_reply(trial.ended, step.reply, step.of)
+    complaints += check_bytes(trial, trial.driver, step.sent)
+    values = list(check_values(trial, step.expect, Remedy(trial, in_steps=True)))
+    if values and trial.failures and step.reply is None:
+        complaints += first(trial.failures)
+    complaints += values
+    if step.closed:
+        if step.closed in trial.closed:
+            trial.closed.discard(step.closed)
+        else:
+            complaints.append(f"{step.closed} should be closed from this side, but is not")
+    return complaints
+
+
+def _check_told(trial: Trial, step: DialogueStep) -> list[str]:
+    """Complain if the failure of a step was not told; forget what was told along with it."""
+    failures = list(trial.failures)
+    if step.of:
+        ended = [one for one in trial.ended if one.command == step.of]
+        failures = [f"{one.code}: {one.message}" for one in ended if isinstance(one, Failed)]
+    if not any(step.fails in failure for failure in failures):
+        found = "; ".join(first(failures)) or "nothing failed"
+        return [f"it should fail with {step.fails!r}, but {found}"]
+    trial.failures.clear()
+    trial.ended[:] = [one for one in trial.ended if not isinstance(one, Failed)]
+    return []

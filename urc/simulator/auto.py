@@ -6,16 +6,17 @@ command sets is remembered, where an argument and a signal share a name.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from functools import partial
 from typing import Final, NamedTuple
 
 from urc.expressions import COUNTERS, ExpressionError, Template
-from urc.model.codec import ReadSpec, WriteSpec
+from urc.model.codec import Envelope, Payload, ReadSpec, WriteSpec
 from urc.model.driver import Argument, Command, Driver, FramingSpec, Poll, TransportSpec
-from urc.model.flow import ExpectStep, IfStep, PromptStep, SendStep, Step
-from urc.model.values import NOTHING, Reading, Signal, Value
+from urc.model.flow import ExpectStep, IfStep, PromptStep, RepeatStep, SendStep, Step
+from urc.model.values import NOTHING, Value
 from urc.patterns import Pattern, example
 from urc.protocol.convert import BadValue
-from urc.protocol.decode import build_converter, build_raw
+from urc.protocol.decode import build_raw
 from urc.protocol.forms import (
     BadText,
     CodecContext,
@@ -27,10 +28,11 @@ from urc.protocol.forms import (
     build_writer,
 )
 from urc.protocol.framing import Framing, FramingError, build_framing
+from urc.simulator.backwards import computed_fields
 from urc.simulator.echo import correlated, own_fields, typed_arguments
-from urc.simulator.plausible import plausible
+from urc.simulator.values import Values
 
-__all__ = ["Answer", "AutoLine", "AutoMessage", "AutoRobot", "Unanswered"]
+__all__ = ["Answer", "Asked", "AutoLine", "AutoMessage", "AutoRobot", "Unanswered", "numbered"]
 
 _ALWAYS_KNOWN: Final = frozenset(("settings", COUNTERS))
 _SLOWEST_S: Final = 1.0
@@ -49,6 +51,8 @@ class Answer(NamedTuple):
     framing: Framing
     prompt: Pattern | None = None
     match: Template | None = None
+    needed: frozenset[str] = frozenset()
+    """Fields of the document that whoever reads it needs, for an answer of its own."""
 
     def fits(self, fields: Mapping[str, object]) -> bool:
         """Return whether there is a frame with these fields."""
@@ -75,13 +79,21 @@ class _Request(NamedTuple):
     names: frozenset[str]
 
 
-class AutoRobot:
-    """What all connections of one emulated robot share: what was set."""
+class Asked(NamedTuple):
+    """A request that came, with the arguments in it."""
 
-    def __init__(self, driver: Driver, settings: Mapping[str, Value]) -> None:
+    request: _Request
+    arguments: Mapping[str, object]
+    frame: Frame
+
+
+class AutoRobot:
+    """What all connections of one emulated robot share: its values."""
+
+    def __init__(self, driver: Driver, settings: Mapping[str, Value], values: Values) -> None:
         self.driver = driver
         self.settings = dict(settings)
-        self._set: dict[str, Reading] = {}
+        self.values = values
         self._raw = {name: build_raw(one) for name, one in driver.signals.items()}
 
     def line(self, transport: str, framing: Framing, *, talks: bool) -> "AutoLine":
@@ -94,14 +106,10 @@ class AutoRobot:
         """
         return AutoLine(self, self.driver.transports[transport], framing, talks=talks)
 
-    def remember(self, arguments: Mapping[str, object]) -> None:
-        """Keep what a command sets."""
-        for name, value in arguments.items():
-            signal = self.driver.signals.get(name)
-            if signal is not None and signal.formula is None and value is not None:
-                kept = _kept(signal, value)
-                if kept is not None:
-                    self._set[name] = kept
+    def _raw_of(self, name: str, now_s: float) -> object:
+        if name not in self._raw:
+            raise BadValue(name)
+        return self._raw[name](self.values.of(name, now_s))
 
     def fields(self, spec: ReadSpec, known: Mapping[str, object], now_s: float) -> "_Fields":
         """Return raw fields for a frame: what was set, else something plausible."""
@@ -109,12 +117,11 @@ class AutoRobot:
         others: dict[str, object] = {}
         for name in spec.fields:
             signal = self.driver.signals.get(name)
-            if signal is None or name in spec.sets:
+            if signal is None or name in spec.sets or name in spec.collects:
                 continue
-            is_set = name in self._set
-            value = self._set[name] if is_set else plausible(signal, now_s)
+            is_set = name in self.values.chosen
             try:
-                raw = self._raw[name](value)
+                raw = self._raw_of(name, now_s)
             except BadValue:
                 continue  # this conversion has no way back
             if not is_set and signal.conversion.polynomial and isinstance(raw, float):
@@ -122,12 +129,9 @@ class AutoRobot:
             is_number = isinstance(raw, (int, float, tuple, list)) or is_set
             (numbers if is_number else others)[name] = raw
         own = own_fields(spec, known)
-        for name, template in spec.sets.items():
-            if len(template.names) == 1 and name in self.driver.signals:
-                # Most expressions of one field only turn its text into a number.
-                value = self._set.get(name, plausible(self.driver.signals[name], now_s))
-                own.setdefault(next(iter(template.names)), value)
-        return _Fields(numbers, others, own)
+        own = computed_fields(spec, partial(self._raw_of, now_s=now_s)) | own
+        unknown = [name for name in spec.fields if name.startswith("_") and name not in own]
+        return _Fields(numbers, others, own, tuple(unknown))
 
 
 class _Fields(NamedTuple):
@@ -135,6 +139,8 @@ class _Fields(NamedTuple):
     others: dict[str, object]
     own: dict[str, object]
     """Those of the document: constants of ``when``, and what correlates with the request."""
+    unknown: tuple[str, ...] = ()
+    """Those of the document that nothing says anything about."""
 
     def attempts(self, fits: Callable[[dict[str, object]], bool]) -> Iterator[dict[str, object]]:
         """Yield fields to write, from all to the least; the frame decides what it can carry."""
@@ -149,6 +155,7 @@ class _Fields(NamedTuple):
                     most[name] = value
         yield most
         yield self.own
+        yield {**dict.fromkeys(self.unknown, 1), **most}
 
 
 class AutoLine:
@@ -167,31 +174,50 @@ class AutoLine:
         self.messages: list[AutoMessage] = []
         if talks and spec.connection == "persistent":
             self.messages = [
-                AutoMessage(self._period_s(one.read), self._answer(one.read))
+                AutoMessage(self._period_s(one.read), self.message(one.name))
                 for one in robot.driver.messages.values()
                 if one.transport == spec.name
             ]
 
-    def greet(self, now_s: float) -> list[bytes]:
+    def greet(self, now_s: float) -> list[Payload]:
         """Return what the robot says as soon as somebody is there; raise `Unanswered`."""
         return [data for one in self.opening for data in self.say(one, now_s)]
 
-    def answer(self, frame: Frame, now_s: float) -> list[bytes] | None:
+    def answer(self, frame: Frame, now_s: float) -> list[Payload] | None:
         """Return the answer to a frame, or None when the driver never sends it.
 
         Raises:
             Unanswered: the answer cannot be made.
         """
-        found = self._recognise(frame)
-        if found is None:
+        asked = self.asked(frame)
+        if asked is None:
             return None
-        request, arguments = found
-        self._robot.remember(arguments)
-        return [data for one in request.answers for data in self.say(one, now_s, arguments)]
+        self._robot.values.remember(asked.arguments)
+        return self.answers(asked, now_s)
+
+    def answers(self, asked: Asked, now_s: float) -> list[Payload]:
+        """Return the declared answers to a request; raise `Unanswered`."""
+        known = asked.arguments
+        said = [data for one in asked.request.answers for data in self.say(one, now_s, known)]
+        return [numbered(data, asked.frame) for data in said]
+
+    def framing_of(self, label: str) -> Framing:
+        """Return how the answer to a command or poll is framed."""
+        for request in self._requests:
+            if request.label == label and request.answers:
+                return request.answers[0].framing
+        return self._framing
+
+    def message(self, name: str) -> Answer:
+        """Return a declared message, to be said."""
+        message = self._robot.driver.messages[name]
+        names = message.answer.names if message.answer is not None else frozenset()
+        needed = frozenset(one for one in message.read.fields if one.startswith("_")) & names
+        return self._answer(message.read)._replace(needed=needed)
 
     def say(
         self, answer: Answer, now_s: float, known: Mapping[str, object] = NOTHING
-    ) -> list[bytes]:
+    ) -> list[Payload]:
         """Return the frames of one answer or message; raise `Unanswered`."""
         if answer.prompt is not None:
             return [example(answer.prompt, {}).encode(self._spec.encoding, "replace")]
@@ -203,27 +229,40 @@ class AutoLine:
         why = "nothing fits"
         for attempt in fields.attempts(answer.fits):
             try:
-                payload = answer.reader.write(attempt)
-                if isinstance(payload, bytes):
-                    pieces = _in_lines(payload, answer, self._spec.encoding)
-                    return [answer.framing.encode(piece) for piece in pieces]
-                why = "a message cannot go over a line of bytes"
+                payload = answer.reader.write({**dict.fromkeys(answer.needed, 1), **attempt})
+                if not isinstance(payload, bytes):
+                    return [payload]
+                pieces = _in_lines(payload, answer, self._spec.encoding)
+                return [answer.framing.encode(piece) for piece in pieces]
             except (NotWritable, FramingError) as error:
                 why = str(error)
         raise Unanswered(f"no answer can be made by its {answer.spec.form}: {why}")
 
-    def _recognise(self, frame: Frame) -> tuple[_Request, dict[str, object]] | None:
-        """Return what the frame asks, and its arguments; what gives this very frame goes first."""
-        near: tuple[_Request, dict[str, object]] | None = None
+    def asked(self, frame: Frame, label: str = "") -> Asked | None:
+        """Return what a frame asks, and its arguments; what gives this very frame goes first.
+
+        Args:
+            frame: as it came.
+            label: a command or poll that is meant where several give the same frame; "" for any.
+        """
+        near: Asked | None = None
+        exact: list[Asked] = []
         for request in self._requests:
             found = request.writer.read(frame)
             arguments = None if found is None else typed_arguments(found, request.arguments)
             if arguments is None:
                 continue
+            near = near or Asked(request, arguments, frame)
             if not request.names or self._gives(request, arguments, frame):
-                return request, arguments
-            near = near or (request, arguments)
-        return near
+                exact.append(Asked(request, arguments, frame))
+                if not label:
+                    break
+        best = exact[0] if exact else near
+        if best is None or label in ("", best.request.label):
+            return best
+        # Of a poll and a command that send the same bytes, either may be meant.
+        same = (one for one in exact if not (one.request.names or best.request.names))
+        return next((one for one in same if one.request.label == label), None)
 
     def _gives(self, request: _Request, arguments: Mapping[str, object], frame: Frame) -> bool:
         namespace = {
@@ -252,6 +291,9 @@ class AutoLine:
         if keepalive is not None and keepalive.send is not None:
             requests.append(self._sent("keepalive", keepalive.send, ()))
         requests += self._script("on_close", self._spec.on_close)[1]
+        for message in driver.messages.values():
+            if message.transport == name and message.answer is not None:
+                requests.append(self._sent(message.name, message.answer, ()))
         yield from sorted(requests, key=lambda one: bool(one.names - _ALWAYS_KNOWN))
 
     def _request(
@@ -312,19 +354,17 @@ def _main_way(steps: Iterable[Step]) -> Iterator[Step]:
         yield step
         if isinstance(step, IfStep):
             yield from _main_way(step.then)
+        elif isinstance(step, RepeatStep):
+            yield from _main_way(step.body)
 
 
-def _kept(signal: Signal, value: object) -> Reading:
-    """Return what `signal` is once a command has set it to `value`, or None."""
-    words = dict(signal.states)
-    if words:
-        word = str(value)
-        return word if word in words.values() else words.get(word)
-    plain = signal._replace(conversion=signal.conversion._replace(polynomial=(), points=(), base=0))
-    try:
-        return build_converter(plain)(value)
-    except BadValue:
-        return None
+def numbered(data: Payload, request: Frame) -> Payload:
+    """Return what answers a request: with its number, where the request has one."""
+    asked = request.payload
+    if not isinstance(data, bytes) or not isinstance(asked, Envelope):
+        return data
+    number = asked.attributes.get("id")
+    return Envelope("response", {"id": number, "ok": True, "status": 200}, data)
 
 
 def _rounded(raw: object) -> object:

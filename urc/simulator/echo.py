@@ -10,19 +10,32 @@ from collections.abc import Iterator, Mapping
 from urc.expressions import Template
 from urc.model.codec import ReadSpec
 from urc.model.driver import Argument
+from urc.patterns import compile_pattern, example
+from urc.protocol.vectors import elements_of
 
 __all__ = ["correlated", "own_fields", "typed_arguments"]
 
 _EQUALS = re.compile(
     r"""(?<![\w.])(_?[A-Za-z]\w*(?:\.\w+)?)\s*==\s*
-    ('[^'\\]*'|"[^"\\]*"|-?\d+(?:\.\d+)?(?![\w.])|_?[A-Za-z]\w*(?:\.\w+)?)(?!\w)""",
+    ('[^'\\]*'|"[^"\\]*"|0x[0-9A-Fa-f]+|-?\d+(?:\.\d+)?(?![\w.])|_?[A-Za-z]\w*(?:\.\w+)?)(?!\w)""",
     re.VERBOSE | re.ASCII,
 )
 _ONE_OF = re.compile(
-    r"""(?<![\w.])(_?[A-Za-z]\w*)\s+in\s+[\[(]\s*('[^'\\]*'|"[^"\\]*"|-?\d+(?:\.\d+)?)\s*[,\])]""",
-    re.ASCII,
+    r"""(?<![\w.])(_?[A-Za-z]\w*)\s+in\s+[\[(]\s*
+    ('[^'\\]*'|"[^"\\]*"|0x[0-9A-Fa-f]+|-?\d+(?:\.\d+)?)\s*[,\])]""",
+    re.VERBOSE | re.ASCII,
 )
 """A name, and the first of the constants that it may be."""
+
+
+_MATCH = re.compile(
+    r"(?<![\w.])(_?[A-Za-z]\w*)\s+is\s+(?:match|search)\(\s*'([^']*)'\s*\)", re.ASCII
+)
+"""A name, and the pattern that it must fit."""
+
+
+_HEMISPHERE = re.compile(r"\|\s*ddmm\(\s*(_?[A-Za-z]\w*)\s*\)", re.ASCII)
+"""What says on which half of the earth a number of degrees and minutes is."""
 
 
 def own_fields(spec: ReadSpec, known: Mapping[str, object]) -> dict[str, object]:
@@ -32,6 +45,8 @@ def own_fields(spec: ReadSpec, known: Mapping[str, object]) -> dict[str, object]
         for left, right in _equalities(spec.when):
             if left in spec.fields and not isinstance(right, _Name):
                 own[left] = right
+    sources = [one.source for one in spec.sets.values()]
+    hemispheres = {found for source in sources for found in _HEMISPHERE.findall(source)}
     wanted = {name for one in spec.sets.values() for name in one.names if len(one.names) > 1}
     for name in spec.fields:
         if not name.startswith("_") or name in own:
@@ -39,6 +54,8 @@ def own_fields(spec: ReadSpec, known: Mapping[str, object]) -> dict[str, object]
         echoed = known.get(name, known.get(name[1:]))
         if echoed is not None:
             own[name] = echoed
+        elif name in hemispheres:
+            own[name] = "N"
         elif name in wanted:
             own[name] = 1
     return own
@@ -61,12 +78,14 @@ def _equalities(template: Template) -> Iterator[tuple[str, object]]:
             yield left, _constant(right)
     for found in _ONE_OF.finditer(template.source):
         yield found[1], _constant(found[2])
+    for found in _MATCH.finditer(template.source):
+        yield found[1], example(compile_pattern(found[2]), {})
 
 
 def _constant(text: str) -> object:
     if text[0] in "'\"":
         return text[1:-1]
-    return float(text) if "." in text else int(text)
+    return float(text) if "." in text else int(text, 16 if text.startswith("0x") else 10)
 
 
 def correlated(match: Template, known: Mapping[str, object]) -> dict[str, object]:
@@ -86,10 +105,19 @@ def typed_arguments(
     for name, raw in found.items():
         argument = arguments.get(name)
         try:
-            typed[name] = _as(argument.type if argument else "", raw)
+            typed[name] = _as("", raw) if argument is None else _value(argument, raw)
         except ValueError:
             return None
     return typed
+
+
+def _value(argument: Argument, raw: object) -> object:
+    if argument.type != "array":
+        return _as(argument.type, raw)
+    items = elements_of(raw)
+    if argument.size is not None and len(items) != argument.size:
+        raise ValueError(raw)
+    return tuple(_as(argument.of, item) for item in items)
 
 
 def _as(kind: str, raw: object) -> object:
@@ -98,9 +126,15 @@ def _as(kind: str, raw: object) -> object:
     if kind == "integer":
         return int(raw)
     if kind == "number":
-        return float(raw)
+        return int(raw) if _is_whole(raw) else float(raw)
     if kind == "boolean":
         if raw.lower() not in ("true", "false", "1", "0", "on", "off"):
             raise ValueError(raw)
         return raw.lower() in ("true", "1", "on")
-    return int(raw) if raw.isdecimal() and str(int(raw)) == raw else raw
+    return int(raw) if _is_whole(raw) and raw[0] != "-" else raw
+
+
+def _is_whole(raw: str) -> bool:
+    """Return whether text is a whole number as an expression writes it."""
+    digits = raw.removeprefix("-")
+    return digits.isdecimal() and digits.isascii() and str(int(raw)) == raw

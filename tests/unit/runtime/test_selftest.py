@@ -7,7 +7,8 @@ from urc.model.profile import DocumentTest, Profile, Setting
 from urc.model.values import Signal
 from urc.patterns import compile_pattern
 from urc.problems import Problem
-from urc.runtime.selftest import _is_same, run_tests, sample_settings
+from urc.runtime.selftest import run_tests, sample_settings
+from urc.runtime.verdicts import is_same
 from urc.testing.codec import regex, text
 from urc.testing.profile import line_profile
 
@@ -85,7 +86,7 @@ def test_bytes_are_those_on_the_wire(test: DocumentTest) -> None:
 
 
 @pytest.mark.parametrize(
-    ("found", "expected", "is_same"),
+    ("found", "expected", "same"),
     [
         (0.10000000149011612, 0.1, True),
         (0.1000001, 0.1, False),
@@ -100,11 +101,9 @@ def test_bytes_are_those_on_the_wire(test: DocumentTest) -> None:
         (0.0, None, False),
     ],
 )
-def test_numbers_are_the_same_to_seven_digits(
-    found: object, expected: object, is_same: bool
-) -> None:
+def test_numbers_are_the_same_to_seven_digits(found: object, expected: object, same: bool) -> None:
     """As many as a number of four bytes has; whole numbers exactly, lists element by element."""
-    assert _is_same(found, expected) is is_same
+    assert is_same(found, expected) is same
 
 
 def test_settings_of_a_test_take_the_place_of_the_defaults() -> None:
@@ -142,11 +141,12 @@ def test_message_that_nobody_asked_for_is_read() -> None:
         ),
         (
             trial(feed={"wire": "42\n"}, reply_to=0, expect={"note": "x"}),
-            "note: expected 'x', but nothing set it",
+            "note: expected 'x', but nothing set it: what came set battery",
         ),
         (
             trial(feed={"wire": "4"}, reply_to=0, expect={"battery": 4}),
-            "battery: expected 4, but nothing set it",
+            "battery: expected 4, but nothing set it:"
+            " '4' waits for the delimiter b'\\n' (write it in double quotes)",
         ),
         (
             trial(feed={"wire": "full\n"}, reply_to=0, expect={"battery": 100}),
@@ -171,7 +171,7 @@ def test_message_that_nobody_asked_for_is_read() -> None:
         ),
         (
             trial(run="stop", fails="timed-out", expect={"battery": 1}, sent={"wire": "halt"}),
-            "battery: expected 1, but nothing set it; wire: at byte 0,"
+            "battery: expected 1, but nothing set it: nothing was fed; wire: at byte 0,"
             " expected 'halt\\n' (68 61 6c 74 0a), found 'stop\\n' (73 74 6f 70 0a)",
         ),
         (

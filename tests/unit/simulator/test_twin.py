@@ -1,11 +1,15 @@
 """The emulated robot, without a socket or a clock."""
 
+from pathlib import Path
+
 import pytest
 
-from urc.expressions import compile_template
-from urc.model.profile import Profile, SimulatorRule
+from urc.model.codec import Envelope
+from urc.model.profile import Profile, Reaction, SimulatorRule
 from urc.patterns import compile_pattern
+from urc.runtime.scripting import load
 from urc.simulator.twin import Twin, TwinLine
+from urc.testing.codec import text
 from urc.testing.profile import line_profile
 
 ASK = b"Give me the battery %\n"
@@ -24,8 +28,8 @@ def rule(
     pattern: str | None, send: str | None, every_s: float | None = None, transport: str = "wire"
 ) -> SimulatorRule:
     match = None if pattern is None else compile_pattern(pattern)
-    answer = None if send is None else compile_template(send)
-    return SimulatorRule(transport, match, answer, every_s)
+    answer = None if send is None else text(send)
+    return SimulatorRule(transport, match, every_s=every_s, reactions=(Reaction(send=answer),))
 
 
 DIALOGUES = [
@@ -91,3 +95,20 @@ def test_periodic_rules_speak_at_their_times() -> None:
     assert line.step(10.1, 3.0) == [b"tick 3\n"]
     assert line.due_in_s == pytest.approx(0.4)
     assert line_with().due_in_s is None
+
+
+def test_a_reply_of_fields_that_mean_nothing_elsewhere_is_answered_all_the_same(
+    tmp_path: Path,
+) -> None:
+    path = tmp_path / "caller.yaml"
+    path.write_text(
+        "urc: 1\nkind: robot\nname: caller\n"
+        "transports: { ros: { type: rosbridge, host: 127.0.0.1 } }\n"
+        "signals: { x: {} }\n"
+        "messages: { x: { subscribe: { topic: /x }, json: { x: data } } }\n"
+        "commands:\n"
+        "  reset: { send: { call: { service: /reset } }, reply: { json: { _ok: success } } }\n"
+    )
+    line = Twin(load(path), {}).line("ros")
+    (answer,) = line.receive(Envelope("call", {"service": "/reset", "id": 7}, {}), 0.0)
+    assert answer == Envelope("response", {"id": 7, "ok": True, "status": 200}, b'{"success":1}')

@@ -1,0 +1,130 @@
+"""Why nothing set a signal, and what to write instead: the first thing that people stumble over.
+
+Floor 4, pure. Looked for only when a test fails.
+"""
+
+from collections.abc import Iterator
+from typing import Final, NamedTuple
+
+from urc.model.codec import ReadSpec
+from urc.model.driver import Driver, Reply
+from urc.protocol.forms import BadText, CodecContext, Frame, build_reader
+from urc.protocol.framing import build_framing
+from urc.runtime.trial import Trial
+
+__all__ = ["Remedy"]
+
+_SHOWN: Final = 40
+_WAITED_FOR: Final = {
+    "length": "for the rest of its length",
+    "fixed": "for the rest of a frame",
+    "sync": "for the rest of a frame",
+    "idle": "for the silence that ends it",
+    "slip": "for the byte that ends it",
+    "cobs": "for the byte that ends it",
+    "brackets": "for the bracket that ends it",
+    "json": "for the end of the JSON",
+}
+"""Framing → what bytes that are no whole frame wait for."""
+
+
+class _Asked(NamedTuple):
+    """Something whose answer a frame could be."""
+
+    how: str
+    """What to write so that it is asked."""
+    transport: str
+    reply: Reply
+
+
+class Remedy:
+    """Finds out why a signal was not set in one test."""
+
+    def __init__(self, trial: Trial, *, in_steps: bool) -> None:
+        self._trial = trial
+        self._driver: Driver = trial.driver
+        self._in_steps = in_steps
+
+    def of(self, signal: str) -> str:
+        """Return the reason, to be put behind "nothing set it", or "" when there is none."""
+        for transport in self._driver.transports:
+            reason = self._of_line(transport, signal)
+            if reason:
+                return f": {reason}"
+        if not self._trial.fed:
+            return ": nothing was fed"
+        others = sorted(self._trial.fresh)
+        if others:
+            return f": what came set {', '.join(others[:5])}"
+        return ""
+
+    def _of_line(self, transport: str, signal: str) -> str:
+        fed = self._trial.fed.get(transport, b"")
+        if not fed:
+            return ""
+        line = self._trial.engine.lines[transport]
+        asked = self._answered_by(transport, fed, signal)
+        if not line.is_open and not line.is_per_request:
+            return f"{transport} is not connected (write connects: {transport})"
+        if asked:
+            return asked
+        if not line.is_open:
+            return f"{transport} is connected only for a request, and there was none"
+        waiting = line.inbox.decoder.pending
+        return self._waits(transport, fed[-waiting:]) if waiting else ""
+
+    def _waits(self, transport: str, rest: bytes) -> str:
+        spec = self._driver.transports[transport]
+        framing = spec.framing
+        text = _shown(rest, spec.encoding)
+        if framing.type == "delimiter":
+            end = framing.options.get("rx")
+            return f"{text} waits for the delimiter {end!r} (write it in double quotes)"
+        what = _WAITED_FOR.get(framing.type, "for the end of its frame")
+        passes = " (write wait: after it)" if framing.type == "idle" and self._in_steps else ""
+        return f"{text} waits {what}{passes}"
+
+    def _answered_by(self, transport: str, fed: bytes, signal: str) -> str:
+        """Return which request a frame would be the answer to, when nobody made it."""
+        spec = self._driver.transports[transport]
+        for asked in self._could_ask():
+            reads = [asked.reply.read, *(stage.read for stage in asked.reply.stages)]
+            if asked.transport != transport or all(signal not in read.fields for read in reads):
+                continue
+            framing = asked.reply.framing or spec.framing
+            decoder = build_framing(framing).decoder()
+            for cut in decoder.feed(fed):
+                if isinstance(cut, bytes) and any(self._fits(cut, transport, one) for one in reads):
+                    text = _shown(cut, spec.encoding)
+                    return f"{text} answers a request that nobody made (write {asked.how})"
+        return ""
+
+    def _fits(self, payload: bytes, transport: str, read: ReadSpec) -> bool:
+        encoding = self._driver.transports[transport].encoding
+        reader = build_reader(read, CodecContext(encoding, self._trial.settings))
+        try:
+            return reader.read(Frame(payload, encoding)) is not None
+        except BadText:
+            return False
+
+    def _could_ask(self) -> Iterator[_Asked]:
+        """Yield what the test did not ask and could have."""
+        used = self._trial.used
+        for poll in self._trial.polls:
+            if poll.reply is not None and ("poll", poll.name) not in used:
+                key = f"polls: [{poll.name}]" if self._in_steps else f"reply_to: {poll.name}"
+                yield _Asked(key, poll.transport, poll.reply)
+        for command in self._driver.commands.values():
+            if command.reply is not None and ("command", command.name) not in used:
+                yield _Asked(f"run: {command.name}", command.transport, command.reply)
+
+
+def _shown(data: bytes, encoding: str) -> str:
+    """Return bytes as text where they are, else in hex."""
+    cut = data[:_SHOWN]
+    more = " …" if len(data) > _SHOWN else ""
+    try:
+        text = cut.decode(encoding)
+    except UnicodeDecodeError:
+        return f"{cut.hex(' ')}{more}"
+    return f"{text!r}{more}" if text.isprintable() or text.strip().isprintable() else cut.hex(" ")

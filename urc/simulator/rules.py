@@ -1,0 +1,209 @@
+"""The rules that a document gives its emulated robot, made ready for one of its lines.
+
+Pure: no socket, no clock.
+"""
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+from urc.expressions import COUNTERS, ExpressionError, Template
+from urc.model.codec import Payload, ReadSpec
+from urc.model.driver import TransportSpec
+from urc.model.profile import Reaction, SimulatorRule
+from urc.model.values import NOTHING
+from urc.protocol.convert import Unusable
+from urc.protocol.forms import (
+    BadText,
+    CodecContext,
+    Frame,
+    NotWritable,
+    Reader,
+    Writer,
+    build_reader,
+    build_writer,
+)
+from urc.protocol.framing import Framing, FramingError, build_framing
+from urc.protocol.gate import Counters
+from urc.protocol.topics import frame_of
+from urc.simulator.auto import Answer, Asked, AutoLine, Unanswered, numbered
+from urc.simulator.values import Names, Unsettable, Values
+
+__all__ = ["Course", "Ruled", "Rules"]
+
+
+class Deed(NamedTuple):
+    """A reaction, ready to be done."""
+
+    what: Reaction
+    writer: Writer | None
+    framing: Framing
+    message: Answer | None
+
+
+class Ruled(NamedTuple):
+    """A rule, ready to be held against frames."""
+
+    what: SimulatorRule
+    reader: Reader | None
+    deeds: tuple[Deed, ...]
+
+
+class Course:
+    """The reactions of one rule, as far as they are done."""
+
+    __slots__ = ("asked", "deeds", "frame", "has_waited", "left_s", "names", "sets")
+
+    def __init__(
+        self,
+        deeds: tuple[Deed, ...],
+        names: Mapping[str, object],
+        asked: Asked | None = None,
+        frame: Frame | None = None,
+        *,
+        sets: bool = True,
+    ) -> None:
+        self.deeds = deeds
+        """What is still to be done."""
+        self.names = names
+        """What the frame said."""
+        self.asked = asked
+        """What was asked, where a declared request set the rule off."""
+        self.frame = frame
+        """What came; None when nothing did."""
+        self.sets = sets
+        """Whether it is for this line to change the robot."""
+        self.left_s = 0.0
+        """Seconds until the first of `deeds` is due."""
+        self.has_waited = False
+
+
+class Rules:
+    """The rules of one line, in the order of the document.
+
+    Args:
+        rules: of this line.
+        spec: of its transport.
+        framing: of the robot's side.
+        auto: answers what is declared.
+        values: of the robot.
+    """
+
+    def __init__(
+        self,
+        rules: tuple[SimulatorRule, ...],
+        spec: TransportSpec,
+        framing: Framing,
+        auto: AutoLine,
+        values: Values,
+    ) -> None:
+        self._context = CodecContext(spec.encoding, values.settings)
+        self._framing = framing
+        self._auto = auto
+        self._values = values
+        self._counters = Counters()
+        ready = [self._ready(rule) for rule in rules]
+        self.asked = tuple(rule for rule in ready if rule.what.every_s is None)
+        """Those that frames set off."""
+        self.periodic = tuple(rule for rule in ready if rule.what.every_s is not None)
+
+    def _ready(self, rule: SimulatorRule) -> Ruled:
+        is_form = isinstance(rule.match, ReadSpec)
+        reader = build_reader(rule.match, self._context) if is_form else None  # type: ignore[arg-type]  # as told
+        framing = self._auto.framing_of(rule.request) if rule.request else self._framing
+        return Ruled(rule, reader, tuple(self._deed(one, framing) for one in rule.reactions))
+
+    def _deed(self, what: Reaction, framing: Framing) -> Deed:
+        if what.framing is not None:
+            framing = build_framing(what.framing).reversed()
+        return Deed(
+            what,
+            build_writer(what.send, self._context) if what.send is not None else None,
+            framing,
+            self._auto.message(what.message) if what.message else None,
+        )
+
+    def find(self, frame: Frame, now_s: float) -> Course | None:
+        """Return what the first rule that takes a frame does, or None when none takes it.
+
+        Raises:
+            Unanswered: the condition of a rule cannot be told, or a field has no value.
+        """
+        for rule in self.asked:
+            asked: Asked | None = None
+            names: Mapping[str, object] | None
+            if rule.what.request:
+                asked = self._auto.asked(frame, rule.what.request)
+                names = None if asked is None else asked.arguments
+            else:
+                names = _names_in(rule, frame)
+            for name, value in (names or NOTHING).items():
+                if isinstance(value, Unusable):
+                    raise Unanswered(f"{name}: {value.why}")
+            if names is None or not self.holds(rule.what.when, now_s, names):
+                continue
+            if asked is not None:
+                self._values.remember(asked.arguments)
+            return Course(rule.deeds, names, asked, frame)
+        return None
+
+    def holds(
+        self, condition: Template | None, now_s: float, names: Mapping[str, object] = NOTHING
+    ) -> bool:
+        """Return whether the condition of a rule is true; raise `Unanswered` if it has no value."""
+        if condition is None:
+            return True
+        try:
+            return bool(condition.evaluate(Names(self._values, now_s, names)))
+        except ExpressionError as error:
+            raise Unanswered(str(error)) from None
+
+    def do(self, deed: Deed, course: Course, now_s: float) -> list[Payload]:
+        """Do one thing and return what is said; raise `Unanswered` for what cannot be done."""
+        what = deed.what
+        try:
+            if course.sets:
+                self._set(what, course, now_s)
+            said: list[Payload] = []
+            if what.answers:
+                asked = course.asked
+                if asked is None and course.frame is not None:
+                    asked = self._auto.asked(course.frame)
+                if asked is None:
+                    raise Unanswered("the driver never sends this, so it declares no answer")
+                said += self._auto.answers(asked, now_s)
+            if deed.message is not None:
+                said += self._auto.say(deed.message, now_s)
+            if deed.writer is not None:
+                said.append(self._written(deed, deed.writer, course, now_s))
+        except (ExpressionError, FramingError, NotWritable, Unsettable) as problem:
+            raise Unanswered(str(problem)) from None
+        return said
+
+    def _set(self, what: Reaction, course: Course, now_s: float) -> None:
+        names = Names(self._values, now_s, course.names)
+        values = {
+            name: one.evaluate(names) if isinstance(one, Template) else one
+            for name, one in what.sets.items()
+        }
+        for name, value in values.items():  # all are computed from what was before
+            self._values.put(name, value)
+
+    def _written(self, deed: Deed, writer: Writer, course: Course, now_s: float) -> Payload:
+        draw = self._counters.draw()
+        names = Names(self._values, now_s, {**course.names, COUNTERS: draw})
+        payload = writer.write(names)
+        self._counters.count(draw)
+        said = deed.framing.encode(payload) if isinstance(payload, bytes) else payload
+        return said if course.frame is None else numbered(said, course.frame)
+
+
+def _names_in(rule: Ruled, came: Frame) -> Mapping[str, object] | None:
+    """Return what a frame says by a rule's own pattern or form; None when it is another one."""
+    frame = came if isinstance(came.payload, bytes) else frame_of(came.payload, came.encoding)
+    try:
+        if rule.reader is not None:
+            return rule.reader.read(frame)
+        match = rule.what.match
+        return None if match is None or isinstance(match, ReadSpec) else match.search(frame.text)
+    except BadText:
+        return None

@@ -1,0 +1,148 @@
+"""What an emulated robot knows of itself: the values of its signals, and its own state.
+
+Pure. All connections of one robot share it.
+"""
+
+from collections.abc import Iterator, Mapping
+from typing import Final
+
+from urc.expressions import ExpressionError
+from urc.model.driver import Driver
+from urc.model.values import NOTHING, Reading, Signal, Value
+from urc.problems import UrcError
+from urc.protocol.convert import BadValue
+from urc.protocol.decode import build_converter
+from urc.simulator.plausible import plausible
+
+__all__ = ["Names", "Unsettable", "Values"]
+
+_DEEPEST: Final = 16
+"""Signals that are computed from each other, one upon the other."""
+
+
+class Unsettable(UrcError):
+    """A value that a signal cannot have; the message is for people."""
+
+
+class Values:
+    """The values of one emulated robot."""
+
+    def __init__(
+        self,
+        driver: Driver,
+        settings: Mapping[str, Value],
+        initial: Mapping[str, Reading] = NOTHING,
+    ) -> None:
+        """Begin with `initial` values, of signals and of the robot's own state."""
+        self.driver = driver
+        self.settings: Mapping[str, Value] = dict(settings)
+        self.state: dict[str, Reading] = {}
+        """What is no signal."""
+        self.chosen: dict[str, Reading] = {}
+        """Signals that were set."""
+        for name, value in initial.items():
+            self.put(name, value)
+
+    def remember(self, arguments: Mapping[str, object]) -> None:
+        """Keep what a command sets, where an argument and a signal share a name."""
+        for name, value in arguments.items():
+            signal = self.driver.signals.get(name)
+            if signal is not None and signal.formula is None and value is not None:
+                try:
+                    self.chosen[name] = _kept(signal, value)
+                except BadValue:
+                    continue  # the command means something else by that name
+
+    def put(self, name: str, value: object) -> None:
+        """Set a signal, within its range, or something of the robot's own state.
+
+        Raises:
+            Unsettable: the signal cannot have the value.
+        """
+        signal = self.driver.signals.get(name)
+        if signal is None:
+            self.state[name] = value  # type: ignore[assignment]  # expressions give nothing else
+            return
+        try:
+            self.chosen[name] = _kept(signal, _within(signal, value))
+        except BadValue as error:
+            raise Unsettable(f"{name}: {error}") from None
+
+    def of(self, name: str, now_s: float, depth: int = 0) -> Reading:
+        """Return the value of a signal: as set, as computed, else something plausible."""
+        signal = self.driver.signals[name]
+        if name in self.chosen:
+            return self.chosen[name]
+        if signal.formula is not None and depth < _DEEPEST:
+            try:
+                return build_converter(signal)(
+                    signal.formula.evaluate(Names(self, now_s, depth=depth + 1))
+                )
+            except (ExpressionError, BadValue):
+                return None
+        return plausible(signal, now_s)
+
+
+class Names(Mapping[str, object]):
+    """A namespace: given names, ``now`` and ``settings``, the robot's state, its signals."""
+
+    __slots__ = ("_depth", "_given", "_now_s", "_values")
+
+    def __init__(
+        self,
+        values: Values,
+        now_s: float,
+        given: Mapping[str, object] = NOTHING,
+        *,
+        depth: int = 0,
+    ) -> None:
+        self._values = values
+        self._now_s = now_s
+        self._given = given
+        self._depth = depth
+
+    def __getitem__(self, name: str) -> object:
+        if name in self._given:
+            return self._given[name]
+        if name == "now":
+            return self._now_s
+        if name == "settings":
+            return self._values.settings
+        if name in self._values.state:
+            return self._values.state[name]
+        if name in self._values.driver.signals:
+            return self._values.of(name, self._now_s, self._depth)
+        raise KeyError(name)
+
+    def __iter__(self) -> Iterator[str]:
+        values = self._values
+        names = (*self._given, "now", "settings", *values.state, *values.driver.signals)
+        return iter(dict.fromkeys(names))
+
+    def __len__(self) -> int:
+        return sum(1 for _ in self)
+
+
+def _kept(signal: Signal, value: object) -> Reading:
+    """Return what `signal` is once it has been set to `value`; raise `BadValue`."""
+    words = dict(signal.states)
+    if words and value is not None:
+        word = str(value)
+        if word in words.values():
+            return word
+        if word in words:
+            return words[word]
+        raise BadValue(f"{value!r} is none of the states {', '.join(words.values())}")
+    plain = signal._replace(conversion=signal.conversion._replace(polynomial=(), points=(), base=0))
+    return build_converter(plain)(value)
+
+
+def _within(signal: Signal, value: object) -> object:
+    """Return a number within the range of its signal: a robot stops at its ends."""
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or signal.states:
+        return value
+    if signal.type == "integer":
+        value = round(value) if abs(value) < float("inf") else value
+    if signal.min is not None:
+        value = max(value, signal.min)
+    return value if signal.max is None else min(value, signal.max)
