@@ -64,6 +64,7 @@ def main() -> int:
     outcomes: list[Outcome] = []
     brought = bring()
     javascript, not_checked = javascript_step()
+    brought.look_again()  # npm brings a language server, too
     environment = os.environ | brought.environment
     steps = (*STATIC, *([javascript] if javascript else []), *TESTS)
     try:

@@ -10,6 +10,7 @@ import subprocess
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from pathlib import Path
 
 from scripts.chromium.bring import BringError, bring_chromium
 from scripts.node import node_executable, playwright_environment
@@ -17,6 +18,16 @@ from scripts.node import node_executable, playwright_environment
 __all__ = ["NEEDS", "Brought", "Need", "bring"]
 
 APT_TIMEOUT_S = 600
+ROSLIB = Path(__file__).resolve().parents[1] / "node_modules" / "roslib"
+LANGUAGE_SERVER = (
+    Path(__file__).resolve().parents[1]
+    / "node_modules"
+    / "yaml-language-server"
+    / "bin"
+    / "yaml-language-server"
+)
+_SYSTEM_PATH = f"{os.environ.get('PATH', os.defpath)}{os.pathsep}/usr/sbin{os.pathsep}/sbin"
+"""Servers are where only root looks by itself."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,11 +38,14 @@ class Need:
     executables: tuple[str, ...]
     """Any one of them will do."""
     package: str
+    """Or several, with spaces between; "" when npm brings it."""
     purpose: str
     variable: str = ""
     """The environment variable that names another executable, if there is one."""
     other: Callable[[], str | None] | None = None
     """Finds it where it is on no path."""
+    is_of_root: bool = False
+    """Nothing brings it: only root has it."""
 
     def find(self) -> str | None:
         """Return what the variable names, else the first executable that is there."""
@@ -64,11 +78,126 @@ NEEDS = (
         purpose="the tests against a server that is not URC",
     ),
     Need(
+        name="iptables",
+        executables=(),
+        package="iptables",
+        purpose="the tests against a robot that vanishes without a word, as root only",
+        other=lambda: shutil.which("iptables") if _is_root() else None,
+    ),
+    Need(
+        name="tun",
+        executables=(),
+        package="",
+        purpose="the tests over a link that is cut between network namespaces, as root only",
+        other=lambda: "/dev/net/tun" if _is_root() and os.access("/dev/net/tun", os.W_OK) else None,
+        is_of_root=True,
+    ),
+    Need(
+        name="ser2net",
+        executables=("ser2net",),
+        package="ser2net",
+        purpose="the tests of serial lines over the network",
+    ),
+    Need(
+        name="curl",
+        executables=("curl",),
+        package="curl",
+        purpose="the tests of the emulated web server with a client that is not URC",
+    ),
+    Need(
+        name="openssl",
+        executables=("openssl",),
+        package="openssl",
+        purpose="the tests of https against a server that is not URC",
+    ),
+    Need(
+        name="ffmpeg",
+        executables=("ffmpeg",),
+        package="ffmpeg",
+        purpose="the tests of camera streams",
+    ),
+    Need(
+        name="lighttpd",
+        executables=("lighttpd", "/usr/sbin/lighttpd"),
+        package="lighttpd",
+        purpose="the tests against a web server that is not URC",
+    ),
+    Need(
+        name="websocketd",
+        executables=("websocketd",),
+        package="websocketd",
+        purpose="the tests against a WebSocket that is not URC",
+    ),
+    Need(
+        name="gpsd",
+        executables=("gpsd", "/usr/sbin/gpsd"),
+        package="gpsd",
+        purpose="the tests against the GPS service",
+    ),
+    Need(
+        name="mosquitto",
+        executables=("mosquitto", "/usr/sbin/mosquitto"),
+        package="mosquitto",
+        purpose="the tests against an MQTT broker",
+    ),
+    Need(
+        name="mosquitto-clients",
+        executables=("mosquitto_pub",),
+        package="mosquitto-clients",
+        purpose="the tests against MQTT clients that are not URC",
+    ),
+    Need(
+        name="roscore",
+        executables=("/usr/bin/rosmaster",),
+        package="ros-core python3-nav-msgs python3-geometry-msgs",
+        purpose="the tests with a real ROS 1 master",
+    ),
+    Need(
+        name="sshd",
+        executables=(),
+        package="openssh-server",
+        purpose="the tests against OpenSSH's server, with users of its own, as root only",
+        other=lambda: shutil.which("sshd", path=_SYSTEM_PATH) if _is_root() else None,
+    ),
+    Need(
+        name="ssh",
+        executables=("ssh",),
+        package="openssh-client",
+        purpose="the tests of the emulated SSH server against OpenSSH's client",
+    ),
+    Need(
+        name="telnetd",
+        executables=(),
+        package="inetutils-telnetd",
+        purpose="the tests against a Telnet server that is not URC, as root only",
+        other=lambda: shutil.which("telnetd", path=_SYSTEM_PATH) if _is_root() else None,
+    ),
+    Need(
+        name="telnet",
+        executables=("telnet",),
+        package="inetutils-telnet",
+        purpose="the tests of the emulated Telnet server against Debian's client",
+    ),
+    Need(
         name="node",
         executables=("node",),
         package="nodejs",
         purpose="the tests of the schemas in an editor's language server",
         other=node_executable,
+    ),
+    Need(
+        name="language-server",
+        executables=(),
+        package="",
+        purpose="the tests of the schemas in an editor's language server",
+        other=lambda: os.fspath(LANGUAGE_SERVER) if LANGUAGE_SERVER.is_file() else None,
+    ),
+    Need(
+        name="roslib",
+        executables=(),
+        package="",
+        purpose="the test of the emulated rosbridge against the client that browsers use",
+        other=lambda: os.fspath(ROSLIB) if ROSLIB.is_dir() else None,
     ),
 )
 
@@ -84,14 +213,25 @@ class Brought:
     def remedy(self) -> str:
         """The one command that brings all that was left out."""
         sudo = "" if _is_root() else "sudo "
-        return f"{sudo}apt-get install -y {' '.join(need.package for need in self.left_out)}"
+        packages = [need.package for need in self.left_out if need.package]
+        commands = [f"{sudo}apt-get install -y {' '.join(packages)}"] if packages else []
+        if any(not need.package and not need.is_of_root for need in self.left_out):
+            commands.append("npm ci --ignore-scripts")
+        if not commands and self.left_out:
+            return "sudo ./dev test"
+        return " && ".join(commands)
+
+    def look_again(self) -> None:
+        """Take note of what has been brought meanwhile."""
+        self.left_out = [need for need in self.left_out if need.find() is None]
+        self.environment["URC_LEFT_OUT"] = ",".join(need.name for need in self.left_out)
 
 
 def bring() -> Brought:
     """Find or install every need; report what is missing."""
     missing = [need for need in NEEDS if need.find() is None]
-    if missing and _is_root() and shutil.which("apt-get"):
-        _apt_install([need.package for need in missing])
+    if any(need.package for need in missing) and _is_root() and shutil.which("apt-get"):
+        _apt_install([name for need in missing for name in need.package.split()])
         missing = [need for need in missing if need.find() is None]
     browser = NEEDS[0].find() or _chromium_from_npm()
     brought = Brought(playwright_environment())

@@ -6,7 +6,6 @@ Floor 4. `urc demo` and `urc serve --simulate` use it; `urc simulate` keeps the 
 from collections.abc import AsyncIterator, Mapping
 from contextlib import asynccontextmanager
 
-from urc.model.driver import ScalarOrTemplate
 from urc.model.profile import Profile
 from urc.model.values import Value
 from urc.simulator.server import serve
@@ -21,15 +20,12 @@ async def stand_in(profile: Profile, settings: Mapping[str, Value]) -> AsyncIter
     Raises:
         UrcError: a transport that cannot be emulated.
     """
-    anywhere = _redirected(profile, {name: {"port": 0} for name in profile.driver.transports})
-    async with serve(anywhere, settings) as listening:
-        places: dict[str, dict[str, ScalarOrTemplate]] = {
-            name: {"host": host, "port": port} for name, (host, port) in listening.items()
-        }
+    async with serve(profile, settings, is_anywhere=True) as listening:
+        places = {name: place.options for name, place in listening.items()}
         yield _redirected(profile, places)
 
 
-def _redirected(profile: Profile, options: Mapping[str, Mapping[str, ScalarOrTemplate]]) -> Profile:
+def _redirected(profile: Profile, options: Mapping[str, Mapping[str, object]]) -> Profile:
     transports = {
         name: spec._replace(options={**spec.options, **options[name]})
         for name, spec in profile.driver.transports.items()

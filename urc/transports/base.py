@@ -1,15 +1,30 @@
 """The seam to the outside world: five members, and one small tree of errors.
 
-A transport moves bytes and knows no meaning. Whatever a library underneath raises is translated at
-the transport's edge into one of the errors below; nothing foreign passes. `urc.runtime.link` is the
-only user, and must not care in which process a transport lives.
+A transport moves payloads and knows no meaning: bytes where the line is a stream or datagrams,
+envelopes where it carries messages (topics, requests, calls). Whatever a library underneath raises
+is translated at the transport's edge into one of the errors below; nothing foreign passes.
+`urc.runtime.link` is the only user, and must not care in which process a transport lives.
 """
 
-from typing import Protocol
+from collections.abc import Callable, Mapping
+from typing import NamedTuple, Protocol, runtime_checkable
 
+from urc.model.codec import Payload
+from urc.model.values import NOTHING, Value
 from urc.problems import UrcError
 
-__all__ = ["ConnectFailed", "PeerClosed", "Transport", "TransportError"]
+__all__ = [
+    "ByteStream",
+    "Carrier",
+    "ConnectFailed",
+    "PeerClosed",
+    "Prompt",
+    "Setup",
+    "Subscription",
+    "Transport",
+    "TransportError",
+    "bytes_of",
+]
 
 
 class TransportError(UrcError):
@@ -39,11 +54,84 @@ class Transport(Protocol):
     async def open(self, timeout_s: float) -> None:
         """Connect, or raise `ConnectFailed` within `timeout_s` seconds."""
 
-    async def receive(self) -> bytes:
-        """Return the next bytes, at least one; raise `PeerClosed` when no more will come."""
+    async def receive(self) -> Payload:
+        """Return the next bytes, at least one, or the next envelope.
 
-    async def send(self, data: bytes) -> None:
+        Raises:
+            PeerClosed: no more will come.
+        """
+
+    async def send(self, data: Payload) -> None:
         """Hand `data` over, waiting while the line is full; raise `TransportError` if it broke."""
 
     async def close(self) -> None:
         """Close at once. Never raises, may be called twice."""
+
+
+def bytes_of(data: Payload) -> bytes:
+    """Return `data` for a line that carries bytes alone; raise `TransportError` for a message."""
+    if isinstance(data, bytes):
+        return data
+    raise TransportError(f"a line of bytes cannot carry a message ({data.verb})")
+
+
+class ByteStream(Protocol):
+    """One open connection that another transport carries."""
+
+    async def take(self) -> bytes:
+        """Return the next bytes, at least one; raise `PeerClosed` when no more will come."""
+
+    async def put(self, data: bytes) -> None:
+        """Hand `data` over, waiting while the stream is full; raise `PeerClosed` if it broke."""
+
+    async def abort(self) -> None:
+        """Close at once. Never raises, may be called twice."""
+
+
+class Carrier(Protocol):
+    """A transport that others go through: SSH, which forwards connections."""
+
+    async def connect(self, host: str, port: int, timeout_s: float) -> ByteStream:
+        """Connect to `host` and `port` as seen from the far end; raise `ConnectFailed`."""
+
+
+class Subscription(NamedTuple):
+    """What a driver's messages listen to on a transport that carries messages."""
+
+    topic: str
+    attributes: Mapping[str, Value] = NOTHING
+    """What the transport's own way of subscribing takes: type, throttle, quality of service …"""
+
+
+class Setup(NamedTuple):
+    """What a transport's factory makes it from."""
+
+    name: str
+    """Of the transport in the driver."""
+    options: Mapping[str, object] = NOTHING
+    """As the document gives them, evaluated: plain values, and lists and mappings of them."""
+    subscriptions: tuple[Subscription, ...] = ()
+    via: Carrier | None = None
+    """What it goes through; None: this machine's own network."""
+
+
+@runtime_checkable
+class Prompt(Protocol):
+    """What a transport of bytes may offer beside: it saves a task's turn for each message.
+
+    The order of bytes is kept: `offer` takes none while others wait, and a sink gets none while
+    `receive` has some to give.
+    """
+
+    def offer(self, data: bytes) -> bool:
+        """Hand `data` over if nothing waits before it; return whether it was taken. Never waits."""
+
+    @property
+    def is_clogged(self) -> bool:
+        """Whether some of what was taken is still to be written; ``send(b"")`` waits for it."""
+
+    def divert(self, sink: Callable[[bytes], bool]) -> None:
+        """Let `sink` have what arrives until the line is closed; it returns whether it took it.
+
+        What it does not take is for `receive`.
+        """

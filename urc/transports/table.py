@@ -4,5 +4,18 @@ from urc.registry import Table
 
 __all__ = ["TRANSPORTS"]
 
-TRANSPORTS = Table("urc.transports", {"tcp": "urc.transports.tcp:from_options"})
-"""Each row's factory takes the transport's own options, evaluated, and returns a `Transport`."""
+TRANSPORTS = Table(
+    "urc.transports",
+    {
+        "tcp": "urc.transports.tcp:from_setup",
+        "udp": "urc.transports.udp:from_setup",
+        "serial": "urc.transports.serial:from_setup",
+        "ssh": "urc.transports.ssh:from_setup",
+        "telnet": "urc.transports.telnet:from_setup",
+        "http": "urc.transports.http:from_setup",
+        "websocket": "urc.transports.websocket:from_setup",
+        "rosbridge": "urc.transports.rosbridge:from_setup",
+        "mqtt": "urc.transports.mqtt_options:from_setup",
+    },
+)
+"""Each row's factory takes a `urc.transports.base.Setup` and returns a `Transport`."""

@@ -6,7 +6,7 @@ import sys
 import pytest
 
 from urc.model.values import Value
-from urc.transports.base import TransportError
+from urc.transports.base import Setup, TransportError
 from urc.transports.table import TRANSPORTS
 
 ADDRESSES = [
@@ -16,27 +16,27 @@ ADDRESSES = [
 ]
 
 WRONG: list[tuple[dict[str, Value], str]] = [
-    ({"port": 1}, "tcp needs a host name or address, not None"),
-    ({"host": " ", "port": 1}, "tcp needs a host name or address, not ' '"),
-    ({"host": "h"}, "tcp needs a port from 1 to 65535, not None"),
-    ({"host": "h", "port": 0}, "tcp needs a port from 1 to 65535, not 0"),
-    ({"host": "h", "port": 65536}, "tcp needs a port from 1 to 65535, not 65536"),
-    ({"host": "h", "port": "6789"}, "tcp needs a port from 1 to 65535, not '6789'"),
-    ({"host": "h", "port": True}, "tcp needs a port from 1 to 65535, not True"),
+    ({"port": 1}, "tcp needs a host name or address as host, not None"),
+    ({"host": " ", "port": 1}, "tcp needs a host name or address as host, not ' '"),
+    ({"host": "h"}, "tcp needs a port from 1 to 65535 as port, not None"),
+    ({"host": "h", "port": 0}, "tcp needs a port from 1 to 65535 as port, not 0"),
+    ({"host": "h", "port": 65536}, "tcp needs a port from 1 to 65535 as port, not 65536"),
+    ({"host": "h", "port": "6789"}, "tcp needs a port from 1 to 65535 as port, not '6789'"),
+    ({"host": "h", "port": True}, "tcp needs a port from 1 to 65535 as port, not True"),
 ]
 
 
 @pytest.mark.parametrize(("options", "address"), ADDRESSES)
 def test_address_is_for_people(options: dict[str, Value], address: str) -> None:
     """An IPv6 address stands in brackets."""
-    assert TRANSPORTS["tcp"].load()(options).address == address
+    assert TRANSPORTS["tcp"].load()(Setup("wire", options)).address == address
 
 
 @pytest.mark.parametrize(("options", "message"), WRONG)
 def test_unusable_options_are_one_line(options: dict[str, Value], message: str) -> None:
     """Found when the transport is made, not when it is opened."""
     with pytest.raises(TransportError) as told:
-        TRANSPORTS["tcp"].load()(options)
+        TRANSPORTS["tcp"].load()(Setup("wire", options))
     assert str(told.value) == message
 
 

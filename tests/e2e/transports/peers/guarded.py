@@ -1,0 +1,44 @@
+"""A robot on TCP whose line the guard holds: Link must not notice the difference."""
+
+from tests.e2e.transports.peers.tcp import TcpPeer
+from urc.guard import wire
+from urc.guard.client import Client, Guard, LineSpec, LocalGuard
+from urc.runtime.clock import LoopClock
+from urc.transports.base import Setup, Transport
+from urc.transports.tcp import from_setup
+
+__all__ = ["GuardedPeer", "InnerPeer"]
+
+
+class GuardedPeer(TcpPeer):
+    """The line is in another process."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._client: Client | None = None
+
+    def client(self, lines: list[LineSpec]) -> Client:
+        """Return a guard of `lines`."""
+        return Guard(lines)
+
+    def transport(self) -> Transport:
+        """Return a line that leads here."""
+        options: dict[str, object] = {"host": "127.0.0.1", "port": self.port}
+        make = wire.Make("wire", "urc.transports.tcp:from_setup", options, [], "", 0.25, False)
+        self._client = self.client([LineSpec(make, from_setup(Setup("wire", options)))])
+        self._client.start()
+        return self._client.transports["wire"]
+
+    async def stop(self) -> None:
+        """End the guard, too."""
+        if self._client is not None:
+            await self._client.finish()
+        await super().stop()
+
+
+class InnerPeer(GuardedPeer):
+    """The same lines, held by this process."""
+
+    def client(self, lines: list[LineSpec]) -> Client:
+        """Return a guard of `lines`."""
+        return LocalGuard(lines, LoopClock())

@@ -1,0 +1,368 @@
+"""rosbridge beyond the contract: independent clients, a real ROS 1 master, what the line keeps."""
+
+import asyncio
+import json
+import logging
+import os
+import sys
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager, suppress
+from pathlib import Path
+from typing import Any
+
+import pytest
+from websockets.asyncio.client import connect
+from websockets.asyncio.server import ServerConnection, serve
+
+from tests.e2e.transports.leaks import nothing_left
+from tests.e2e.transports.programs import free_port, listens, program
+from urc.config.load import load_profile
+from urc.model.codec import Envelope
+from urc.model.profile import Profile
+from urc.runtime.catalog import built_in_catalog
+from urc.runtime.session import Session
+from urc.simulator.server import serve as serve_robot
+from urc.transports.base import PeerClosed, Setup, Subscription, Transport, TransportError
+from urc.transports.rosbridge import from_setup
+
+pytestmark = pytest.mark.anyio
+
+WAIT_S = 10.0
+CLIENTS = Path(__file__).parent / "clients"
+ROVER = """
+urc: 1
+kind: robot
+name: rover
+title: Rover
+settings:
+  host: { type: host, default: 127.0.0.1 }
+  port: { type: port, default: 9090 }
+transports:
+  ros: { type: rosbridge, host: "{{ settings.host }}", port: "{{ settings.port }}" }
+signals:
+  x: { unit: m }
+messages:
+  odom:
+    subscribe: { topic: /odom, type: nav_msgs/Odometry }
+    json: { x: pose.pose.position.x }
+commands:
+  drive:
+    args: { speed: { type: number, min: -1, max: 1 } }
+    send:
+      publish:
+        topic: /cmd_vel
+        type: geometry_msgs/Twist
+        json: { linear: { x: "{{ speed }}" } }
+  reset: { send: { call: { service: /reset, type: std_srvs/Trigger } } }
+  dock: { send: { goal: { action: /dock, type: irobot_create_msgs/action/Dock } } }
+"""
+
+
+def line(port: int, *topics: Subscription, **options: object) -> Transport:
+    return from_setup(Setup("ros", {"host": "127.0.0.1", "port": port, **options}, topics))
+
+
+async def heard(transport: Transport) -> Envelope:
+    said = await asyncio.wait_for(transport.receive(), WAIT_S)
+    assert isinstance(said, Envelope)
+    return said
+
+
+@pytest.fixture
+def rover(tmp_path: Path) -> Profile:
+    path = tmp_path / "rover.yaml"
+    path.write_text(ROVER)
+    return load_profile(path, built_in_catalog())
+
+
+@asynccontextmanager
+async def emulated(profile: Profile) -> AsyncIterator[int]:
+    settings = {"host": "127.0.0.1", "port": 0}
+    async with serve_robot(profile, settings) as listening:
+        yield listening["ros"].port
+
+
+class Bridge:
+    """A bridge that the test plays: what the client said, and what it is to hear."""
+
+    def __init__(self) -> None:
+        self.said: list[dict[str, Any]] = []
+        self.clients: list[ServerConnection] = []
+        self.port = 0
+        self._changed = asyncio.Event()
+
+    async def meet(self, client: ServerConnection) -> None:
+        self.clients.append(client)
+        async for frame in client:
+            assert isinstance(frame, str), "a client speaks text"
+            self.said.append(json.loads(frame))
+            self._changed.set()
+
+    async def say(self, operation: dict[str, Any]) -> None:
+        await self.clients[-1].send(json.dumps(operation))
+
+    async def hears(self, count: int) -> list[dict[str, Any]]:
+        async with asyncio.timeout(WAIT_S):
+            while len(self.said) < count:
+                self._changed.clear()
+                await self._changed.wait()
+        return self.said
+
+
+@asynccontextmanager
+async def bridge() -> AsyncIterator[Bridge]:
+    played = Bridge()
+    async with serve(played.meet, "127.0.0.1", 0, ping_interval=None) as server:
+        played.port = server.sockets[0].getsockname()[1]
+        yield played
+        for client in played.clients:
+            client.transport.abort()
+
+
+async def test_line_subscribes_each_topic_once_and_asks_which_there_are() -> None:
+    """A second subscription would cancel the first one's throttle: the lowest of both is sent."""
+    topics = (
+        Subscription("/imu", {"type": "sensor_msgs/Imu", "throttle": 0.2, "queue_length": 1}),
+        Subscription("/imu", {"throttle": 0.1}),
+        Subscription("/camera", {"compression": "cbor"}),
+    )
+    async with nothing_left(), bridge() as robot:
+        transport = line(robot.port, *topics, ros=2)
+        await transport.open(3.0)
+        asked, imu, camera = await robot.hears(3)
+        assert asked["service"] == "/rosapi/topics"
+        assert imu["type"] == "sensor_msgs/msg/Imu"
+        assert (imu["throttle_rate"], imu["queue_length"]) == (100, 1)
+        assert camera["compression"] == "cbor"
+        await transport.close()
+
+
+async def test_topic_is_advertised_once_a_connection_and_nothing_is_said_late() -> None:
+    """What was published while there was no line is gone; the new one begins anew."""
+    twist = Envelope("publish", {"topic": "/cmd_vel", "type": "geometry_msgs/Twist"}, {"x": 1})
+    async with nothing_left(), bridge() as robot:
+        transport = line(robot.port)
+        await transport.open(3.0)
+        for _ in range(2):
+            await transport.send(twist)
+        assert [one["op"] for one in await robot.hears(3)] == ["advertise", "publish", "publish"]
+        robot.clients[-1].transport.abort()
+        with pytest.raises(PeerClosed):
+            await heard(transport)
+        for _ in range(100):  # a client that queued them would send them all at once
+            with pytest.raises(TransportError):
+                await transport.send(twist)
+        robot.said.clear()
+        await transport.open(3.0)
+        await transport.send(Envelope("call", {"service": "/last", "id": 1}))
+        assert [one["op"] for one in await robot.hears(1)] == ["call_service"]
+        await transport.close()
+
+
+async def test_answers_find_their_questions(caplog: pytest.LogCaptureFixture) -> None:
+    """Calls by their id, with why not; goals with feedback; nonsense is counted and survived."""
+    async with nothing_left(), bridge() as robot:
+        transport = line(robot.port)
+        await transport.open(3.0)
+        await transport.send(Envelope("call", {"service": "/a", "id": 5}, {"x": float("nan")}))
+        await transport.send(Envelope("call", {"service": "/b", "id": 6}, {}))
+        first, second = await robot.hears(2)
+        assert first["args"] == {"x": None}
+        await robot.say(
+            {"op": "service_response", "id": second["id"], "values": "no", "result": False}
+        )
+        await robot.say({"op": "service_response", "id": "unknown", "values": {}, "result": True})
+        await robot.say({"op": "dance"})
+        await robot.say({"op": "service_response", "id": first["id"], "values": {"y": 1}})
+        refused, answered = await heard(transport), await heard(transport)
+        assert refused.attributes == {"id": 6, "ok": False, "reason": "no"}
+        assert answered == Envelope("response", {"id": 5, "ok": True}, {"y": 1})
+        goal = {"action": "/dock", "type": "a/action/Dock", "id": 7, "feedback": True}
+        await transport.send(Envelope("goal", goal, {}))
+        await transport.send(Envelope("cancel", {"action": "/dock"}))
+        started, cancelled = (await robot.hears(4))[2:]
+        assert cancelled == {"op": "cancel_action_goal", "id": started["id"], "action": "/dock"}
+        about = {"id": started["id"], "action": "/dock"}
+        await robot.say({"op": "action_feedback", **about, "values": {"left": 1}})
+        await robot.say(
+            {"op": "action_result", **about, "values": {}, "status": 5, "result": False}
+        )
+        assert await heard(transport) == Envelope(
+            "feedback", {"action": "/dock", "id": 7}, {"left": 1}
+        )
+        ended = await heard(transport)
+        assert (ended.attributes["ok"], ended.attributes["reason"]) == (
+            False,
+            "the action was cancelled",
+        )
+        await transport.close()
+    assert "2 such frames" in caplog.text
+
+
+async def test_topics_that_nobody_publishes_are_told_once(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    """The bridge itself says nothing about them, and would not for ever."""
+    caplog.set_level(logging.WARNING)
+    async with nothing_left(), bridge() as robot:
+        transport = line(robot.port, Subscription("/odom"), Subscription("/lidar"))
+        for count in (3, 6):
+            await transport.open(3.0)
+            asked = (await robot.hears(count))[-3]
+            values = {"topics": ["/odom"], "types": ["nav_msgs/Odometry"]}
+            await robot.say({"op": "service_response", "id": asked["id"], "values": values})
+            await robot.say({"op": "publish", "topic": "/odom", "msg": {}})
+            await heard(transport)
+            await transport.close()
+    told = [record.message for record in caplog.records if "publishes" in record.message]
+    assert told == [f"rosbridge 127.0.0.1:{robot.port}: nobody publishes /lidar"]
+
+
+async def test_slow_taker_gets_the_newest() -> None:
+    """The bridge is never held up; of one topic the oldest go, of the other none."""
+    async with nothing_left(), bridge() as robot:
+        transport = line(robot.port, Subscription("/fast"), Subscription("/rare"))
+        await transport.open(3.0)
+        await robot.hears(3)
+        await robot.say({"op": "publish", "topic": "/rare", "msg": {"n": -1}})
+        for number in range(2000):
+            await robot.say({"op": "publish", "topic": "/fast", "msg": {"n": number}})
+        got: list[int] = []
+        while not got or got[-1] != 1999:
+            message = await heard(transport)
+            assert isinstance(message.body, dict)
+            got.append(message.body["n"])
+            await asyncio.sleep(0.001)
+        assert got[0] == -1
+        assert got[1:] == sorted(got[1:])
+        await transport.close()
+
+
+async def test_profile_drives_the_emulated_robot(rover: Profile) -> None:
+    """The driver as it is, over a real socket: telemetry, a topic, a service, an action."""
+    async with nothing_left(), emulated(rover) as port:
+        settings = {"host": "127.0.0.1", "port": port}
+        async with Session(rover, settings, built_in_catalog().transports) as session:
+            with session.hub.subscribe() as news:
+                async with asyncio.timeout(WAIT_S):
+                    while session.hub.latest("x") is None:
+                        await news.changed()
+                        news.take()
+            for name, values in (("drive", {"speed": 0.5}), ("reset", {}), ("dock", {})):
+                async with asyncio.timeout(WAIT_S):
+                    await session.command(name, values)
+
+
+async def test_roslibpy_takes_the_emulated_robot_for_a_bridge(rover: Profile) -> None:
+    """Topics, types, services of the robot and of other clients, and what they say of failures."""
+    async with nothing_left(), emulated(rover) as port:
+        said = await run(sys.executable, str(CLIENTS / "roslibpy_client.py"), str(port))
+    assert said["topics"] == ["/odom"]
+    assert said["type"] == "nav_msgs/Odometry"
+    assert said["heard"]["/echo"] == {"data": "grüezi / hello"}
+    assert "position" in said["heard"]["/odom"]["pose"]["pose"]
+    assert "does not exist" in said["unknown"]
+    assert said["sum"] == 42
+
+
+@pytest.mark.needs("node")
+@pytest.mark.needs("roslib")
+async def test_roslib_takes_the_emulated_robot_for_a_bridge(rover: Profile) -> None:
+    """In JavaScript, with its own decoders of CBOR and PNG, and an action of ROS 2."""
+    async with nothing_left(), emulated(rover) as port:
+        said = await run("node", str(CLIENTS / "roslib_client.mjs"), str(port))
+    assert said["topics"]["topics"] == ["/odom"]
+    for compression in ("none", "cbor", "png"):
+        assert said[compression] == {"data": f"grüezi by {compression}", "values": [1.5, None]}
+    assert "does not exist" in said["nobody"]["why"]
+
+
+@pytest.mark.needs("roscore")
+async def test_twist_reaches_a_real_ros_master_and_odometry_comes_back(
+    rover: Profile, tmp_path: Path
+) -> None:
+    """roscore and rospy behind the emulated bridge: ROS's own types and tools say what arrived."""
+    port = free_port()
+    environment = {
+        "PATH": "/usr/local/sbin:/usr/sbin:/usr/bin:/sbin:/bin",
+        "HOME": str(tmp_path),
+        "ROS_MASTER_URI": f"http://127.0.0.1:{port}",
+        "ROS_IP": "127.0.0.1",
+        "LANG": "C.UTF-8",
+    }
+    env = ["env", "-i", *(f"{name}={value}" for name, value in environment.items())]
+    glue_command = [
+        *env, "/usr/bin/python3", str(CLIENTS / "rospy_glue.py"),
+        "/cmd_vel", "geometry_msgs/Twist", "--", "/odom", "nav_msgs/Odometry",
+    ]  # fmt: skip
+    async with program(*env, "/usr/bin/rosmaster", "--core", "-p", str(port)):
+        await listens(port)
+        async with emulated(rover) as bridge_port, talking(*glue_command) as glue:
+            assert json.loads(await answer(glue)) == {"ready": True}
+            async with connect(f"ws://127.0.0.1:{bridge_port}", compression=None) as ears:
+                await ears.send(json.dumps({"op": "subscribe", "topic": "/cmd_vel"}))
+                await ears.send(
+                    json.dumps({"op": "advertise", "topic": "/odom", "type": "nav_msgs/Odometry"})
+                )
+                topics = (Subscription("/odom", {"type": "nav_msgs/Odometry"}),)
+                transport = line(bridge_port, *topics)
+                await transport.open(3.0)
+                twist = {"linear": {"x": 0.25}, "angular": {"z": -0.5}}
+                kind = "geometry_msgs/Twist"
+                await transport.send(
+                    Envelope("publish", {"topic": "/cmd_vel", "type": kind}, twist)
+                )
+
+                said = json.loads(await asyncio.wait_for(ears.recv(), WAIT_S))
+                while said.get("topic") != "/cmd_vel":
+                    said = json.loads(await asyncio.wait_for(ears.recv(), WAIT_S))
+                assert glue.stdin is not None
+                glue.stdin.write(json.dumps(said).encode() + b"\n")
+                seen = await output(*env, "rostopic", "echo", "-p", "-n", "1", "/cmd_vel")
+                header, values = seen.split()[-2:]
+                row = dict(zip(header.split(","), values.split(","), strict=True))
+                assert (row["field.linear.x"], row["field.angular.z"]) == ("0.25", "-0.5")
+
+                odometry = "{pose: {pose: {position: {x: 1.5}}}}"
+                say = ["rostopic", "pub", "-r", "20", "/odom", "nav_msgs/Odometry", odometry]
+                async with program(*env, *say):
+                    told = json.loads(await answer(glue))
+                await ears.send(json.dumps({"op": "publish", **told}))
+                while True:  # the emulated robot has an odometry of its own
+                    message = await heard(transport)
+                    assert isinstance(message.body, dict)
+                    pose = message.body["pose"]["pose"]
+                    if pose["position"]["x"] == 1.5:
+                        break
+                assert pose["orientation"] == {"x": 0.0, "y": 0.0, "z": 0.0, "w": 0.0}
+                await transport.close()
+
+
+@asynccontextmanager
+async def talking(*command: str) -> AsyncIterator[asyncio.subprocess.Process]:
+    pipe = asyncio.subprocess.PIPE
+    process = await asyncio.create_subprocess_exec(*command, stdin=pipe, stdout=pipe)
+    try:
+        yield process
+    finally:
+        with suppress(ProcessLookupError):  # it has ended by itself
+            process.kill()
+        await process.wait()
+
+
+async def answer(process: asyncio.subprocess.Process) -> bytes:
+    assert process.stdout is not None
+    return await asyncio.wait_for(process.stdout.readline(), WAIT_S)
+
+
+async def output(*command: str) -> str:
+    """Run a program to its end and return what it printed."""
+    async with talking(*command) as process, asyncio.timeout(3 * WAIT_S):
+        assert process.stdout is not None
+        return (await process.stdout.read()).decode()
+
+
+async def run(*command: str) -> Any:
+    said = await output(*command)
+    assert said, f"{os.path.basename(command[1])} said nothing"
+    return json.loads(said.splitlines()[-1])

@@ -1,0 +1,144 @@
+"""`urc trust` against OpenSSH's server: shown, asked for, kept, and shown again when it changes."""
+
+import asyncio
+import os
+import pty
+import subprocess
+import sys
+from collections.abc import AsyncIterator
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+
+from tests.e2e.processes import ROOT
+from tests.e2e.transports.sshd import USER, Sshd, fingerprint_of, new_key
+
+pytestmark = [pytest.mark.anyio, pytest.mark.needs("sshd")]
+
+WAIT_S = 30.0
+PROFILE = r"""
+urc: 1
+kind: robot
+name: diver
+settings:
+  port: { type: port }
+  password: { type: string, secret: true }
+transports:
+  jump: { type: ssh, mode: forward, host: 127.0.0.1, port: "{{ settings.port }}", username: USER,
+          password: "{{ settings.password }}" }
+  console: { type: tcp, via: jump, host: 127.0.0.1, port: 1,
+             framing: { type: delimiter, tx: LF, rx: LF } }
+"""
+
+
+class Desk(NamedTuple):
+    """A person with a profile, and a server that it leads to."""
+
+    sshd: Sshd
+    profile: Path
+    data: Path
+
+    async def trusts(self, *words: str, answer: str = "") -> tuple[int, str]:
+        """Run ``urc trust``, at a terminal where there is an answer; return its code and words."""
+        command = [sys.executable, "-m", "urc.cli.main", "trust", str(self.profile)]
+        ours, theirs = pty.openpty()
+        try:
+            process = await asyncio.create_subprocess_exec(
+                *command, *words, "--set", f"port={self.sshd.port}",
+                cwd=ROOT,
+                env=os.environ | {"URC_DATA_DIR": str(self.data)},
+                stdin=theirs if answer else subprocess.DEVNULL,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.STDOUT,
+            )  # fmt: skip
+            os.write(ours, f"{answer}\n".encode())
+            async with asyncio.timeout(WAIT_S):
+                said, _ = await process.communicate()
+        finally:
+            os.close(ours)
+            os.close(theirs)
+        return process.returncode or 0, said.decode()
+
+    @property
+    def kept(self) -> str:
+        """What the file of trusted keys holds."""
+        file = self.data / "known_hosts"
+        return file.read_text("ascii") if file.exists() else ""
+
+
+@pytest.fixture
+async def desk(tmp_path: Path, tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[Desk]:
+    """Run a server for one test."""
+    folder = tmp_path_factory.mktemp("sshd")
+    sshd = Sshd(folder)
+    await sshd.start()
+    profile = tmp_path / "diver.yaml"
+    profile.write_text(PROFILE.replace("USER", USER), "utf-8")
+    yield Desk(sshd, profile, tmp_path / "data")
+    sshd.kill()
+
+
+async def test_key_is_kept_when_a_person_says_yes(desk: Desk) -> None:
+    """Nobody logs in for that, so no password is asked for; the second time nothing is asked."""
+    code, said = await desk.trusts(answer="no")
+    assert (code, desk.kept) == (1, "")
+    assert f"shows the host key {desk.sshd.fingerprint} (ssh-ed25519)" in said
+    assert "nothing is kept" in said
+
+    code, said = await desk.trusts("jump", answer="yes")
+    assert code == 0, said
+    public = desk.sshd.host_key.with_suffix(".pub").read_text("ascii").split()
+    assert desk.kept == f"[127.0.0.1]:{desk.sshd.port} {public[0]} {public[1]}\n"
+    assert (desk.data / "known_hosts").stat().st_mode & 0o777 == 0o600
+
+    code, said = await desk.trusts()
+    assert code == 0
+    assert "it is trusted already" in said
+    assert "Accepted" not in desk.sshd.said
+    assert "Failed password" not in desk.sshd.said
+
+
+async def test_script_must_name_the_fingerprint(desk: Desk, tmp_path: Path) -> None:
+    """Whatever the server shows is not good enough."""
+    code, said = await desk.trusts()
+    assert code == 2
+    assert "nobody can be asked here; --yes SHA256:… trusts that fingerprint" in said
+    other = fingerprint_of(new_key(tmp_path / "other"))
+    code, said = await desk.trusts("--yes", other)
+    assert code == 1
+    assert f"that is not the key that was to be trusted ({other}); nothing is kept" in said
+    assert desk.kept == ""
+    code, said = await desk.trusts("--yes", desk.sshd.fingerprint)
+    assert code == 0, said
+    assert desk.kept.count("\n") == 1
+
+
+async def test_changed_key_is_shown_with_the_old_one_and_takes_its_place(desk: Desk) -> None:
+    """One server has one key; those of others stay."""
+    before = desk.sshd.fingerprint
+    assert (await desk.trusts("--yes", before))[0] == 0
+    file = desk.data / "known_hosts"
+    elsewhere = desk.kept.replace("127.0.0.1", "10.0.0.9")
+    file.write_text(desk.kept + elsewhere, "ascii")
+    desk.sshd.kill()
+    desk.sshd.change_host_key()
+    await desk.sshd.start()
+    code, said = await desk.trusts(answer="no")
+    assert code == 1
+    assert f"it was {before} before" in said
+    assert f"shows the host key {desk.sshd.fingerprint}" in said
+    assert (await desk.trusts(answer="yes"))[0] == 0
+    assert elsewhere in desk.kept
+    assert desk.kept.count("\n") == 2
+
+
+async def test_wrong_use_is_told(desk: Desk) -> None:
+    """Names that are no ssh transport, and servers that are not there."""
+    code, said = await desk.trusts("console")
+    assert code == 2
+    assert "there is no ssh transport 'console'" in said
+    desk.sshd.kill()
+    code, said = await desk.trusts()
+    assert code == 1
+    assert "(connection refused)" in said

@@ -1,0 +1,94 @@
+"""What the guard asks of a line beyond its five members: how much is unsent, and to forget it.
+
+Both are optional. A line that has them tells the truth, and leaves nothing behind.
+"""
+
+import asyncio
+
+import pytest
+
+from tests.e2e.transports.peers.base import WAIT_S
+from tests.e2e.transports.test_contract import (
+    LATE_S,
+    OPEN_S,
+    class_of,
+    hears,
+    is_closed,
+    large,
+    robot,
+    within,
+)
+from urc.transports.base import Transport, TransportError
+
+pytestmark = pytest.mark.anyio
+
+COUNTED = ("tcp", "tcp with tls", "websocket", "telnet", "rosbridge", "mqtt", "ssh", "serial")
+"""Lines that must tell: a robot that moves over one of them may be cut off."""
+
+HELD_UP = tuple(kind for kind in COUNTED if class_of(kind).traits.pushes_back)
+"""Those on which a robot can hold up the sender."""
+
+
+def unsent_of(transport: Transport) -> int:
+    count = getattr(transport, "unsent", None)
+    assert count is not None, "it does not tell"
+    return int(count())
+
+
+async def settles(transport: Transport) -> None:
+    """Wait until nothing is unsent."""
+    async with asyncio.timeout(WAIT_S):
+        while unsent_of(transport):  # noqa: ASYNC110 - nobody tells when bytes have left
+            await asyncio.sleep(0.005)
+
+
+@pytest.mark.parametrize("kind", COUNTED)
+async def test_what_was_taken_is_not_unsent(kind: str) -> None:
+    """A line that works is clear again after a moment."""
+    async with robot(kind, "echo") as (peer, transport):
+        assert unsent_of(transport) == 0
+        await transport.open(OPEN_S)
+        for _ in range(3):
+            await within(WAIT_S, transport.send(peer.ask))
+            await hears(transport, peer.answer)
+            await settles(transport)
+        await transport.close()
+        assert unsent_of(transport) == 0
+
+
+@pytest.mark.parametrize("kind", HELD_UP)
+async def test_what_a_robot_does_not_take_is_unsent(kind: str) -> None:
+    """It stays so for as long as the robot does not take it, and `abort` forgets it at once."""
+    async with robot(kind, "deaf") as (peer, transport):
+        await transport.open(OPEN_S)
+
+        async def fill() -> None:
+            while True:
+                await transport.send(large(peer.ask))
+                await asyncio.sleep(0)
+
+        filling = asyncio.ensure_future(fill())
+        await asyncio.wait([filling], timeout=1.0)
+        filling.cancel()
+        await asyncio.gather(filling, return_exceptions=True)
+        assert unsent_of(transport) > 0
+        abort = getattr(transport, "abort", transport.close)
+        await within(LATE_S, abort())
+        assert unsent_of(transport) == 0
+
+
+@pytest.mark.parametrize("kind", COUNTED)
+async def test_aborted_line_is_closed_and_may_be_opened_again(kind: str) -> None:
+    """As after `close`, and it may be called twice."""
+    async with robot(kind, "echo") as (peer, transport):
+        abort = getattr(transport, "abort", transport.close)
+        await within(LATE_S, abort())
+        await transport.open(OPEN_S)
+        await within(LATE_S, abort())
+        await within(LATE_S, abort())
+        with pytest.raises(TransportError):
+            await within(LATE_S, transport.send(peer.ask))
+        await is_closed(transport, LATE_S)
+        await transport.open(OPEN_S)
+        await within(WAIT_S, transport.send(peer.ask))
+        await hears(transport, peer.answer)

@@ -1,0 +1,69 @@
+"""What stands below an SSH connection, over a line of the test's own."""
+
+import asyncio
+
+import pytest
+
+from urc.transports.ssh_wire import UNTAKEN_BYTES, Wire
+
+pytestmark = pytest.mark.anyio
+
+
+class Line(asyncio.Transport):
+    """Takes `kernel` bytes, and holds the rest."""
+
+    def __init__(self, kernel: float) -> None:
+        super().__init__()
+        self.kernel = kernel
+        self.held = 0
+        self.is_cut = False
+
+    def set_write_buffer_limits(self, high: int | None = None, low: int | None = None) -> None:
+        assert high == 0
+
+    def get_write_buffer_size(self) -> int:
+        return self.held
+
+    def write(self, data: object) -> None:
+        size = len(data)  # type: ignore[arg-type] # bytes
+        taken = min(self.kernel, size)
+        self.kernel -= taken
+        self.held += int(size - taken)
+
+    def abort(self) -> None:
+        self.is_cut = True
+
+
+class Polite(asyncio.Protocol):
+    """Answers everything with as much."""
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        assert isinstance(transport, Line)
+        self._line = transport
+
+    def data_received(self, data: bytes) -> None:
+        self._line.write(data)
+
+
+def asked(line: Line, times: int) -> Wire:
+    wire = Wire(Polite())
+    wire.connection_made(line)
+    for _ in range(times):
+        if not line.is_cut:
+            wire.passes(bytes(65536))
+    return wire
+
+
+async def test_answers_that_nobody_takes_end_the_line() -> None:
+    """They are not heaped up for as long as the server asks."""
+    wire = asked(line := Line(kernel=100_000), 1000)
+    assert line.is_cut
+    assert line.held <= UNTAKEN_BYTES + 65536
+    assert "takes none of the answers" in wire.fault
+
+
+async def test_answers_that_are_taken_do_not() -> None:
+    """However many there are."""
+    wire = asked(line := Line(kernel=float("inf")), 1000)
+    assert not line.is_cut
+    assert wire.fault == ""

@@ -1,0 +1,120 @@
+"""The options of http and websocket: what people read, and one line for whatever is wrong."""
+
+import pytest
+
+from urc.transports.base import Setup, Subscription, TransportError
+from urc.transports.http_streams import streams_of
+from urc.transports.table import TRANSPORTS
+
+ADDRESSES = [
+    ("http", "http://robot.local", "http http://robot.local:80/"),
+    ("http", "https://10.0.0.1/api?key=1", "http https://10.0.0.1:443/api?key=1"),
+    ("http", " http://[fe80::1]:81/x ", "http http://[fe80::1]:81/x"),
+    ("websocket", "ws://robot.local/control", "websocket ws://robot.local:80/control"),
+    ("websocket", "wss://robot.local", "websocket wss://robot.local:443/"),
+]
+
+URL = "a url such as http://192.168.4.1/, not"
+WRONG: list[tuple[str, dict[str, object], str]] = [
+    ("http", {}, f"http needs {URL} ''"),
+    ("http", {"url": "robot"}, f"http needs {URL} 'robot'"),
+    ("http", {"url": "ws://robot"}, f"http needs {URL} 'ws://robot'"),
+    ("http", {"url": "http://"}, f"http needs {URL} 'http://'"),
+    ("http", {"url": "http://a:99999"}, f"http needs {URL} 'http://a:99999'"),
+    ("http", {"url": "http://a:0"}, f"http needs {URL} 'http://a:0'"),
+    ("http", {"url": "http://a/#x"}, f"http needs {URL} 'http://a/#x'"),
+    ("http", {"url": "http://a b/"}, f"http needs {URL} 'http://a b/'"),
+    ("http", {"url": 5}, "http needs a text as url, not 5"),
+    (
+        "http",
+        {"url": "http://me:secret@robot"},
+        "http takes user and password under auth, not in the url",
+    ),
+    (
+        "websocket",
+        {"url": "http://a"},
+        "websocket needs a url such as ws://192.168.4.1/, not 'http://a'",
+    ),
+]
+
+BESIDE: list[tuple[dict[str, object], str]] = [
+    ({"tls": True}, "http was given tls, but its url says that it has none"),
+    ({"auth": "me"}, "http needs a mapping as auth, not 'me'"),
+    ({"auth": {"type": "magic"}}, "http needs basic, bearer or digest as type, not 'magic'"),
+    ({"auth": {"type": "bearer"}}, "http needs a token for auth of type bearer"),
+    ({"auth": {"type": "basic"}}, "http needs a user for auth of type basic"),
+    ({"headers": {"X Y": "z"}}, "http cannot send the header 'X Y' as it is"),
+    ({"headers": {"X": "a\nHost: b"}}, "http cannot send the header 'X' as it is"),
+    ({"headers": {"Host": "b"}}, "http sets the header Host itself"),
+    ({"max_body": 0}, "http needs max_body from 1 to 2.68435e+08, not 0"),
+    ({"in_flight": True}, "http needs a number as in_flight, not True"),
+    ({"answer_timeout": "soon"}, "http needs answer_timeout from 0.05s to 600s, not 'soon'"),
+    ({"answer_timeout": "20m"}, "http needs answer_timeout from 0.05s to 600s, not '20m'"),
+]
+
+
+@pytest.mark.parametrize(("kind", "url", "address"), ADDRESSES)
+def test_address_is_for_people(kind: str, url: str, address: str) -> None:
+    """With the port, also where it is the usual one."""
+    assert TRANSPORTS[kind].load()(Setup("web", {"url": url})).address == address
+
+
+@pytest.mark.parametrize(("kind", "options", "message"), WRONG)
+def test_unusable_url_is_one_line(kind: str, options: dict[str, object], message: str) -> None:
+    """Found when the transport is made, not when it is opened."""
+    with pytest.raises(TransportError) as told:
+        TRANSPORTS[kind].load()(Setup("web", options))
+    assert str(told.value) == message
+
+
+@pytest.mark.parametrize(("options", "message"), BESIDE)
+def test_unusable_options_are_one_line(options: dict[str, object], message: str) -> None:
+    """The value of a header, which may be a secret, is not shown."""
+    with pytest.raises(TransportError) as told:
+        TRANSPORTS["http"].load()(Setup("web", {"url": "http://robot", **options}))
+    assert str(told.value) == message
+
+
+def test_events_of_one_path_share_a_stream() -> None:
+    """Each path is asked for once, whoever listens to what of it."""
+    found = streams_of(
+        [
+            Subscription("/events#battery", {"stream": "sse"}),
+            Subscription("/events", {"stream": "sse"}),
+            Subscription("/cam", {"stream": "mjpeg"}),
+        ]
+    )
+    assert [(one.kind, one.path) for one in found] == [("sse", "/events"), ("mjpeg", "/cam")]
+    assert found[0].topics == {"/events#battery", "/events"}
+
+
+STREAMS: list[tuple[list[Subscription], str]] = [
+    (
+        [Subscription("/cam")],
+        "http needs mjpeg, stills, sse or lines as stream of '/cam', not None",
+    ),
+    (
+        [Subscription("/cam#x", {"stream": "mjpeg"})],
+        "http knows events by name in streams of sse only: '/cam#x'",
+    ),
+    (
+        [Subscription("/s", {"stream": "stills", "every": 0.001})],
+        "http needs every from 10ms to 1h for '/s', not 0.001",
+    ),
+    (
+        [Subscription("/s#a", {"stream": "sse"}), Subscription("/s", {"stream": "lines"})],
+        "http cannot listen to '/s' in two ways",
+    ),
+    (
+        [Subscription(f"/{n}", {"stream": "lines"}) for n in range(17)],
+        "http listens to at most 16 paths",
+    ),
+]
+
+
+@pytest.mark.parametrize(("subscriptions", "message"), STREAMS)
+def test_unusable_subscription_is_one_line(subscriptions: list[Subscription], message: str) -> None:
+    """Found when the transport is made."""
+    with pytest.raises(TransportError) as told:
+        streams_of(subscriptions)
+    assert str(told.value) == message

@@ -1,0 +1,118 @@
+"""`urc trust`: the host key of an SSH server, shown to a person and kept when that is right."""
+
+import argparse
+import sys
+from typing import TYPE_CHECKING
+
+from urc.cli.arguments import add_profile, load, what_it_has
+from urc.cli.failures import Misuse
+from urc.problems import UrcError
+
+if TYPE_CHECKING:
+    from urc.model.profile import Profile
+    from urc.model.values import Value
+    from urc.transports.ssh import SshTransport
+    from urc.transports.ssh_dial import Offer
+
+EXAMPLE = "urc trust my-robot.yaml --set host=192.168.1.20"
+
+_NOT_ASKED_FOR = "-"
+"""Stands for a password: nobody logs in to look at a key."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the profile, the transport, and the answer."""
+    add_profile(parser)
+    parser.add_argument(
+        "transport", metavar="TRANSPORT", nargs="?", help="an ssh transport, if there are several"
+    )
+    parser.add_argument("--yes", metavar="SHA256:…", help="trust this fingerprint, and ask nothing")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Show the key and keep it when a person says so; 1 when it is not kept."""
+    from urc.cli.running import run_loop
+
+    profile = load(arguments.profile)
+    name = _transport(profile, arguments.transport)
+    line = _line(profile, name, _settings(profile, name, arguments))
+    if line.target.keys.is_pinned:
+        raise Misuse(f"transports.{name}: host_key in the document says which key is right")
+    offers: list[Offer] = []
+
+    async def look() -> int:
+        offers.append(await line.look_at_key(profile.driver.transports[name].timeouts.connect_s))
+        return 0
+
+    code = run_loop(look())
+    return _decide(line, offers[0], arguments.yes) if offers else code
+
+
+def _transport(profile: "Profile", named: str | None) -> str:
+    """Return the transport that is meant."""
+    choices = [name for name, spec in profile.driver.transports.items() if spec.type == "ssh"]
+    if not choices:
+        raise Misuse(f"{profile.name} has no ssh transport: nothing to trust")
+    if named is None and len(choices) == 1:
+        return choices[0]
+    if named is None:
+        raise Misuse(f"{profile.name} has several ssh transports; name one: {', '.join(choices)}")
+    if named not in choices:
+        raise Misuse(f"there is no ssh transport {named!r}; {what_it_has(named, choices)}")
+    return named
+
+
+def _settings(profile: "Profile", name: str, arguments: argparse.Namespace) -> dict[str, "Value"]:
+    """Return the settings; where nobody logs in on the way, secrets may be left out."""
+    from urc.cli.settings import settings_given
+
+    ((values, missing),) = settings_given([profile], arguments)
+    if not profile.driver.transports[name].via:
+        values |= {one: _NOT_ASKED_FOR for one in missing if profile.settings[one].is_secret}
+    missing = tuple(one for one in missing if one not in values)
+    if missing:
+        words = " ".join(f"--set {one}=…" for one in missing)
+        raise Misuse(f"{profile.name} needs {', '.join(missing)}: add {words}")
+    return values
+
+
+def _line(profile: "Profile", name: str, settings: dict[str, "Value"]) -> "SshTransport":
+    from urc.runtime.catalog import built_in_catalog
+    from urc.runtime.lines import make_transports
+    from urc.transports.ssh import SshTransport
+
+    line = make_transports(profile.driver, settings, built_in_catalog().transports)[name]
+    if not isinstance(line, SshTransport):
+        raise UrcError(f"transports.{name}: another package's ssh has no keys that URC can keep")
+    return line
+
+
+def _decide(line: "SshTransport", offer: "Offer", yes: str | None) -> int:
+    from urc.transports.known_hosts import remember
+
+    address = line.target.address
+    print(f"{address.text} shows the host key {offer.fingerprint} ({offer.algorithm})")
+    if not offer.expected:
+        print("it is trusted already")
+        return 0
+    if offer.expected == "revoked":
+        raise UrcError("this key is revoked in the known-hosts file, and cannot be trusted")
+    if offer.expected != "unknown":
+        print(f"it was {offer.expected} before: the robot was set up anew, or somebody listens in")
+    if yes is None and not _is_confirmed():
+        print("nothing is kept")
+        return 1
+    if yes is not None and yes.rstrip("=") != offer.fingerprint:
+        raise UrcError(f"that is not the key that was to be trusted ({yes}); nothing is kept")
+    file = remember(address.host, address.port, offer.key)
+    print(f"trusted from now on, by {file}")
+    return 0
+
+
+def _is_confirmed() -> bool:
+    if not sys.stdin.isatty():
+        raise Misuse("nobody can be asked here; --yes SHA256:… trusts that fingerprint")
+    try:
+        return input("Is that the robot's own key? Type yes: ").strip().lower() == "yes"
+    except EOFError:
+        return False

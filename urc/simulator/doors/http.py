@@ -1,0 +1,323 @@
+"""The emulated robot behind a web server: requests, and streams of pictures, events and lines.
+
+Requests go to the robot's rules as envelopes. What the driver listens to is served as a stream by
+its path: what the robot says on that topic or, for a camera, a picture of one wandering colour.
+"""
+
+import asyncio
+import http.client
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+from urllib.parse import parse_qsl, unquote, urlsplit
+
+import h11
+import msgspec
+
+from urc.model.codec import Envelope, Payload
+from urc.problems import UrcError
+from urc.simulator.doors.base import (
+    READ_BYTES,
+    TAKEN_WITHIN_S,
+    Crowd,
+    Guest,
+    Listening,
+    Place,
+    converse,
+    keep_alive,
+    reason,
+    shown_place,
+)
+from urc.simulator.doors.http_guard import Guard
+from urc.simulator.doors.http_picture import picture
+from urc.simulator.twin import TwinLine
+
+__all__ = ["HttpDoor", "listen_url"]
+
+MAX_BODY_BYTES = 1_048_576
+PICTURE_EVERY_S = 0.1
+_BOUNDARY = "picture"
+_OURS = ("content-length", "transfer-encoding", "connection")
+_TYPES = {
+    "mjpeg": f"multipart/x-mixed-replace;boundary={_BOUNDARY}",
+    "sse": "text/event-stream",
+    "lines": "text/plain; charset=utf-8",
+}
+
+
+class Asked(NamedTuple):
+    """One request of a client."""
+
+    method: str
+    target: str
+    """As it was sent."""
+    path: str
+    """Below the path of the driver's URL, decoded, without the query."""
+    headers: Mapping[str, str]
+    body: bytes
+
+    @property
+    def ways(self) -> list[Envelope]:
+        """The request as a driver may have written it: with a query, or with all in the path."""
+        query = urlsplit(self.target).query
+        attributes: dict[str, object] = {"method": self.method, "path": self.path}
+        attributes["headers"] = self.headers
+        if not query:
+            return [Envelope("request", attributes, self.body)]
+        pairs = {"query": dict(parse_qsl(query, keep_blank_values=True))}
+        whole = {"path": f"{self.path}?{unquote(query)}"}
+        return [Envelope("request", {**attributes, **one}, self.body) for one in (pairs, whole)]
+
+
+class HttpDoor:
+    """One listening port and whoever came in through it."""
+
+    def __init__(self, place: Place) -> None:
+        """Prepare the door; `open` listens."""
+        self._place = place
+        self._crowd = Crowd(place)
+        self._server: asyncio.Server | None = None
+        self._base = ""
+        self._guard = Guard(place.options.get("auth"))
+
+    async def open(self) -> Listening:
+        """Listen on the port of the option `url`, or on any."""
+        place = self._place
+        port, path = listen_url(place, "http")
+        self._base = path.rstrip("/")
+        try:
+            self._server = await asyncio.start_server(
+                self._let_in, place.host, port, limit=READ_BYTES
+            )
+        except OSError as fault:
+            where = shown_place(place.host, port)
+            message = f"transports.{place.name}: cannot listen on {where} ({reason(fault)})"
+            raise UrcError(message) from fault
+        host, port = self._server.sockets[0].getsockname()[:2]
+        url = f"http://{shown_place(host, port)}{path}"
+        return Listening(host, port, f"http {url}", {"url": url, "tls": None})
+
+    async def close(self) -> None:
+        """Stop listening and cut every connection."""
+        if self._server is None:
+            return
+        self._server.close()
+        await self._crowd.close()
+        await self._server.wait_closed()
+
+    def _let_in(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        keep_alive(writer.get_extra_info("socket"))
+        writer.transport.set_write_buffer_limits(high=READ_BYTES)
+        talk = _Talk(self._place, self._guard, self._base, reader, writer)
+        self._crowd.welcome(talk.run, writer.transport.abort)
+
+
+def listen_url(place: Place, scheme: str) -> tuple[int, str]:
+    """Return the port and path of the option `url`; port 0 lets the system choose.
+
+    Raises:
+        UrcError: it is no URL that can be listened on.
+    """
+    url = str(place.options.get("url"))
+    try:
+        parts = urlsplit(url)
+        port = 80 if parts.port is None else parts.port
+    except ValueError as fault:
+        raise UrcError(f"transports.{place.name}.url: {url!r} is no url to listen on") from fault
+    if place.is_anywhere:
+        return 0, parts.path or "/"
+    if parts.scheme != scheme:
+        message = f"transports.{place.name}.url: {scheme} can be emulated, not {parts.scheme!r}"
+        raise UrcError(message)
+    return port, parts.path or "/"
+
+
+class _Talk:
+    """One connection: requests one after the other, the last of which may be a stream."""
+
+    def __init__(
+        self,
+        place: Place,
+        guard: Guard,
+        base: str,
+        reader: asyncio.StreamReader,
+        writer: asyncio.StreamWriter,
+    ) -> None:
+        self._place = place
+        self._guard = guard
+        self._base = base
+        self._reader = reader
+        self._writer = writer
+        self._http = h11.Connection(h11.SERVER)
+
+    async def run(self, guest: Guest) -> None:
+        try:
+            while (asked := await self._next(guest)) is not None:
+                await self._serve(guest, asked)
+                if self._http.our_state is not h11.DONE:
+                    break
+                self._http.start_next_cycle()
+        except h11.RemoteProtocolError as fault:
+            await self._refuse(fault)
+        self._writer.close()
+        async with asyncio.timeout(TAKEN_WITHIN_S):
+            await self._writer.wait_closed()
+
+    async def _next(self, guest: Guest) -> Asked | None:
+        """Return the next request, None at the end of the connection."""
+        head: h11.Request | None = None
+        body = bytearray()
+        while True:
+            event = self._http.next_event()
+            if event is h11.NEED_DATA:
+                if self._http.they_are_waiting_for_100_continue:
+                    await self._say(h11.InformationalResponse(status_code=100, headers=[]))
+                self._http.receive_data(await self._reader.read(READ_BYTES))
+                guest.heard_s = asyncio.get_running_loop().time()
+            elif isinstance(event, h11.Request):
+                head = event
+            elif isinstance(event, h11.Data):
+                body += event.data
+                if len(body) > MAX_BODY_BYTES:
+                    raise h11.RemoteProtocolError("too long", error_status_hint=413)
+            elif isinstance(event, h11.EndOfMessage) and head is not None:
+                return self._asked(head, bytes(body))
+            else:
+                return None
+
+    def _asked(self, head: h11.Request, body: bytes) -> Asked:
+        target = head.target.decode("ascii", "replace")
+        path = unquote(urlsplit(target).path).removeprefix(self._base) or "/"
+        headers = {name.decode(): value.decode("latin-1") for name, value in head.headers}
+        return Asked(head.method.decode(), target, path, headers, body)
+
+    async def _serve(self, guest: Guest, asked: Asked) -> None:
+        given = asked.headers.get("authorization", "")
+        challenge = self._guard.challenge(asked.method, asked.target, given)
+        if challenge is not None:
+            await self._answer(401, [("WWW-Authenticate", challenge)], b"who are you?\n", asked)
+            return
+        kind = self._kind(asked)
+        if kind == "stills":
+            taken = picture(self._place.now())
+            await self._answer(200, [("Content-Type", "image/jpeg")], taken, asked)
+        elif kind:
+            await self._stream(guest, asked, kind)
+        else:
+            await self._answer(*_written(self._asks(guest.line, asked)), asked)
+
+    def _asks(self, line: TwinLine, asked: Asked) -> Envelope:
+        """Return the robot's answer; one that it takes without a word is answered as well."""
+        for envelope in asked.ways:
+            before = line.faults
+            for one in line.receive(envelope, self._place.now()):
+                if isinstance(one, Envelope) and one.verb == "response":
+                    return one
+            if line.faults == before:
+                return Envelope("response", {"ok": True, "status": 200})
+        reason = f"{line.last_fault}\n"
+        return Envelope("response", {"ok": False, "status": 404, "reason": reason})
+
+    def _kind(self, asked: Asked) -> str:
+        """Return how the driver listens to that path, "" when it does not."""
+        if asked.method != "GET":
+            return ""
+        ways = self._place.topics.items()
+        target = asked.target.removeprefix(self._base)
+        names = (asked.path, target)
+        kinds = [how.get("stream") for topic, how in ways if topic.partition("#")[0] in names]
+        return str(kinds[0]) if kinds else ""
+
+    async def _answer(
+        self, status: int, headers: Sequence[tuple[str, str]], body: bytes, asked: Asked
+    ) -> None:
+        given = {name.lower() for name, _ in headers}
+        sent = (
+            [*headers, ("Content-Length", str(len(body)))]
+            if "content-length" not in given
+            else [*headers]
+        )
+        if self._place.spec.connection == "per_request":
+            sent.append(("Connection", "close"))
+        reason = http.client.responses.get(status, "")
+        await self._say(h11.Response(status_code=status, headers=sent, reason=reason.encode()))
+        if body and asked.method != "HEAD":
+            await self._say(h11.Data(data=body))
+        await self._say(h11.EndOfMessage())
+
+    async def _stream(self, guest: Guest, asked: Asked, kind: str) -> None:
+        """Send what the robot says on a topic, until the client goes."""
+        headers = [("Content-Type", _TYPES[kind]), ("Cache-Control", "no-store")]
+        await self._say(h11.Response(status_code=200, headers=headers))
+        if kind == "mjpeg":
+            await self._pictures()
+            return
+        path = asked.path
+
+        async def put(said: Sequence[Payload]) -> None:
+            for one in said:
+                if isinstance(one, Envelope) and one.verb == "message":
+                    topic, _, event = str(one.attributes.get("topic")).partition("#")
+                    if topic == path:
+                        await self._say(h11.Data(data=_piece(kind, event, _bytes(one.body))))
+
+        await converse(self._place, guest, self._gone, put)
+
+    async def _pictures(self) -> None:
+        gone = asyncio.ensure_future(self._gone())
+        try:
+            while not gone.done():
+                taken = picture(self._place.now())
+                head = f"--{_BOUNDARY}\r\nContent-Type: image/jpeg\r\nContent-Length: {len(taken)}"
+                await self._say(h11.Data(data=f"{head}\r\n\r\n".encode() + taken + b"\r\n"))
+                await asyncio.wait([gone], timeout=PICTURE_EVERY_S)
+        finally:
+            gone.cancel()
+
+    async def _gone(self) -> None:
+        """Wait until the client closes; what it says meanwhile is nobody's."""
+        while await self._reader.read(READ_BYTES):
+            pass
+
+    async def _say(self, event: h11.Event) -> None:
+        data = self._http.send(event)
+        if data:
+            self._writer.write(data)
+            async with asyncio.timeout(TAKEN_WITHIN_S):
+                await self._writer.drain()
+
+    async def _refuse(self, fault: h11.RemoteProtocolError) -> None:
+        """Tell a client that does not speak HTTP, if it can still be told."""
+        if self._http.our_state in (h11.IDLE, h11.SEND_RESPONSE):
+            headers = [("Content-Length", "0"), ("Connection", "close")]
+            await self._say(h11.Response(status_code=fault.error_status_hint, headers=headers))
+            await self._say(h11.EndOfMessage())
+
+
+def _written(answer: Envelope) -> tuple[int, list[tuple[str, str]], bytes]:
+    """Return status, headers and body of the robot's answer."""
+    attributes, body = answer.attributes, answer.body
+    is_ok = bool(attributes.get("ok", True))
+    status = attributes.get("status")
+    found = attributes.get("headers")
+    headers = [(str(k), str(v)) for k, v in found.items()] if isinstance(found, Mapping) else []
+    if not is_ok and body is None:
+        body = str(attributes.get("reason") or "refused").encode()
+    if not any(name.lower() == "content-type" for name, _ in headers):
+        kind = "text/plain; charset=utf-8" if isinstance(body, bytes | None) else "application/json"
+        headers.append(("Content-Type", kind))
+    plain = status if isinstance(status, int) and 200 <= status <= 599 else (200 if is_ok else 500)
+    return plain, headers, _bytes(body)
+
+
+def _bytes(body: object) -> bytes:
+    if isinstance(body, bytes):
+        return body
+    return b"" if body is None else msgspec.json.encode(body)
+
+
+def _piece(kind: str, event: str, body: bytes) -> bytes:
+    """Return a message as it goes into an event stream, or as a line."""
+    if kind == "lines":
+        return body.replace(b"\n", b" ") + b"\n"
+    name = [b"event: " + event.encode()] if event else []
+    return b"\n".join([*name, *(b"data: " + line for line in body.splitlines()), b"", b""])

@@ -1,0 +1,364 @@
+"""What a rosbridge server does with the operations of its clients, without any connection.
+
+Topics are passed on between clients as the real bridge does, a client's own included. What a client
+publishes, calls or starts also goes to the emulated robot, and what that says goes to the client.
+As with the real bridge, nearly all errors are silence; only a failed call answers.
+"""
+
+import base64
+import struct
+import zlib
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any, NamedTuple
+
+import msgspec
+
+from urc.model.codec import Envelope, Payload
+
+__all__ = ["Desk", "Seat"]
+
+MAX_TOPICS = 512
+"""Topics, services and subscriptions that one client may name."""
+_ENDS = {True: 4, False: 6}
+"""Of an action: succeeded or aborted."""
+
+_decode = msgspec.json.Decoder().decode
+_encode = msgspec.json.Encoder().encode
+
+
+class _Wanted(NamedTuple):
+    """One client's subscription to one topic."""
+
+    throttle_s: float
+    compression: str
+    fragment_bytes: int
+
+
+class Desk:
+    """What the clients of one bridge share."""
+
+    def __init__(self, declared: Mapping[str, str]) -> None:
+        """Start with the robot's own topics: name → type, "" where it is not known."""
+        self.types = dict(declared)
+        self.seats: list[Seat] = []
+        self.servers: dict[str, Seat] = {}
+        """Service → the client that offers it."""
+        self.asked: dict[str, tuple[Seat, object]] = {}
+        """Id of a call passed on → who asked, and under which id."""
+        self._count = 0
+
+    def passed_on(self, service: str, seat: "Seat", number: object, args: object) -> None:
+        """Let the client that offers a service answer another one's call."""
+        self._count += 1
+        key = f"call_service:{service}:{self._count}"
+        while len(self.asked) >= MAX_TOPICS:
+            del self.asked[next(iter(self.asked))]
+        self.asked[key] = seat, number
+        self.servers[service].write(
+            {"op": "call_service", "id": key, "service": service, "args": args}
+        )
+
+    def publish(self, topic: str, message: object, now_s: float) -> None:
+        """Give a message to every client that listens."""
+        for seat in self.seats:
+            seat.show(topic, message, now_s)
+
+
+class Seat:
+    """One client at the desk."""
+
+    def __init__(self, desk: Desk, send: Callable[[str | bytes], None]) -> None:
+        """Join `desk`; `send` takes one frame, text or binary."""
+        self._desk = desk
+        self._send = send
+        self._wanted: dict[str, _Wanted] = {}
+        self._shown_s: dict[str, float] = {}
+        self._calls: dict[object, str] = {}
+        """Id of an unanswered call → its service."""
+        self._goals: dict[object, str] = {}
+        """Id of a running goal → its action."""
+        self._fragments = 0
+        desk.seats.append(self)
+
+    def leave(self) -> None:
+        """Be gone, with everything that was offered."""
+        desk = self._desk
+        desk.seats.remove(self)
+        desk.servers = {name: seat for name, seat in desk.servers.items() if seat is not self}
+        desk.asked = {key: who for key, who in desk.asked.items() if who[0] is not self}
+
+    def hears(self, text: str | bytes, now_s: float) -> Envelope | None:
+        """Take one frame of the client; return what the emulated robot is to be told of it."""
+        try:
+            operation = _decode(text)
+        except (msgspec.DecodeError, UnicodeDecodeError):
+            return None  # as the real one: nothing tells the client
+        if not isinstance(operation, dict):
+            return None
+        work = _WORK.get(str(operation.get("op")))
+        return None if work is None else work(self, operation, now_s)
+
+    def says(self, payload: Payload, now_s: float) -> None:
+        """Tell the client what the emulated robot said."""
+        if not isinstance(payload, Envelope):
+            return
+        payload = payload._replace(body=_fields(payload.body))
+        number, body = payload.attributes.get("id"), payload.body
+        match payload.verb:
+            case "message":
+                topic = str(payload.attributes.get("topic"))
+                self._desk.types.setdefault(topic, "")
+                self.show(topic, body, now_s)
+            case "feedback" if number in self._goals:
+                self._feedback(number, body)
+            case "response" if number in self._calls:
+                self._respond(self._calls.pop(number), number, payload)
+            case "response" if number in self._goals:
+                self._finish(self._goals.pop(number), number, payload)
+
+    def refuses(self, asked: Envelope) -> None:
+        """Tell that the emulated robot knows nothing of what was asked for."""
+        number = asked.attributes.get("id")
+        if number in self._calls:
+            service = self._calls.pop(number)
+            self.answer(service, number, f"Service {service} does not exist", False)
+        elif number in self._goals:
+            reason = {"reason": "no such action"}
+            self._finish(
+                self._goals.pop(number), number, Envelope("response", {"ok": False}, reason)
+            )
+
+    def show(self, topic: str, message: object, now_s: float) -> None:
+        """Give a message to the client if it listens, and not more often than it wants."""
+        wanted = self._wanted.get(topic)
+        if wanted is None:
+            return
+        if now_s < self._shown_s.get(topic, float("-inf")) + wanted.throttle_s:
+            return
+        self._shown_s[topic] = now_s
+        operation = {"op": "publish", "topic": topic, "msg": message}
+        if wanted.compression == "cbor":
+            import cbor2  # only where a client asks for it
+
+            self._send(cbor2.dumps(operation))
+        elif wanted.compression == "png":
+            self.write({"op": "png", "data": _png(_encode(operation))})
+        elif wanted.fragment_bytes:
+            self._write_pieces(_encode(operation).decode(), wanted.fragment_bytes)
+        else:
+            self.write(operation)
+
+    def write(self, operation: Mapping[str, object]) -> None:
+        """Send one operation as text."""
+        self._send(_encode(operation).decode())
+
+    def _write_pieces(self, text: str, size: int) -> None:
+        self._fragments += 1
+        pieces = [text[start : start + size] for start in range(0, len(text), size)]
+        for number, piece in enumerate(pieces):
+            self.write(
+                {
+                    "op": "fragment",
+                    "id": str(self._fragments),
+                    "data": piece,
+                    "num": number,
+                    "total": len(pieces),
+                }
+            )
+
+    # -- what the robot answers
+
+    def answer(self, service: str, number: object, values: object, is_ok: bool) -> None:
+        """Answer a call of this client."""
+        operation = {"op": "service_response", "service": service, "values": values}
+        if number is not None:
+            operation["id"] = number
+        self.write({**operation, "result": is_ok})
+
+    def _respond(self, service: str, number: object, said: Envelope) -> None:
+        is_ok = said.attributes.get("ok") is not False
+        values = said.body if is_ok else said.attributes.get("reason") or said.body
+        self.answer(service, number, {} if values is None else values, is_ok)
+
+    def _feedback(self, number: object, body: object) -> None:
+        action = self._goals[number]
+        self.write({"op": "action_feedback", "id": number, "action": action, "values": body})
+
+    def _finish(self, action: str, number: object, said: Envelope) -> None:
+        is_ok = said.attributes.get("ok") is not False
+        self.write(
+            {
+                "op": "action_result",
+                "id": number,
+                "action": action,
+                "values": {} if said.body is None else said.body,
+                "status": _ENDS[is_ok],
+                "result": is_ok,
+            }
+        )
+
+    # -- the client's operations
+
+    def subscribe(self, operation: Mapping[str, Any], now_s: float) -> None:
+        """A second subscription to a topic takes the first one's place, throttle and all."""
+        topic = _text(operation, "topic")
+        if not topic or len(self._wanted) >= MAX_TOPICS:
+            return
+        self._learn(topic, operation)
+        throttle_ms, fragment = operation.get("throttle_rate"), operation.get("fragment_size")
+        self._wanted[topic] = _Wanted(
+            max(0, throttle_ms) / 1000 if isinstance(throttle_ms, int | float) else 0.0,
+            str(operation.get("compression") or "none"),
+            max(0, fragment) if isinstance(fragment, int) else 0,
+        )
+
+    def unsubscribe(self, operation: Mapping[str, Any], now_s: float) -> None:
+        """Forget a subscription."""
+        self._wanted.pop(_text(operation, "topic"), None)
+
+    def advertise(self, operation: Mapping[str, Any], now_s: float) -> None:
+        """Take note of the type of a topic."""
+        self._learn(_text(operation, "topic"), operation)
+
+    def publish(self, operation: Mapping[str, Any], now_s: float) -> Envelope | None:
+        """Give a message to all who listen, and to the robot; without a known type to nobody."""
+        topic, message = _text(operation, "topic"), operation.get("msg")
+        if topic not in self._desk.types or not isinstance(message, dict):
+            return None
+        self._desk.publish(topic, message, now_s)
+        kind = self._desk.types[topic]
+        attributes = {"topic": topic, "type": kind} if kind else {"topic": topic}
+        return Envelope("publish", attributes, message)
+
+    def call(self, operation: Mapping[str, Any], now_s: float) -> Envelope | None:
+        """Answer a call of rosapi, or give it to the client or robot that offers the service."""
+        service, number = _text(operation, "service"), operation.get("id")
+        args = operation.get("args")
+        args = {} if args is None else args
+        known = self._rosapi(service, args)
+        if known is not None:
+            self.answer(service, number, known, True)
+        elif service in self._desk.servers:
+            self._desk.passed_on(service, self, number, args)
+        else:
+            self._keep(self._calls, number, service)
+            attributes = {"service": service, "id": number}
+            return Envelope("call", attributes, args)
+        return None
+
+    def offer(self, operation: Mapping[str, Any], now_s: float) -> None:
+        """Let this client answer the calls of a service."""
+        if len(self._desk.servers) < MAX_TOPICS:
+            self._desk.servers[_text(operation, "service")] = self
+
+    def withdraw(self, operation: Mapping[str, Any], now_s: float) -> None:
+        """Offer a service no longer."""
+        name = _text(operation, "service")
+        if self._desk.servers.get(name) is self:
+            del self._desk.servers[name]
+
+    def respond(self, operation: Mapping[str, Any], now_s: float) -> None:
+        """Pass an answer on to the client that asked."""
+        asked = self._desk.asked.pop(str(operation.get("id")), None)
+        if asked is not None:
+            seat, number = asked
+            values = operation.get("values")
+            is_ok = operation.get("result") is not False
+            seat.answer(_text(operation, "service"), number, values, is_ok)
+
+    def start(self, operation: Mapping[str, Any], now_s: float) -> Envelope:
+        """Give a goal to the robot."""
+        action, number = _text(operation, "action"), operation.get("id")
+        self._keep(self._goals, number, action)
+        attributes = {
+            "action": action,
+            "type": _text(operation, "action_type"),
+            "feedback": operation.get("feedback") is True,
+            "id": number,
+        }
+        return Envelope("goal", attributes, operation.get("args") or {})
+
+    def cancel(self, operation: Mapping[str, Any], now_s: float) -> Envelope:
+        """Cancel a goal."""
+        attributes = {"action": _text(operation, "action"), "id": operation.get("id")}
+        return Envelope("cancel", attributes)
+
+    def _learn(self, topic: str, operation: Mapping[str, Any]) -> None:
+        kind = _text(operation, "type")
+        if topic and kind and len(self._desk.types) < MAX_TOPICS:
+            self._desk.types[topic] = self._desk.types.get(topic) or kind
+
+    def _keep(self, table: dict[object, str], number: object, name: str) -> None:
+        if not isinstance(number, str | int):
+            return  # nobody could tell the answers apart
+        while len(table) >= MAX_TOPICS:
+            del table[next(iter(table))]
+        table[number] = name
+
+    def _rosapi(self, service: str, args: object) -> dict[str, object] | None:
+        """Return what the real bridge's companion node says, or None when it is not asked."""
+        folder, _, question = service.rpartition("/")
+        if folder not in ("/rosapi", "rosapi"):
+            return None
+        given = args if isinstance(args, dict) else {}
+        types = dict(sorted(self._desk.types.items()))
+        match question:
+            case "topics":
+                return {"topics": list(types), "types": list(types.values())}
+            case "topic_type":
+                return {"type": types.get(str(given.get("topic")), "")}
+            case "topics_for_type":
+                kind = given.get("type")
+                return {"topics": [name for name, known in types.items() if known == kind]}
+            case "services":
+                return {"services": sorted(self._desk.servers)}
+        return None
+
+
+_Work = Callable[[Seat, Mapping[str, Any], float], Envelope | None]
+_WORK: Mapping[str, _Work] = {
+    "subscribe": Seat.subscribe,
+    "unsubscribe": Seat.unsubscribe,
+    "advertise": Seat.advertise,
+    "publish": Seat.publish,
+    "call_service": Seat.call,
+    "advertise_service": Seat.offer,
+    "unadvertise_service": Seat.withdraw,
+    "service_response": Seat.respond,
+    "send_action_goal": Seat.start,
+    "cancel_action_goal": Seat.cancel,
+}
+
+
+def _text(operation: Mapping[str, Any], name: str) -> str:
+    value = operation.get(name)
+    return value if isinstance(value, str) else ""
+
+
+def _fields(body: object) -> object:
+    """Return a body as an object: the emulated robot may have it as JSON text."""
+    if not isinstance(body, bytes):
+        return body
+    try:
+        return _decode(body) if body.strip() else {}
+    except (msgspec.DecodeError, UnicodeDecodeError):
+        return {"data": body}
+
+
+def _png(data: bytes) -> str:
+    """Return `data` as the pixels of a square 8-bit RGB image, padded with newlines, in base64."""
+    side = max(1, round((len(data) / 3) ** 0.5))
+    height = -(-len(data) // (side * 3))
+    padded = data.ljust(side * height * 3, b"\n")
+    stride = side * 3
+    rows = b"".join(b"\0" + padded[at : at + stride] for at in range(0, len(padded), stride))
+    chunks: Iterable[tuple[bytes, bytes]] = (
+        (b"IHDR", struct.pack(">IIBBBBB", side, height, 8, 2, 0, 0, 0)),
+        (b"IDAT", zlib.compress(rows)),
+        (b"IEND", b""),
+    )
+    image = b"\x89PNG\r\n\x1a\n" + b"".join(
+        struct.pack(">I", len(body)) + kind + body + struct.pack(">I", zlib.crc32(kind + body))
+        for kind, body in chunks
+    )
+    return base64.b64encode(image).decode()

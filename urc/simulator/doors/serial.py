@@ -1,0 +1,196 @@
+"""The emulated robot behind a pseudo-terminal, which programs open as any serial port.
+
+Its name is the system's. Where the profile names a file that is not there, a link of that name
+leads to it, so that the profile works as it is; names in ``/dev`` are left to the system. A profile
+that says ``socket://HOST:PORT`` gets a TCP port.
+"""
+
+import asyncio
+import errno
+import os
+import sys
+from collections.abc import Sequence
+from contextlib import suppress
+from pathlib import Path
+
+from urc.model.codec import Payload
+from urc.problems import UrcError
+from urc.simulator.doors.base import (
+    READ_BYTES,
+    Crowd,
+    Door,
+    Guest,
+    Listening,
+    Place,
+    converse,
+    reason,
+)
+from urc.simulator.doors.tcp import TcpDoor
+
+__all__ = ["SerialDoor"]
+
+_LOOK_S = 0.02
+"""How often a closed pseudo-terminal is looked at: the system does not tell that it was opened."""
+
+
+class SerialDoor:
+    """One port, with at most one client, as a wire has."""
+
+    def __init__(self, place: Place) -> None:
+        """Prepare the door; `open` makes the port."""
+        port = str(place.options.get("port") or "")
+        is_address = "://" in port and not (place.is_anywhere and port.startswith("rfc2217:"))
+        self._door: Door = _SocketDoor(place, port) if is_address else _PtyDoor(place, port)
+
+    async def open(self) -> Listening:
+        """Make the port."""
+        return await self._door.open()
+
+    async def close(self) -> None:
+        """Unplug it."""
+        await self._door.close()
+
+
+class _PtyDoor:
+    def __init__(self, place: Place, port: str) -> None:
+        self._place = place
+        self._port = port
+        self._crowd = Crowd(place, limit=1)
+        self._wire = -1
+        self._link: Path | None = None
+        self._watch: asyncio.Task[None] | None = None
+
+    async def open(self) -> Listening:
+        if sys.platform == "win32":
+            raise UrcError(f"transports.{self._place.name}: this system has no pseudo-terminals")
+        import pty
+        import tty
+
+        self._wire, client = pty.openpty()
+        tty.setraw(client)
+        path = os.ttyname(client)
+        os.close(client)  # from now on reading fails for as long as nobody has it open
+        os.set_blocking(self._wire, False)
+        text = f"serial {path}"
+        if self._needs_link():
+            self._link = Path(self._port)
+            try:
+                self._link.symlink_to(path)
+            except OSError as fault:
+                message = f"cannot make {self._port} ({reason(fault)})"
+                await self.close()
+                raise UrcError(f"transports.{self._place.name}: {message}") from fault
+            text += f", as {self._port}"
+        self._watch = asyncio.create_task(self._await_clients())
+        return Listening("", 0, text, {"port": path}, path)
+
+    async def close(self) -> None:
+        if self._watch is not None:
+            self._watch.cancel()
+            await asyncio.gather(self._watch, return_exceptions=True)
+        await self._crowd.close()
+        if self._link is not None:
+            with suppress(OSError):
+                self._link.unlink()
+        if self._wire >= 0:
+            os.close(self._wire)
+            self._wire = -1
+
+    def _needs_link(self) -> bool:
+        path = Path(self._port)
+        return (
+            not self._place.is_anywhere
+            and path.is_absolute()
+            and not path.is_relative_to("/dev")
+            and not path.exists()
+        )
+
+    async def _await_clients(self) -> None:
+        """Let in whoever opens the port, one after another."""
+        while True:
+            first = self._read()
+            if first is None:
+                await asyncio.sleep(_LOOK_S)
+                continue
+            gone = asyncio.Event()
+            wire = _Wire(self._wire, first)
+            self._crowd.welcome(lambda guest, wire=wire: self._talk(guest, wire), gone.set)  # type: ignore[misc] # of this turn
+            await gone.wait()
+
+    def _read(self) -> bytes | None:
+        """Return what has come, None while nobody has the port open."""
+        try:
+            return os.read(self._wire, READ_BYTES)
+        except BlockingIOError:
+            return b""
+        except OSError:
+            return None
+
+    async def _talk(self, guest: Guest, wire: "_Wire") -> None:
+        await converse(self._place, guest, wire.take, wire.put)
+
+
+class _Wire:
+    """The robot's end while a client has the other."""
+
+    def __init__(self, number: int, first: bytes) -> None:
+        self._number = number
+        self._first = first
+
+    async def take(self) -> bytes | None:
+        """Return the next bytes, None when the client has closed its end."""
+        if self._first:
+            data, self._first = self._first, b""
+            return data
+        while True:
+            try:
+                return os.read(self._number, READ_BYTES)
+            except BlockingIOError:
+                await self._until_ready()
+            except OSError as fault:
+                if fault.errno == errno.EIO:
+                    return None
+                raise
+
+    async def put(self, said: Sequence[Payload]) -> None:
+        """Write what the robot says, waiting while the client does not read."""
+        data = b"".join(one for one in said if isinstance(one, bytes))
+        while data:
+            try:
+                data = data[os.write(self._number, data) :]
+            except BlockingIOError:
+                await self._until_ready(is_write=True)
+
+    async def _until_ready(self, *, is_write: bool = False) -> None:
+        loop = asyncio.get_running_loop()
+        ready = asyncio.Event()
+        if is_write:
+            loop.add_writer(self._number, ready.set)
+        else:
+            loop.add_reader(self._number, ready.set)
+        try:
+            await ready.wait()
+        finally:
+            if is_write:
+                loop.remove_writer(self._number)
+            else:
+                loop.remove_reader(self._number)
+
+
+class _SocketDoor(TcpDoor):
+    """A port behind ``socket://HOST:PORT``."""
+
+    def __init__(self, place: Place, port: str) -> None:
+        scheme, _, rest = port.partition("://")
+        number = rest.rpartition(":")[2]
+        if scheme != "socket" or not (number.isascii() and number.isdecimal()):
+            raise UrcError(
+                f"transports.{place.name}.port: {port!r} cannot be emulated; a path and "
+                "socket://HOST:PORT can"
+            )
+        super().__init__(place._replace(options={**place.options, "port": int(number)}))
+
+    async def open(self) -> Listening:
+        found = await super().open()
+        address = f"socket://{found.text.partition(' ')[2]}"
+        return found._replace(text=f"serial {address}", options={"port": address})

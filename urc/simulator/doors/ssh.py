@@ -1,0 +1,258 @@
+"""The emulated robot behind an SSH server.
+
+A shell, or the command that the driver starts, talks to the robot. Forwarded connections lead to
+the other lines of the same robot, and to nothing else.
+"""
+
+import asyncio
+import os
+import secrets
+from collections.abc import Awaitable, Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import asyncssh
+
+from urc._folders import data_folder
+from urc.model.codec import Payload
+from urc.problems import UrcError
+from urc.simulator.doors.base import (
+    MAX_CLIENTS,
+    READ_BYTES,
+    TAKEN_WITHIN_S,
+    Crowd,
+    Guest,
+    Listening,
+    Place,
+    converse,
+    option_port,
+    reason,
+    shown_place,
+)
+from urc.simulator.doors.terminal import Keys, echo_of
+
+__all__ = ["SshDoor"]
+
+DEFAULT_PORT = 22
+LOGIN_WITHIN_S = 10.0
+_WINDOW = 65536
+_NOT_FOUND = 127
+"""What a shell says of a command that it does not know."""
+
+
+class SshDoor:
+    """One listening port and whoever came in through it."""
+
+    def __init__(self, place: Place) -> None:
+        """Prepare the door; `open` listens."""
+        self._place = place._replace(options={"port": DEFAULT_PORT, **place.options})
+        self._crowd = Crowd(self._place)
+        self._acceptor: asyncssh.SSHAcceptor | None = None
+        self._connections: dict[asyncssh.SSHServerConnection, None] = {}
+        self._lock = _Lock(self._place)
+
+    async def open(self) -> Listening:
+        """Listen on the port of the options, or on any."""
+        place, port = self._place, option_port(self._place)
+        key = asyncssh.generate_private_key("ssh-ed25519") if place.is_anywhere else _own_key()
+        try:
+            self._acceptor = await asyncssh.listen(
+                place.host,
+                port,
+                server_factory=lambda: _Server(self._place, self._lock, self._connections),
+                server_host_keys=[key],
+                process_factory=self._let_in,
+                encoding=None,
+                line_editor=False,
+                window=_WINDOW,
+                login_timeout=LOGIN_WITHIN_S,
+                keepalive_interval=5,
+                agent_forwarding=False,
+                allow_scp=False,
+                gss_host=None,
+                config=None,
+            )
+        except OSError as fault:
+            where = shown_place(place.host, port)
+            message = f"transports.{place.name}: cannot listen on {where} ({reason(fault)})"
+            raise UrcError(message) from fault
+        host, port = self._acceptor.get_addresses()[0][:2]
+        shown = key.get_fingerprint("sha256")
+        text = f"ssh {shown_place(host, port)} (host key {shown})"
+        options = {"host": host, "port": port, "host_key": shown, **self._lock.options}
+        return Listening(host, port, text, options)
+
+    async def close(self) -> None:
+        """Stop listening and cut every connection."""
+        if self._acceptor is None:
+            return
+        self._acceptor.close()
+        await self._crowd.close()
+        for connection in list(self._connections):
+            connection.abort()
+            await connection.wait_closed()
+        await self._acceptor.wait_closed()
+
+    def _let_in(self, process: "asyncssh.SSHServerProcess[bytes]") -> None:
+        declared = self._place.options.get("command")
+        if process.command is not None and process.command != declared:
+            name = process.command.split(" ", 1)[0]
+            process.stderr.write(f"{name}: command not found\n".encode())
+            process.exit(_NOT_FOUND)
+            return
+        process.stdout.channel.set_write_buffer_limits(high=READ_BYTES)
+        self._crowd.welcome(
+            lambda guest: _Talk(self._place, process).run(guest), process.channel.abort
+        )
+
+
+class _Lock:
+    """Who may come in: whoever knows what the driver's options say."""
+
+    def __init__(self, place: Place) -> None:
+        options = place.options
+        self.username = str(options.get("username", ""))
+        self.options: dict[str, Any] = {}
+        """With which the driver's own transport gets in."""
+        self.password = str(options.get("password") or "")
+        self._key: asyncssh.SSHKey | None = None
+        self._takes_any_key = options.get("agent") is True
+        if place.is_anywhere:
+            # Nobody has to have the real robot's keys to try its twin.
+            self.password = secrets.token_urlsafe(16)
+            self.options = {"password": self.password, "key": None, "agent": False}
+        elif key := str(options.get("key") or ""):
+            self._key = _private_key(place, key, str(options.get("passphrase") or "") or None)
+
+    @property
+    def is_open(self) -> bool:
+        return not (self.password or self._key or self._takes_any_key)
+
+    def fits_password(self, username: str, password: str) -> bool:
+        return (
+            bool(self.password)
+            and username == self.username
+            and secrets.compare_digest(password.encode(), self.password.encode())
+        )
+
+    def fits_key(self, username: str, key: asyncssh.SSHKey) -> bool:
+        if username != self.username:
+            return False
+        mine = self._key is not None and key.public_data == self._key.public_data
+        return mine or self._takes_any_key
+
+
+class _Server(asyncssh.SSHServer):
+    """One client's connection."""
+
+    def __init__(
+        self, place: Place, lock: _Lock, connections: dict[asyncssh.SSHServerConnection, None]
+    ) -> None:
+        self._place = place
+        self._lock = lock
+        self._connections = connections
+        self._connection: asyncssh.SSHServerConnection
+
+    def connection_made(self, conn: asyncssh.SSHServerConnection) -> None:
+        self._connection = conn
+        if len(self._connections) >= MAX_CLIENTS:
+            next(iter(self._connections)).abort()
+        self._connections[conn] = None
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        self._connections.pop(self._connection, None)
+
+    def begin_auth(self, username: str) -> bool:
+        return not self._lock.is_open
+
+    def password_auth_supported(self) -> bool:
+        return bool(self._lock.password)
+
+    def validate_password(self, username: str, password: str) -> bool:
+        return self._lock.fits_password(username, password)
+
+    def public_key_auth_supported(self) -> bool:
+        return True
+
+    def validate_public_key(self, username: str, key: asyncssh.SSHKey) -> bool:
+        return self._lock.fits_key(username, key)
+
+    def connection_requested(
+        self, dest_host: str, dest_port: int, orig_host: str, orig_port: int
+    ) -> Awaitable[asyncssh.SSHTCPSession[bytes]] | bool:
+        inside = self._place.carried.get((dest_host, dest_port))
+        if inside is None:
+            raise asyncssh.ChannelOpenError(
+                asyncssh.OPEN_CONNECT_FAILED, "the emulated robot has nothing there"
+            )
+        return self._connection.forward_connection(inside.host, inside.port)  # type: ignore[return-value]
+
+
+class _Talk:
+    """The conversation with one client's shell or command."""
+
+    def __init__(self, place: Place, process: "asyncssh.SSHServerProcess[bytes]") -> None:
+        self._place = place
+        self._process = process
+        self._keys = Keys(place.spec)
+        self._is_terminal = process.term_type is not None
+
+    async def run(self, guest: Guest) -> None:
+        try:
+            await converse(self._place, guest, self._take, self._put)
+            self._process.exit(0)
+            async with asyncio.timeout(TAKEN_WITHIN_S):
+                await self._process.wait_closed()
+        except (asyncssh.Error, BrokenPipeError) as gone:
+            raise ConnectionResetError(str(gone)) from gone
+
+    async def _take(self) -> bytes:
+        typed = b""
+        while not typed:
+            try:
+                data = await self._process.stdin.read(READ_BYTES)
+            except (asyncssh.TerminalSizeChanged, asyncssh.SignalReceived):
+                continue
+            if not data:
+                return b""
+            typed = data
+            if self._is_terminal:
+                self._process.stdout.write(echo_of(data))
+                typed = self._keys.read(data)
+        return typed
+
+    async def _put(self, said: Sequence[Payload]) -> None:
+        for one in said:
+            if isinstance(one, bytes):
+                self._process.stdout.write(one)
+        await self._process.stdout.drain()
+
+
+def _own_key() -> asyncssh.SSHKey:
+    """Return the host key of this user's emulated robots: made once, so that it is trusted once."""
+    file = data_folder() / "simulator_host_key"
+    try:
+        return asyncssh.read_private_key(file)
+    except (OSError, asyncssh.KeyImportError):
+        key = asyncssh.generate_private_key("ssh-ed25519")
+    with suppress(OSError):  # then it is another one the next time
+        file.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
+        _write(file, key.export_private_key("openssh"))
+    return key
+
+
+def _write(file: Path, content: bytes) -> None:
+    descriptor = os.open(file, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600)
+    with os.fdopen(descriptor, "wb") as out:
+        out.write(content)
+
+
+def _private_key(place: Place, key: str, passphrase: str | None) -> asyncssh.SSHKey | None:
+    """Return the key of the options; None when this machine does not have it."""
+    try:
+        if "-----BEGIN" in key:
+            return asyncssh.import_private_key(key.strip() + "\n", passphrase)
+        return asyncssh.read_private_key(os.path.expanduser(key), passphrase)
+    except (OSError, ValueError) as fault:
+        raise UrcError(f"transports.{place.name}.key: cannot be used ({fault})") from fault

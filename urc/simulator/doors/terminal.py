@@ -1,0 +1,40 @@
+"""What a terminal at the far end does to bytes: any key that ends a line ends it, and it echoes.
+
+A person's client sends CR where a driver may say LF; a real robot's terminal takes either.
+"""
+
+from typing import Final
+
+from urc.model.driver import TransportSpec
+
+__all__ = ["Keys", "echo_of"]
+
+_LINE_ENDS: Final = (b"\r", b"\n", b"\r\n")
+
+
+class Keys:
+    """What one client types, with the line ends that the driver declares."""
+
+    def __init__(self, spec: TransportSpec) -> None:
+        """Read for the framing of `spec`; where that has no line ends, bytes stay what they are."""
+        framing = spec.framing.sent or spec.framing
+        end = framing.options.get("tx") if framing.type == "delimiter" else None
+        self._end = end if isinstance(end, bytes) and end in _LINE_ENDS else b""
+        self._was_cr = False
+
+    def read(self, data: bytes) -> bytes:
+        """Return `data` with every CR, LF or CR LF as the driver would have sent it."""
+        if not self._end or not data:
+            return data
+        if self._was_cr and data[:1] == b"\n":
+            data = data[1:]  # the second half of a line end that came in two pieces
+            self._was_cr = False
+            if not data:
+                return b""
+        self._was_cr = data[-1:] == b"\r"
+        return data.replace(b"\r\n", b"\n").replace(b"\r", b"\n").replace(b"\n", self._end)
+
+
+def echo_of(data: bytes) -> bytes:
+    """Return what a terminal shows of what is typed."""
+    return data.replace(b"\r\n", b"\n").replace(b"\r", b"\n").replace(b"\n", b"\r\n")

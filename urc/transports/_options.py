@@ -1,0 +1,75 @@
+"""Reads the options of a document, with one clear line for each that cannot be used."""
+
+from collections.abc import Mapping
+
+from urc.transports.base import TransportError
+
+__all__ = ["choice", "flag", "host", "port", "text"]
+
+
+def host(kind: str, options: Mapping[str, object], key: str = "host") -> str:
+    """Return a host name or address.
+
+    Raises:
+        TransportError: it is missing or none.
+    """
+    found = options.get(key)
+    if not isinstance(found, str) or not found.strip():
+        raise TransportError(f"{kind} needs a host name or address as {key}, not {found!r}")
+    return found.strip()
+
+
+def port(kind: str, options: Mapping[str, object], key: str = "port") -> int:
+    """Return a port from 1 to 65535.
+
+    Raises:
+        TransportError: it is missing or none.
+    """
+    found = options.get(key)
+    if isinstance(found, bool) or not isinstance(found, int) or not 1 <= found <= 65535:
+        raise TransportError(f"{kind} needs a port from 1 to 65535 as {key}, not {found!r}")
+    return found
+
+
+def text(kind: str, options: Mapping[str, object], key: str, default: str = "") -> str:
+    """Return a text, `default` when the option is left out or empty.
+
+    Raises:
+        TransportError: it is no text.
+    """
+    found = options.get(key)
+    if found is None or found == "":
+        return default
+    if not isinstance(found, str):
+        raise TransportError(f"{kind} needs text as {key}, not {found!r}")
+    return found
+
+
+def flag(kind: str, options: Mapping[str, object], key: str, *, default: bool) -> bool:
+    """Return a yes or no, `default` when the option is left out.
+
+    Raises:
+        TransportError: it is neither.
+    """
+    found = options.get(key)
+    if found is None:
+        return default
+    if not isinstance(found, bool):
+        raise TransportError(f"{kind} needs true or false as {key}, not {found!r}")
+    return found
+
+
+def choice(
+    kind: str, options: Mapping[str, object], key: str, among: tuple[str, ...], default: str
+) -> str:
+    """Return one of the words in `among`, `default` when the option is left out.
+
+    Raises:
+        TransportError: it is none of them.
+    """
+    found = options.get(key)
+    if found is None:
+        return default
+    if found not in among:
+        raise TransportError(f"{kind} knows {key}: {' | '.join(among)}, not {found!r}")
+    return str(found)

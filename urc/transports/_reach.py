@@ -1,0 +1,88 @@
+"""Opens a stream to a host and port: directly or through another transport, with TLS or not."""
+
+import asyncio
+import errno
+import socket
+
+from urc.transports._faults import explain, late, place_of
+from urc.transports._lookup import Lookup
+from urc.transports._stream import READ_AHEAD_BYTES, Stream, adopt, tune
+from urc.transports._tls import Tls
+from urc.transports.base import ByteStream, Carrier, ConnectFailed
+
+__all__ = ["Reach"]
+
+
+class Reach:
+    """The way to one host and port; `open` may be called as often as needed."""
+
+    def __init__(
+        self,
+        host: str,
+        port: int,
+        *,
+        via: Carrier | None = None,
+        tls: Tls | None = None,
+        read_ahead_bytes: int = READ_AHEAD_BYTES,
+    ) -> None:
+        """Prepare the way to `host` (name or address), `port` 1..65535. Nothing is opened yet."""
+        self.host = host
+        self.port = port
+        self.place = place_of(host, port)
+        """For people."""
+        self._via = via
+        self._tls = tls
+        self._read_ahead_bytes = read_ahead_bytes
+        self._lookup = Lookup(host, port, socket.SOCK_STREAM)
+
+    async def open(self, timeout_s: float) -> ByteStream:
+        """Return an open stream, or raise `ConnectFailed` within `timeout_s` seconds.
+
+        Every address of a name is tried in turn, each with a fair share of the time that is left.
+        """
+        try:
+            async with asyncio.timeout(timeout_s):
+                stream = await self._connect(timeout_s)
+                if self._tls is None:
+                    return stream
+                return await self._tls.secure(stream, self.host, self.place)
+        except TimeoutError as fault:
+            raise ConnectFailed(late(self.place, timeout_s)) from fault
+        except (OSError, UnicodeError) as fault:
+            raise ConnectFailed(explain(self.host, self.place, fault)) from fault
+
+    async def _connect(self, timeout_s: float) -> ByteStream:
+        if self._via is not None:
+            return await self._via.connect(self.host, self.port, timeout_s)
+        loop = asyncio.get_running_loop()
+        deadline = loop.time() + timeout_s
+        addresses = await self._lookup.addresses()
+        fault: OSError | None = None
+        for index, (family, address) in enumerate(addresses):
+            share_s = (deadline - loop.time()) / (len(addresses) - index)
+            try:
+                async with asyncio.timeout(share_s):
+                    return await _dial(family, address, self._read_ahead_bytes)
+            except TimeoutError:
+                # The last address gets all that is left: then the time of the whole is up as well.
+                fault = fault or TimeoutError(errno.ETIMEDOUT, "timed out")
+            except OSError as refused:
+                fault = refused
+        raise fault or OSError("the name leads to no address")
+
+
+async def _dial(family: int, address: object, read_ahead_bytes: int) -> Stream:
+    """Connect one socket, which is closed again when that fails or is cancelled."""
+    loop = asyncio.get_running_loop()
+    line = socket.socket(family, socket.SOCK_STREAM)
+    try:
+        line.setblocking(False)
+        tune(line)
+        await loop.sock_connect(line, address)  # type: ignore[arg-type] # as getaddrinfo gave it
+        if line.getsockname() == line.getpeername():
+            # A port of this machine that nobody listens on, and the kernel chose it for our end.
+            raise ConnectionRefusedError(errno.ECONNREFUSED, "connected to itself")
+        return await adopt(line, read_ahead_bytes)
+    except BaseException:
+        line.close()
+        raise

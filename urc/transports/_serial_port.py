@@ -1,0 +1,217 @@
+"""One open port of serialx as a byte stream. Imported only when a port is opened."""
+
+import asyncio
+import socket
+import sys
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from typing import Any, cast
+
+from serialx import BaseSerialTransport, SerialException, create_serial_connection
+from serialx.platforms.serial_rfc2217 import RFC2217SerialTransport
+from serialx.platforms.serial_rfc2217.types import (
+    Rfc2217Command,
+    SetLinestateMaskCmd,
+    SetModemstateMaskCmd,
+)
+
+from urc.transports._faults import CLOSED, HUNG_UP, broke, reason
+from urc.transports._stream import READ_AHEAD_BYTES, forget_unsent, unsent_in
+from urc.transports.base import PeerClosed
+
+__all__ = ["FAULTS", "SerialPort", "open_port"]
+
+FAULTS: tuple[type[Exception], ...] = (OSError, SerialException, ValueError, LookupError)
+"""What the library raises; the last of what is no RFC 2217."""
+UNTAKEN_BYTES = 1_048_576
+"""Answers to options that a server may leave untaken."""
+if sys.platform != "win32":
+    import termios
+
+    FAULTS = (*FAULTS, termios.error)
+_KEPT_OPTIONS, _AT_ONCE = 64, 4096
+"""Options that wait for a question of ours, and bytes that are looked at before they are cut."""
+_DRAIN_S, _LOOK_S = 0.3, 0.01
+"""How long closing waits for bytes that are on their way to a slow wire."""
+
+
+async def open_port(
+    port: str, arguments: Mapping[str, object], tune: Callable[[socket.socket], None]
+) -> "SerialPort":
+    """Open `port` and set it up; what came in before is dropped.
+
+    Args:
+        port: a path or name, or ``rfc2217://HOST:PORT``.
+        arguments: the settings, as the library names them.
+        tune: set on the socket, where there is one.
+
+    Raises:
+        OSError, SerialException, termios.error, ValueError: it cannot be.
+    """
+    loop = asyncio.get_running_loop()
+    stream = SerialPort()
+    kind = _Rfc2217 if port.startswith("rfc2217://") else None
+    transport, _ = await create_serial_connection(
+        loop, lambda: stream, port, transport_cls=kind, **cast("dict[str, Any]", arguments)
+    )
+    carrier: asyncio.Transport | None = getattr(transport, "_tcp_transport", None)
+    if carrier is not None:  # the library has no other way to its socket
+        stream.socket = carrier.get_extra_info("socket")
+        tune(stream.socket)
+    else:
+        with suppress(*FAULTS):
+            transport.serial.reset_read_buffer()
+    return stream
+
+
+class _Rfc2217(RFC2217SerialTransport):
+    """Does not insist on an answer about notifications that it has no use for.
+
+    The library waits for one until its time is up; ser2net, the usual server, gives none.
+    """
+
+    def _data_received(self, data: bytes) -> None:
+        """Take what came; a server that lies, or takes none of our answers, ends the line."""
+        for start in range(0, len(data), _AT_ONCE):
+            line, serial = self._tcp_transport, self._serial
+            if line is None or serial is None or line.is_closing():
+                return
+            try:
+                super()._data_received(data[start : start + _AT_ONCE])
+            except Exception as fault:  # the library checks little of what arrives
+                self._give_up(f"what the server sends is no RFC 2217 ({reason(fault)})")
+                return
+            # What nobody has asked for would be kept there for ever, and searched each time.
+            del serial._engine._pending_telnet[:-_KEPT_OPTIONS]  # noqa: SLF001 - no other way
+            if line.get_write_buffer_size() > UNTAKEN_BYTES:
+                self._give_up("the server asks, and takes none of the answers")
+
+    def _give_up(self, why: str) -> None:
+        if self._tcp_transport is not None:
+            self._tcp_transport.abort()
+        self._tcp_connection_lost(OSError(why))
+
+    async def _send_and_wait(self, cmd: Rfc2217Command) -> Rfc2217Command:
+        if isinstance(cmd, SetLinestateMaskCmd | SetModemstateMaskCmd):
+            self._send_command(cmd)
+            return cmd
+        return await super()._send_and_wait(cmd)
+
+
+class SerialPort(asyncio.Protocol):
+    """A `ByteStream`, with `unsent` and `reset`. A port nobody reads is not read by us either."""
+
+    def __init__(self) -> None:
+        self._arrived_bytes = bytearray()
+        self._is_paused = False
+        self._ended: str | None = None
+        self._arrived = asyncio.Event()
+        self._writable = asyncio.Event()
+        self._writable.set()
+        self._gone = asyncio.Event()
+        self._transport: BaseSerialTransport
+        self.socket: socket.socket | None = None
+        """Of a port behind a server."""
+
+    # -- called by the library
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        """Take the port over."""
+        assert isinstance(transport, BaseSerialTransport)  # noqa: S101 - the library's own promise
+        self._transport = transport
+        transport.set_write_buffer_limits(high=0)
+
+    def data_received(self, data: bytes) -> None:
+        """Keep what has come."""
+        self._arrived_bytes += data
+        if len(self._arrived_bytes) >= READ_AHEAD_BYTES and not self._is_paused:
+            self._is_paused = True
+            self._transport.pause_reading()
+        self._arrived.set()
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        """Note that the port is gone: unplugged, or closed by us."""
+        self._end(broke(exc) if exc else HUNG_UP)
+        self._gone.set()
+
+    def pause_writing(self) -> None:
+        """Let `put` wait."""
+        self._writable.clear()
+
+    def resume_writing(self) -> None:
+        """Let `put` go on."""
+        self._writable.set()
+
+    # -- a `ByteStream`
+
+    async def take(self) -> bytes:
+        """Return the next bytes, at least one; raise `PeerClosed` when no more will come."""
+        while not self._arrived_bytes:
+            if self._ended is not None:
+                raise PeerClosed(self._ended)
+            self._arrived.clear()
+            await self._arrived.wait()
+        data = bytes(self._arrived_bytes)
+        self._arrived_bytes.clear()
+        if self._is_paused and self._ended is None:
+            self._is_paused = False
+            self._transport.resume_reading()
+        return data
+
+    async def put(self, data: bytes) -> None:
+        """Hand `data` to the system, waiting while it is full; raise `PeerClosed` if it broke."""
+        await self._until_writable()
+        try:
+            self._transport.write(data)
+        except FAULTS as fault:
+            self._end(broke(fault))
+        await self._until_writable()
+
+    async def abort(self) -> None:
+        """Close, after a moment for bytes that are on their way; never raises."""
+        with suppress(TimeoutError):
+            async with asyncio.timeout(_DRAIN_S):
+                # Nobody tells when the wire has taken the last byte.
+                while self._ended is None and self._writable.is_set() and self.unsent():  # noqa: ASYNC110
+                    await asyncio.sleep(_LOOK_S)
+        if self.socket is None:
+            self._forget_unsent()
+        await self._close()
+
+    async def reset(self) -> None:
+        """Close at once and let the system forget what is not on the wire; never raises."""
+        self._forget_unsent()
+        await self._close()
+
+    def unsent(self) -> int:
+        """Return the bytes handed over that are not on the wire yet."""
+        waiting = self._transport.get_write_buffer_size()
+        if self.socket is not None:
+            return waiting + (unsent_in(self.socket) if self.socket.fileno() >= 0 else 0)
+        with suppress(*FAULTS, NotImplementedError):
+            waiting += self._transport.serial.num_unwritten_bytes()
+        return waiting
+
+    def _forget_unsent(self) -> None:
+        """Empty the system's buffer, which would hold up the close until a slow wire took it."""
+        if self.socket is not None:
+            forget_unsent(self.socket)
+        else:
+            with suppress(*FAULTS, NotImplementedError):
+                self._transport.serial.reset_write_buffer()
+
+    async def _close(self) -> None:
+        self._end(CLOSED)
+        self._transport.abort()
+        await self._gone.wait()
+
+    async def _until_writable(self) -> None:
+        await self._writable.wait()
+        if self._ended is not None:
+            raise PeerClosed(self._ended)
+
+    def _end(self, why: str) -> None:
+        if self._ended is None:
+            self._ended = why
+        self._arrived.set()
+        self._writable.set()

@@ -1,0 +1,251 @@
+"""TLS over any stream: a socket, or a connection that another transport carries.
+
+The library's own TLS needs a socket; here it works on two buffers in memory, which the stream
+underneath fills and empties. TLS 1.2 at least, and the certificate is checked unless that was
+switched off.
+"""
+
+import asyncio
+import ssl
+import tempfile
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Self, TypeVar
+
+from urc.transports import _options
+from urc.transports._faults import HUNG_UP, reason
+from urc.transports.base import ByteStream, ConnectFailed, PeerClosed, TransportError
+
+__all__ = ["Tls"]
+
+_T = TypeVar("_T")
+
+_READ_BYTES = 65536
+_PEM = "-----BEGIN"
+_EXPIRED, _NOT_YET = 10, 9
+_WRONG_NAME = (62, 64)
+_UNKNOWN = (2, 18, 19, 20, 21)
+"""OpenSSL's numbers (X509_V_ERR_…) of what can be wrong with a certificate."""
+
+
+class Tls:
+    """How a line is made secret, as the option ``tls`` says it."""
+
+    def __init__(
+        self, context: ssl.SSLContext, server_name: str = "", *, is_server: bool = False
+    ) -> None:
+        """Use `context`; `server_name` is what the certificate must be for, "": the host."""
+        self._context = context
+        self._server_name = server_name
+        self._is_server = is_server
+
+    @classmethod
+    def of(cls, kind: str, option: object, *, is_server: bool = False) -> Self | None:
+        """Return what the option asks for, None for none.
+
+        Args:
+            kind: of the transport, for messages.
+            option: ``true``, ``false``, None, or a mapping with ``ca``, ``cert``, ``key`` (files,
+                or the text of one), ``server_name`` and ``verify``.
+            is_server: the robot connects to us, and we show it our certificate.
+
+        Raises:
+            TransportError: an option or a file cannot be used.
+        """
+        if option is None or option is False:
+            return None
+        if option is True:
+            option = {}
+        if not isinstance(option, Mapping):
+            raise TransportError(f"{kind} needs true or options as tls, not {option!r}")
+        context = _context_of(f"{kind}, tls:", option, is_server=is_server)
+        return cls(context, _options.text(kind, option, "server_name"), is_server=is_server)
+
+    async def secure(self, stream: ByteStream, host: str, place: str) -> ByteStream:
+        """Agree on keys over `stream`, which is closed when that fails or is cancelled.
+
+        Raises:
+            ConnectFailed: the other side cannot be trusted, or speaks no TLS.
+        """
+        name = None if self._is_server else self._server_name or host
+        try:
+            secured = _TlsStream(stream, self._context, name)
+            await secured.shake_hands()
+        except ssl.SSLError as fault:
+            await stream.abort()
+            raise ConnectFailed(_explain(place, name or "", fault)) from fault
+        except (PeerClosed, ValueError) as fault:
+            await stream.abort()
+            raise ConnectFailed(f"no TLS with {place} ({fault})") from fault
+        except BaseException:
+            await stream.abort()
+            raise
+        return secured
+
+
+class _TlsStream:
+    """A `ByteStream` over another one."""
+
+    def __init__(self, stream: ByteStream, context: ssl.SSLContext, name: str | None) -> None:
+        self._stream = stream
+        self._arrived = ssl.MemoryBIO()
+        self._leaving = ssl.MemoryBIO()
+        self._tls = context.wrap_bio(
+            self._arrived, self._leaving, server_side=name is None, server_hostname=name
+        )
+        self._turn = asyncio.Lock()
+        """Records must go out in the order in which they were made."""
+
+    async def shake_hands(self) -> None:
+        while True:
+            try:
+                self._tls.do_handshake()
+            except ssl.SSLWantReadError:
+                await self._flush()
+                self._arrived.write(await self._stream.take())
+            except ssl.SSLError:
+                await self._flush()  # the alert that tells the other side why
+                raise
+            else:
+                await self._flush()
+                return
+
+    async def take(self) -> bytes:
+        while True:
+            data = self._decrypted()
+            if self._leaving.pending:
+                await self._flush()  # an answer to a change of keys
+            if data:
+                return data
+            self._arrived.write(await self._stream.take())
+
+    async def put(self, data: bytes) -> None:
+        _guarded(lambda: self._tls.write(data))
+        await self._flush()
+
+    async def abort(self) -> None:
+        await self._stream.abort()
+
+    def unsent(self) -> int:
+        count = getattr(self._stream, "unsent", None)
+        return self._leaving.pending + (int(count()) if count is not None else 0)
+
+    async def reset(self) -> None:
+        reset = getattr(self._stream, "reset", self._stream.abort)
+        await reset()
+
+    def end(self, why: str) -> None:
+        end = getattr(self._stream, "end", None)
+        if end is not None:
+            end(why)
+
+    async def _flush(self) -> None:
+        async with self._turn:
+            if data := self._leaving.read():
+                await self._stream.put(data)
+
+    def _decrypted(self) -> bytes:
+        """Return what can be read by now, b"" when nothing can."""
+        parts: list[bytes] = []
+        while True:
+            try:
+                part = self._tls.read(_READ_BYTES)
+            except ssl.SSLWantReadError:
+                break
+            except ssl.SSLError as fault:
+                if parts:
+                    break  # told with the next call
+                if isinstance(fault, ssl.SSLZeroReturnError):
+                    raise PeerClosed(HUNG_UP) from fault
+                raise PeerClosed(f"the line broke (TLS: {_words(fault)})") from fault
+            if not part:
+                if not parts:
+                    raise PeerClosed(HUNG_UP)
+                break
+            parts.append(part)
+        return b"".join(parts)
+
+
+def _guarded(work: Callable[[], _T]) -> _T:
+    try:
+        return work()
+    except ssl.SSLError as fault:
+        raise PeerClosed(f"the line broke (TLS: {_words(fault)})") from fault
+
+
+def _context_of(where: str, options: Mapping[str, object], *, is_server: bool) -> ssl.SSLContext:
+    side = ssl.Purpose.CLIENT_AUTH if is_server else ssl.Purpose.SERVER_AUTH
+    authority = _options.text(where, options, "ca")
+    is_checked = _options.flag(where, options, "verify", default=True)
+    try:
+        context = ssl.create_default_context(side)
+        if authority:
+            if not is_server:
+                context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)  # this authority and no other
+            context.load_verify_locations(cadata=_pem(authority))
+    except (OSError, ValueError) as fault:
+        raise TransportError(f"{where} cannot use ca ({reason(fault)})") from fault
+    context.minimum_version = ssl.TLSVersion.TLSv1_2
+    if not is_checked:
+        context.check_hostname = False
+        context.verify_mode = ssl.CERT_NONE
+    elif is_server and authority:
+        context.verify_mode = ssl.CERT_REQUIRED
+    _load_own(where, context, options, is_server=is_server)
+    return context
+
+
+def _load_own(
+    where: str, context: ssl.SSLContext, options: Mapping[str, object], *, is_server: bool
+) -> None:
+    """Load our own certificate, if there is one."""
+    certificate = _options.text(where, options, "cert")
+    key = _options.text(where, options, "key")
+    if not certificate:
+        if is_server or key:
+            raise TransportError(f"{where} it needs a certificate as cert")
+        return
+    try:
+        # The library reads files only, and a key may be a secret setting: it is on the disk for as
+        # long as that takes, in a folder that nobody else may enter.
+        with tempfile.TemporaryDirectory(prefix="urc-") as folder:
+            files = [Path(folder, name) for name in ("cert", "key")]
+            files[0].write_text(_pem(certificate), "ascii")
+            files[1].write_text(_pem(key or certificate), "ascii")
+            context.load_cert_chain(files[0], files[1], password=_no_password)
+    except (OSError, ValueError) as fault:
+        raise TransportError(f"{where} cannot use cert and key ({_words(fault)})") from fault
+
+
+def _no_password() -> str:
+    raise ValueError("the key has a password; give it without one")
+
+
+def _pem(given: str) -> str:
+    """Return the text of a file, or the text that was given instead."""
+    return given if _PEM in given else Path(given).expanduser().read_text("ascii")
+
+
+def _explain(place: str, name: str, fault: ssl.SSLError) -> str:
+    """Return one line about why there is no TLS with `place`."""
+    if isinstance(fault, ssl.SSLCertVerificationError):
+        code = fault.verify_code
+        if code == _EXPIRED:
+            return f"the certificate of {place} has expired"
+        if code == _NOT_YET:
+            return f"the certificate of {place} is not valid yet; check the clocks of both"
+        if code in _WRONG_NAME:
+            return f"the certificate of {place} is not for {name!r}; see tls.server_name"
+        if code in _UNKNOWN:
+            return f"the certificate of {place} is from an authority unknown here; see tls.ca"
+        return f"the certificate of {place} is not valid ({fault.verify_message})"
+    if fault.reason in ("WRONG_VERSION_NUMBER", "HTTP_REQUEST", "PACKET_LENGTH_TOO_LONG"):
+        return f"{place} does not speak TLS"
+    return f"no TLS with {place} ({_words(fault)})"
+
+
+def _words(fault: BaseException) -> str:
+    """Return OpenSSL's words without its numbers and source lines."""
+    if isinstance(fault, ssl.SSLError) and fault.reason:
+        return str(fault.reason).replace("_", " ").lower()
+    return reason(fault)

@@ -1,0 +1,87 @@
+"""Listens to what is announced over multicast DNS, for types of services that are asked for.
+
+The library (zeroconf, extra ``mdns``) is imported only when it is used.
+"""
+
+import asyncio
+from collections.abc import Sequence
+from importlib.util import find_spec
+from typing import Any, NamedTuple
+
+from urc.transports.base import TransportError
+
+__all__ = ["Announced", "announced"]
+
+RESOLVE_S = 1.0
+"""How long one service may take to tell where it is."""
+MAX_SERVICES = 256
+
+
+class Announced(NamedTuple):
+    """One service that somebody announces."""
+
+    type: str
+    """As asked for: ``_rosbridge._tcp``."""
+    name: str
+    host: str
+    """Address."""
+    port: int
+
+
+async def announced(
+    types: Sequence[str], seconds: float, interfaces: Sequence[str] = ()
+) -> list[Announced]:
+    """Return what is announced within `seconds`, in the order of type and name.
+
+    Args:
+        types: of services, such as ``_rosbridge._tcp``; at least one.
+        seconds: how long to listen.
+        interfaces: addresses of this machine to listen on; all when left out.
+
+    Raises:
+        TransportError: the library is not there, or there is no network to listen on.
+    """
+    if find_spec("zeroconf") is None:
+        raise TransportError("mDNS needs the package zeroconf: pip install 'urc[mdns]'")
+    from zeroconf import InterfaceChoice, ServiceStateChange
+    from zeroconf.asyncio import AsyncServiceBrowser, AsyncZeroconf
+
+    found: dict[tuple[str, str], None] = {}
+
+    def changed(
+        zeroconf: Any, service_type: str, name: str, state_change: ServiceStateChange
+    ) -> None:
+        if state_change is ServiceStateChange.Removed:
+            found.pop((service_type, name), None)
+        elif len(found) < MAX_SERVICES:
+            found[service_type, name] = None
+
+    try:
+        zeroconf = AsyncZeroconf(interfaces=list(interfaces) or InterfaceChoice.All)
+    except OSError as fault:
+        raise TransportError(
+            f"nothing can be heard over mDNS ({fault.strerror or fault})"
+        ) from fault
+    try:
+        wanted = [f"{one}.local." for one in types]
+        browser = AsyncServiceBrowser(zeroconf.zeroconf, wanted, handlers=[changed])
+        await asyncio.sleep(seconds)
+        await browser.async_cancel()
+        places = await asyncio.gather(*(_resolve(zeroconf, *service) for service in found))
+    finally:
+        await zeroconf.async_close()
+    return sorted(one for several in places for one in several)
+
+
+async def _resolve(zeroconf: Any, kind: str, name: str) -> list[Announced]:
+    """Return where a service is; an announcement without an address is none."""
+    from zeroconf import IPVersion
+    from zeroconf.asyncio import AsyncServiceInfo
+
+    info = AsyncServiceInfo(kind, name)
+    if not await info.async_request(zeroconf.zeroconf, RESOLVE_S * 1000) or not info.port:
+        return []
+    addresses = info.parsed_addresses(IPVersion.V4Only) or info.parsed_addresses()
+    short = kind.removesuffix(".local.")
+    label = name.removesuffix(f".{kind}")
+    return [Announced(short, label, address, info.port) for address in addresses[:1]]

@@ -1,0 +1,47 @@
+"""The serial ports of this machine. The library is serialx, of the extra ``serial``."""
+
+from importlib.util import find_spec
+from typing import NamedTuple
+
+from urc.transports.base import TransportError
+
+__all__ = ["SerialPort", "serial_ports"]
+
+
+class SerialPort(NamedTuple):
+    """One port."""
+
+    device: str
+    usb: str
+    """Vendor and product, ``2341:0043``; "" where it is no USB device."""
+    product: str
+    serial_number: str
+
+
+def serial_ports() -> list[SerialPort]:
+    """Return every port that the system knows, USB devices first.
+
+    Raises:
+        TransportError: the library is not there, or the system does not tell.
+    """
+    if find_spec("serialx") is None:
+        raise TransportError("serial ports need the package serialx: pip install 'urc[serial]'")
+    import serialx
+
+    try:
+        ports = serialx.list_serial_ports()
+    except OSError as fault:
+        why = (fault.strerror or str(fault)).lower()
+        raise TransportError(f"the serial ports cannot be listed ({why})") from fault
+    found = [
+        SerialPort(
+            str(port.device),
+            f"{port.vid:04x}:{port.pid:04x}"
+            if port.vid is not None and port.pid is not None
+            else "",
+            " ".join(filter(None, (port.manufacturer, port.product))),
+            port.serial_number or "",
+        )
+        for port in ports
+    ]
+    return sorted(found, key=lambda port: (not port.usb, port.device))

@@ -1,0 +1,293 @@
+"""HTTP to a robot: requests and their answers, and streams of pictures, events and lines.
+
+A request is handed over once its bytes are in the kernel; its answer comes from `receive` like
+everything else. So many may be under way at once; when one more is made and none of them ends soon,
+the oldest is given up. Nothing waits for a connection to come: what cannot be sent now fails now.
+"""
+
+import asyncio
+from collections.abc import AsyncIterator, Coroutine, Mapping
+from typing import Any
+from urllib.parse import urlencode
+
+import httpx2
+import msgspec
+
+from urc.model.codec import Envelope, Payload
+from urc.transports._faults import CLOSED, late
+from urc.transports.base import ConnectFailed, PeerClosed, Setup, Transport, TransportError
+from urc.transports.http_body import complaint, read_body
+from urc.transports.http_client import Client, HttpFault
+from urc.transports.http_inbox import Inbox
+from urc.transports.http_streams import Pulse, Stream, streams_of
+from urc.transports.web_dial import Dialer
+from urc.transports.web_place import Options
+
+__all__ = ["HttpTransport", "from_setup"]
+
+MAX_BODY_BYTES = 8_388_608
+IN_FLIGHT = 4
+ANSWER_S = 10.0
+PATIENCE_S = 1.0
+"""How long a request waits for a place before the oldest one is given up."""
+
+
+class HttpTransport:
+    """One robot's web server, opened as often as it is needed."""
+
+    def __init__(self, setup: Setup) -> None:
+        """Read the options of `setup`; nothing is opened yet.
+
+        Raises:
+            TransportError: an option or a subscription is not usable.
+        """
+        options = Options("http", setup.options)
+        self._place = options.place("http")
+        self._credentials = options.credentials(("basic", "bearer", "digest"))
+        self._headers = options.headers()
+        self._max_body = int(options.number("max_body", MAX_BODY_BYTES, 1, 2**28))
+        self._most = int(options.number("in_flight", IN_FLIGHT, 1, 32))
+        self._answer_s = options.duration("answer_timeout", ANSWER_S, 0.05, 600)
+        self._probe = options.text("probe")
+        self._streams = streams_of(setup.subscriptions)
+        self._dialer = Dialer(self._place, tls=options.tls(self._place), via=setup.via)
+        self._talk: _Talk | None = None
+
+    @property
+    def address(self) -> str:
+        """Where it leads, for people: ``http http://192.168.4.1:80/``."""
+        place = self._place
+        return f"http http{'s' * place.is_secure}://{place.authority}{place.path}"
+
+    async def open(self, timeout_s: float) -> None:
+        """See whether the robot can be reached, or raise `ConnectFailed` within `timeout_s` s."""
+        await self.close()
+        client = Client(
+            self._place,
+            self._dialer,
+            credentials=self._credentials,
+            headers=self._headers,
+            connections=self._most + len(self._streams) + 1,
+        )
+        talk = _Talk(client, self._most, self._answer_s, self._max_body)
+        try:
+            async with asyncio.timeout(timeout_s):
+                await client.reach(timeout_s)
+                if self._probe:
+                    await talk.probe(self._probe)
+        except TimeoutError as fault:
+            await talk.close()
+            raise ConnectFailed(late(self._place.authority, timeout_s)) from fault
+        except BaseException:
+            await talk.close()
+            raise
+        for spec in self._streams:
+            talk.listen(Stream(spec, client, talk.inbox, talk.pulse, self._max_body))
+        self._talk = talk
+
+    async def receive(self) -> Envelope:
+        """Return the next answer, picture or event.
+
+        Raises:
+            PeerClosed: the robot cannot be reached any more.
+        """
+        if self._talk is None:
+            raise PeerClosed(CLOSED)
+        return await self._talk.receive()
+
+    async def send(self, data: Payload) -> None:
+        """Hand a request to the kernel; its answer, or why there is none, comes from `receive`.
+
+        Raises:
+            PeerClosed: the line is closed.
+            TransportError: `data` is no request.
+        """
+        if not isinstance(data, Envelope) or data.verb != "request":
+            what = f"{data.verb} anything" if isinstance(data, Envelope) else "send bare bytes"
+            raise TransportError(f"http makes requests; it cannot {what}")
+        if self._talk is None:
+            raise PeerClosed(CLOSED)
+        await self._talk.send(data)
+
+    async def close(self) -> None:
+        """Close every connection at once. Never raises, may be called twice."""
+        talk, self._talk = self._talk, None
+        if talk is not None:
+            await talk.close()
+
+
+def from_setup(setup: Setup) -> Transport:
+    """Make a transport out of a document's options; raise `TransportError` for an unusable one."""
+    return HttpTransport(setup)
+
+
+class _Talk:
+    """All that belongs to one opening of the transport."""
+
+    def __init__(self, client: Client, most: int, answer_s: float, max_body_bytes: int) -> None:
+        self.inbox = Inbox()
+        self.pulse = Pulse()
+        self._client = client
+        self._most = most
+        self._answer_s = answer_s
+        self._max_bytes = max_body_bytes
+        self._number = 0
+        self._is_looking = False
+        self._requests: dict[int, asyncio.Task[None]] = {}
+        """By place, oldest first: under way, or answered and not taken yet."""
+        self._has_place = asyncio.Event()
+        self._tasks: set[asyncio.Task[None]] = set()
+        """All that run, given up or not."""
+
+    def listen(self, stream: Stream) -> None:
+        self._start(stream.run())
+
+    def _start(self, work: Coroutine[Any, Any, None]) -> asyncio.Task[None]:
+        task = asyncio.create_task(work)
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
+        return task
+
+    async def probe(self, path: str) -> None:
+        try:
+            async with self._client.answer(self._client.request("GET", path, {}, None)) as response:
+                reason = await complaint(response)
+        except HttpFault as fault:
+            raise ConnectFailed(str(fault)) from fault
+        if reason:
+            raise ConnectFailed(f"the probe of {path} failed: {reason}")
+
+    async def receive(self) -> Envelope:
+        envelope, place = await self.inbox.take()
+        if place is not None:
+            self._requests.pop(place, None)
+            self._has_place.set()
+        return envelope
+
+    async def send(self, data: Envelope) -> None:
+        if self.inbox.ended is not None:
+            raise PeerClosed(self.inbox.ended)
+        await self._until_place()
+        self._number += 1
+        handed = asyncio.Event()
+        work = self._request(self._number, data, handed)
+        task = self._requests[self._number] = self._start(work)
+        try:
+            await handed.wait()
+        except asyncio.CancelledError:
+            task.cancel()
+            raise
+
+    async def close(self) -> None:
+        self.inbox.end(CLOSED)
+        tasks = list(self._tasks)
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
+        await self._client.close()
+
+    async def _until_place(self) -> None:
+        """Wait until a request may be made; after a while the oldest one makes room."""
+        try:
+            async with asyncio.timeout(PATIENCE_S):
+                while len(self._requests) >= self._most:
+                    self._has_place.clear()
+                    await self._has_place.wait()
+        except TimeoutError:
+            while len(self._requests) >= self._most:
+                place = next(iter(self._requests))
+                self._requests.pop(place).cancel()
+                self.inbox.give_up(place)
+
+    async def _request(self, place: int, data: Envelope, handed: asyncio.Event) -> None:
+        """Make one request, and put its answer into the inbox."""
+        fault: HttpFault | None = None
+        # A robot that has closed idle connections is heard first: none of them is used then.
+        await asyncio.sleep(0)
+        try:
+            async with asyncio.timeout(self._answer_s):
+                answer = await self._ask(data, handed)
+        except TimeoutError:
+            fault = HttpFault(f"no answer within {self._answer_s:g} s", is_unanswered=True)
+        except HttpFault as found:
+            fault = found
+        finally:
+            handed.set()
+        if fault is not None:
+            answer = Envelope("response", {"ok": False, "reason": str(fault)})
+        attributes = {"id": data.attributes.get("id"), **answer.attributes}
+        self.inbox.answer(place, answer._replace(attributes=attributes))
+        if fault is not None:
+            await self._conclude(fault)
+
+    async def _conclude(self, fault: HttpFault) -> None:
+        """Find out whether a robot that has not answered is still there, and say when it is not."""
+        if fault.is_unreachable:
+            self.inbox.end(str(fault))
+        elif fault.is_unanswered and not self._is_looking:
+            self._is_looking = True
+            try:
+                await self._client.reach()
+            except ConnectFailed as gone:
+                self.inbox.end(str(gone))
+            finally:
+                self._is_looking = False
+
+    async def _ask(self, data: Envelope, handed: asyncio.Event) -> Envelope:
+        request = _request_of(self._client, data)
+        body = await request.aread()
+        request.stream = _Handed(body, handed)
+        async with self._client.answer(request) as response:
+            self.pulse.beat()
+            reason = await complaint(response)
+            found = b"" if reason else await read_body(response, self._max_bytes)
+            attributes: dict[str, object] = {
+                "ok": not reason,
+                "status": response.status_code,
+                "headers": dict(response.headers),
+            }
+            if reason:
+                attributes["reason"] = reason
+            return Envelope("response", attributes, found)
+
+
+class _Handed(httpx2.AsyncByteStream):
+    """The body of a request, which notes that all of it is in the kernel."""
+
+    def __init__(self, body: bytes, handed: asyncio.Event) -> None:
+        self._body = body
+        self._handed = handed
+
+    async def __aiter__(self) -> AsyncIterator[bytes]:
+        if self._body:
+            yield self._body
+        self._handed.set()
+
+
+def _request_of(client: Client, data: Envelope) -> httpx2.Request:
+    """Return the library's request for ours."""
+    attributes = data.attributes
+    path, query = str(attributes.get("path", "/")), attributes.get("query")
+    if isinstance(query, Mapping):
+        query = urlencode({str(name): _plain(value) for name, value in query.items()})
+    if query:
+        path += f"{'&' if '?' in path else '?'}{query}"
+    headers = attributes.get("headers") or {}
+    if not isinstance(headers, Mapping):
+        raise HttpFault(f"headers must be names and values, not {headers!r}")
+    named = {str(name): _plain(value) for name, value in headers.items()}
+    body = data.body
+    if body is not None and not isinstance(body, bytes):
+        if not any(name.lower() == "content-type" for name in named):
+            named["Content-Type"] = "application/json"
+        try:
+            body = msgspec.json.encode(body)
+        except (msgspec.MsgspecError, TypeError) as fault:
+            raise HttpFault(f"the body cannot be written as JSON ({fault})") from fault
+    return client.request(str(attributes.get("method", "GET")), path, named, body)
+
+
+def _plain(value: object) -> str:
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    return "" if value is None else str(value)

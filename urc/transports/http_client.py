@@ -1,0 +1,342 @@
+"""HTTP/1.1 to one place, on the library `httpx2`: connections, credentials, errors in one line.
+
+The library's own way of connecting is replaced: every connection leads to the place of the
+document, whatever the request says; proxies of the environment and redirects are not followed; and
+names are looked up as the TCP transport does it, in no thread that the program waits for.
+"""
+
+import asyncio
+import ssl
+from collections.abc import AsyncIterator, Iterable, Mapping
+from contextlib import asynccontextmanager, suppress
+from typing import Any
+
+import httpcore2
+import httpx2
+
+from urc.transports._faults import HUNG_UP, late, one_line
+from urc.transports.base import ByteStream, ConnectFailed, PeerClosed, TransportError
+from urc.transports.web_dial import Dialer
+from urc.transports.web_place import Credentials, WebPlace
+
+__all__ = ["Client", "HttpFault"]
+
+KEPT_S = 3.0
+"""An idle connection is used again for this long; small robots close theirs after five seconds."""
+CONNECT_S = 3.0
+"""Longest wait for a connection, its TLS included."""
+MAX_COOKIES = 50
+
+
+class HttpFault(TransportError):
+    """A request failed. Its text is for people."""
+
+    def __init__(
+        self, text: str, *, is_unreachable: bool = False, is_unanswered: bool = False
+    ) -> None:
+        """Tell what failed.
+
+        Args:
+            text: for people.
+            is_unreachable: there was no connection at all.
+            is_unanswered: there was one, and nothing that can be called an answer came on it.
+        """
+        super().__init__(text)
+        self.is_unreachable = is_unreachable
+        self.is_unanswered = is_unanswered
+
+
+class Client:
+    """All connections of one transport, while it is open."""
+
+    def __init__(
+        self,
+        place: WebPlace,
+        dialer: Dialer,
+        *,
+        credentials: Credentials | None,
+        headers: Mapping[str, str],
+        connections: int,
+    ) -> None:
+        """Prepare; nothing is connected yet. At most `connections` at a time."""
+        self._place = place
+        self._credentials = credentials
+        self._backend = _Backend(dialer)
+        pool = httpcore2.AsyncConnectionPool(
+            ssl_context=_NO_TLS,
+            max_connections=connections,
+            keepalive_expiry=KEPT_S,
+            network_backend=self._backend,
+        )
+        self._origin = f"http{'s' * place.is_secure}://{place.authority}"
+        self._client = httpx2.AsyncClient(
+            transport=_Wire(pool),
+            auth=_auth(credentials),
+            headers={"Accept-Encoding": "identity", "User-Agent": "urc", **headers},
+            timeout=httpx2.Timeout(None, connect=CONNECT_S, pool=CONNECT_S),
+            follow_redirects=False,
+            trust_env=False,
+        )
+
+    async def reach(self, timeout_s: float = CONNECT_S) -> None:
+        """Connect once, for the next request; raise `ConnectFailed`."""
+        await self._backend.reach(timeout_s)
+
+    def request(
+        self, method: str, path: str, headers: Mapping[str, str], body: bytes | None
+    ) -> httpx2.Request:
+        """Return a request for `path`, which goes on from the path of the document's URL.
+
+        Raises:
+            HttpFault: it cannot be said in HTTP, or would lead elsewhere.
+        """
+        base = self._place.path.partition("?")[0].rstrip("/")
+        try:
+            url = httpx2.URL(f"{self._origin}{base}/{path.lstrip('/')}")
+            request = self._client.build_request(method, url, headers=dict(headers), content=body)
+        except (httpx2.InvalidURL, UnicodeError, TypeError, ValueError) as fault:
+            raise HttpFault(f"{method} {path[:80]!r} is no request ({fault})") from fault
+        return request
+
+    @asynccontextmanager
+    async def answer(
+        self, request: httpx2.Request, silence_s: float | None = None
+    ) -> AsyncIterator[httpx2.Response]:
+        """Send `request` and give its answer, whose body is still to be read, for the context.
+
+        Whatever goes wrong in the context, too, is raised as `HttpFault`.
+
+        Args:
+            request: as from `request`.
+            silence_s: longest wait between two pieces of the answer; None: as long as it takes.
+        """
+        if silence_s is not None:
+            request.extensions["timeout"] = {**request.extensions["timeout"], "read": silence_s}
+        if len(self._client.cookies.jar) > MAX_COOKIES:
+            self._client.cookies.clear()
+        try:
+            response = await self._sent(request)
+            try:
+                yield response
+            finally:
+                await response.aclose()
+        except _FAULTS as fault:
+            raise self._translated(fault, silence_s or CONNECT_S) from fault
+
+    async def _sent(self, request: httpx2.Request) -> httpx2.Response:
+        try:
+            return await self._client.send(request, stream=True)
+        except (httpcore2.TimeoutException, httpcore2.NetworkError, httpcore2.ProtocolError):
+            raise
+        except Exception as fault:  # the library reads challenges and cookies without much care
+            # It would answer a senseless challenge again and again.
+            if (fresh := _auth(self._credentials)) is not None:
+                self._client.auth = fresh
+            if isinstance(fault, _FAULTS):
+                raise
+            where = self._place.authority
+            raise HttpFault(f"what {where} answers is not understood ({_short(fault)})") from fault
+
+    async def close(self) -> None:
+        """Close every connection. Never raises."""
+        await self._backend.close()
+        with suppress(Exception):  # of connections that are broken already
+            await self._client.aclose()
+
+    def _translated(self, fault: Exception, waited_s: float) -> HttpFault:
+        where = self._place.authority
+        if isinstance(fault, httpcore2.ConnectError | httpcore2.ConnectTimeout):
+            return HttpFault(str(fault), is_unreachable=True)
+        if isinstance(fault, httpcore2.PoolTimeout):
+            return HttpFault(f"all connections to {where} are taken by other requests")
+        if isinstance(fault, httpcore2.TimeoutException):
+            return HttpFault(late(where, waited_s), is_unanswered=True)
+        if isinstance(fault, httpcore2.RemoteProtocolError | httpx2.ProtocolError):
+            if "without sending" in str(fault):
+                text = "the robot closed the line without an answer"
+                return HttpFault(text, is_unanswered=True)
+            return HttpFault(f"what {where} sends is not HTTP ({_short(fault)})")
+        if isinstance(fault, httpcore2.LocalProtocolError | NotImplementedError):
+            return HttpFault(f"this request cannot be made ({_short(fault)})")
+        return HttpFault(_short(fault), is_unanswered=True)
+
+
+_FAULTS = (
+    httpcore2.TimeoutException,
+    httpcore2.NetworkError,
+    httpcore2.ProtocolError,
+    httpx2.ProtocolError,
+    NotImplementedError,  # Digest with auth-int alone
+)
+_NO_TLS = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
+"""For the pool, which would otherwise read the system's certificates: streams bring their TLS."""
+
+
+def _short(fault: Exception) -> str:
+    return one_line(str(fault) or "no reason is known").rstrip(".")
+
+
+def _auth(credentials: Credentials | None) -> httpx2.Auth | None:
+    if credentials is None:
+        return None
+    if credentials.kind == "digest":
+        return httpx2.DigestAuth(credentials.user, credentials.secret)
+    if credentials.kind == "basic":
+        return httpx2.BasicAuth(credentials.user, credentials.secret)
+    return _Bearer(credentials.header)
+
+
+class _Bearer(httpx2.Auth):
+    def __init__(self, header: str) -> None:
+        self._header = header
+
+    def auth_flow(self, request: httpx2.Request) -> Any:  # a generator of the library's own types
+        request.headers["Authorization"] = self._header
+        yield request
+
+
+class _Backend(httpcore2.AsyncNetworkBackend):
+    """Connects to one place alone. The connection of `reach` is the first one that is used."""
+
+    def __init__(self, dialer: Dialer) -> None:
+        self._dialer = dialer
+        self._spare: ByteStream | None = None
+
+    async def reach(self, timeout_s: float) -> None:
+        await self.close()
+        self._spare = await self._dialer.stream(timeout_s)
+
+    async def close(self) -> None:
+        spare, self._spare = self._spare, None
+        if spare is not None:
+            await spare.abort()
+
+    async def connect_tcp(
+        self,
+        host: str,
+        port: int,
+        timeout: float | None = None,
+        local_address: str | None = None,
+        socket_options: Iterable[Any] | None = None,
+    ) -> httpcore2.AsyncNetworkStream:
+        spare, self._spare = self._spare, None
+        if spare is not None:
+            connection = _Connection(spare)
+            if not connection.is_readable():  # else the robot did not want to wait
+                return connection
+            await connection.aclose()
+        try:
+            return _Connection(await self._dialer.stream(timeout or CONNECT_S))
+        except ConnectFailed as fault:
+            raise httpcore2.ConnectError(str(fault)) from fault
+
+    async def sleep(self, seconds: float) -> None:
+        await asyncio.sleep(seconds)
+
+
+class _Connection(httpcore2.AsyncNetworkStream):
+    """One of our streams, as the library's pool wants it."""
+
+    def __init__(self, stream: ByteStream) -> None:
+        self._stream = stream
+        self._early = b""
+
+    async def read(self, max_bytes: int, timeout: float | None = None) -> bytes:
+        if self._early:
+            early, self._early = self._early, b""
+            return early
+        try:
+            async with asyncio.timeout(timeout):
+                return await self._stream.take()
+        except TimeoutError as fault:
+            raise httpcore2.ReadTimeout from fault
+        except PeerClosed as ended:
+            if str(ended) == HUNG_UP:
+                return b""
+            raise httpcore2.ReadError(str(ended)) from ended
+
+    async def write(self, buffer: bytes, timeout: float | None = None) -> None:
+        if not buffer:
+            return
+        try:
+            async with asyncio.timeout(timeout):
+                await self._stream.put(buffer)
+        except TimeoutError as fault:
+            raise httpcore2.WriteTimeout from fault
+        except PeerClosed as ended:
+            raise httpcore2.WriteError(str(ended)) from ended
+
+    async def aclose(self) -> None:
+        await self._stream.abort()
+
+    async def start_tls(
+        self,
+        ssl_context: ssl.SSLContext,
+        server_hostname: str | None = None,
+        timeout: float | None = None,
+    ) -> httpcore2.AsyncNetworkStream:
+        return self  # it has been started, by `Reach`
+
+    def get_extra_info(self, info: str) -> object:
+        return self.is_readable() if info == "is_readable" else None
+
+    def is_readable(self) -> bool:
+        """Whether `read` would not wait: of an idle connection, that the robot has closed it.
+
+        A stream has no other way to ask than to begin to take, and to leave it when it waits.
+        """
+        if self._early:
+            return True
+        taking = self._stream.take()
+        try:
+            taking.send(None)
+        except StopIteration as taken:
+            self._early = taken.value
+            return True
+        except PeerClosed:
+            return True
+        taking.close()
+        return False
+
+
+class _Wire(httpx2.AsyncBaseTransport):
+    """Hands the library's requests to a pool of ours, and its errors on as they are."""
+
+    def __init__(self, pool: httpcore2.AsyncConnectionPool) -> None:
+        self._pool = pool
+
+    async def handle_async_request(self, request: httpx2.Request) -> httpx2.Response:
+        url = request.url
+        assert isinstance(request.stream, httpx2.AsyncByteStream)  # noqa: S101 - as the client makes it
+        answer = await self._pool.handle_async_request(
+            httpcore2.Request(
+                method=request.method,
+                url=httpcore2.URL(
+                    scheme=url.raw_scheme, host=url.raw_host, port=url.port, target=url.raw_path
+                ),
+                headers=request.headers.raw,
+                content=request.stream,
+                extensions=request.extensions,
+            )
+        )
+        return httpx2.Response(
+            answer.status,
+            headers=answer.headers,
+            stream=_Body(answer),
+            extensions=answer.extensions,
+        )
+
+    async def aclose(self) -> None:
+        await self._pool.aclose()
+
+
+class _Body(httpx2.AsyncByteStream):
+    def __init__(self, answer: httpcore2.Response) -> None:
+        self._answer = answer
+
+    async def __aiter__(self) -> AsyncIterator[bytes]:
+        async for piece in self._answer.aiter_stream():
+            yield piece
+
+    async def aclose(self) -> None:
+        await self._answer.aclose()

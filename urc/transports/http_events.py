@@ -1,0 +1,147 @@
+"""Cuts ``text/event-stream`` and plain lines out of a body. Pure: bytes in, messages out.
+
+Server-sent events are read as the HTML standard says (section 9.2.6, "Interpreting an event
+stream"), except that data stays bytes. Everything has a bound: an event or a line that is longer is
+left out whole and counted, and what follows it is read again.
+"""
+
+from typing import Final, NamedTuple
+
+__all__ = ["Event", "EventCutter", "LineCutter"]
+
+_BOM: Final = b"\xef\xbb\xbf"
+_MAX_NAME: Final = 200
+"""Characters of an event's name or id that are kept."""
+_TOO_LONG: Final = b"\0 too long"
+"""Stands for a line that is; compared by identity."""
+
+
+class Event(NamedTuple):
+    """One event of a stream."""
+
+    name: str
+    """"" for one without a name (the standard's ``message``)."""
+    data: bytes
+    """Its data lines, joined by LF."""
+    id: str
+    """The newest id of the stream so far; what a new connection starts after."""
+
+
+class LineCutter:
+    """Takes a body in any pieces, and gives its lines without their ends (CR LF, LF or CR)."""
+
+    def __init__(self, max_bytes: int, instead: bytes | None = None) -> None:
+        """Leave out lines of more than `max_bytes`, or give `instead`."""
+        self._most = max_bytes
+        self._instead = instead
+        self._buffer = bytearray()
+        self._is_skipping = False
+        self._was_cr = False
+        self.left_out = 0
+        """Lines that were too long."""
+
+    def feed(self, data: bytes) -> list[bytes]:
+        """Take the next piece of the body and return the lines that are complete with it."""
+        if self._was_cr and data.startswith(b"\n"):
+            data = data[1:]
+            self._was_cr = False
+        if data:
+            self._was_cr = data.endswith(b"\r")
+        # A body of CR LF or LF alone is the usual one, and is split without looking at each byte.
+        plain = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n") if b"\r" in data else data
+        first, *others = plain.split(b"\n")
+        if not others:
+            self._add(first)
+            return []
+        lines: list[bytes] = []
+        self._add(first)
+        self._finish(lines)
+        *whole, last = others
+        for line in whole:
+            self._add(line)
+            self._finish(lines)
+        self._add(last)
+        return lines
+
+    def end(self) -> bytes:
+        """Return what came after the last end of a line, once the body is over."""
+        rest = b"" if self._is_skipping else bytes(self._buffer)
+        self._buffer.clear()
+        return rest
+
+    def _add(self, piece: bytes) -> None:
+        if self._is_skipping:
+            return
+        self._buffer += piece
+        if len(self._buffer) > self._most:
+            self._is_skipping = True
+            self._buffer.clear()
+            self.left_out += 1
+
+    def _finish(self, lines: list[bytes]) -> None:
+        if not self._is_skipping:
+            lines.append(bytes(self._buffer))
+        elif self._instead is not None:
+            lines.append(self._instead)
+        self._is_skipping = False
+        self._buffer.clear()
+
+
+class EventCutter:
+    """Takes an event stream in any pieces, and gives its events."""
+
+    def __init__(self, max_bytes: int, last_id: str = "") -> None:
+        """Leave out events of more than `max_bytes`; `last_id` is that of the connection before."""
+        self._most = max_bytes
+        self._lines = LineCutter(max_bytes + _MAX_NAME, _TOO_LONG)
+        self._is_start = True
+        self._name = ""
+        self._data: list[bytes] = []
+        self._size = 0
+        self._is_too_long = False
+        self._next_id = last_id
+        self.last_id = last_id
+        """The id of the newest event, for the header Last-Event-ID."""
+        self.left_out = 0
+        """Events that were too long."""
+        self.retry_s: float | None = None
+        """Wait before a new connection, as the robot wishes; None: it has no wish."""
+
+    def feed(self, data: bytes) -> list[Event]:
+        """Take the next piece of the stream and return the events that are complete with it."""
+        events: list[Event] = []
+        for line in self._lines.feed(data):
+            text = line.removeprefix(_BOM) if self._is_start else line
+            self._is_start = False
+            if text:
+                self._field(text)
+            else:
+                self._dispatch(events)
+        return events
+
+    def _field(self, line: bytes) -> None:
+        if line is _TOO_LONG:
+            self._is_too_long = True
+            return
+        name, _, value = line.partition(b":")
+        value = value.removeprefix(b" ")
+        if name == b"data":
+            self._size += len(value) + bool(self._data)
+            self._is_too_long |= self._size > self._most
+            if not self._is_too_long:
+                self._data.append(value)
+        elif name == b"event":
+            self._name = value.decode("utf-8", "replace")[:_MAX_NAME]
+        elif name == b"id" and b"\0" not in value:
+            self._next_id = value.decode("utf-8", "replace")[:_MAX_NAME]
+        elif name == b"retry" and value.isdigit() and len(value) < 10:
+            self.retry_s = int(value) / 1000
+
+    def _dispatch(self, events: list[Event]) -> None:
+        self.last_id = self._next_id
+        if self._is_too_long:
+            self.left_out += 1
+        elif self._data:
+            events.append(Event(self._name, b"\n".join(self._data), self.last_id))
+        self._name, self._size, self._is_too_long = "", 0, False
+        self._data.clear()

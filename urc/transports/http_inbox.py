@@ -1,0 +1,91 @@
+"""What has arrived over HTTP and has not been taken yet: answers, pictures, events; all bounded."""
+
+import asyncio
+from collections.abc import Mapping
+
+from urc.model.codec import Envelope
+from urc.transports.base import PeerClosed
+
+__all__ = ["Inbox"]
+
+EVENTS_BYTES = 1_048_576
+"""Size of the events and lines that wait at most; their robot is not read until some are taken."""
+EVENTS = 64
+
+
+class Inbox:
+    """A bounded queue in the order of arrival. A newer picture takes the place of the older one."""
+
+    def __init__(self) -> None:
+        self._waiting: dict[object, Envelope] = {}
+        """By its place: a stream's name for a picture, else a number."""
+        self._number = 0
+        self._events = 0
+        self._events_bytes = 0
+        self._arrived = asyncio.Event()
+        self._has_room = asyncio.Event()
+        self._has_room.set()
+        self._ended: str | None = None
+        self.dropped = 0
+        """Pictures that were given up for newer ones."""
+
+    def answer(self, place: int, envelope: Envelope) -> None:
+        """Add the answer to a request; there are no more of them than requests may be made."""
+        self._waiting["answer", place] = envelope
+        self._arrived.set()
+
+    def give_up(self, place: int) -> None:
+        """Forget an answer that has not been taken."""
+        self._waiting.pop(("answer", place), None)
+
+    def picture(self, topic: str, body: bytes) -> None:
+        """Add a picture, instead of the one of that topic that waits."""
+        self.dropped += topic in self._waiting
+        self._waiting[topic] = Envelope("message", {"topic": topic, "dropped": self.dropped}, body)
+        self._arrived.set()
+
+    async def event(self, attributes: Mapping[str, object], body: bytes) -> None:
+        """Add an event or a line, waiting while too many wait already."""
+        while self._events >= EVENTS or self._events_bytes >= EVENTS_BYTES:
+            self._has_room.clear()
+            await self._has_room.wait()
+        self._events += 1
+        self._events_bytes += len(body)
+        self._number += 1
+        self._waiting["event", self._number] = Envelope("message", attributes, body)
+        self._arrived.set()
+
+    def end(self, reason: str) -> None:
+        """No more will come; what waits can still be taken."""
+        if self._ended is None:
+            self._ended = reason
+        self._arrived.set()
+        self._has_room.set()
+
+    @property
+    def ended(self) -> str | None:
+        """Why no more will come; None while the line is up."""
+        return self._ended
+
+    async def take(self) -> tuple[Envelope, int | None]:
+        """Return the next envelope, and the place of the request when it is an answer.
+
+        Raises:
+            PeerClosed: no more will come.
+        """
+        while not self._waiting:
+            if self._ended is not None:
+                raise PeerClosed(self._ended)
+            self._arrived.clear()
+            await self._arrived.wait()
+        where = next(iter(self._waiting))
+        envelope = self._waiting.pop(where)
+        if not isinstance(where, tuple):
+            return envelope, None
+        kind, number = where
+        if kind == "answer":
+            return envelope, number
+        self._events -= 1
+        self._events_bytes -= len(envelope.body) if isinstance(envelope.body, bytes) else 0
+        self._has_room.set()
+        return envelope, None

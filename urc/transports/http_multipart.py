@@ -1,0 +1,161 @@
+"""Cuts a ``multipart/x-mixed-replace`` body (MJPEG) into its parts. Pure: bytes in, parts out.
+
+Cameras are careless with the format (RFC 2046, section 5.1): the boundary is quoted or not, the
+header may already have the two dashes that belong to the body, a part may lack Content-Length, and
+lines may end in LF alone. All of that is read. Every piece has a bound; past it the stream is no
+multipart stream, and that is an error.
+"""
+
+import re
+from email.message import Message
+from typing import Final, Literal
+
+__all__ = ["MAX_BOUNDARY", "MAX_HEADER_BYTES", "MultipartCutter", "MultipartFault", "boundary_of"]
+
+MAX_BOUNDARY: Final = 200
+"""Characters; RFC 2046 allows 70, cameras do not all keep to it."""
+MAX_HEADER_BYTES: Final = 8192
+"""Headers of one part, and whatever is between two parts."""
+
+_LENGTH: Final = re.compile(rb"^content-length[ \t]*:[ \t]*(\d{1,15})[ \t]*$", re.I | re.M)
+
+
+class MultipartFault(ValueError):
+    """What came is no multipart stream, or more than is taken."""
+
+
+def boundary_of(content_type: str) -> bytes:
+    """Return the boundary that a Content-Type names, without the dashes before it.
+
+    Raises:
+        MultipartFault: it is not of a multipart body, or the boundary is missing or too long.
+    """
+    header = Message()
+    header["content-type"] = content_type
+    if header.get_content_maintype() != "multipart":
+        found = content_type or "no Content-Type"
+        raise MultipartFault(f"the answer is {found}, not multipart/x-mixed-replace")
+    named = header.get_param("boundary", "")
+    core = (named if isinstance(named, str) else "").strip().lstrip("-")
+    if not core:
+        raise MultipartFault("the Content-Type names no boundary")
+    if len(core) > MAX_BOUNDARY or not core.isascii():
+        raise MultipartFault(f"the boundary has more than {MAX_BOUNDARY} characters, or odd ones")
+    return core.encode()
+
+
+class MultipartCutter:
+    """Takes a body in any pieces, and gives its parts without their headers."""
+
+    def __init__(self, boundary: bytes, max_part_bytes: int) -> None:
+        """Cut at `boundary`, as from `boundary_of`; a part has at most `max_part_bytes`."""
+        # Between parts the line before, and the dashes, may be missing; inside a part they are
+        # what tells a delimiter from the picture.
+        self._loose = re.compile(rb"(?:\A|\r?\n)-*" + re.escape(boundary))
+        self._strict = re.compile(rb"\r?\n-+" + re.escape(boundary))
+        self._keep = len(boundary) + 80
+        """So much of the end is searched again: a delimiter may have come in half."""
+        self._most = max_part_bytes
+        self._buffer = bytearray()
+        self._state: Literal["seek", "rest", "head", "counted", "open", "ended"] = "seek"
+        self._from = 0
+        self._length = 0
+
+    @property
+    def is_ended(self) -> bool:
+        """Whether the closing delimiter has come: what follows is no part."""
+        return self._state == "ended"
+
+    def feed(self, data: bytes) -> list[bytes]:
+        """Take the next piece of the body and return the parts that are complete with it.
+
+        Raises:
+            MultipartFault: something has no end, or a part is larger than is taken.
+        """
+        self._buffer += data
+        parts: list[bytes] = []
+        steps = {
+            "seek": self._seek, "rest": self._rest, "head": self._head,
+            "counted": self._counted, "open": self._open, "ended": self._drop,
+        }  # fmt: skip
+        while steps[self._state](parts):
+            pass
+        return parts
+
+    def _seek(self, parts: list[bytes]) -> bool:
+        """Skip what is before the next delimiter."""
+        found = self._loose.search(self._buffer, self._from)
+        if found is None:
+            self._from = max(0, len(self._buffer) - self._keep)
+            if len(self._buffer) > MAX_HEADER_BYTES:
+                raise MultipartFault(f"no boundary within {MAX_HEADER_BYTES} bytes")
+            return False
+        self._cut(found.end(), "rest")
+        return True
+
+    def _rest(self, parts: list[bytes]) -> bool:
+        """Skip the rest of the delimiter's line; two dashes there mean the end."""
+        if len(self._buffer) < 2:
+            return False
+        if self._buffer.startswith(b"--"):
+            self._state = "ended"
+            return True
+        end = self._buffer.find(b"\n")
+        if end < 0:
+            self._check_header()
+            return False
+        self._cut(end + 1, "head")
+        return True
+
+    def _head(self, parts: list[bytes]) -> bool:
+        """Read the headers of a part up to the empty line."""
+        found = _EMPTY_LINE.search(self._buffer)
+        if found is None:
+            self._check_header()
+            return False
+        if found.end() > MAX_HEADER_BYTES:
+            raise MultipartFault(f"the headers of a part exceed {MAX_HEADER_BYTES} bytes")
+        head = bytes(self._buffer[: found.end()]).replace(b"\r", b"")
+        length = _LENGTH.search(head)
+        self._length = int(length[1]) if length else 0
+        if self._length > self._most:
+            raise MultipartFault(f"a part of {self._length} bytes; at most {self._most} are taken")
+        self._cut(found.end(), "counted" if length else "open")
+        return True
+
+    def _counted(self, parts: list[bytes]) -> bool:
+        """Take a part whose length is known."""
+        if len(self._buffer) < self._length:
+            return False
+        parts.append(bytes(self._buffer[: self._length]))
+        self._cut(self._length, "seek")
+        return True
+
+    def _open(self, parts: list[bytes]) -> bool:
+        """Take a part that ends where the next delimiter begins."""
+        found = self._strict.search(self._buffer, self._from)
+        end = found.start() if found else len(self._buffer) - self._keep
+        if end > self._most:
+            raise MultipartFault(f"a part without an end within {self._most} bytes")
+        if found is None:
+            self._from = max(0, end)
+            return False
+        parts.append(bytes(self._buffer[:end]))
+        self._cut(found.end(), "rest")
+        return True
+
+    def _drop(self, parts: list[bytes]) -> bool:
+        self._buffer.clear()
+        return False
+
+    def _check_header(self) -> None:
+        if len(self._buffer) > MAX_HEADER_BYTES:
+            raise MultipartFault(f"the headers of a part exceed {MAX_HEADER_BYTES} bytes")
+
+    def _cut(self, end: int, state: Literal["seek", "rest", "head", "counted", "open"]) -> None:
+        del self._buffer[:end]
+        self._from = 0
+        self._state = state
+
+
+_EMPTY_LINE: Final = re.compile(rb"\A\r?\n|\n\r?\n")

@@ -1,0 +1,272 @@
+"""What a robot sends over HTTP by itself: pictures, events, lines. Each stream is a task.
+
+A stream that fails is asked for again, later each time, and the line stands; its first failure and
+its recovery are logged, the failures between are not. Only when there is no connection to the robot
+at all, and nothing else has come from it for a while either, is the line given up.
+"""
+
+import asyncio
+import logging
+import random
+from collections.abc import AsyncIterator, Mapping, Sequence
+from contextlib import asynccontextmanager
+from types import TracebackType
+from typing import Final, NamedTuple
+
+import httpx2
+
+from urc.transports.base import Subscription, TransportError
+from urc.transports.http_body import complaint, read_body
+from urc.transports.http_client import Client, HttpFault
+from urc.transports.http_events import Event, EventCutter, LineCutter
+from urc.transports.http_inbox import Inbox
+from urc.transports.http_multipart import MultipartCutter, MultipartFault, boundary_of
+
+__all__ = ["SHORTEST_RETRY_S", "Pulse", "Stream", "StreamSpec", "streams_of"]
+
+KINDS: Final = ("mjpeg", "stills", "sse", "lines")
+MAX_STREAMS: Final = 16
+MAX_EVENT_BYTES: Final = 262_144
+SILENCE_S: Final = 5.0
+"""Pictures that stay out for this long are asked for again."""
+_FIRST_WAIT_S: Final = 0.5
+_LONGEST_WAIT_S: Final = 5.0
+SHORTEST_RETRY_S: Final = 0.2
+"""However soon the robot would like to be asked again."""
+_LONGEST_RETRY_S: Final = 60.0
+_NO_MORE: Final = 204
+_GONE_S: Final = 2.0
+"""With nothing from the robot for this long, a refused connection means that it is gone."""
+
+log = logging.getLogger(__name__)
+
+
+class StreamSpec(NamedTuple):
+    """One stream, as the driver's messages listen to it."""
+
+    kind: str
+    path: str
+    every_s: float
+    topics: frozenset[str]
+    """All topics of that path: of events, those with ``#NAME`` at the end are of one name alone."""
+
+
+def streams_of(subscriptions: Sequence[Subscription]) -> list[StreamSpec]:
+    """Return the streams that are to be asked for; several topics may come out of one.
+
+    Raises:
+        TransportError: a subscription that HTTP cannot serve.
+    """
+    found: dict[str, StreamSpec] = {}
+    for topic, how in subscriptions:
+        kind, every_s = how.get("stream"), how.get("every", 1.0)
+        path, _, event = topic.partition("#")
+        if kind not in KINDS:
+            words = "mjpeg, stills, sse or lines"
+            raise TransportError(f"http needs {words} as stream of {topic!r}, not {kind!r}")
+        if event and kind != "sse":
+            raise TransportError(f"http knows events by name in streams of sse only: {topic!r}")
+        if not isinstance(every_s, int | float) or not 0.01 <= every_s <= 3600:
+            raise TransportError(f"http needs every from 10ms to 1h for {topic!r}, not {every_s!r}")
+        spec = StreamSpec(str(kind), path, float(every_s), frozenset({topic}))
+        known = found.setdefault(path, spec)
+        if (known.kind, known.every_s) != (spec.kind, spec.every_s):
+            raise TransportError(f"http cannot listen to {path!r} in two ways")
+        found[path] = known._replace(topics=known.topics | {topic})
+    if len(found) > MAX_STREAMS:
+        raise TransportError(f"http listens to at most {MAX_STREAMS} paths")
+    return list(found.values())
+
+
+class Pulse:
+    """When anything came from the robot, on whichever connection."""
+
+    def __init__(self) -> None:
+        self._clock = asyncio.get_running_loop().time
+        self._beat_s = self._clock()
+
+    def beat(self) -> None:
+        """Something came."""
+        self._beat_s = self._clock()
+
+    @property
+    def silence_s(self) -> float:
+        """Seconds since then."""
+        return self._clock() - self._beat_s
+
+
+class Stream:
+    """One stream of an open transport; `run` does the work until it is cancelled."""
+
+    def __init__(
+        self, spec: StreamSpec, client: Client, inbox: Inbox, pulse: Pulse, max_body_bytes: int
+    ) -> None:
+        """Prepare the stream.
+
+        Args:
+            spec: what is asked for.
+            client: asks.
+            inbox: takes what comes.
+            pulse: of the transport.
+            max_body_bytes: of one picture.
+        """
+        self._spec = spec
+        self._client = client
+        self._inbox = inbox
+        self._pulse = pulse
+        self._max_bytes = max_body_bytes
+        self._wait_s = _FIRST_WAIT_S
+        self._failures = 0
+        self._last_id = ""
+        self._retry_s: float | None = None
+        self._is_over = False
+
+    async def run(self) -> None:
+        """Ask for the stream again and again, until the robot says that there will be no more."""
+        once = {"mjpeg": self._mjpeg, "stills": self._still, "sse": self._sse, "lines": self._lines}
+        clock = asyncio.get_running_loop().time
+        while not self._is_over:
+            began_s = clock()
+            try:
+                await once[self._spec.kind]()
+            except (HttpFault, MultipartFault) as fault:
+                self._fail(fault)
+            is_still = self._spec.kind == "stills" and not self._failures
+            await asyncio.sleep(
+                max(0.0, began_s + self._spec.every_s - clock()) if is_still else self._pause_s()
+            )
+
+    async def _mjpeg(self) -> None:
+        # A byte now and then is an answer, yet no picture.
+        patience = _Bound(SILENCE_S, "no picture")
+        async with self._open({}, SILENCE_S) as response, patience:
+            boundary = boundary_of(response.headers.get("content-type", ""))
+            cutter = MultipartCutter(boundary, self._max_bytes)
+            async for piece in response.aiter_raw():
+                parts = [part for part in cutter.feed(piece) if part]
+                if parts:
+                    self._came()
+                    patience.extend()
+                for part in parts:
+                    self._inbox.picture(self._topic, part)
+        raise HttpFault("the robot ended the stream")
+
+    async def _still(self) -> None:
+        async with self._open({}, SILENCE_S) as response:
+            body = await read_body(response, self._max_bytes)
+            if body:
+                self._came()
+                self._inbox.picture(self._topic, body)
+
+    async def _sse(self) -> None:
+        headers = {"Accept": "text/event-stream", "Cache-Control": "no-store"}
+        if self._last_id:
+            headers["Last-Event-ID"] = self._last_id
+        async with self._open(headers, None) as response:
+            if response.status_code == _NO_MORE:
+                self._is_over = True
+                return
+            kind = response.headers.get("content-type", "no Content-Type")
+            if not kind.startswith("text/event-stream"):
+                raise HttpFault(f"the answer is {kind[:80]}, not text/event-stream")
+            cutter = EventCutter(MAX_EVENT_BYTES, self._last_id)
+            async for piece in response.aiter_raw():
+                for event in cutter.feed(piece):
+                    self._came()
+                    await self._deliver(event)
+                self._last_id = cutter.last_id
+                if cutter.retry_s is not None:
+                    wish_s = min(cutter.retry_s, _LONGEST_RETRY_S)
+                    self._retry_s = max(wish_s, SHORTEST_RETRY_S)
+
+    async def _lines(self) -> None:
+        async with self._open({}, None) as response:
+            cutter = LineCutter(MAX_EVENT_BYTES)
+            async for piece in response.aiter_raw():
+                for line in cutter.feed(piece):
+                    await self._line(line)
+            await self._line(cutter.end())
+
+    async def _line(self, line: bytes) -> None:
+        if line:
+            self._came()
+            await self._inbox.event({"topic": self._topic}, line)
+
+    async def _deliver(self, event: Event) -> None:
+        """Hand an event to whoever listens to its name, else to whoever listens to the path."""
+        named = f"{self._spec.path}#{event.name}"
+        topic = named if named in self._spec.topics else self._spec.path
+        if topic in self._spec.topics:
+            attributes = {"topic": topic, "event": event.name, "id": event.id}
+            await self._inbox.event(attributes, event.data)
+
+    @asynccontextmanager
+    async def _open(
+        self, headers: Mapping[str, str], silence_s: float | None
+    ) -> AsyncIterator[httpx2.Response]:
+        request = self._client.request("GET", self._spec.path, headers, None)
+        # The head of the answer has a bound even where the stream may be silent for hours.
+        head = _Bound(SILENCE_S if silence_s is None else 2 * silence_s, "no answer")
+        async with head, self._client.answer(request, silence_s) as response:
+            head.lift()
+            self._pulse.beat()
+            if reason := await complaint(response):
+                raise HttpFault(reason)
+            yield response
+
+    @property
+    def _topic(self) -> str:
+        return self._spec.path
+
+    def _pause_s(self) -> float:
+        """Return the wait before the next attempt: longer each time, and never quite the same."""
+        if self._retry_s is not None and not self._failures:
+            return self._retry_s
+        wait_s, self._wait_s = self._wait_s, min(2 * self._wait_s, _LONGEST_WAIT_S)
+        return wait_s * (1 - 0.25 * random.random())  # noqa: S311 - spreads attempts, no secret
+
+    def _came(self) -> None:
+        """Note that the stream gives what it should."""
+        self._pulse.beat()
+        self._wait_s = _FIRST_WAIT_S
+        if self._failures:
+            log.info("%s: here again after %d failures", self._spec.path, self._failures)
+            self._failures = 0
+
+    def _fail(self, fault: Exception) -> None:
+        self._failures += 1
+        if self._failures == 1:
+            log.warning("%s: %s; trying again", self._spec.path, fault)
+        is_gone = isinstance(fault, HttpFault) and fault.is_unreachable
+        if is_gone and self._pulse.silence_s > _GONE_S:
+            self._inbox.end(str(fault))
+
+
+class _Bound:
+    """A time-out that can be put off and lifted; late, it raises `HttpFault`."""
+
+    def __init__(self, limit_s: float, lack: str) -> None:
+        self._limit_s = limit_s
+        self._lack = lack
+        self._timeout = asyncio.timeout(limit_s)
+
+    async def __aenter__(self) -> None:
+        await self._timeout.__aenter__()
+
+    async def __aexit__(
+        self,
+        kind: type[BaseException] | None,
+        fault: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        try:
+            await self._timeout.__aexit__(kind, fault, trace)
+        except TimeoutError as late:
+            raise HttpFault(f"{self._lack} within {self._limit_s:g} s") from late
+
+    def extend(self) -> None:
+        """Begin anew."""
+        self._timeout.reschedule(asyncio.get_running_loop().time() + self._limit_s)
+
+    def lift(self) -> None:
+        self._timeout.reschedule(None)

@@ -1,0 +1,145 @@
+"""Which SSH host keys are trusted: a file of our own, and what the options name.
+
+The file has the form of OpenSSH's ``known_hosts``. Nothing is ever added to it but by `remember`,
+which runs when a person has said so (``urc trust``).
+"""
+
+import os
+import tempfile
+from contextlib import suppress
+from pathlib import Path
+from typing import NamedTuple
+
+import asyncssh
+
+from urc._folders import data_folder
+from urc.transports.base import TransportError
+
+__all__ = ["DEFAULT_PORT", "HostKeys", "Known", "fingerprint", "own_file", "remember"]
+
+DEFAULT_PORT = 22
+
+
+class Known(NamedTuple):
+    """What is known about one server."""
+
+    trusted: tuple[asyncssh.SSHKey, ...] = ()
+    authorities: tuple[asyncssh.SSHKey, ...] = ()
+    """Keys that sign host keys."""
+    revoked: tuple[asyncssh.SSHKey, ...] = ()
+
+
+def own_file() -> Path:
+    """Return the file in which URC keeps the keys that were confirmed."""
+    return data_folder() / "known_hosts"
+
+
+def fingerprint(key: asyncssh.SSHKey) -> str:
+    """Return the key's ``SHA256:…``, as ``ssh-keygen -l`` prints it."""
+    return str(key.get_fingerprint("sha256"))
+
+
+class HostKeys:
+    """What one transport trusts."""
+
+    def __init__(self, pinned: str = "", file: str = "") -> None:
+        """Trust one fingerprint only, or our own file and another one.
+
+        Args:
+            pinned: ``SHA256:…``; "": the files decide.
+            file: a ``known_hosts`` file beside our own; "": none.
+        """
+        self._pinned = pinned.rstrip("=")
+        self._file = file
+
+    @property
+    def is_pinned(self) -> bool:
+        """Whether the document itself says which key is right."""
+        return bool(self._pinned)
+
+    def known(self, host: str, port: int) -> Known:
+        """Return what the files say about a server.
+
+        Raises:
+            TransportError: a file cannot be read.
+        """
+        if self._pinned:
+            return Known()
+        found = _read(own_file(), host, port, is_asked_for=False)
+        if self._file:
+            other = _read(Path(self._file).expanduser(), host, port, is_asked_for=True)
+            found = Known(*(mine + theirs for mine, theirs in zip(found, other, strict=True)))
+        return found
+
+    def judge(self, key: asyncssh.SSHKey, known: Known) -> str:
+        """Return "" when `key` is trusted, else what was expected: a fingerprint or ``unknown``."""
+        if self._pinned:
+            return "" if fingerprint(key) == self._pinned else self._pinned
+        if key in known.revoked:
+            return "revoked"
+        if key in known.trusted:
+            return ""
+        return " or ".join(map(fingerprint, known.trusted)) or "unknown"
+
+
+def remember(host: str, port: int, key: asyncssh.SSHKey) -> Path:
+    """Write `key` into our own file as the one key of that server; return the file.
+
+    Raises:
+        TransportError: it cannot be written.
+    """
+    file = own_file()
+    name = _name(host, port)
+    public = key.export_public_key("openssh").decode("ascii").split()
+    try:
+        lines = file.read_text("utf-8").splitlines() if file.exists() else []
+        kept = [line for line in lines if line.split(" ", 1)[0] != name]
+        _write(file, "\n".join([*kept, f"{name} {public[0]} {public[1]}"]) + "\n")
+    except (OSError, UnicodeError) as fault:
+        raise TransportError(f"cannot write {file} ({_why(fault)})") from fault
+    return file
+
+
+def _name(host: str, port: int) -> str:
+    return host if port == DEFAULT_PORT else f"[{host}]:{port}"
+
+
+def _read(file: Path, host: str, port: int, *, is_asked_for: bool) -> Known:
+    try:
+        text = file.read_text("utf-8")
+    except FileNotFoundError as missing:
+        if is_asked_for:
+            raise TransportError(f"there is no known-hosts file {file}") from missing
+        return Known()
+    except (OSError, UnicodeError) as fault:
+        raise TransportError(f"cannot read the known-hosts file {file} ({_why(fault)})") from fault
+    try:
+        # Told the port, asyncssh would take the key of the host's port 22 for that of any port.
+        found = asyncssh.match_known_hosts(
+            asyncssh.import_known_hosts(text), _name(host, port), "", None
+        )
+    except ValueError as fault:
+        raise TransportError(f"{file} is no known-hosts file ({fault})") from fault
+    trusted, authorities, revoked = (tuple(keys) for keys in found[:3])
+    return Known(trusted, authorities, revoked)
+
+
+def _write(file: Path, text: str) -> None:
+    """Replace the file as a whole, readable by its owner alone."""
+    file.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
+    # mkstemp makes it 0600.
+    descriptor, name = tempfile.mkstemp(dir=file.parent, prefix=f".{file.name}.")
+    try:
+        with os.fdopen(descriptor, "w", encoding="utf-8", newline="\n") as new:
+            new.write(text)
+            new.flush()
+            os.fsync(new.fileno())
+        Path(name).replace(file)
+    except BaseException:
+        with suppress(OSError):
+            Path(name).unlink()
+        raise
+
+
+def _why(fault: Exception) -> str:
+    return str(getattr(fault, "strerror", None) or fault).lower()

@@ -1,0 +1,133 @@
+"""The options of an MQTT transport, read; and how a body becomes bytes. Needs no MQTT library."""
+
+from collections.abc import Mapping
+from importlib.util import find_spec
+from typing import NamedTuple
+
+import msgspec
+
+from urc.transports import _options
+from urc.transports._faults import place_of
+from urc.transports._tls import Tls
+from urc.transports.base import Setup, Transport, TransportError
+from urc.transports.web_dial import Dialer
+from urc.transports.web_place import WebPlace
+
+__all__ = ["Options", "Topic", "Will", "body_bytes", "from_setup", "read_options"]
+
+DEFAULT_PORT, DEFAULT_TLS_PORT = 1883, 8883
+
+_encode = msgspec.json.Encoder().encode
+
+
+class Topic(NamedTuple):
+    """One subscription."""
+
+    topic: str
+    qos: int = 0
+
+
+class Will(NamedTuple):
+    """What the broker publishes when the line ends."""
+
+    topic: str
+    payload: bytes
+    qos: int = 0
+    retain: bool = False
+
+
+class Options(NamedTuple):
+    """All of one transport."""
+
+    host: str
+    port: int
+    is_v5: bool = True
+    """MQTT 5; else 3.1.1."""
+    client_id: str = ""
+    """"": one that the library makes up."""
+    username: str = ""
+    password: str | None = None
+    tls: Tls | None = None
+    will: Will | None = None
+    subscriptions: tuple[Topic, ...] = ()
+
+    @property
+    def where(self) -> str:
+        """Host and port as people write them."""
+        return place_of(self.host, self.port)
+
+
+def from_setup(setup: Setup) -> Transport:
+    """Make a transport out of a document's options; see docs/transports/mqtt.md.
+
+    Raises:
+        TransportError: an option is missing or not usable, or the library is not there.
+    """
+    options = read_options(setup)
+    if find_spec("paho") is None:
+        raise TransportError("mqtt needs the package paho-mqtt: pip install 'urc[mqtt]'")
+    from urc.transports.mqtt import MqttTransport  # imports paho
+
+    place = WebPlace(options.tls is not None, options.host, options.port, "")
+    return MqttTransport(options, Dialer(place, tls=options.tls, via=setup.via))
+
+
+def read_options(setup: Setup) -> Options:
+    """Return the options of `setup`; raise `TransportError` with one line for a wrong one."""
+    given: Mapping[str, object] = setup.options
+    tls = Tls.of("mqtt", given.get("tls"))
+    port = DEFAULT_TLS_PORT if tls is not None else DEFAULT_PORT
+    username = _options.text("mqtt", given, "username")
+    password = _options.text("mqtt", given, "password")
+    if password and not username:
+        raise TransportError("mqtt was given a password but no username")
+    version = str(given.get("version", 5))
+    if version not in ("5", "3.1.1"):
+        raise TransportError(f"mqtt needs 5 or 3.1.1 as version, not {version!r}")
+    return Options(
+        _options.host("mqtt", given),
+        _options.port("mqtt", {"port": port, **given}),
+        version == "5",
+        _options.text("mqtt", given, "client_id"),
+        username,
+        password or None,
+        tls,
+        _will(given.get("will")),
+        tuple(Topic(one.topic, _qos("qos", one.attributes)) for one in setup.subscriptions),
+    )
+
+
+def body_bytes(body: object) -> bytes:
+    """Return the bytes of a message: bytes as they are, anything else as JSON.
+
+    Raises:
+        TransportError: it has no JSON.
+    """
+    if isinstance(body, bytes):
+        return body
+    if body is None:
+        return b""
+    try:
+        return _encode(body)
+    except (TypeError, ValueError, OverflowError) as problem:
+        raise TransportError(f"this cannot be sent as JSON ({problem})") from problem
+
+
+def _will(given: object) -> Will | None:
+    if given is None:
+        return None
+    if not isinstance(given, Mapping):
+        raise TransportError(f"mqtt needs topic and payload as will, not {given!r}")
+    topic = _options.text("mqtt", given, "topic")
+    if not topic or "+" in topic or "#" in topic:
+        raise TransportError(f"mqtt needs one topic without wildcards for its will, not {topic!r}")
+    payload = _options.text("mqtt", given, "payload").encode()
+    retain = _options.flag("mqtt", given, "retain", default=False)
+    return Will(topic, payload, _qos("qos", given), retain)
+
+
+def _qos(name: str, given: Mapping[str, object]) -> int:
+    value = given.get(name, 0)
+    if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value <= 2:
+        raise TransportError(f"mqtt needs 0, 1 or 2 as {name}, not {value!r}")
+    return value

@@ -1,0 +1,271 @@
+"""ROS 1 and ROS 2 robots behind a rosbridge server: topics, services and actions.
+
+Theory of operation. One WebSocket a connection, which is URC's own transport of that kind: opened,
+watched by pings, closed. What is said on it is roslibpy's (`urc.transports.rosbridge_client`), and
+is thrown away with the connection, so nothing can be said late. A task reads all the time, however
+slowly the messages are taken: one reader that stalls freezes the topic for every client of the
+bridge.
+
+The bridge tells no errors: a topic that nobody publishes, a wrong type, a white-list, all are
+silence. So it is asked once, through rosapi, which topics there are.
+"""
+
+import asyncio
+import logging
+from collections.abc import Callable, Mapping
+from importlib.util import find_spec
+from typing import Any
+
+from urc.model.codec import Envelope, Payload
+from urc.model.values import Value
+from urc.transports.base import ConnectFailed, PeerClosed, Setup, Transport, TransportError
+from urc.transports.rosbridge_client import Listening, RosClient
+from urc.transports.rosbridge_frames import MAX_BYTES, BadFrame, FrameReader
+from urc.transports.topics import Inbox
+from urc.transports.websocket import WebSocketTransport
+
+__all__ = ["RosbridgeTransport", "from_setup"]
+
+DEFAULT_PORT = 9090
+_WEBSOCKET = ("auth", "headers")
+"""Options that are the WebSocket's own."""
+
+_TURN_S = 0.005
+"""How long frames are read before others have their turn on the loop."""
+
+log = logging.getLogger(__name__)
+
+
+class RosbridgeTransport:
+    """One connection to a rosbridge server, opened as often as it is needed."""
+
+    def __init__(
+        self,
+        wire: WebSocketTransport,
+        where: str,
+        subscriptions: tuple[Listening, ...] = (),
+        ros: int | None = None,
+    ) -> None:
+        """Prepare a line; nothing is opened yet.
+
+        Args:
+            wire: leads to the bridge; ours from now on.
+            where: for people: ``192.168.1.5:9090``.
+            subscriptions: sent whenever the line is opened, one a topic.
+            ros: 1 or 2: how the names of types are spelled; None: as they are written.
+        """
+        self._wire = wire
+        self._where = where
+        self._subscriptions = subscriptions
+        self._ros = ros
+        self._session: _Session | None = None
+        self._missed: set[str] = set()
+        """Topics that were told to be missing."""
+
+    @property
+    def address(self) -> str:
+        """Where it leads, for people: ``rosbridge 192.168.1.5:9090``."""
+        return f"rosbridge {self._where}"
+
+    async def open(self, timeout_s: float) -> None:
+        """Connect and subscribe, or raise `ConnectFailed` within `timeout_s` seconds."""
+        await self.close()
+        await self._wire.open(timeout_s)
+        session = _Session(self._wire, self._ros, self._tell)
+        try:
+            async with asyncio.timeout(timeout_s):
+                await session.begin(self._subscriptions)
+        except BaseException as fault:
+            await session.end()
+            await self._wire.close()
+            if isinstance(fault, PeerClosed | TimeoutError):
+                told = str(fault) or "it takes nothing"
+                message = f"{self._where} took no subscription ({told})"
+                raise ConnectFailed(message) from fault
+            raise
+        self._session = session
+
+    async def receive(self) -> Envelope:
+        """Return the next message, response or feedback; `PeerClosed` when no more will come."""
+        if self._session is None:
+            raise PeerClosed("the line is closed")
+        return await self._session.inbox.take()
+
+    async def send(self, data: Payload) -> None:
+        """Publish, call, start a goal or cancel it; return once the kernel has it.
+
+        Raises:
+            PeerClosed: the line broke.
+            TransportError: it is nothing that rosbridge can send.
+        """
+        if self._session is None:
+            raise PeerClosed("the line is closed")
+        if not isinstance(data, Envelope):
+            raise TransportError("rosbridge carries messages, not bytes; use publish or call")
+        await self._session.perform(data)
+
+    async def close(self) -> None:
+        """Close at once, with all that is unsent or unanswered. Never raises, twice is fine."""
+        session, self._session = self._session, None
+        try:
+            if session is not None:
+                await session.end()
+        finally:
+            await self._wire.close()
+
+    def unsent(self) -> int:
+        """Return the bytes handed over that have not left this machine for good."""
+        return self._wire.unsent()
+
+    async def abort(self) -> None:
+        """Close at once; what the bridge has not got by now it never gets. Never raises."""
+        session, self._session = self._session, None
+        try:
+            if session is not None:
+                await session.end()
+        finally:
+            await self._wire.abort()
+
+    def _tell(self, topics: set[str]) -> None:
+        """Log the topics that nobody publishes; each once for as long as this object lives."""
+        for topic in sorted(topics - self._missed):
+            log.warning("%s: nobody publishes %s", self.address, topic)
+        self._missed |= topics
+
+
+def from_setup(setup: Setup) -> Transport:
+    """Make a transport out of a document's options; see docs/transports/rosbridge.md.
+
+    Raises:
+        TransportError: an option is missing or not usable.
+    """
+    options = setup.options
+    host, port = options.get("host"), options.get("port", DEFAULT_PORT)
+    if not isinstance(host, str) or not host.strip():
+        raise TransportError(f"rosbridge needs a host name or address, not {host!r}")
+    if isinstance(port, bool) or not isinstance(port, int) or not 1 <= port <= 65535:
+        raise TransportError(f"rosbridge needs a port from 1 to 65535, not {port!r}")
+    path, tls = options.get("path", "/"), options.get("tls") or None
+    if not isinstance(path, str) or not path.startswith("/"):
+        raise TransportError(f"rosbridge needs a path that starts with /, not {path!r}")
+    ros = options.get("ros")
+    if ros is not None and (isinstance(ros, bool) or ros not in (1, 2)):
+        raise TransportError(f"rosbridge needs 1 or 2 as ros, not {ros!r}")
+    host = host.strip()
+    where = f"[{host}]:{port}" if ":" in host else f"{host}:{port}"
+    url = f"{'ws' if tls is None else 'wss'}://{where}{path}"
+    given = {name: options[name] for name in _WEBSOCKET if name in options}
+    wire = WebSocketTransport(
+        setup._replace(options={"url": url, "tls": tls, "max_message": MAX_BYTES, **given})
+    )
+    wanted = [_listening(one.topic, one.attributes) for one in setup.subscriptions]
+    return RosbridgeTransport(wire, where, _merged(wanted), int(ros) if ros else None)
+
+
+def _listening(topic: str, attributes: Mapping[str, Value]) -> Listening:
+    def number(name: str, factor: float = 1) -> int:
+        value = attributes.get(name) or 0
+        if isinstance(value, bool) or not isinstance(value, int | float) or value < 0:
+            raise TransportError(f"rosbridge: {name} of {topic} is no number, not {value!r}")
+        return round(value * factor)
+
+    compression = attributes.get("compression") or "none"
+    if compression not in ("none", "png", "cbor"):
+        raise TransportError(f"rosbridge: {compression!r} of {topic} is not none, png or cbor")
+    if compression == "cbor" and find_spec("cbor2") is None:
+        raise TransportError("cbor needs the package cbor2: pip install 'urc[cbor]'")
+    return Listening(
+        topic,
+        str(attributes.get("type") or ""),
+        number("throttle", 1000),
+        number("queue_length"),
+        str(compression),
+    )
+
+
+def _merged(wanted: list[Listening]) -> tuple[Listening, ...]:
+    """Return one subscription a topic: a second one would cancel the first one's throttle."""
+    found: dict[str, Listening] = {}
+    for one in wanted:
+        other = found.setdefault(one.topic, one)
+        if other is not one:
+            found[one.topic] = one._replace(
+                type=other.type or one.type,
+                throttle_ms=min(other.throttle_ms, one.throttle_ms),
+                queue_length=max(other.queue_length, one.queue_length),
+                compression="none" if "none" in (one.compression, other.compression) else other[4],
+            )
+    return tuple(found.values())
+
+
+class _Session:
+    """What belongs to one open connection, and goes with it."""
+
+    def __init__(
+        self, wire: WebSocketTransport, ros: int | None, missing: Callable[[set[str]], None]
+    ) -> None:
+        self.inbox = Inbox()
+        self._wire = wire
+        self._client = RosClient(self.inbox, ros)
+        self._frames = FrameReader()
+        self._missing = missing
+        self._bad = 0
+        self._reader: asyncio.Task[None] | None = None
+
+    async def begin(self, subscriptions: tuple[Listening, ...]) -> None:
+        """Subscribe, ask which topics there are, and read from now on."""
+        frames: list[bytes] = []
+        if subscriptions:  # asked first: later, ROS 1 would count our own subscriptions
+            wanted = {one.topic for one in subscriptions}
+            frames += self._client.ask("/rosapi/topics", lambda said: self._compare(wanted, said))
+        for one in subscriptions:
+            frames += self._client.listen(one)
+        self._reader = asyncio.create_task(self._read())
+        await self._write(frames)
+
+    async def perform(self, envelope: Envelope) -> None:
+        """Send what an envelope asks for."""
+        await self._write(self._client.perform(envelope))
+
+    async def end(self) -> None:
+        """Stop reading, and give up whoever waits."""
+        self.inbox.end("the line is closed")
+        if self._reader is not None:
+            self._reader.cancel()
+            await asyncio.gather(self._reader, return_exceptions=True)
+
+    async def _write(self, frames: list[bytes]) -> None:
+        for frame in frames:
+            await self._wire.send(frame)
+
+    async def _read(self) -> None:
+        """Take every frame as it comes, until the connection ends."""
+        clock = asyncio.get_running_loop().time
+        began_s = clock()
+        try:
+            while True:
+                self._take(await self._wire.receive())
+                # Frames that are there already are not waited for, and some take long to read.
+                if self.inbox.is_filling or clock() - began_s > _TURN_S:
+                    await asyncio.sleep(0)
+                    began_s = clock()
+        except TransportError as ended:
+            self.inbox.end(str(ended))
+
+    def _take(self, frame: bytes) -> None:
+        try:
+            operation = self._frames.read(frame)
+            if operation is not None:
+                self._client.arrived(operation, len(frame))
+        except BadFrame as problem:
+            self._bad += 1
+            if self._bad & (self._bad - 1) == 0:  # the 1st, 2nd, 4th, 8th …
+                log.warning("rosbridge: %s (%d such frames)", problem, self._bad)
+
+    def _compare(self, wanted: set[str], said: Mapping[str, Any]) -> None:
+        """Tell which topics are not among those that rosapi names."""
+        names = said.get("topics")
+        if isinstance(names, list):
+            # In ROS 2 the feedback of an action is no topic of its own.
+            missing = {one for one in wanted.difference(names) if not one.endswith("/feedback")}
+            self._missing(missing)

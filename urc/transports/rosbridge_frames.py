@@ -1,0 +1,261 @@
+"""The frames of the rosbridge protocol: WebSocket messages ⇄ operations, bounded.
+
+Pure. A frame is JSON text, or CBOR where a subscription asked for it; an operation may come in
+fragments, or as a PNG image whose pixels are its JSON. Not-a-number and the infinities have no
+JSON: the bridge writes null for them, and what comes as CBOR is made the same.
+"""
+
+import base64
+import binascii
+import math
+import struct
+import zlib
+from collections.abc import Mapping
+from typing import Any
+
+import msgspec
+
+__all__ = ["BadFrame", "FrameReader", "encode_operation"]
+
+MAX_BYTES = 16 * 1024 * 1024
+"""Largest operation, however it is packed; the bridge's own limit is 10 MB."""
+MAX_FRAGMENTED = 8
+"""Operations that may be half there at one time; with more the oldest is given up."""
+MAX_FRAGMENTS = 4096
+MAX_PNG_BYTES = 2 * 1024 * 1024
+"""Of the text in an image: it is unpacked byte by byte, which takes a second for so many."""
+MAX_VALUES = 2_000_000
+"""Commas and brackets of an operation: an empty list takes three bytes there and fifty here."""
+_CBOR_MAP = b"\xa0"
+"""A map in CBOR starts with this byte or a higher one, JSON with none of them."""
+_LONGEST_ID = 256
+_PNG_MAGIC = b"\x89PNG\r\n\x1a\n"
+_NUMBERS = {
+    # RFC 8746: the tags of arrays of numbers, little-endian.
+    69: "H", 70: "I", 71: "Q", 72: "b", 77: "h", 78: "i", 79: "q", 85: "f", 86: "d",
+}  # fmt: skip
+
+_decode_json = msgspec.json.Decoder().decode
+_encode_json = msgspec.json.Encoder().encode
+
+
+class BadFrame(ValueError):
+    """A frame that is none, in one line."""
+
+
+def encode_operation(operation: Mapping[str, object]) -> bytes:
+    """Return an operation as JSON; bytes become base64, not-a-number null.
+
+    Raises:
+        BadFrame: something in it has no JSON.
+    """
+    try:
+        return _encode_json(operation)
+    except (TypeError, ValueError, OverflowError) as problem:
+        raise BadFrame(f"this cannot be sent as JSON ({problem})") from problem
+
+
+class FrameReader:
+    """Makes operations of frames; knows the fragments of one connection."""
+
+    def __init__(self) -> None:
+        self._halves: dict[str, dict[int, str]] = {}
+        """Fragmented operation → its pieces by number."""
+        self._sizes: dict[str, int] = {}
+        """Fragmented operation → characters of its pieces."""
+
+    def read(self, frame: bytes) -> dict[str, Any] | None:
+        """Return the operation of a frame, or None when it is not complete yet.
+
+        Raises:
+            BadFrame: it is no operation.
+        """
+        if frame[:1] >= _CBOR_MAP:
+            return _operation(_read_cbor(frame))
+        operation = _read_json(frame)
+        # One within the other at most: fragments of a PNG.
+        for _ in range(2):
+            match operation.get("op"):
+                case "fragment":
+                    joined = self._join(operation)
+                    if joined is None:
+                        return None
+                    operation = _read_json(joined)
+                case "png":
+                    operation = _read_json(_png_text(operation))
+                case _:
+                    break
+        return operation
+
+    def _join(self, piece: Mapping[str, Any]) -> str | None:
+        name, number, total, data = (piece.get(key) for key in ("id", "num", "total", "data"))
+        if not (isinstance(number, int) and isinstance(total, int) and isinstance(data, str)):
+            raise BadFrame("a fragment without number, total or data")
+        if not 0 <= number < total <= MAX_FRAGMENTS:
+            raise BadFrame(f"fragment {number} of {total} is none")
+        key = str(name) if isinstance(name, str | int) else "?"
+        if len(key) > _LONGEST_ID:
+            raise BadFrame(f"the id of a fragment has {len(key)} characters")
+        pieces = self._halves.setdefault(key, {})
+        self._sizes[key] = self._sizes.get(key, 0) + len(data) - len(pieces.get(number, ""))
+        pieces[number] = data
+        if self._sizes[key] > MAX_BYTES:
+            self._forget(key)
+            raise BadFrame(f"the fragments of an operation are more than {MAX_BYTES} characters")
+        if len(pieces) < total:
+            while len(self._halves) > MAX_FRAGMENTED or sum(self._sizes.values()) > MAX_BYTES:
+                self._forget(next(iter(self._halves)))
+            return None
+        self._forget(key)
+        return "".join(pieces[place] for place in sorted(pieces))
+
+    def _forget(self, key: str) -> None:
+        del self._halves[key], self._sizes[key]
+
+
+def _operation(found: object) -> dict[str, Any]:
+    if not isinstance(found, dict) or not isinstance(found.get("op"), str):
+        raise BadFrame("a frame without an operation")
+    return found
+
+
+def _read_json(text: bytes | str) -> dict[str, Any]:
+    if len(text) > MAX_VALUES:
+        flat = text.encode() if isinstance(text, str) else text
+        if sum(map(flat.count, (b",", b"[", b"{"))) > MAX_VALUES:
+            raise BadFrame(f"a frame has more than {MAX_VALUES} values")
+    try:
+        return _operation(_decode_json(text))
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as problem:
+        raise BadFrame(f"a frame is not JSON ({problem})") from problem
+
+
+def _read_cbor(data: bytes) -> object:
+    import cbor2  # only where a subscription asks for CBOR
+
+    try:
+        return _Plain().of(cbor2.loads(data, tag_hook=_tagged))
+    except (cbor2.CBORError, ValueError, RecursionError, MemoryError) as problem:
+        raise BadFrame(f"a frame is not CBOR ({problem})") from problem
+
+
+def _tagged(first: Any, second: Any) -> object:
+    """Return the numbers of a tagged array; in cbor2 6 the tag comes first, before it second."""
+    tag = first if hasattr(first, "tag") else second
+    code, data = _NUMBERS.get(tag.tag), tag.value
+    if code is None or not isinstance(data, bytes) or len(data) % struct.calcsize(code):
+        raise ValueError(f"tag {tag.tag} is not known")
+    return list(struct.unpack(f"<{len(data) // struct.calcsize(code)}{code}", data))
+
+
+class _Plain:
+    """Makes of CBOR what JSON can say, and no more of it than was sent.
+
+    CBOR may name a value that it has said before, and that one named others: a few bytes would
+    become more than any memory holds.
+    """
+
+    def __init__(self) -> None:
+        self._room = MAX_BYTES
+        """Bytes that may still be said; a value is at least one."""
+
+    def of(self, value: Any) -> Any:
+        """Return `value` with null for every number that JSON has not."""
+        self._room -= 1 + (len(value) if isinstance(value, str | bytes) else 0)
+        if self._room < 0:
+            raise ValueError(f"it stands for more than {MAX_BYTES} bytes")
+        if isinstance(value, float):
+            return value if math.isfinite(value) else None
+        if isinstance(value, dict):
+            return {_key(name): self.of(inner) for name, inner in value.items()}
+        if isinstance(value, list):
+            return [self.of(inner) for inner in value]
+        if value is None or isinstance(value, bool | str | bytes):
+            return value
+        if isinstance(value, int) and value.bit_length() <= 64:
+            return value
+        raise ValueError(f"{type(value).__name__} is no value of a message")
+
+
+def _key(name: object) -> str:
+    if not isinstance(name, str):
+        raise ValueError(f"{type(name).__name__} is no name of a field")
+    return name
+
+
+def _png_text(operation: Mapping[str, Any]) -> bytes:
+    """Return the JSON in the pixels of a PNG; it is padded with newlines."""
+    try:
+        image = base64.b64decode(operation.get("data", ""), validate=True)
+    except (binascii.Error, TypeError, ValueError) as problem:
+        raise BadFrame(f"the data of a png is not base64 ({problem})") from problem
+    return _pixels(image).rstrip(b"\n\x00")
+
+
+def _pixels(image: bytes) -> bytes:
+    """Return the bytes of an 8-bit RGB image that is not interlaced, as the bridge makes them."""
+    if not image.startswith(_PNG_MAGIC):
+        raise BadFrame("the data of a png is no PNG image")
+    width = height = 0
+    packed = bytearray()
+    at = len(_PNG_MAGIC)
+    while at + 8 <= len(image):
+        length, kind = struct.unpack_from(">I4s", image, at)
+        chunk = image[at + 8 : at + 8 + length]
+        at += length + 12
+        if kind == b"IHDR" and len(chunk) == 13:
+            width, height, *form = struct.unpack(">IIBBBBB", chunk)
+            if form != [8, 2, 0, 0, 0]:
+                raise BadFrame("a png is not 8-bit RGB")
+        elif kind == b"IDAT":
+            packed += chunk
+    size = height * (width * 3 + 1)
+    if not 0 < size <= MAX_PNG_BYTES:
+        raise BadFrame(f"a png of {width} x {height} pixels is not taken")
+    try:
+        rows = zlib.decompressobj().decompress(bytes(packed), size)
+    except zlib.error as problem:
+        raise BadFrame(f"a png cannot be unpacked ({problem})") from problem
+    if len(rows) != size:
+        raise BadFrame("a png ends too early")
+    return _unfiltered(rows, width * 3)
+
+
+def _unfiltered(rows: bytes, stride: int) -> bytes:
+    """Undo the filters of a PNG: each row says which, in its first byte."""
+    out = bytearray()
+    above = bytes(stride)
+    for start in range(0, len(rows), stride + 1):
+        row = bytearray(rows[start + 1 : start + 1 + stride])
+        match rows[start]:
+            case 0:
+                pass
+            case 2:
+                row = bytearray((x + up) & 255 for x, up in zip(row, above, strict=True))
+            case 1 | 3 | 4 as kind:
+                _undo_left(kind, row, above)
+            case unknown:
+                raise BadFrame(f"a png has a filter {unknown}")
+        out += row
+        above = bytes(row)
+    return bytes(out)
+
+
+def _undo_left(kind: int, row: bytearray, above: bytes) -> None:
+    """Undo a filter that looks at the pixel to the left, in place."""
+    for place in range(len(row)):
+        left = row[place - 3] if place >= 3 else 0
+        up = above[place]
+        if kind == 1:
+            guess = left
+        elif kind == 3:
+            guess = (left + up) // 2
+        else:
+            corner = above[place - 3] if place >= 3 else 0
+            by_left, by_up = abs(up - corner), abs(left - corner)
+            by_corner = abs(left + up - 2 * corner)
+            if by_left <= by_up and by_left <= by_corner:
+                guess = left
+            else:
+                guess = up if by_up <= by_corner else corner
+        row[place] = (row[place] + guess) & 255

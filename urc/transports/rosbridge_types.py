@@ -1,0 +1,17 @@
+"""How ROS 1 and ROS 2 spell the name of a type."""
+
+__all__ = ["spelled"]
+
+
+def spelled(name: str, kind: str, ros: int | None) -> str:
+    """Return `name` as that version of ROS spells it.
+
+    Args:
+        name: ``pkg/Type`` or ``pkg/msg/Type``; "" stays "".
+        kind: the middle word: ``msg``, ``srv`` or ``action``.
+        ros: 1, 2, or None: as it is written.
+    """
+    words = name.split("/")
+    if ros is None or not all(words) or len(words) not in (2, 3):
+        return name
+    return f"{words[0]}/{words[-1]}" if ros == 1 else f"{words[0]}/{kind}/{words[-1]}"

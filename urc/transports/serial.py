@@ -1,0 +1,209 @@
+"""A serial port: on this machine, or behind a server (``socket://``, ``rfc2217://``).
+
+The library underneath is serialx, of the extra ``serial``. What ``socket://`` names is a plain TCP
+line and treated as one: whoever runs that server has set the port up.
+"""
+
+import asyncio
+import errno
+import os
+import sys
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, NamedTuple, cast
+
+from urc.transports import _options
+from urc.transports._faults import late, reason
+from urc.transports._reach import Reach
+from urc.transports._stream import StreamLine, tune
+from urc.transports.base import ConnectFailed, Setup, Transport, TransportError
+
+if TYPE_CHECKING:
+    from urc.transports._serial_port import SerialPort
+
+__all__ = ["Settings", "SerialTransport", "from_setup"]
+
+_PARITIES = {"none": "N", "odd": "O", "even": "E", "mark": "M", "space": "S"}
+_FLOWS = ("none", "rts_cts", "xon_xoff")
+_SOCKET, _RFC2217 = "socket://", "rfc2217://"
+
+
+class Settings(NamedTuple):
+    """How bytes are put on the wire."""
+
+    baud: int = 115_200
+    """Bits a second."""
+    data_bits: int = 8
+    parity: str = "none"
+    stop_bits: float = 1
+    flow_control: str = "none"
+    rts: bool | None = None
+    """What the pin is at when the port has been opened; None: as usual, which is high."""
+    dtr: bool | None = None
+    is_exclusive: bool = True
+    """Keep other programs out."""
+
+
+class SerialTransport(StreamLine):
+    """One serial port, opened as often as it is needed."""
+
+    def __init__(self, port: str, settings: Settings) -> None:
+        """Prepare the line; `port` is a path or name, or an address with its scheme."""
+        super().__init__()
+        self._port = port
+        self._settings = settings
+        self._reach: Reach | None = None
+        if port.startswith((_SOCKET, _RFC2217)):
+            self._reach = Reach(*_host_and_port(port))
+        self._is_raw = port.startswith(_SOCKET)
+
+    @property
+    def address(self) -> str:
+        """Where it leads, for people: ``serial /dev/ttyUSB0``."""
+        return f"serial {self._port}"
+
+    async def open(self, timeout_s: float) -> None:
+        """Open the port and set it up, or raise `ConnectFailed` within `timeout_s` seconds."""
+        await self.close()
+        if self._is_raw and self._reach is not None:
+            self._stream = await self._reach.open(timeout_s)
+        else:
+            self._stream = await self._open_port(timeout_s)
+
+    async def _open_port(self, timeout_s: float) -> "SerialPort":
+        from urc.transports._serial_port import FAULTS, open_port
+
+        try:
+            async with asyncio.timeout(timeout_s):
+                return await open_port(self._port, _arguments_of(self._settings), tune)
+        except TimeoutError as fault:
+            raise ConnectFailed(late(self._shown, timeout_s)) from fault
+        except FAULTS as fault:
+            raise ConnectFailed(explain(self._port, self._shown, fault)) from fault
+
+    @property
+    def _shown(self) -> str:
+        return self._reach.place if self._reach is not None else self._port
+
+
+def from_setup(setup: Setup) -> Transport:
+    """Make a transport out of a document's options.
+
+    Raises:
+        TransportError: an option is missing or not usable, or the extra is not installed.
+    """
+    options = setup.options
+    port = _options.text("serial", options, "port").strip()
+    if not port:
+        raise TransportError("serial needs a port, as /dev/ttyUSB0 or socket://HOST:PORT")
+    if setup.via is not None:
+        raise TransportError("serial goes through no other transport; leave via out")
+    if not port.startswith(_SOCKET):
+        _need_serialx()
+    return SerialTransport(port, _settings_of(options))
+
+
+def explain(port: str, shown: str, fault: BaseException) -> str:
+    """Return one line about why a port could not be opened."""
+    code = getattr(fault, "errno", None) or (fault.args[0] if fault.args else None)
+    if isinstance(fault, ConnectionRefusedError):
+        return f"nothing listens on {shown} (connection refused)"
+    if isinstance(fault, FileNotFoundError) or code in (errno.ENXIO, errno.ENODEV):
+        return f"there is no {shown}; is it plugged in?"
+    if isinstance(fault, PermissionError):
+        return f"no permission for {shown}{_remedy(port)}"
+    if code in (errno.EBUSY, errno.EAGAIN):
+        return f"{shown} is in use by another program"
+    if code in (errno.ENOTTY, errno.EISDIR):
+        return f"{shown} is no serial port"
+    if code == errno.EINVAL:
+        return f"{shown} cannot be set up as asked; check baud, data_bits, parity and stop_bits"
+    words = fault.args[1] if code is not None and len(fault.args) > 1 else reason(fault)
+    return f"cannot open {shown} ({str(words).lower()})"
+
+
+def _remedy(port: str) -> str:
+    """Say which group may use the port, where the system has groups."""
+    if sys.platform == "win32":
+        return ""
+    import grp
+
+    try:
+        state = os.stat(port)
+        group = grp.getgrgid(state.st_gid).gr_name
+    except (OSError, KeyError):
+        return ""
+    if not state.st_mode & 0o060 or group == "root":
+        return f"; its mode is {state.st_mode & 0o777:o}, and it belongs to the group {group!r}"
+    return f"; it takes the group {group!r}: sudo usermod -aG {group} $USER, and sign in again"
+
+
+def _settings_of(options: Mapping[str, object]) -> Settings:
+    return Settings(
+        baud=_number(options, "baud", 115_200, range(50, 20_000_001)),
+        data_bits=_number(options, "data_bits", 8, range(5, 9)),
+        parity=_options.choice("serial", options, "parity", tuple(_PARITIES), "none"),
+        stop_bits=_stop_bits(options),
+        flow_control=_options.choice("serial", options, "flow_control", _FLOWS, "none"),
+        rts=_pin(options, "rts"),
+        dtr=_pin(options, "dtr"),
+        is_exclusive=_options.flag("serial", options, "exclusive", default=True),
+    )
+
+
+def _number(options: Mapping[str, object], key: str, default: int, among: range) -> int:
+    found = options.get(key, default)
+    if isinstance(found, bool) or not isinstance(found, int) or found not in among:
+        limits = f"{among.start} to {among.stop - 1}"
+        raise TransportError(f"serial needs {key} from {limits}, not {found!r}")
+    return found
+
+
+def _stop_bits(options: Mapping[str, object]) -> float:
+    found = options.get("stop_bits", 1)
+    if isinstance(found, bool) or found not in (1, 1.5, 2):
+        raise TransportError(f"serial knows stop_bits: 1 | 1.5 | 2, not {found!r}")
+    return cast("float", found)
+
+
+def _pin(options: Mapping[str, object], key: str) -> bool | None:
+    if options.get(key) is None:
+        return None
+    return _options.flag("serial", options, key, default=True)
+
+
+def _arguments_of(settings: Settings) -> dict[str, object]:
+    """Return the settings as the library names them."""
+    from serialx import PinState
+
+    arguments: dict[str, object] = {
+        "baudrate": settings.baud,
+        "byte_size": settings.data_bits,
+        "parity": _PARITIES[settings.parity],
+        "stopbits": settings.stop_bits,
+        "rtscts": settings.flow_control == "rts_cts",
+        "xonxoff": settings.flow_control == "xon_xoff",
+        "exclusive": settings.is_exclusive,
+    }
+    for name, level in (("rts", settings.rts), ("dtr", settings.dtr)):
+        if level is not None:
+            arguments[f"{name}_on_open"] = PinState.HIGH if level else PinState.LOW
+    return arguments
+
+
+def _host_and_port(address: str) -> tuple[str, int]:
+    scheme, _, rest = address.partition("://")
+    host, _, number = rest.partition("/")[0].rpartition(":")
+    host = host.removeprefix("[").removesuffix("]")
+    port = int(number) if number.isascii() and number.isdecimal() else 0
+    if not host or not 1 <= port <= 65535:
+        raise TransportError(f"serial needs {scheme}://HOST:PORT, not {address!r}")
+    return host, port
+
+
+def _need_serialx() -> None:
+    try:
+        import serialx  # noqa: F401
+    except ImportError as missing:
+        raise TransportError(
+            "serial needs the package serialx: pip install 'urc[serial]'"
+        ) from missing

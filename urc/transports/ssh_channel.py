@@ -1,0 +1,172 @@
+"""One channel of an SSH connection as a stream of bytes.
+
+What arrives is held until somebody takes it; beyond `READ_AHEAD_BYTES` the channel is not read any
+more, and the window of the protocol holds the other side up. `put` returns once the kernel has
+every byte.
+"""
+
+import asyncio
+from collections import deque
+
+import asyncssh
+from asyncssh.constants import EXTENDED_DATA_STDERR
+
+from urc.transports._faults import CLOSED, HUNG_UP, one_line
+from urc.transports.base import PeerClosed
+from urc.transports.ssh_wire import Wire, why_lost
+
+__all__ = ["MAX_PACKET", "WINDOW", "Channel"]
+
+READ_AHEAD_BYTES = 65536
+"""Most bytes that are held before somebody takes them."""
+WINDOW = 262_144
+"""Bytes that the other side may send beyond that."""
+MAX_PACKET = 32768
+_CLOSES_WITHIN_S = 1.0
+"""A program that has closed its output should have ended by then."""
+_LAST_WORDS = 200
+"""Bytes of what a program says about its own end."""
+
+
+class Channel(asyncssh.SSHClientSession[bytes], asyncssh.SSHTCPSession[bytes]):
+    """A shell, a program, or a forwarded connection."""
+
+    def __init__(self, wire: Wire, program: str = "") -> None:
+        """Prepare a channel.
+
+        Args:
+            wire: below the SSH connection; full when the kernel takes no more.
+            program: what its end is told of, ``the shell``; "": a forwarded connection.
+        """
+        self._wire = wire
+        self._program = program
+        self._parts: deque[bytes] = deque()
+        self._held = 0
+        self._is_read = True
+        self._last_words = b""
+        self._outcome = ""
+        self._ended: str | None = None
+        """Why nothing more will come; None while the channel is up."""
+        self._late: asyncio.TimerHandle | None = None
+        self._arrived = asyncio.Event()
+        self._writable = asyncio.Event()
+        self._writable.set()
+        self._channel: asyncssh.SSHClientChannel[bytes] | asyncssh.SSHTCPChannel[bytes]
+
+    # -- called by asyncssh
+
+    def connection_made(self, chan: object) -> None:
+        """Take the channel."""
+        self._channel = chan  # type: ignore[assignment] # of either base
+        self._channel.set_write_buffer_limits(high=0)
+
+    def data_received(self, data: bytes, datatype: int | None) -> None:
+        """Hold what comes, beside complaints."""
+        if datatype == EXTENDED_DATA_STDERR:
+            self._last_words = (self._last_words + data)[-_LAST_WORDS:]
+            return
+        self._parts.append(data)
+        self._held += len(data)
+        if self._held >= READ_AHEAD_BYTES and self._is_read:
+            self._is_read = False
+            self._channel.pause_reading()
+        self._arrived.set()
+
+    def exit_status_received(self, status: int) -> None:
+        """Note how the program ended."""
+        self._outcome = f"{self._program} ended with status {status}"
+
+    def exit_signal_received(self, signal: str, core_dumped: bool, msg: str, lang: str) -> None:
+        """Note how the program ended."""
+        self._outcome = f"{self._program} was ended by signal {one_line(signal, 20)}"
+
+    def eof_received(self) -> bool:
+        """Nothing more will come; of a program, we wait for how it ended."""
+        if not self._program:
+            self._end(HUNG_UP)
+        elif self._late is None:
+            loop = asyncio.get_running_loop()
+            self._late = loop.call_later(_CLOSES_WITHIN_S, self._end, self._farewell())
+        return False
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        """The channel is gone, alone or with its connection."""
+        if exc is not None:
+            self._wire.end(why_lost(exc))
+        self._end(self._wire.fault or self._farewell())
+
+    def pause_writing(self) -> None:
+        """The other side takes no more."""
+        self._writable.clear()
+
+    def resume_writing(self) -> None:
+        """The other side has taken everything."""
+        self._writable.set()
+
+    # -- a `ByteStream`
+
+    async def take(self) -> bytes:
+        """Return the next bytes, at least one; raise `PeerClosed` when no more will come."""
+        while not self._parts:
+            if self._ended is not None:
+                raise PeerClosed(self._ended)
+            self._arrived.clear()
+            await self._arrived.wait()
+        data = self._parts.popleft() if len(self._parts) == 1 else b"".join(self._parts)
+        self._parts.clear()
+        self._held = 0
+        if not self._is_read:
+            self._is_read = True
+            self._channel.resume_reading()
+        return data
+
+    async def put(self, data: bytes) -> None:
+        """Hand `data` over, waiting while the line is full; raise `PeerClosed` if it broke."""
+        await self._until_writable()
+        try:
+            self._channel.write(data)
+        except OSError as closed:  # by either side
+            raise PeerClosed(self._ended or self._farewell()) from closed
+        await self._until_writable()
+
+    async def abort(self) -> None:
+        """Close at once. Never raises, may be called twice."""
+        self.discard()
+
+    def discard(self) -> None:
+        """Close at once."""
+        self._end(CLOSED)
+        self._channel.abort()
+
+    def unsent(self) -> int:
+        """Return the bytes handed over that the server has not acknowledged.
+
+        The SSH connection's own, and those of its other channels, are counted as well.
+        """
+        return self._channel.get_write_buffer_size() + self._wire.unsent()
+
+    async def _until_writable(self) -> None:
+        while self._ended is None:
+            if not self._writable.is_set():
+                await self._writable.wait()
+            elif self._wire.is_full:
+                await self._wire.drained()
+            else:
+                break
+        if self._ended is not None or self._wire.fault:
+            raise PeerClosed(self._ended or self._wire.fault)
+
+    def _farewell(self) -> str:
+        said = self._last_words.decode("utf-8", "replace").strip().splitlines()
+        if not self._program or not (self._outcome or said):
+            return HUNG_UP
+        words = f" ({one_line(said[-1])})" if said else ""
+        return (self._outcome or f"{self._program} closed the line") + words
+
+    def _end(self, reason: str) -> None:
+        if self._late is not None:
+            self._late.cancel()
+        if self._ended is None:
+            self._ended = reason
+        self._arrived.set()
+        self._writable.set()

@@ -1,0 +1,175 @@
+"""One SSH connection, and the sharing of it by everything that goes through it."""
+
+import asyncio
+from collections.abc import Awaitable, Callable
+from contextlib import suppress
+from typing import Any, NoReturn
+
+import asyncssh
+
+from urc.transports._faults import CLOSED, HUNG_UP, one_line
+from urc.transports.base import ConnectFailed, PeerClosed
+from urc.transports.ssh_channel import MAX_PACKET, WINDOW, Channel
+from urc.transports.ssh_wire import Wire
+from urc.transports.topic_socket import Address
+
+__all__ = ["Connection", "Shared"]
+
+_GONE_WITHIN_S = 0.5
+"""What a closed connection may take to be gone."""
+
+
+class Connection:
+    """An SSH connection after its login."""
+
+    def __init__(self, ssh: asyncssh.SSHClientConnection, wire: Wire, address: Address) -> None:
+        """Take over a connection and what is below it."""
+        self.ssh = ssh
+        self._wire = wire
+        self._address = address
+        self._strays: set[asyncio.Task[Any]] = set()
+        self.when_closed: Callable[[], Awaitable[None]] | None = None
+        """Called once, when `close` has closed it: gives up what it goes through."""
+
+    @property
+    def is_up(self) -> bool:
+        """Whether channels can be opened."""
+        return not self._wire.fault and not self.ssh.is_closed()
+
+    @property
+    def fault(self) -> str:
+        """Why it is over; "" while it is up."""
+        return self._wire.fault
+
+    async def ended(self) -> NoReturn:
+        """Wait for its end; raise `PeerClosed` then."""
+        await self.ssh.wait_closed()
+        raise PeerClosed(self._wire.fault or HUNG_UP)
+
+    async def program(self, command: str | None, **options: Any) -> Channel:
+        """Start `command`, or a shell for None, and return its standard input and output."""
+        what = "the shell" if command is None else "the command"
+        return await self._opened(
+            lambda channel: self.ssh.create_session(
+                lambda: channel, command, encoding=None, window=WINDOW, max_pktsize=MAX_PACKET,
+                **options,
+            ),
+            Channel(self._wire, what),
+            f"{self._address.text} does not start {what}",
+        )  # fmt: skip
+
+    async def forwarded(self, host: str, port: int) -> Channel:
+        """Return a connection to `host` and `port` as the server sees them."""
+        place = Address(host, port).text
+        return await self._opened(
+            lambda channel: self.ssh.create_connection(
+                lambda: channel, host, port, encoding=None, window=WINDOW, max_pktsize=MAX_PACKET
+            ),
+            Channel(self._wire),
+            f"cannot connect to {place} through ssh {self._address.text}",
+        )
+
+    async def close(self) -> None:
+        """Close at once, with every channel."""
+        self._wire.end(CLOSED)
+        self.ssh.abort()
+        with suppress(TimeoutError):
+            async with asyncio.timeout(_GONE_WITHIN_S):
+                await self.ssh.wait_closed()
+                await self._wire.gone()
+                if self._strays:
+                    await asyncio.wait(self._strays)
+        when_closed, self.when_closed = self.when_closed, None
+        if when_closed is not None:
+            await when_closed()
+
+    async def _opened(
+        self, begin: Callable[[Channel], Awaitable[Any]], channel: Channel, failure: str
+    ) -> Channel:
+        """Open `channel`; when nobody waits for it any more, it is closed once it is open.
+
+        asyncssh would forget about a channel whose opening is cancelled, the server would not.
+        """
+        task = asyncio.ensure_future(begin(channel))
+        try:
+            await asyncio.shield(task)
+        except asyncssh.ChannelOpenError as refused:
+            why = self._wire.fault or one_line(refused.reason.lower()).removeprefix(
+                "connect failed: "
+            )
+            raise ConnectFailed(f"{failure} ({why or 'no reason is given'})") from refused
+        except (asyncssh.Error, OSError) as fault:
+            raise ConnectFailed(
+                f"{failure} ({self._wire.fault or one_line(str(fault).lower())})"
+            ) from fault
+        except asyncio.CancelledError:
+            self._strays.add(task)
+            task.add_done_callback(lambda done: self._drop(done, channel))
+            raise
+        return channel
+
+    def _drop(self, task: "asyncio.Task[Any]", channel: Channel) -> None:
+        self._strays.discard(task)
+        if not task.cancelled() and task.exception() is None:
+            channel.discard()
+
+
+class Shared:
+    """The one connection of a transport: open while somebody uses it, opened by the first."""
+
+    def __init__(self, dial: Callable[[float], Awaitable[Connection]]) -> None:
+        """Prepare.
+
+        Args:
+            dial: opens a connection, given the seconds there are for it; leaves nothing when it is
+                cancelled.
+        """
+        self._dial = dial
+        self._users = 0
+        self._attempt: asyncio.Task[Connection] | None = None
+        """Opens the connection, then holds it."""
+
+    async def join(self, timeout_s: float) -> Connection:
+        """Return the connection, opening it if need be; `leave` it when done with it.
+
+        The caller bounds the wait; whoever else waits for the same attempt goes on.
+
+        Raises:
+            ConnectFailed: it could not be opened. Then there is nothing to leave.
+        """
+        self._users += 1
+        try:
+            if self._attempt is None or not self._is_good(self._attempt):
+                self._attempt = asyncio.ensure_future(self._again(self._attempt, timeout_s))
+            return await asyncio.shield(self._attempt)
+        except BaseException:
+            await self.leave()
+            raise
+
+    async def leave(self) -> None:
+        """Give the connection up; the last one who does closes it."""
+        self._users -= 1
+        if self._users:
+            return
+        attempt, self._attempt = self._attempt, None
+        if attempt is None:
+            return
+        attempt.cancel()  # nothing happens when it is done
+        await asyncio.wait([attempt])
+        if not attempt.cancelled() and attempt.exception() is None:
+            await attempt.result().close()
+
+    async def _again(
+        self, before: "asyncio.Task[Connection] | None", timeout_s: float
+    ) -> Connection:
+        """Put the dead connection away, if there was one, and open a new one."""
+        if before is not None and not before.cancelled() and before.exception() is None:
+            await before.result().close()
+        return await self._dial(timeout_s)
+
+    @staticmethod
+    def _is_good(attempt: "asyncio.Task[Connection]") -> bool:
+        if not attempt.done():
+            return True
+        failed = attempt.cancelled() or attempt.exception() is not None
+        return not failed and attempt.result().is_up

@@ -1,0 +1,207 @@
+"""How an SSH connection is opened: the socket, the host key, the login, and what may go wrong."""
+
+from typing import Any, NamedTuple
+
+import asyncssh
+
+from urc.transports._faults import one_line
+from urc.transports.base import ConnectFailed, TransportError
+from urc.transports.known_hosts import HostKeys, Known, fingerprint
+from urc.transports.ssh_connection import Connection
+from urc.transports.ssh_login import Login, algorithms, credentials, host_key_algorithms
+from urc.transports.ssh_wire import Through, why_lost
+from urc.transports.topic_socket import Address
+
+__all__ = ["Offer", "Target", "dial", "look_at_key"]
+
+ALIVE_COUNT = 2
+"""Questions whether it is still there that a server may leave unanswered."""
+
+
+class Offer(NamedTuple):
+    """The host key that a server showed."""
+
+    key: asyncssh.SSHKey
+    expected: str = ""
+    """What was expected instead: fingerprints, ``revoked``, or ``unknown`` when nothing is known
+    of this server; "" when the key is trusted."""
+
+    @property
+    def fingerprint(self) -> str:
+        """``SHA256:…``."""
+        return fingerprint(self.key)
+
+    @property
+    def algorithm(self) -> str:
+        """``ssh-ed25519`` …."""
+        return self.key.algorithm.decode("ascii")
+
+
+class Target(NamedTuple):
+    """One server, and how to get in."""
+
+    address: Address
+    login: Login
+    keys: HostKeys
+    alive_every_s: float = 2.0
+    """Silence after which the server is asked whether it is still there."""
+    name: str = ""
+    """Of the transport, for the command that trusts a key."""
+
+
+class _Client(asyncssh.SSHClient):
+    """Judges the host key, and notes why the connection ended."""
+
+    def __init__(self, target: Target, known: Known, *, only_looks: bool) -> None:
+        self._keys = target.keys
+        self._known = known
+        self._only_looks = only_looks
+        self.through: Through | None = None
+        self.offer: Offer | None = None
+
+    def validate_host_public_key(
+        self, host: str, addr: str, port: int, key: asyncssh.SSHKey
+    ) -> bool:
+        self.offer = Offer(key, self._keys.judge(key, self._known))
+        return not self.offer.expected and not self._only_looks
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        if self.through is not None:
+            self.through.wire.end(why_lost(exc))
+
+
+async def dial(
+    target: Target, outer: asyncssh.SSHClientConnection | None, timeout_s: float
+) -> Connection:
+    """Connect and log in.
+
+    Args:
+        target: the server.
+        outer: another SSH connection to go through; None: this machine's own network.
+        timeout_s: what each of the server's addresses gets a share of; the caller bounds the whole.
+
+    Raises:
+        ConnectFailed: with one line that says what to do, where something can be done.
+    """
+    client = _Client(target, _known(target), only_looks=False)
+    async with credentials(target.login) as secrets:
+        return await _connect(target, client, outer, timeout_s, secrets)
+
+
+async def look_at_key(
+    target: Target, outer: asyncssh.SSHClientConnection | None, timeout_s: float
+) -> Offer:
+    """Return the key that the server shows, without logging in; see `dial`."""
+    client = _Client(target, _known(target), only_looks=True)
+    try:
+        connection = await _connect(target, client, outer, timeout_s, {"client_keys": None})
+        await connection.close()  # trusted by the signature of an authority
+    except ConnectFailed:
+        if client.offer is None:
+            raise
+    if client.offer is None:
+        raise ConnectFailed(f"{target.address.text} shows a certificate, which needs no trust")
+    return client.offer
+
+
+async def _connect(
+    target: Target,
+    client: _Client,
+    outer: asyncssh.SSHClientConnection | None,
+    timeout_s: float,
+    secrets: dict[str, Any],
+) -> Connection:
+    try:
+        client.through = through = Through(outer or await target.address.dial(timeout_s))
+    except (OSError, UnicodeError) as fault:
+        raise ConnectFailed(target.address.explain(fault)) from fault
+    known = _known(target)
+    try:
+        ssh = await asyncssh.connect(
+            target.address.host,
+            target.address.port,
+            client_factory=lambda: client,
+            config=None,  # ~/.ssh/config is this user's, the document must mean the same to all
+            tunnel=through,
+            known_hosts=([], list(known.authorities), list(known.revoked)),
+            server_host_key_algs=host_key_algorithms(
+                known.trusted,
+                has_authorities=bool(known.authorities),
+                legacy=target.login.legacy,
+            ),
+            keepalive_interval=target.alive_every_s,
+            keepalive_count_max=ALIVE_COUNT,
+            gss_host=None,
+            host_based_auth=False,
+            **algorithms(target.login),
+            **secrets,
+        )
+    except (asyncssh.Error, OSError, ValueError) as fault:
+        raise ConnectFailed(_explain(target, client, fault)) from fault
+    finally:
+        through.give_up_unused()
+    return Connection(ssh, through.wire, target.address)
+
+
+def _known(target: Target) -> Known:
+    try:
+        return target.keys.known(target.address.host, target.address.port)
+    except TransportError as fault:
+        raise ConnectFailed(str(fault)) from fault
+
+
+def _explain(target: Target, client: _Client, fault: Exception) -> str:
+    """Return one line for people about why there is no connection."""
+    place, login = target.address.text, target.login
+    if client.offer is not None and client.offer.expected:
+        return _explain_key(target, client.offer)
+    match fault:
+        case asyncssh.PermissionDenied():
+            shown = [
+                what
+                for what, is_shown in (
+                    ("password", login.password), ("key", login.key), ("agent", login.agent)
+                )
+                if is_shown
+            ]  # fmt: skip
+            text = " and ".join(shown) or "no password and no key"
+            return f"{place} does not let {login.username!r} in (tried: {text})"
+        case asyncssh.HostKeyNotVerifiable():
+            return f"the host key of {place} is not trusted ({_first(fault.reason)})"
+        case asyncssh.KeyExchangeFailed():
+            hint = "" if login.legacy else "; 'legacy: true' allows old ones"
+            return f"{place} speaks no algorithm that URC takes{hint} ({_first(fault.reason)})"
+        case asyncssh.ConnectionLost():
+            return f"{place} closed the line before the login was done"
+        case asyncssh.ProtocolError() | asyncssh.ProtocolNotSupported():
+            return f"{place} does not speak SSH as expected ({_first(fault.reason).lower()})"
+        case asyncssh.DisconnectError():
+            return f"{place} refused the connection ({_first(fault.reason).lower()})"
+        case asyncssh.ChannelOpenError():
+            return f"nothing listens on {place} at the far end ({_first(fault.reason).lower()})"
+        case _:
+            return f"cannot connect to {place} ({_first(str(fault)).lower()})"
+
+
+def _explain_key(target: Target, offer: Offer) -> str:
+    place, shown = target.address.text, f"{offer.fingerprint} ({offer.algorithm})"
+    command = f"'urc trust PROFILE {target.name}'"
+    if offer.expected == "unknown":
+        return (
+            f"the host key of {place} is not known: it shows {shown}; "
+            f"if that is the robot's own, {command} trusts it"
+        )
+    if offer.expected == "revoked":
+        return f"the host key of {place} is revoked: it shows {shown}"
+    if target.keys.is_pinned:
+        remedy = "put the new one into host_key"
+    else:
+        remedy = f"{command} trusts the new one"
+    return (
+        f"the host key of {place} is another one: expected {offer.expected}, it shows {shown}; "
+        f"somebody may be listening in. If the robot was set up anew, {remedy}"
+    )
+
+
+def _first(text: str) -> str:
+    return one_line(text.splitlines()[0]) if text else "no reason is given"

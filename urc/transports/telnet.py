@@ -1,0 +1,184 @@
+"""Telnet to a robot: a stream of bytes beside which the two ends agree on options.
+
+The line below is a TCP connection of this machine, or one that another transport carries.
+"""
+
+import asyncio
+import socket
+from collections.abc import Callable, Coroutine
+from contextlib import suppress
+from typing import Any, Final, NamedTuple
+
+from urc.transports import _options
+from urc.transports._faults import late
+from urc.transports._stream import StreamLine, adopt
+from urc.transports.base import (
+    ByteStream,
+    Carrier,
+    ConnectFailed,
+    PeerClosed,
+    Setup,
+    TransportError,
+)
+from urc.transports.telnet_protocol import BINARY, ECHO, NAWS, SGA, TTYPE, TelnetTalk
+from urc.transports.topic_socket import Address
+
+__all__ = ["TelnetTransport", "Wishes", "from_setup"]
+
+DEFAULT_PORT: Final = 23
+_QUICKACK: Final = getattr(socket, "TCP_QUICKACK", None)
+_COLUMNS: Final = 240
+"""Of the terminal that we say we are: so wide that no shell breaks a robot's line."""
+_LONGEST_NAME: Final = 40
+_SMALL_BYTES: Final = 1024
+"""With more at once, the system acknowledges soon enough by itself."""
+
+
+class Wishes(NamedTuple):
+    """What this end takes part in, and what it asks for by itself."""
+
+    is_first: bool = False
+    """Our wishes are the first thing we send; else we only answer."""
+    echo: bool = False
+    """Whether the robot may repeat what it is sent."""
+    binary: bool = False
+    """Whether bytes are to pass as they are, both ways."""
+    terminal: str = "VT100"
+    """What we say when asked which terminal we are."""
+
+
+class TelnetTransport(StreamLine):
+    """One Telnet connection, opened as often as it is needed."""
+
+    def __init__(self, host: str, port: int, wishes: Wishes, via: Carrier | None = None) -> None:
+        """Prepare a line to `host`, through `via` if there is one. Nothing is opened yet."""
+        super().__init__()
+        self._address = Address(host, port)
+        self._wishes = wishes
+        self._via = via
+
+    @property
+    def address(self) -> str:
+        """Where it leads, for people: ``telnet 192.168.1.5:23``."""
+        return f"telnet {self._address.text}"
+
+    async def open(self, timeout_s: float) -> None:
+        """Connect, or raise `ConnectFailed` within `timeout_s` seconds."""
+        await self.close()
+        place = self._address.text
+        inner: ByteStream | None = None
+        try:
+            async with asyncio.timeout(timeout_s):
+                inner, line = await self._connect(timeout_s)
+                talk, first = _begin(self._wishes)
+                if first:
+                    await inner.put(first)
+            self._stream, inner = _TelnetStream(inner, talk, line), None
+        except TimeoutError as fault:
+            raise ConnectFailed(late(place, timeout_s)) from fault
+        except (OSError, UnicodeError) as fault:
+            raise ConnectFailed(self._address.explain(fault)) from fault
+        except PeerClosed as closed:
+            raise ConnectFailed(f"{place} closed the line at once") from closed
+        finally:
+            if inner is not None:
+                await inner.abort()
+
+    async def _connect(self, timeout_s: float) -> tuple[ByteStream, socket.socket | None]:
+        if self._via is not None:
+            host, port = self._address.host, self._address.port
+            return await self._via.connect(host, port, timeout_s), None
+        line = await self._address.dial(timeout_s)
+        try:
+            # A Synch comes as urgent data; kept apart, its last byte would be missing.
+            line.setsockopt(socket.SOL_SOCKET, socket.SO_OOBINLINE, 1)
+            return await adopt(line), line
+        except BaseException:
+            line.close()
+            raise
+
+
+class _TelnetStream:
+    """The text of a line that speaks Telnet."""
+
+    def __init__(self, inner: ByteStream, talk: TelnetTalk, line: socket.socket | None) -> None:
+        """Speak Telnet over `inner`; `line` is its socket, where it has one here."""
+        self._inner = inner
+        self._talk = talk
+        self._line = line
+        self._put = inner.put  # the way of every message: looked up once
+        self._encode = talk.encode
+
+    async def take(self) -> bytes:
+        while True:
+            data = await self._inner.take()
+            if self._line is not None and len(data) < _SMALL_BYTES:
+                _acknowledge(self._line)
+            text, answers = self._talk.receive(data)
+            if answers:
+                await self._put(answers)
+            if text:
+                return text
+
+    def put(self, data: bytes) -> Coroutine[Any, Any, None]:
+        return self._put(self._encode(data))
+
+    async def abort(self) -> None:
+        await self._inner.abort()
+
+    def unsent(self) -> int:
+        count: Callable[[], int] | None = getattr(self._inner, "unsent", None)
+        return count() if count is not None else 0
+
+    async def reset(self) -> None:
+        reset = getattr(self._inner, "reset", self._inner.abort)
+        await reset()
+
+
+def _acknowledge(line: socket.socket) -> None:
+    """Tell the other side at once that its bytes have come.
+
+    Telnet servers write in small pieces and wait for each to be acknowledged, which costs 40 ms a
+    command where that is put off. The system forgets the wish with every read.
+    """
+    if _QUICKACK is not None:
+        with suppress(OSError):  # the line is going down
+            line.setsockopt(socket.IPPROTO_TCP, _QUICKACK, 1)
+
+
+def from_setup(setup: Setup) -> TelnetTransport:
+    """Make a transport out of a document's options; docs/transports/telnet.md explains each.
+
+    Raises:
+        TransportError: an option is missing or not usable.
+    """
+    options = {"port": DEFAULT_PORT, **setup.options}
+    terminal = _options.text("telnet", options, "terminal", "VT100")
+    if len(terminal) > _LONGEST_NAME or not (terminal.isascii() and terminal.isprintable()):
+        raise TransportError(
+            f"telnet takes as terminal a name of up to {_LONGEST_NAME} letters, not {terminal!r}"
+        )
+    negotiate = _options.choice("telnet", options, "negotiate", ("full", "passive"), "passive")
+    wishes = Wishes(
+        is_first=negotiate == "full",
+        echo=_options.flag("telnet", options, "echo", default=False),
+        binary=_options.flag("telnet", options, "binary", default=False),
+        terminal=terminal,
+    )
+    host, port = _options.host("telnet", options), _options.port("telnet", options)
+    return TelnetTransport(host, port, wishes, setup.via)
+
+
+def _begin(wishes: Wishes) -> tuple[TelnetTalk, bytes]:
+    """Return a fresh talk, and what to send first."""
+    binary = (BINARY,) if wishes.binary else ()
+    echo = (ECHO,) if wishes.echo else ()
+    talk = TelnetTalk(
+        ours=frozenset((SGA, TTYPE, NAWS, *binary)),
+        theirs=frozenset((SGA, *binary, *echo)),
+        terminal=wishes.terminal,
+        columns=_COLUMNS,
+    )
+    if not wishes.is_first:
+        return talk, b""
+    return talk, talk.ask(ours=(SGA, *binary), theirs=(SGA, *binary, *echo))

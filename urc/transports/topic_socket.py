@@ -1,0 +1,69 @@
+"""A connected socket for a library that brings its own protocol, and what went wrong in one line.
+
+The libraries' own ways of connecting look names up in threads that a program waits for at its end;
+this one does as the TCP transport does, and says the same when it fails.
+"""
+
+import asyncio
+import errno
+import socket
+
+from urc.transports._faults import explain, place_of, reason
+from urc.transports._lookup import Lookup
+from urc.transports._stream import tune
+
+__all__ = ["Address", "reason"]
+
+
+class Address:
+    """Host and port of a line, and how people write them."""
+
+    def __init__(self, host: str, port: int) -> None:
+        """Prepare; nothing is looked up yet."""
+        self.host = host
+        self.port = port
+        self.text = place_of(host, port)
+        self._lookup = Lookup(host, port, socket.SOCK_STREAM)
+
+    async def dial(self, timeout_s: float) -> socket.socket:
+        """Return a connected socket that does not block; each address gets a fair share of time.
+
+        Raises:
+            OSError, UnicodeError: what `explain` puts into words.
+        """
+        loop = asyncio.get_running_loop()
+        deadline = loop.time() + timeout_s
+        addresses = await self._lookup.addresses()
+        fault: OSError | None = None
+        for place, (family, address) in enumerate(addresses):
+            share_s = (deadline - loop.time()) / (len(addresses) - place)
+            try:
+                async with asyncio.timeout(share_s):
+                    return await _connected(family, address)
+            except TimeoutError:
+                fault = fault or TimeoutError(errno.ETIMEDOUT, "timed out")
+            except OSError as refused:
+                fault = refused
+        raise fault or OSError("the name leads to no address")
+
+    def explain(self, fault: Exception) -> str:
+        """Return one line for people about why `dial` could not connect."""
+        if isinstance(fault, OSError | UnicodeError):
+            return explain(self.host, self.text, fault)
+        return f"cannot connect to {self.text} ({reason(fault)})"
+
+
+async def _connected(family: int, address: object) -> socket.socket:
+    """Connect one socket, which is closed again when that fails or is cancelled."""
+    loop = asyncio.get_running_loop()
+    line = socket.socket(family, socket.SOCK_STREAM)
+    try:
+        line.setblocking(False)
+        tune(line)
+        await loop.sock_connect(line, address)  # type: ignore[arg-type] # as getaddrinfo gave it
+        if line.getsockname() == line.getpeername():
+            raise ConnectionRefusedError(errno.ECONNREFUSED, "connected to itself")
+    except BaseException:
+        line.close()
+        raise
+    return line

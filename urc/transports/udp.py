@@ -1,0 +1,312 @@
+"""UDP to a robot: a payload is a datagram, and a datagram is a frame.
+
+There is no connection, so there is little that can be known: opening asks nobody, and a robot that
+is gone is only silent. What can be told is told: a machine that answers that nobody listens there,
+and a network that has no way. Where the robot's address is not given, it is the one of whoever
+talks first, and opening waits for that.
+
+Datagrams that nobody takes push the oldest out; `dropped` counts them.
+"""
+
+import asyncio
+import errno
+import socket
+import sys
+from collections import deque
+from collections.abc import Callable
+from contextlib import suppress
+
+from urc.model.codec import Payload
+from urc.transports import _options
+from urc.transports._faults import CLOSED, broke, explain, place_of, reason
+from urc.transports._lookup import Lookup
+from urc.transports._stream import as_bytes
+from urc.transports.base import ConnectFailed, PeerClosed, Setup, Transport, TransportError
+
+__all__ = ["UdpTransport", "from_setup"]
+
+READ_AHEAD = 512
+"""Most datagrams that are read before somebody takes them."""
+READ_AHEAD_BYTES = 1_048_576
+"""The same in bytes."""
+_AT_ONCE = 64
+"""Datagrams that are read before others have their turn on the loop."""
+_LONGEST = 65_536
+_RECVERR = {socket.AF_INET: (socket.IPPROTO_IP, 11), socket.AF_INET6: (socket.IPPROTO_IPV6, 25)}
+"""IP_RECVERR of Linux, which Python does not name: refusals reach unconnected sockets, too."""
+_LOST_HERE = (errno.ENOBUFS, errno.EAGAIN, errno.ENOMEM)
+"""The datagram found no place on this machine: that is how datagrams get lost."""
+_NO_WAY = (errno.EHOSTUNREACH, errno.ENETUNREACH, errno.ENETDOWN, errno.EADDRNOTAVAIL)
+
+_Address = tuple[str | int, ...]
+
+
+class UdpTransport:
+    """One socket that talks to one robot, or to all that hear a broadcast."""
+
+    def __init__(
+        self,
+        host: str = "",
+        port: int = 0,
+        *,
+        listen: int = 0,
+        bind: str = "",
+        accepts_any: bool = False,
+        is_broadcast: bool = False,
+    ) -> None:
+        """Prepare the line. Nothing is opened yet.
+
+        Args:
+            host: the robot's name or address; "": whoever talks first.
+            port: where it listens, 1..65535; 0: it answers where it is heard from.
+            listen: own port; 0 lets the system choose.
+            bind: own address; "": all of them.
+            accepts_any: take datagrams from everybody, not from `host` alone.
+            is_broadcast: `host` stands for many.
+        """
+        self._host = host
+        self._port = port
+        self._listen = listen
+        self._bind = bind
+        self._accepts_any = accepts_any or not host
+        self._is_broadcast = is_broadcast
+        self._lookup = Lookup(host, port, socket.SOCK_DGRAM) if host else None
+        self._allowed: frozenset[str] = frozenset()
+        self._robot: _Address | None = None
+        """Where datagrams go; None until somebody has talked."""
+        self._line: socket.socket | None = None
+        self._endpoint: asyncio.DatagramTransport | None = None
+        """Reads `_line` where the loop cannot watch sockets."""
+        self._buffer = memoryview(bytearray(_LONGEST))
+        self._arrived: deque[bytes] = deque()
+        self._arrived_bytes = 0
+        self._ended = CLOSED
+        self._changed = asyncio.Event()
+        self.dropped = 0
+        """Datagrams that came and were pushed out by newer ones, since the transport was made."""
+
+    @property
+    def address(self) -> str:
+        """Where it leads, for people: ``udp 192.168.10.1:8889``, ``udp *:14550 (listening)``."""
+        if self._host and self._port:
+            return f"udp {place_of(self._host, self._port)}"
+        sender = f" for {self._host}" if self._host else ""
+        return f"udp {place_of(self._bind or '*', self._listen)} (listening{sender})"
+
+    async def open(self, timeout_s: float) -> None:
+        """Take the own port, at once where the robot's host is known.
+
+        Otherwise wait until somebody talks, or raise `ConnectFailed` within `timeout_s` seconds.
+        """
+        await self.close()
+        try:
+            async with asyncio.timeout(timeout_s):
+                await self._begin()
+                while self._lookup is None and self._robot is None:
+                    self._changed.clear()
+                    await self._changed.wait()
+        except TimeoutError as fault:
+            is_known = self._line is not None
+            await self.close()
+            what = "nobody has talked to" if is_known else "no answer about the host of"
+            raise ConnectFailed(f"{what} {self.address} within {timeout_s:g} s") from fault
+        except BaseException:
+            await self.close()
+            raise
+
+    async def receive(self) -> bytes:
+        """Return the next datagram; raise `PeerClosed` when the line is closed or refused."""
+        while not self._arrived:
+            if self._ended:
+                raise PeerClosed(self._ended)
+            self._changed.clear()
+            await self._changed.wait()
+        data = self._arrived.popleft()
+        self._arrived_bytes -= len(data)
+        return data
+
+    async def send(self, data: Payload) -> None:
+        """Send `data` as one datagram; raise `TransportError` if that cannot be."""
+        payload = as_bytes(data)
+        if self._line is None or self._ended or self._robot is None:
+            raise PeerClosed(self._ended or CLOSED)
+        try:
+            self._line.sendto(payload, self._robot)
+        except OSError as fault:
+            if fault.errno not in _LOST_HERE:
+                self._take_fault(fault, len(payload))
+
+    def offer(self, data: bytes) -> bool:
+        """Send `data` without a turn of the loop; return whether it went well. Never waits."""
+        if self._line is None or self._ended or self._robot is None:
+            return False
+        try:
+            self._line.sendto(data, self._robot)
+        except OSError:
+            return False  # `send` finds out what is to be said about it
+        return True
+
+    async def close(self) -> None:
+        """Close at once. Never raises, may be called twice."""
+        line, self._line = self._line, None
+        endpoint, self._endpoint = self._endpoint, None
+        if endpoint is not None:
+            endpoint.abort()
+            await asyncio.sleep(0)  # the loop closes the socket in its next turn
+        elif line is not None:
+            with suppress(NotImplementedError):
+                asyncio.get_running_loop().remove_reader(line)
+            line.close()
+        self._robot = None
+        self._arrived.clear()
+        self._arrived_bytes = 0
+        self._end(CLOSED)
+
+    async def _begin(self) -> None:
+        family = socket.AF_INET6 if ":" in self._bind else socket.AF_INET
+        if self._lookup is not None:
+            try:
+                rows = await self._lookup.addresses()
+            except (OSError, UnicodeError) as fault:
+                raise ConnectFailed(explain(self._host, self._host, fault)) from fault
+            # Nobody tells which address of a name works, and robots have the old kind.
+            family, address = min(rows, key=lambda row: row[0] != socket.AF_INET)
+            self._allowed = frozenset(str(one[0]).partition("%")[0] for _, one in rows)
+            self._robot = tuple(address) if self._port else None  # type: ignore[arg-type]
+        self._line = line = self._bound(family)
+        self._ended = ""
+        loop = asyncio.get_running_loop()
+        try:
+            loop.add_reader(line, self._read)
+        except NotImplementedError:  # the usual loop of Windows
+            self._endpoint, _ = await loop.create_datagram_endpoint(
+                lambda: _Endpoint(self._heard, self._note), sock=line
+            )
+
+    def _bound(self, family: socket.AddressFamily) -> socket.socket:
+        bind = self._bind or ("::" if family == socket.AF_INET6 else "0.0.0.0")  # noqa: S104
+        line = socket.socket(family, socket.SOCK_DGRAM)
+        try:
+            line.setblocking(False)
+            if self._is_broadcast:
+                line.setsockopt(socket.SOL_SOCKET, socket.SO_BROADCAST, 1)
+            if sys.platform == "linux" and not self._is_broadcast:
+                line.setsockopt(*_RECVERR[family], 1)
+            line.bind((bind, self._listen))
+        except OSError as fault:
+            line.close()
+            place = place_of(bind, self._listen)
+            raise ConnectFailed(f"cannot listen on udp {place} ({reason(fault)})") from fault
+        return line
+
+    def _read(self) -> None:
+        """Take what has arrived; called by the loop."""
+        line = self._line
+        for index in range(_AT_ONCE):
+            if line is None:
+                return
+            try:
+                count, sender = line.recvfrom_into(self._buffer)
+            except BlockingIOError:
+                if not index:
+                    _forget_faults(line)  # what keeps the loop awake is no datagram
+                return
+            except OSError as fault:
+                _forget_faults(line)
+                self._note(fault)
+                return
+            self._heard(bytes(self._buffer[:count]), sender)
+
+    def _heard(self, datagram: bytes, sender: _Address) -> None:
+        """Keep a datagram of the robot."""
+        host = str(sender[0]).partition("%")[0]
+        if not datagram or not (self._accepts_any or host in self._allowed):
+            return
+        if self._robot is None:
+            self._robot = sender
+        self._arrived.append(datagram)
+        self._arrived_bytes += len(datagram)
+        while len(self._arrived) > READ_AHEAD or self._arrived_bytes > READ_AHEAD_BYTES:
+            self._arrived_bytes -= len(self._arrived.popleft())
+            self.dropped += 1
+        self._changed.set()
+
+    def _note(self, fault: OSError) -> None:
+        with suppress(TransportError):
+            self._take_fault(fault, 0)
+
+    def _take_fault(self, fault: OSError, length: int) -> None:
+        """End the line for what is wrong with it, and raise that.
+
+        Raises:
+            TransportError: always.
+        """
+        if fault.errno == errno.EMSGSIZE:
+            raise TransportError(f"{length} bytes are too many for one datagram") from fault
+        place = place_of(self._host, self._port)
+        if isinstance(fault, ConnectionRefusedError | ConnectionResetError):
+            self._end(f"nothing listens on {place} (port unreachable)")
+        elif fault.errno in _NO_WAY:
+            self._end(f"no way to {place} from this network ({reason(fault)})")
+        else:
+            self._end(broke(fault))
+        raise PeerClosed(self._ended) from fault
+
+    def _end(self, why: str) -> None:
+        if not self._ended:
+            self._ended = why
+        self._changed.set()
+
+
+class _Endpoint(asyncio.DatagramProtocol):
+    """Passes on what the loop reads by itself."""
+
+    def __init__(
+        self, heard: Callable[[bytes, _Address], None], note: Callable[[OSError], None]
+    ) -> None:
+        self._heard = heard
+        self._note = note
+
+    def datagram_received(self, data: bytes, addr: _Address) -> None:
+        self._heard(data, addr)
+
+    def error_received(self, exc: Exception) -> None:
+        if isinstance(exc, OSError):
+            self._note(exc)
+
+
+def from_setup(setup: Setup) -> Transport:
+    """Make a transport out of a document's options.
+
+    Raises:
+        TransportError: an option is missing or not usable.
+    """
+    options = setup.options
+    if setup.via is not None:
+        raise TransportError("udp goes through no other transport; leave via out")
+    host = _options.text("udp", options, "host").strip()
+    port = _options.port("udp", options) if options.get("port") is not None else 0
+    listen = _options.port("udp", options, "listen") if options.get("listen") is not None else 0
+    is_broadcast = _options.flag("udp", options, "broadcast", default=False)
+    usual = "host" if host and not is_broadcast else "any"
+    who = _options.choice("udp", options, "from", ("any", "host"), usual)
+    if not host and (port or who == "host" or is_broadcast):
+        raise TransportError("udp needs a host name or address as host")
+    if not listen and not (host and port):
+        raise TransportError("udp needs host and port of the robot, or an own port as listen")
+    return UdpTransport(
+        host,
+        port,
+        listen=listen,
+        bind=_options.text("udp", options, "bind"),
+        accepts_any=who == "any",
+        is_broadcast=is_broadcast,
+    )
+
+
+def _forget_faults(line: socket.socket) -> None:
+    """Empty the queue in which Linux keeps why earlier datagrams did not arrive."""
+    if sys.platform == "linux":
+        with suppress(OSError):
+            while True:
+                line.recvmsg(0, 512, socket.MSG_ERRQUEUE)

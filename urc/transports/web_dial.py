@@ -1,0 +1,115 @@
+"""Connections to the one place that a web transport leads to: directly, with TLS, through another.
+
+`Reach` gives streams of our own; a library that brings its own protocol wants a socket, and gets
+either the connection's own or, where that is no plain one, an end of a pair that is pumped.
+"""
+
+import asyncio
+import socket
+from collections.abc import Coroutine
+from typing import Any
+
+from urc.transports._faults import late
+from urc.transports._reach import Reach
+from urc.transports._stream import forget_unsent, unsent_in
+from urc.transports._tls import Tls
+from urc.transports.base import ByteStream, Carrier, ConnectFailed, PeerClosed
+from urc.transports.topic_socket import Address
+from urc.transports.web_place import WebPlace
+
+__all__ = ["Dialer"]
+
+_PIECE_BYTES = 65536
+
+
+class Dialer:
+    """Connects to one place, as often as it is asked."""
+
+    def __init__(self, place: WebPlace, *, tls: Tls | None, via: Carrier | None) -> None:
+        """Lead to `place`, made secret by `tls`, through `via` if there is one."""
+        self._reach = Reach(place.host, place.port, via=via, tls=tls)
+        is_plain = tls is None and via is None
+        self._address = Address(place.host, place.port) if is_plain else None
+        self._bridges: set[asyncio.Task[None]] = set()
+        self._carried: ByteStream | None = None
+        """What the newest bridge leads to."""
+
+    @property
+    def place(self) -> str:
+        """Where it leads, for people."""
+        return self._reach.place
+
+    async def stream(self, timeout_s: float) -> ByteStream:
+        """Return an open stream, or raise `ConnectFailed` within `timeout_s` seconds."""
+        return await self._reach.open(timeout_s)
+
+    async def plug(self, timeout_s: float) -> socket.socket:
+        """Return a connected socket, or raise `ConnectFailed` within `timeout_s` seconds."""
+        if self._address is None:
+            return self._bridge(await self._reach.open(timeout_s))
+        try:
+            async with asyncio.timeout(timeout_s):
+                return await self._address.dial(timeout_s)
+        except TimeoutError as fault:
+            raise ConnectFailed(late(self.place, timeout_s)) from fault
+        except (OSError, UnicodeError) as fault:
+            raise ConnectFailed(self._address.explain(fault)) from fault
+
+    def unsent(self, line: socket.socket) -> int:
+        """Return the bytes that were written to `line`, of `plug`, and have not left for good."""
+        count = getattr(self._carried, "unsent", None) if self._bridges else None
+        return unsent_in(line) + (int(count()) if count is not None else 0)
+
+    async def reset(self, line: socket.socket) -> None:
+        """Close `line` and what it leads to; what is unsent is never sent."""
+        forget_unsent(line)
+        reset = getattr(self._carried, "reset", None) if self._bridges else None
+        if reset is not None:
+            await reset()
+
+    async def close(self) -> None:
+        """End what is pumped."""
+        bridges = list(self._bridges)
+        for bridge in bridges:
+            bridge.cancel()
+        await asyncio.gather(*bridges, return_exceptions=True)
+
+    def _bridge(self, stream: ByteStream) -> socket.socket:
+        self._carried = stream
+        ours, theirs = socket.socketpair()
+        ours.setblocking(False)
+        theirs.setblocking(False)
+        task = asyncio.create_task(_pump(stream, theirs))
+        self._bridges.add(task)
+        task.add_done_callback(self._bridges.discard)
+        return ours
+
+
+async def _pump(stream: ByteStream, end: socket.socket) -> None:
+    """Move bytes both ways until either side has ended, then end the other."""
+    loop = asyncio.get_running_loop()
+
+    async def out() -> None:
+        while data := await loop.sock_recv(end, _PIECE_BYTES):
+            await stream.put(data)
+
+    async def back() -> None:
+        while True:
+            await loop.sock_sendall(end, await stream.take())
+
+    try:
+        async with asyncio.TaskGroup() as ways:
+            outward = ways.create_task(_until_closed(out()))
+            inward = ways.create_task(_until_closed(back()))
+            outward.add_done_callback(lambda _: inward.cancel())
+            inward.add_done_callback(lambda _: outward.cancel())
+    finally:
+        end.close()
+        await stream.abort()
+
+
+async def _until_closed(way: Coroutine[Any, Any, None]) -> None:
+    try:
+        await way
+    except (PeerClosed, OSError):
+        return  # either side has ended: the other is told by ending it, too

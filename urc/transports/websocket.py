@@ -1,0 +1,247 @@
+"""WebSocket to a robot (RFC 6455), on the library `websockets`.
+
+Each message is one payload. What arrives is read ahead a little and then left in the kernel's
+queue, so a robot that floods waits; `send` returns once the kernel has every byte. Pings tell a
+robot that is gone without a word: it answers none. Nothing is kept while there is no connection.
+"""
+
+import asyncio
+from contextlib import suppress
+
+from websockets.asyncio.client import ClientConnection, connect
+from websockets.exceptions import (
+    ConnectionClosed,
+    InvalidHandshake,
+    InvalidMessage,
+    InvalidStatus,
+    NegotiationError,
+)
+from websockets.frames import CloseCode
+from websockets.typing import Subprotocol
+
+from urc.model.codec import Payload
+from urc.transports._faults import CLOSED, HUNG_UP, broke, late, one_line
+from urc.transports._stream import as_bytes
+from urc.transports.base import ConnectFailed, PeerClosed, Setup, Transport, TransportError
+from urc.transports.web_dial import Dialer
+from urc.transports.web_place import Options
+
+__all__ = ["WebSocketTransport", "from_setup"]
+
+READ_AHEAD_MESSAGES = 4
+"""Messages that are read before somebody takes them."""
+MAX_MESSAGE_BYTES = 1_048_576
+UNTAKEN_BYTES = 1_048_576
+"""Answers to pings that the robot may leave untaken."""
+_NORMAL = CloseCode.NORMAL_CLOSURE
+_CLOSE_S = 0.2
+"""How long a close in good order may take; then the connection is cut."""
+
+
+class WebSocketTransport:
+    """One WebSocket, opened as often as it is needed."""
+
+    def __init__(self, setup: Setup) -> None:
+        """Read the options of `setup`; nothing is opened yet.
+
+        Raises:
+            TransportError: an option is missing or not usable.
+        """
+        options = Options("websocket", setup.options)
+        self._place = options.place("ws")
+        self._headers = options.headers()
+        credentials = options.credentials(("basic", "bearer"))
+        if credentials is not None:
+            self._headers["Authorization"] = credentials.header
+        self._subprotocols = [Subprotocol(one) for one in options.tokens("subprotocols")]
+        self._is_text = options.choice("send_as", ("text", "binary"), "text") == "text"
+        self._max_bytes = int(options.number("max_message", MAX_MESSAGE_BYTES, 1, 2**26))
+        self._ping_s = options.duration("ping_every", 5.0, 0.1, 3600)
+        self._pong_s = options.duration("ping_timeout", 5.0, 0.1, 3600)
+        tls = options.tls(self._place)
+        self._dialer = Dialer(self._place, tls=tls, via=setup.via)
+        self._socket: ClientConnection | None = None
+
+    @property
+    def address(self) -> str:
+        """Where it leads, for people: ``websocket ws://192.168.4.1:80/control``."""
+        place = self._place
+        return f"websocket ws{'s' * place.is_secure}://{place.authority}{place.path}"
+
+    async def open(self, timeout_s: float) -> None:
+        """Connect and shake hands, or raise `ConnectFailed` within `timeout_s` seconds."""
+        await self.close()
+        where = self._place.authority
+        try:
+            async with asyncio.timeout(timeout_s):
+                self._socket = await self._connect(timeout_s)
+        except TimeoutError as fault:
+            raise ConnectFailed(late(where, timeout_s)) from fault
+        except (InvalidHandshake, EOFError, OSError) as fault:
+            raise ConnectFailed(_refusal(fault, where)) from fault
+        finally:
+            if self._socket is None:
+                await self._dialer.close()
+
+    async def receive(self) -> bytes:
+        """Return the next message that is not empty; raise `PeerClosed` when no more will come."""
+        if self._socket is None:
+            raise PeerClosed(CLOSED)
+        try:
+            while True:
+                message = await self._socket.recv(decode=False)
+                if message:
+                    return message
+        except ConnectionClosed as ended:
+            raise PeerClosed(_end(ended)) from ended
+
+    async def send(self, data: Payload) -> None:
+        """Hand one message to the kernel, waiting while it is full.
+
+        Raises:
+            PeerClosed: the line broke.
+            TransportError: `data` is no text, and text is what is sent here.
+        """
+        message = as_bytes(data)
+        if self._socket is None:
+            raise PeerClosed(CLOSED)
+        if self._is_text:
+            try:
+                message.decode()
+            except UnicodeDecodeError as fault:
+                text = "a text message must be UTF-8, and these bytes are not; use send_as: binary"
+                raise TransportError(text) from fault
+        try:
+            await self._socket.send(message, text=self._is_text)
+        except ConnectionClosed as ended:
+            raise PeerClosed(_end(ended)) from ended
+
+    async def close(self) -> None:
+        """Say good-bye and close, within a moment. Never raises, may be called twice."""
+        connection, self._socket = self._socket, None
+        try:
+            if connection is not None:
+                await _hang_up(connection)
+        finally:
+            await self._dialer.close()
+
+    def unsent(self) -> int:
+        """Return the bytes handed over that have not left this machine for good."""
+        if self._socket is None:
+            return 0
+        transport = self._socket.transport
+        line = transport.get_extra_info("socket")
+        return transport.get_write_buffer_size() + self._dialer.unsent(line)
+
+    async def abort(self) -> None:
+        """Close at once; what the robot has not got by now it never gets. Never raises."""
+        connection, self._socket = self._socket, None
+        try:
+            if connection is not None:
+                await self._dialer.reset(connection.transport.get_extra_info("socket"))
+                connection.transport.abort()
+                with suppress(TimeoutError):
+                    async with asyncio.timeout(_CLOSE_S):
+                        await connection.wait_closed()
+        finally:
+            await self._dialer.close()
+
+    async def _connect(self, timeout_s: float) -> ClientConnection:
+        place = self._place
+        line = await self._dialer.plug(timeout_s)
+        try:
+            # Our own bound holds over connecting and the handshake; the library needs none.
+            return await _Connect(
+                f"ws://{place.authority}{place.path}",  # TLS is underneath, if there is any
+                sock=line,
+                create_connection=_Connection,
+                subprotocols=self._subprotocols or None,
+                additional_headers=self._headers,
+                proxy=None,
+                compression=None,
+                open_timeout=None,
+                ping_interval=self._ping_s,
+                ping_timeout=self._pong_s,
+                close_timeout=_CLOSE_S,
+                max_size=self._max_bytes,
+                max_queue=READ_AHEAD_MESSAGES,
+                write_limit=0,
+            )
+        except BaseException:
+            line.close()
+            raise
+
+
+class _Connection(ClientConnection):
+    """Does not heap up answers to pings that the other side does not take.
+
+    The library writes them without asking whether there is room.
+    """
+
+    _untaken = 0
+
+    def data_received(self, data: bytes) -> None:
+        """Take what came, and end the line when it makes us answer without end."""
+        before = self.transport.get_write_buffer_size()
+        super().data_received(data)
+        after = self.transport.get_write_buffer_size()
+        self._untaken = self._untaken + after - before if before else after
+        if self._untaken > UNTAKEN_BYTES:
+            self.set_connection_exc(OSError("the robot pings, and takes none of the answers"))
+            self.transport.abort()
+
+
+class _Connect(connect):
+    """Follows no redirect: a robot must not lead us elsewhere."""
+
+    def process_redirect(self, exc: Exception) -> Exception | str:
+        return exc
+
+
+def from_setup(setup: Setup) -> Transport:
+    """Make a transport out of a document's options; raise `TransportError` for an unusable one."""
+    return WebSocketTransport(setup)
+
+
+async def _hang_up(connection: ClientConnection) -> None:
+    """Close in good order; if that takes too long, or nobody waits for it any more, cut."""
+    try:
+        with suppress(TimeoutError):
+            async with asyncio.timeout(2 * _CLOSE_S):
+                await connection.close()
+    finally:
+        connection.transport.abort()
+        with suppress(TimeoutError):  # one turn of the loop: then the socket is closed, too
+            async with asyncio.timeout(_CLOSE_S):
+                await connection.wait_closed()
+
+
+def _refusal(fault: Exception, where: str) -> str:
+    """Return one line for people about why there is no WebSocket."""
+    if isinstance(fault, InvalidStatus):
+        response = fault.response
+        target = response.headers.get("Location")
+        if 300 <= response.status_code < 400 and target is not None:
+            return f"robot redirected to {one_line(target)}; redirects are not followed"
+        status = one_line(f"{response.status_code} {response.reason_phrase}")
+        return f"{where} answered {status} instead of a WebSocket"
+    if isinstance(fault, NegotiationError):
+        return f"{where} wants what was not offered ({one_line(str(fault))})"
+    if isinstance(fault, InvalidMessage | EOFError | ConnectionError):
+        return f"what listens on {where} does not speak HTTP, or closed the line"
+    return f"what listens on {where} is no WebSocket ({one_line(str(fault))})"
+
+
+def _end(ended: ConnectionClosed) -> str:
+    """Return one line for people about why a connection is over."""
+    theirs, ours, cause = ended.rcvd, ended.sent, ended.__cause__
+    if theirs is not None and ended.rcvd_then_sent is not False:
+        said = f" ({theirs.code} {one_line(theirs.reason)})" if theirs.code != _NORMAL else ""
+        return f"{HUNG_UP}{said}".replace(" )", ")")
+    if ours is not None and ours.code == CloseCode.INTERNAL_ERROR and "ping" in ours.reason:
+        return "the robot answered no ping"
+    if ours is not None and ours.code != _NORMAL:
+        return f"what the robot sent is not taken ({ours.code} {one_line(ours.reason)})"
+    if isinstance(cause, OSError) and cause.args:
+        return broke(cause)
+    return HUNG_UP
