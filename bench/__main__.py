@@ -6,7 +6,24 @@ from importlib import import_module
 
 from bench.harness import report
 
-NAMES = ("startup", "engine_binary", "engine_text")
+NAMES = (
+    "startup",
+    "engine_binary",
+    "engine_text",
+    "driver_poll",
+    "driver_flood",
+    "transport_tcp",
+    "transport_udp",
+    "transport_serial",
+    "transport_ssh",
+    "transport_telnet",
+    "transport_http",
+    "transport_websocket",
+    "transport_rosbridge",
+    "transport_mqtt",
+    "motion_path",
+    "motion_stop",
+)
 
 
 def main() -> int:

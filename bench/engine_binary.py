@@ -11,10 +11,15 @@ from binascii import crc_hqx
 from collections.abc import Callable, Mapping, Sequence
 from struct import Struct
 
+from bench.engine_text import driver_of
 from bench.harness import Goal, Result, compare
 from urc.model.framing import ChecksumSpec, CrcSpec, FrameLayout, Window
+from urc.model.values import Sample
+from urc.protocol.engine import Engine
+from urc.protocol.events import Samples
 from urc.protocol.forms import Frame
 from urc.protocol.frame import Seal
+from urc.protocol.messages import WARM_AFTER
 from urc.testing.struct import reader, writer
 
 DECLARED = """
@@ -29,6 +34,24 @@ struct:
   - { id: energy, type: u32be, scale: 0.0001 }
   - { id: fault, type: u8, enum: { "0": none, "1": over_voltage, "2": under_voltage } }
 """
+DRIVER = """
+transports:
+  wire:
+    type: tcp
+    host: 127.0.0.1
+    port: 6789
+    framing: { type: fixed, size: 24, checksum: { algorithm: crc16-xmodem } }
+signals:
+  temp_fet: {}
+  temp_motor: {}
+  current: {}
+  duty: {}
+  erpm: { type: integer }
+  v_in: {}
+  energy: {}
+  fault: { type: string }
+messages:
+  values:""" + DECLARED.replace("\n", "\n    ")
 CHECKSUM = ChecksumSpec(CrcSpec(16, 0x1021), 16, Window(0, -2), -2)
 VALUES: Mapping[str, object] = {
     "temp_fet": 25.1,
@@ -40,6 +63,8 @@ VALUES: Mapping[str, object] = {
     "energy": 1.5,
     "fault": "over_voltage",
 }
+FRAMES = 10
+"""In one piece, as they come from a fast line."""
 LAYOUT = Struct(">BhhihihIB")
 FAULTS = {0: "none", 1: "over_voltage", 2: "under_voltage"}
 FAULT_NUMBERS = {name: number for number, name in FAULTS.items()}
@@ -66,6 +91,26 @@ def decode_by_hand(frame: bytes) -> Mapping[str, object] | None:
     }
 
 
+class ByHand:
+    """What takes the frames out of a stream by hand, and makes samples of each."""
+
+    def __init__(self) -> None:
+        self._left = b""
+
+    def receive(self, data: bytes, now: float) -> list[Sample]:
+        """Return the samples of the frames that are whole now."""
+        data = self._left + data if self._left else data
+        samples: list[Sample] = []
+        start = 0
+        while len(data) - start >= 24:
+            found = decode_by_hand(data[start : start + 24])
+            start += 24
+            if found is not None:
+                samples += [Sample(name, value, now) for name, value in found.items()]  # type: ignore[arg-type]
+        self._left = data[start:]
+        return samples
+
+
 def encode_by_hand(values: Mapping[str, float]) -> bytes:
     return LAYOUT.pack(
         4,
@@ -81,7 +126,7 @@ def encode_by_hand(values: Mapping[str, float]) -> bytes:
 
 
 def run(*, full: bool = False) -> Sequence[Result]:
-    """Measure reading with and without the engine's `Frame`, and writing."""
+    """Measure reading, alone and through the whole engine, and writing."""
     seal = Seal(FrameLayout(tail=2, size=24, checksum=CHECKSUM))
     open_frame, read, write = seal.open, reader(DECLARED).read, writer(DECLARED).write
     data = seal.close(encode_by_hand(VALUES))  # type: ignore[arg-type]  # numbers where it matters
@@ -91,10 +136,17 @@ def run(*, full: bool = False) -> Sequence[Result]:
         one.payload = open_frame(frame)
         return read(one)
 
-    def decode_anew(frame: bytes) -> Mapping[str, object] | None:
-        return read(Frame(open_frame(frame), "utf-8"))
-
-    assert decode(data) == decode_anew(data) == decode_by_hand(data) == VALUES
+    engine, hand = Engine(driver_of(DRIVER), {}), ByHand()
+    engine.tick(0.0)
+    engine.start("wire", 0.0)
+    several = data * FRAMES
+    for _ in range(WARM_AFTER):
+        received = engine.receive("wire", data, 1.0)
+    assert received == [Samples("wire", tuple(hand.receive(data, 1.0)))]
+    received = engine.receive("wire", several, 1.0)
+    told = [sample for event in received if isinstance(event, Samples) for sample in event.samples]
+    assert told == hand.receive(several, 1.0)
+    assert decode(data) == decode_by_hand(data) == VALUES
     assert write(VALUES) == encode_by_hand(VALUES) == data[:-2]  # type: ignore[arg-type]
     rounds, versions = (41 if full else 15), {"python": platform.python_version()}
     cases: list[tuple[Goal, Callable[[], float], Callable[[], float]]] = [
@@ -105,10 +157,15 @@ def run(*, full: bool = False) -> Sequence[Result]:
             _seconds(decode, data),
         ),
         (
-            # The object that carries a frame past all messages of a line is the engine's.
-            Goal("engine_binary: the same with a new Frame each / by hand", 1.3),
-            _seconds(decode_by_hand, data),
-            _seconds(decode_anew, data),
+            # From the bytes of the wire to the samples, framing included on both sides.
+            Goal("engine_binary: bytes to samples, a frame at a time / by hand", 1.053),
+            _seconds(lambda data: hand.receive(data, 1.0), data),
+            _seconds(lambda data: engine.receive("wire", data, 1.0), data),
+        ),
+        (
+            Goal("engine_binary: bytes to samples, 10 frames at a time / by hand", 1.053),
+            _seconds(lambda data: hand.receive(data, 1.0), several, 2_000),
+            _seconds(lambda data: engine.receive("wire", data, 1.0), several, 2_000),
         ),
         (
             Goal("engine_binary: encode 8 arguments / by hand", 1.053),
@@ -122,12 +179,14 @@ def run(*, full: bool = False) -> Sequence[Result]:
     ]
 
 
-def _seconds(function: Callable[..., object], argument: object) -> Callable[[], float]:
-    """Return what measures 20 000 calls, in seconds of this process."""
+def _seconds(
+    function: Callable[..., object], argument: object, times: int = 20_000
+) -> Callable[[], float]:
+    """Return what measures so many calls, in seconds of this process."""
 
     def measure() -> float:
         began = time.process_time()
-        for _ in range(20_000):
+        for _ in range(times):
             function(argument)
         return time.process_time() - began
 

@@ -12,6 +12,7 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from importlib.metadata import version
 
+from bench.documents import DOCUMENT, by_json, by_orjson, json_lines
 from bench.harness import Goal, Result, compare
 from urc.config.parse_driver import parse_driver
 from urc.config.part import Findings, Part
@@ -20,6 +21,7 @@ from urc.model.values import Sample
 from urc.protocol.asking import Builder
 from urc.protocol.encode import build_check
 from urc.protocol.fast_read import Taken
+from urc.protocol.known import Known
 from urc.protocol.messages import WARM_AFTER, Messages
 from urc.protocol.readings import Readings
 from urc.runtime.catalog import built_in_catalog
@@ -77,36 +79,6 @@ messages:
   ok: { pattern: "OK {done:integer}" }
 """
 )
-DOCUMENT = {
-    "header": {
-        "seq": 48213,
-        "stamp": {"sec": 1700000000, "nanosec": 250000000},
-        "frame_id": "odom",
-    },
-    "child_frame_id": "base_link",
-    "pose": {
-        "pose": {
-            "position": {"x": 1.25, "y": -0.5, "z": 0.0},
-            "orientation": {"x": 0.0, "y": 0.0, "z": 0.3826, "w": 0.9239},
-        },
-        "covariance": [0.01, 0.0, 0.0, 0.01],
-    },
-    "twist": {
-        "twist": {
-            "linear": {"x": 0.42, "y": 0.0, "z": 0.0},
-            "angular": {"x": 0.0, "y": 0.0, "z": -0.11},
-        }
-    },
-    "battery": {"percentage": 0.87, "voltage": 24.3, "present": True, "cells": [4.05, 4.06, 4.05]},
-    "state": {
-        "mode": "AUTO",
-        "estop": False,
-        "errors": [],
-        "uptime_s": 86400.25,
-        "host": "rover-7.local",
-        "version": "1.12.0-rc.4",
-    },
-}
 PATHS = {
     "x": "pose.pose.position.x",
     "y": "pose.pose.position.y",
@@ -220,22 +192,6 @@ def by_split(line: bytes, now: float) -> list[Sample] | None:
     return None
 
 
-def by_json(line: bytes, now: float) -> list[Sample] | None:
-    """The standard library and subscripts."""
-    document = json.loads(line)
-    pose, twist = document["pose"]["pose"], document["twist"]["twist"]
-    return [
-        Sample("x", pose["position"]["x"], now),
-        Sample("y", pose["position"]["y"], now),
-        Sample("w", pose["orientation"]["w"], now),
-        Sample("speed", twist["linear"]["x"], now),
-        Sample("turn", twist["angular"]["z"], now),
-        Sample("volts", document["battery"]["voltage"], now),
-        Sample("cell", document["battery"]["cells"][0], now),
-        Sample("mode", document["state"]["mode"], now),
-    ]
-
-
 def drive(vx: float, wz: float) -> bytes:
     vx = max(-1.0, min(1.0, vx))
     wz = max(-2.0, min(2.0, wz))
@@ -262,7 +218,7 @@ def driver_of(text: str) -> Driver:
 def reader_of(text: str) -> Callable[[bytes, float], Taken | None]:
     """Return bytes → samples and refused values, as a line of the engine does it."""
     driver = driver_of(text)
-    line = Builder(driver, Readings(driver.signals)).lines["wire"]
+    line = Builder(driver, Readings(driver.signals), Known(driver.signals, {})).lines["wire"]
     messages: Messages = line.inbox.messages
     return messages.take
 
@@ -270,7 +226,7 @@ def reader_of(text: str) -> Callable[[bytes, float], Taken | None]:
 def sender_of(text: str) -> Callable[[str, Mapping[str, object]], bytes]:
     """Return command and arguments → bytes, the check of the arguments included."""
     driver = driver_of(text)
-    builder = Builder(driver, Readings(driver.signals))
+    builder = Builder(driver, Readings(driver.signals), Known(driver.signals, {}))
     commands = {
         name: (build_check(command), builder.command(command).encode)
         for name, command in driver.commands.items()
@@ -319,6 +275,7 @@ def run(*, full: bool = False) -> Sequence[Result]:
     """Measure reading and writing of text."""
     rounds, times = (25, 4000) if full else (15, 2000)
     versions = {"python": platform.python_version(), "msgspec": version("msgspec")}
+    versions["orjson"] = version("orjson")
     document = json.dumps(DOCUMENT, separators=(",", ":")).encode()
     hand, regex, pattern = HandRegex().read, reader_of(REGEXES), reader_of(PATTERNS)
     declared, send = reader_of(JSON), sender_of(COMMANDS)
@@ -333,11 +290,20 @@ def run(*, full: bool = False) -> Sequence[Result]:
         assert wanted == regex(line, 1.0) == pattern(line, 1.0) == (by_split(line, 1.0), ())
     assert declared(document, 1.0) == (by_json(document, 1.0), ())
     assert len(document) == 558
+    lines = json_lines()
+    for line in lines:
+        taken = declared(line, 1.0)
+        assert taken is not None
+        assert {*taken[0]} == {*(by_orjson(line, 1.0) or ())}
     for name, arguments in ARGUMENTS:
         assert {"drive": drive, "aim": aim}[name](**arguments) == send(name, arguments)
 
     def pair(
-        name: str, at_most: float, base: Callable[[], None], ours: Callable[[], None]
+        name: str,
+        at_most: float,
+        base: Callable[[], None],
+        ours: Callable[[], None],
+        times: int = times,
     ) -> Result:
         return compare(
             Goal(f"engine_text: {name}", at_most),
@@ -353,6 +319,10 @@ def run(*, full: bool = False) -> Sequence[Result]:
         pair(
             "8 paths of JSON / hand json", 1 / 1.5,
             reading(by_json, [document]), reading(declared, [document]),
+        ),
+        pair(
+            "8 paths of JSON, 10 % incomplete / hand orjson", 1 / 1.5,
+            reading(by_orjson, lines), reading(declared, lines), times // 10,
         ),
         pair("encode / hand f-string", 1 / 0.95, by_hand, sending(send)),
     ]  # fmt: skip

@@ -11,7 +11,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 
-__all__ = ["Goal", "Result", "compare", "process_seconds", "report"]
+__all__ = ["Goal", "Result", "compare", "compare_all", "process_seconds", "report"]
 
 PROCESS_TIMEOUT_S = 60
 
@@ -74,19 +74,36 @@ def compare(
     versions: Mapping[str, str] | None = None,
 ) -> Result:
     """Measure both in turn, after one round that does not count."""
-    baseline(), subject()
-    pairs = [(baseline(), subject()) for _ in range(rounds)]
-    bases, subjects = zip(*pairs, strict=True)
-    return Result(
-        name=goal.name,
-        ratio=round(statistics.median(after / before for before, after in pairs), 3),
-        goal=goal.at_most,
-        baseline_ms=round(statistics.median(bases) * 1000, 2),
-        subject_ms=round(statistics.median(subjects) * 1000, 2),
-        spread=round(max(bases) / statistics.median(bases), 2),
-        rounds=rounds,
-        versions=versions or {},
-    )
+    return compare_all([(goal, baseline)], subject, rounds=rounds, versions=versions)[0]
+
+
+def compare_all(
+    baselines: Sequence[tuple[Goal, Callable[[], float]]],
+    subject: Callable[[], float],
+    *,
+    rounds: int = 11,
+    versions: Mapping[str, str] | None = None,
+) -> list[Result]:
+    """Measure a subject and all its baselines in turn, after one round that does not count."""
+    measured: list[list[float]] = []
+    for _ in range(rounds + 1):
+        measured.append([*(baseline() for _, baseline in baselines), subject()])
+    results: list[Result] = []
+    *columns, subjects = zip(*measured[1:], strict=True)
+    for (goal, _), bases in zip(baselines, columns, strict=True):
+        pairs = zip(bases, subjects, strict=True)
+        result = Result(
+            name=goal.name,
+            ratio=round(statistics.median(after / before for before, after in pairs), 3),
+            goal=goal.at_most,
+            baseline_ms=round(statistics.median(bases) * 1000, 2),
+            subject_ms=round(statistics.median(subjects) * 1000, 2),
+            spread=round(max(bases) / statistics.median(bases), 2),
+            rounds=rounds,
+            versions=versions or {},
+        )
+        results.append(result)
+    return results
 
 
 def report(results: Sequence[Result]) -> int:

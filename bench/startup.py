@@ -3,20 +3,28 @@
 import platform
 import shutil
 import sys
+import tempfile
 from collections.abc import Sequence
 from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 
 from bench.harness import Goal, Result, compare, process_seconds
+from bench.profiles import write_profiles
 
 ROOT = Path(__file__).resolve().parents[1]
 PROFILE = ROOT / "robots" / "puppet.yaml"
+PROFILES = 100
 SCHEMA = ROOT / "schemas" / "robot.schema.json"
 
 
 def run(*, full: bool = False) -> Sequence[Result]:
     """Measure `urc --version` and `urc validate`."""
+    with tempfile.TemporaryDirectory() as folder:
+        return _run(write_profiles(Path(folder), PROFILES), full=full)
+
+
+def _run(profiles: list[str], *, full: bool) -> Sequence[Result]:
     rounds = 41 if full else 15
     versions = {
         "python": platform.python_version(),
@@ -40,6 +48,13 @@ def run(*, full: bool = False) -> Sequence[Result]:
             partial(process_seconds, [checker, "--schemafile", str(SCHEMA), str(PROFILE)]),
             partial(process_seconds, [urc, "validate", str(PROFILE)]),
             rounds=rounds,
+            versions=versions,
+        ),
+        compare(
+            Goal(f"startup: urc validate {PROFILES} profiles / check-jsonschema", 0.3),
+            partial(process_seconds, [checker, "--schemafile", str(SCHEMA), *profiles]),
+            partial(process_seconds, [urc, "validate", *profiles]),
+            rounds=9 if full else 5,
             versions=versions,
         ),
         compare(

@@ -1,0 +1,78 @@
+"""What a flood of lines costs over a real socket, against drivers written by hand.
+
+CPU time of this process from asking for the lines until the newest value of each is kept.
+"""
+
+import asyncio
+import platform
+import time
+from collections.abc import Callable, Coroutine, Sequence
+from functools import partial
+from typing import Any, Protocol
+
+from bench.driver_hand import ProtocolDriver, StreamDriver
+from bench.driver_robot import robot
+from bench.driver_urc import declared, profile
+from bench.harness import Goal, Result, compare_all
+
+LINES = 60_000
+WARM_UP = 1000
+
+
+class Driver(Protocol):
+    """What all of them can do."""
+
+    async def flood(self, count: int) -> None:
+        """Ask for `count` lines, and return when all have come."""
+
+
+async def _measure(driver: Driver) -> float:
+    await driver.flood(WARM_UP)
+    began = time.process_time()
+    await driver.flood(LINES)
+    return time.process_time() - began
+
+
+async def _by_hand(kind: type[ProtocolDriver] | type[StreamDriver], port: int) -> float:
+    driver = await kind.connect(port)
+    try:
+        taken = await _measure(driver)
+        assert len(driver.latest) == 14
+        assert not driver.faults
+        return taken
+    finally:
+        await driver.close()
+
+
+def run(*, full: bool = False) -> Sequence[Result]:
+    """Measure `LINES` lines."""
+    loaded = profile()
+
+    async def ours(port: int) -> float:
+        async with declared(loaded, port) as driver:
+            taken = await _measure(driver)
+            hub = driver.hub
+            assert len(hub.changed_since(0)) == 14
+            assert not hub.links["wire"].faults
+            return taken
+
+    def seconds(work: Callable[[int], Coroutine[Any, Any, float]], port: int) -> float:
+        return asyncio.run(work(port))
+
+    with robot(is_beside=False) as port:
+        return compare_all(
+            [
+                (
+                    # 1.11 is 0.9 times the speed.
+                    Goal("driver_flood: 60 000 lines, CPU / hand split on Protocol", 1.111),
+                    partial(seconds, partial(_by_hand, ProtocolDriver), port),
+                ),
+                (
+                    Goal("driver_flood: 60 000 lines, CPU / hand split on StreamReader", 0.5),
+                    partial(seconds, partial(_by_hand, StreamDriver), port),
+                ),
+            ],
+            partial(seconds, ours, port),
+            rounds=25 if full else 9,
+            versions={"python": platform.python_version()},
+        )

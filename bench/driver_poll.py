@@ -1,0 +1,74 @@
+"""What a request and its reply cost over a real socket, against drivers written by hand.
+
+CPU time of this process: the robot is another one, the same for all. Each round connects anew, and
+asks `TIMES` times after a warm-up.
+"""
+
+import asyncio
+import platform
+import time
+from collections.abc import Callable, Coroutine, Sequence
+from functools import partial
+from typing import Any, Protocol
+
+from bench.driver_hand import ProtocolDriver, StreamDriver
+from bench.driver_robot import robot
+from bench.driver_urc import declared, profile
+from bench.harness import Goal, Result, compare_all
+
+TIMES = 1500
+WARM_UP = 100
+ANSWER = {"x": 1.25, "y": -0.337, "heading": 90.5}
+
+
+class Driver(Protocol):
+    """What all of them can do."""
+
+    async def drive(self, vx: float, wz: float) -> dict[str, object]:
+        """Send a speed, return what the robot answers."""
+
+
+async def _measure(driver: Driver) -> float:
+    for _ in range(WARM_UP):
+        assert await driver.drive(0.25, -1.5) == ANSWER
+    began = time.process_time()
+    for _ in range(TIMES):
+        await driver.drive(0.25, -1.5)
+    return time.process_time() - began
+
+
+async def _by_hand(kind: type[ProtocolDriver] | type[StreamDriver], port: int) -> float:
+    driver = await kind.connect(port)
+    try:
+        return await _measure(driver)
+    finally:
+        await driver.close()
+
+
+def run(*, full: bool = False) -> Sequence[Result]:
+    """Measure a command and its reply."""
+    loaded = profile()
+
+    async def ours(port: int) -> float:
+        async with declared(loaded, port) as driver:
+            return await _measure(driver)
+
+    def seconds(work: Callable[[int], Coroutine[Any, Any, float]], port: int) -> float:
+        return asyncio.run(work(port))
+
+    with robot(is_beside=True) as port:
+        return compare_all(
+            [
+                (
+                    Goal("driver_poll: command and reply over TCP, CPU / hand Protocol", 1.05),
+                    partial(seconds, partial(_by_hand, ProtocolDriver), port),
+                ),
+                (
+                    Goal("driver_poll: command and reply over TCP, CPU / hand StreamReader", 0.9),
+                    partial(seconds, partial(_by_hand, StreamDriver), port),
+                ),
+            ],
+            partial(seconds, ours, port),
+            rounds=25 if full else 9,
+            versions={"python": platform.python_version()},
+        )

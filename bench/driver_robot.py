@@ -1,0 +1,88 @@
+"""The robot of `driver_poll` and `driver_flood`: a process of its own, so its work is not measured.
+
+``python -m bench.driver_robot`` prints its port. It answers ``VEL …`` with an odometry line, and
+``FLOOD n`` with n lines of a mix and ``OK n`` behind them. It ends with its standard input.
+"""
+
+import os
+import socket
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+__all__ = ["LINES", "ODOMETRY", "robot"]
+
+LINES = (
+    b"BAT 24.31 87",
+    b"ODO 1.250 -0.337 90.5",
+    b"IMU 0.01 -0.02 9.81 0.001 0.002 -0.003",
+    b"RNG 1.20 0.85",
+)
+ODOMETRY = LINES[1] + b"\n"
+
+
+@contextmanager
+def robot(*, is_beside: bool) -> Iterator[int]:
+    """Run the robot for as long as the context lasts; give its port.
+
+    Args:
+        is_beside: it has the processor of whoever drives it, where the system has a say. On another
+            one, an answer comes now before and now after the driver goes to sleep; how often, and
+            what waking up costs on this machine, would decide the figure instead of the work.
+    """
+    allowed = (
+        os.sched_getaffinity(0) if is_beside and hasattr(os, "sched_getaffinity") else set[int]()
+    )
+    if allowed:
+        os.sched_setaffinity(0, {min(allowed)})
+    process = subprocess.Popen(
+        [sys.executable, "-m", "bench.driver_robot"],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    with process:
+        try:
+            assert process.stdout is not None
+            yield int(process.stdout.readline())
+        finally:
+            process.kill()
+            if allowed:
+                os.sched_setaffinity(0, allowed)
+
+
+def _serve(line: socket.socket) -> None:
+    line.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+    left = b""
+    with line:
+        while data := line.recv(65536):
+            *requests, left = (left + data).split(b"\n")
+            for request in requests:
+                if request.startswith(b"FLOOD "):
+                    line.sendall(_flood(int(request[6:])))
+                else:
+                    line.sendall(ODOMETRY)
+
+
+def _flood(count: int) -> bytes:
+    lines = [LINES[place % len(LINES)] for place in range(count)]
+    return b"\n".join([*lines, b"OK %d\n" % count])
+
+
+def _main() -> None:
+    listener = socket.create_server(("127.0.0.1", 0))
+    print(listener.getsockname()[1], flush=True)
+
+    def accept() -> None:
+        while True:
+            line, _ = listener.accept()
+            threading.Thread(target=_serve, args=(line,), daemon=True).start()
+
+    threading.Thread(target=accept, daemon=True).start()
+    sys.stdin.read()  # ends with whoever started this
+
+
+if __name__ == "__main__":
+    _main()

@@ -1,0 +1,99 @@
+"""How soon a robot hears the stop when its operator vanishes: the distribution for each death.
+
+Real processes: pages, `urc serve` with its guards, robots that stamp what they hear. Time runs from
+the sending of the last tick that had an effect to the first byte of the stop. As root a relay
+between network namespaces adds the two deaths of the link; otherwise they are left out, and told.
+"""
+
+import json
+import tempfile
+from collections.abc import Sequence
+from math import inf
+from pathlib import Path
+
+from bench.harness import Result
+from urc.testing.rig import can_relay
+from urc.testing.rig_deaths import BOUND_MS, DEATHS, LINK_DEATHS, Rig, Trial
+
+__all__ = ["run"]
+
+EACH, EACH_IF_FULL = 100, 1000
+LANES = 20
+BIN_MS = 10
+MOST_BOUTS = 3
+"""Times as many bouts as would do, when the machine is too busy to say anything."""
+
+
+def run(*, full: bool) -> Sequence[Result]:
+    """Let pages die in every way; the slowest stop is held to the bound."""
+    wanted = EACH_IF_FULL if full else EACH
+    results: list[Result] = []
+    has_relay = can_relay()
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        Rig(Path(folder), lanes=LANES, has_relay=has_relay) as rig,
+    ):
+        rig.bout("close")  # starts the guards
+        for death in DEATHS:
+            if death in LINK_DEATHS and not has_relay:
+                print(json.dumps({"left_out": f"motion_stop {death}: needs root and /dev/net/tun"}))
+                continue
+            trials = _trials(rig, death, wanted)
+            said = [one for one in trials if not one.is_excused]
+            print(json.dumps(_distribution(death, said, len(trials) - len(said))), flush=True)
+            results.append(_result(death, said, wanted))
+    return results
+
+
+def _trials(rig: Rig, death: str, wanted: int) -> list[Trial]:
+    trials: list[Trial] = []
+    for _ in range(MOST_BOUTS * wanted // LANES):
+        trials += rig.bout(death)
+        if sum(not one.is_excused for one in trials) >= wanted:
+            break
+    return trials
+
+
+def _distribution(death: str, trials: Sequence[Trial], excused: int) -> dict[str, object]:
+    """Return what the trials say, and their histogram: from how many ms on → how many."""
+    times = sorted(one.stop_ms for one in trials if one.stop_ms < inf)
+    bins: dict[str, int] = {}
+    for stop_ms in times:
+        name = str(int(stop_ms // BIN_MS) * BIN_MS)
+        bins[name] = bins.get(name, 0) + 1
+    return {
+        "motion_stop": death,
+        "trials": len(trials),
+        "broken": sum(not one.is_good for one in trials),
+        "faults": sorted({one.fault for one in trials if one.fault}),
+        "excused": excused,
+        **{name: round(value, 1) for name, value in _quantiles(times).items()},
+        "histogram_ms": bins,
+    }
+
+
+def _quantiles(times: Sequence[float]) -> dict[str, float]:
+    if not times:
+        return {}
+    last = len(times) - 1
+    return {
+        "min_ms": times[0],
+        "p50_ms": times[last // 2],
+        "p99_ms": times[round(last * 0.99)],
+        "max_ms": times[-1],
+    }
+
+
+def _result(death: str, trials: Sequence[Trial], wanted: int) -> Result:
+    """Return the slowest stop over the bound; one that broke the contract otherwise is infinite."""
+    is_whole = len(trials) >= wanted and not any(one.fault for one in trials)
+    slowest = max((one.stop_ms for one in trials), default=inf) if is_whole else inf
+    return Result(
+        name=f"motion stop after {death}: slowest of {len(trials)} / lease + 50 ms",
+        ratio=round(slowest / BOUND_MS, 3),
+        goal=1.0,
+        baseline_ms=BOUND_MS,
+        subject_ms=round(slowest, 1),
+        spread=1.0,
+        rounds=len(trials),
+    )
