@@ -30,6 +30,10 @@ class Watched:
         """Return the files that are not as they were."""
         return [file for file, state in self._states.items() if _state(file) != state]
 
+    def states(self) -> list[object]:
+        """Return what every file is like now; equal when none of them changed in between."""
+        return [_state(file) for file in self._states]
+
 
 def wait_for_change(watched: Watched, sleep: Callable[[float], None] = time.sleep) -> list[str]:
     """Return the files that changed, once any did and all are left alone for one look.

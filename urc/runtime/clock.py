@@ -6,7 +6,7 @@ from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from typing import Protocol
 
-__all__ = ["Alarm", "Clock", "LoopClock", "within"]
+__all__ = ["Alarm", "Clock", "LoopClock", "Repeating", "within"]
 
 
 class Alarm(Protocol):
@@ -32,9 +32,8 @@ class Clock(Protocol):
 class LoopClock:
     """The running event loop's time."""
 
-    def now(self) -> float:
-        """Return monotonic seconds."""
-        return time.monotonic()
+    now = staticmethod(time.monotonic)
+    """Return monotonic seconds."""
 
     async def sleep(self, seconds: float) -> None:
         """Return after `seconds`."""
@@ -44,6 +43,24 @@ class LoopClock:
         """Make `action` run at `time_s`, or at once when that is past."""
         # Relative to our own reading: other loops' clocks need not start where this one does.
         return asyncio.get_running_loop().call_later(max(0.0, time_s - self.now()), action)
+
+
+class Repeating:
+    """An alarm whose action returns the seconds to the next call, or None for the last one."""
+
+    def __init__(self, clock: Clock, delay_s: float, action: Callable[[], float | None]) -> None:
+        self._clock = clock
+        self._action = action
+        self._alarm: Alarm = clock.call_at(clock.now() + delay_s, self._ring)
+
+    def cancel(self) -> None:
+        """Call it off for good."""
+        self._alarm.cancel()
+
+    def _ring(self) -> None:
+        delay_s = self._action()
+        if delay_s is not None:
+            self._alarm = self._clock.call_at(self._clock.now() + delay_s, self._ring)
 
 
 @asynccontextmanager

@@ -11,6 +11,7 @@ import logging
 from collections.abc import Callable, Mapping, Sequence
 from typing import Protocol
 
+from urc.model.codec import Payload
 from urc.model.driver import Command
 from urc.model.values import Sample
 from urc.protocol.events import (
@@ -26,16 +27,14 @@ from urc.protocol.events import (
 )
 from urc.runtime.clock import Alarm, Clock
 from urc.runtime.hub import Hub, Note
+from urc.runtime.waiting import MAX_WAITING, Answer, Waiting
 
-__all__ = ["Answer", "Dispatcher", "EngineLike", "Port"]
+__all__ = ["Dispatcher", "EngineLike", "Port"]
 
-MAX_WAITING = 256
-"""Commands that may wait for their answer at a time; one more is refused."""
 _SOONEST_S = 0.001
 """A tick that leaves work overdue is not repeated sooner, so that no engine can hold the loop."""
 _AFTER_A_BUG_S = 1.0
-
-Answer = Replied | Failed
+_READINGS_AND_REPLY = 2
 
 log = logging.getLogger(__name__)
 
@@ -47,11 +46,15 @@ class EngineLike(Protocol):
     def deadline(self) -> float | None:
         """When `tick` wants to be called."""
 
+    @property
+    def calm_s(self) -> float:
+        """Neither `receive` nor `command` makes a deadline that is nearer than this."""
+
     def start(self, transport: str, now: float) -> Sequence[Event]:
         """The transport is open."""
 
-    def receive(self, transport: str, data: bytes, now: float) -> Sequence[Event]:
-        """Bytes arrived."""
+    def receive(self, transport: str, data: Payload, now: float) -> Sequence[Event]:
+        """Bytes or an envelope arrived."""
 
     def closed(self, transport: str, reason: str, now: float) -> Sequence[Event]:
         """The transport is gone, or could not be opened."""
@@ -79,8 +82,8 @@ class Port(Protocol):
     def want_close(self, reason: str) -> None:
         """Write what is queued and close; at once when there is a reason."""
 
-    def queue(self, data: bytes, *, is_secret: bool = False) -> None:
-        """Write these bytes; secret ones are not shown to whoever watches the traffic."""
+    def queue(self, data: Payload, *, is_secret: bool = False) -> None:
+        """Write bytes or an envelope; secret ones are not shown to whoever watches the traffic."""
 
     def heard(self) -> None:
         """A good frame arrived."""
@@ -91,24 +94,43 @@ class Port(Protocol):
     def hang_up(self, reason: str) -> None:
         """Give the connection up, and tell the engine from the link's own task."""
 
+    def send(self, data: Payload, *, is_secret: bool = False) -> None:
+        """Do what `queue` and `publish` do, for the only thing that is to be written now."""
+
     def publish(self) -> None:
-        """Show the state, if it has changed."""
+        """Write what is queued; show the state, if it has changed."""
 
 
 class Dispatcher:
     """Passes news to the engine and performs what it answers."""
 
     def __init__(
-        self, engine: EngineLike, hub: Hub, clock: Clock, commands: Mapping[str, Command]
+        self,
+        engine: EngineLike,
+        hub: Hub,
+        clock: Clock,
+        commands: Mapping[str, Command],
+        limit_s: Callable[[str], float],
     ) -> None:
+        """Take an engine over.
+
+        Args:
+            engine: called by nobody else from now on.
+            hub: takes readings and notes.
+            clock: the time.
+            commands: of the driver.
+            limit_s: command → seconds after which its wait ends, whatever the engine says.
+        """
         self._engine = engine
         self._hub = hub
         self._clock = clock
         self._commands = commands
         self._ports: dict[str, Port] = {}
-        self._waiting: dict[int, asyncio.Future[Answer]] = {}
+        self._waiting = Waiting(clock, limit_s)
+        self._loop: asyncio.AbstractEventLoop | None = None
         self._alarm: Alarm | None = None
         self._alarm_s: float | None = None
+        self._calm_s = engine.calm_s
         self._is_stopped = False
 
     def attach(self, transport: str, port: Port) -> None:
@@ -119,9 +141,23 @@ class Dispatcher:
         """Tell the engine that a transport is open."""
         self._run(lambda now: self._engine.start(transport, now))
 
-    def receive(self, transport: str, data: bytes) -> None:
+    def receive(self, transport: str, data: Payload, now: float) -> None:
         """Tell the engine what arrived; all readings in it reach the hub in one go."""
-        self._run(lambda now: self._engine.receive(transport, data, now), heard_on=transport)
+        if self._is_stopped:
+            return
+        try:
+            events = self._engine.receive(transport, data, now)
+        except Exception as bug:  # supervisor, as in `_run`
+            self._survive(bug)
+            return
+        if len(events) == 1 and type(only := events[0]) is Samples:
+            self._ports[transport].heard()
+            self._hub.put(only.samples)
+        elif len(events) == _READINGS_AND_REPLY and type(reply := events[1]) is Replied:
+            self._answered(events[0], reply, transport)
+        elif events:
+            self._perform(events, transport)
+        self._arm_after(now)
 
     def closed(self, transport: str, reason: str) -> None:
         """Tell the engine that a transport is gone, or could not be opened."""
@@ -129,18 +165,30 @@ class Dispatcher:
 
     def command(self, request: Request) -> asyncio.Future[Answer]:
         """Start a command. The future gets exactly one answer, unless `forget` comes first."""
-        answer: asyncio.Future[Answer] = asyncio.get_running_loop().create_future()
-        refusal = self._refusal(request)
-        if refusal is not None:
-            answer.set_result(refusal)
+        loop = self._loop = self._loop or asyncio.get_running_loop()  # which costs a system call
+        answer: asyncio.Future[Answer] = asyncio.Future(loop=loop)
+        command = self._commands.get(request.command)
+        port = self._ports.get(command.transport) if command else None
+        if self._is_stopped or self._waiting.is_full or (port is not None and port.is_full):
+            answer.set_result(self._refusal(request))
             return answer
-        self._waiting[request.id] = answer
-        self._run(lambda now: self._engine.command(request, now))
+        now = self._clock.now()
+        self._waiting.add(request, answer, now)
+        try:
+            events = self._engine.command(request, now)
+        except Exception as bug:  # supervisor, as in `_run`
+            self._survive(bug)
+            return answer
+        if len(events) == 1 and type(sent := events[0]) is Send:
+            self._ports[sent.transport].send(sent.data, is_secret=sent.is_secret)
+        elif events:
+            self._perform(events, None)
+        self._arm_after(now)
         return answer
 
     def forget(self, request_id: int) -> None:
         """Nobody waits for this answer any more."""
-        self._waiting.pop(request_id, None)
+        self._waiting.forget(request_id)
 
     def wind_up(self) -> None:
         """Begin: let the engine say when it wants to be called."""
@@ -161,26 +209,19 @@ class Dispatcher:
         self._is_stopped = True
         if self._alarm is not None:
             self._alarm.cancel()
-        for number in list(self._waiting):
-            self._settle(Failed(number, "", "disconnected", reason))
+        self._waiting.close(reason)
 
-    def _refusal(self, request: Request) -> Failed | None:
-        """Return why the engine is not even asked, or None."""
+    def _refusal(self, request: Request) -> Failed:
+        """Return why the engine is not even asked."""
         if self._is_stopped:
             return Failed(request.id, request.command, "disconnected", "the session is closed")
-        command = self._commands.get(request.command)
-        port = self._ports.get(command.transport) if command else None
-        if len(self._waiting) >= MAX_WAITING:
+        if self._waiting.is_full:
             text = f"{MAX_WAITING} commands are waiting already; this one was dropped"
-        elif port is not None and port.is_full:
-            text = "the robot takes no more bytes at the moment; the command was dropped"
         else:
-            return None
+            text = "the robot takes no more bytes at the moment; the command was dropped"
         return Failed(request.id, request.command, "queue-full", text)
 
-    def _run(
-        self, step: Callable[[float], Sequence[Event]], *, heard_on: str | None = None
-    ) -> None:
+    def _run(self, step: Callable[[float], Sequence[Event]]) -> None:
         if self._is_stopped:
             return
         try:
@@ -189,59 +230,73 @@ class Dispatcher:
             self._survive(bug)
             return
         if events:
-            self._perform(events, heard_on)
+            self._perform(events, None)
         self._arm()
 
+    def _answered(self, first: Event, reply: Replied, transport: str) -> None:
+        """Do what `_perform` does, with what most answers are: readings and a reply."""
+        if type(first) is not Samples:
+            self._perform((first, reply), transport)
+            return
+        self._ports[transport].heard()
+        self._hub.put(first.samples)
+        self._waiting.settle(reply)
+
     def _perform(self, events: Sequence[Event], heard_on: str | None) -> None:
-        samples: list[Sample] = []
+        samples: Sequence[Sample] = ()
         answers: list[Answer] = []
+        ports = self._ports
         for event in events:
-            match event:
-                case Samples():
-                    samples += event.samples
-                    if event.transport:
-                        self._ports[event.transport].heard()
-                case Fault():
-                    self._ports[event.transport].count(event)
-                case Send():
-                    self._ports[event.transport].queue(event.data, is_secret=event.is_secret)
-                case Open():
-                    self._ports[event.transport].want_open()
-                case Close():
-                    self._ports[event.transport].want_close(event.reason)
-                case Replied():
-                    answers.append(event)
-                    if heard_on is not None:
-                        self._ports[heard_on].heard()
-                case Failed():
-                    answers.append(event)
+            if type(event) is Samples:
+                samples = (*samples, *event.samples) if samples else event.samples
+                if event.transport:
+                    ports[event.transport].heard()
+            elif type(event) is Send:
+                ports[event.transport].queue(event.data, is_secret=event.is_secret)
+            elif type(event) is Replied:
+                answers.append(event)
+                if heard_on is not None and not samples:
+                    ports[heard_on].heard()
+            elif type(event) is Failed:
+                answers.append(event)
+            elif type(event) is Fault:
+                ports[event.transport].count(event)
+            elif type(event) is Open:
+                ports[event.transport].want_open()
+            elif type(event) is Close:
+                ports[event.transport].want_close(event.reason)
         if samples:
             self._hub.put(samples)
         # After the hub: whoever waits for a reply finds its readings there.
         for answer in answers:
-            self._settle(answer)
-        for port in self._ports.values():
+            self._waiting.settle(answer)
+        for port in ports.values():
             port.publish()
 
-    def _settle(self, answer: Answer) -> None:
-        waiting = self._waiting.pop(answer.id, None)
-        if waiting is not None and not waiting.done():
-            waiting.set_result(answer)
+    def _arm_after(self, now: float) -> None:
+        """Do what `_arm` does, unless there is no need to look: the alarm rings soon enough."""
+        if self._alarm_s is None or self._alarm_s > now + self._calm_s:
+            self._arm()
 
     def _arm(self, soonest_s: float = 0.0) -> None:
         due_s = self._engine.deadline
         if due_s is not None and soonest_s:
             due_s = max(due_s, self._clock.now() + soonest_s)
-        if due_s == self._alarm_s:
+        # An alarm that rings too early costs less than a new one for every message.
+        if due_s is None or (self._alarm_s is not None and self._alarm_s <= due_s):
             return
         if self._alarm is not None:
             self._alarm.cancel()
         self._alarm_s = due_s
-        self._alarm = None if due_s is None else self._clock.call_at(due_s, self._tick)
+        self._alarm = self._clock.call_at(due_s, self._tick)
 
     def _tick(self) -> None:
         self._alarm = self._alarm_s = None
         if self._is_stopped:
+            return
+        due_s = self._engine.deadline
+        if due_s is None or due_s > self._clock.now():
+            self._arm()  # it was set for something that came in the meantime
             return
         try:
             events = self._engine.tick(self._clock.now())

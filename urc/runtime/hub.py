@@ -10,8 +10,10 @@ from collections import deque
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
+from operator import itemgetter
 from typing import Literal
 
+from urc.model.codec import Envelope
 from urc.model.values import Sample, Signal
 
 __all__ = [
@@ -31,6 +33,9 @@ LinkState = Literal["idle", "connecting", "live", "silent", "lost"]
 NOTES_KEPT = 500
 TRAFFIC_KEPT = 1000
 TAP_KEPT = 10_000
+_FEW = 16
+"""Readings that are kept one by one; of more, most are older than others of the same signal."""
+_name_of = itemgetter(0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,6 +74,8 @@ class Traffic:
     transport: str
     direction: Literal["sent", "received"]
     data: bytes
+    envelope: Envelope | None = None
+    """The message that `data` shows, on a line that carries messages."""
 
 
 class Subscription:
@@ -157,14 +164,22 @@ class Hub:
 
     def put(self, samples: Iterable[Sample]) -> None:
         """Take readings; a repeated value counts as a change, because its age is new."""
-        taken = tuple(samples)
-        self.revision += 1
-        for sample in taken:
-            self._latest[sample.signal] = sample
-            self._changed[sample.signal] = self.revision
+        taken = samples if type(samples) is tuple else tuple(samples)
+        revision = self.revision = self.revision + 1
+        latest, changed = self._latest, self._changed
+        if len(taken) <= _FEW:
+            for sample in taken:
+                name = sample[0]
+                latest[name] = sample
+                changed[name] = revision
+        else:
+            newest = dict(zip(map(_name_of, taken), taken, strict=True))
+            latest.update(newest)
+            changed.update(dict.fromkeys(newest, revision))
         for tap in self._taps:
             tap.put(taken)
-        self._wake()
+        for subscription in self._subscriptions:
+            subscription.wake()
 
     def set_link(self, status: LinkStatus) -> None:
         """Take the state of one transport."""

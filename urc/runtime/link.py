@@ -10,34 +10,36 @@ A connection is good from the first good frame on, and only that resets the back
 accepts and closes again is not hammered. Lines shown to people follow `LinkState`; while attempts
 fail the state stays what it is and the count rises.
 
-The link uses the five members of a transport and nothing else, and does not care in which process
-it lives.
+The link needs the five members of a transport and nothing else, and does not care in which process
+it lives. One that is a `Prompt` as well saves the turns of the two tasks: what arrives while the
+reader waits goes straight to the engine, and what the engine sends straight to the kernel. Whatever
+must wait, is too much at once, or broke is left to the tasks.
 """
 
 import asyncio
 import logging
-from collections.abc import Callable, Coroutine, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Coroutine
 from typing import Any
 
+from urc.model.codec import Envelope, Payload
 from urc.model.driver import TransportSpec
 from urc.protocol.events import Fault
-from urc.runtime.clock import Alarm, Clock, within
+from urc.runtime.clock import Clock, Repeating, within
 from urc.runtime.dispatcher import Dispatcher
 from urc.runtime.hub import Hub, LinkState
-from urc.runtime.report import REDACTED, LinkReport
-from urc.transports.base import Transport, TransportError
+from urc.runtime.outgoing import Outgoing
+from urc.runtime.report import LinkReport
+from urc.transports.base import Prompt, Transport, TransportError
 
 __all__ = ["Link"]
 
-MAX_QUEUED_BYTES = 262_144
-"""Bytes that may wait to be written; with more the line is given up, and says so."""
-SLICE_BYTES = 1024
-"""Bytes that are handed to the engine before others have their turn on the loop."""
+SLICE_BYTES = 4096
+"""Most bytes that are handed to the engine before others have their turn on the loop."""
+SLICE_S = 0.001
+"""What the engine may be busy with them; where it takes longer, fewer bytes are handed over."""
+_LEAST_SLICE_BYTES = 512
 _CHUNK_COST = 32
 """What a chunk costs beside its bytes, in bytes: tiny chunks must not hold the loop either."""
-STUCK_S = 5.0
-"""A robot that takes no byte for this long is gone."""
 SETTLE_S = 1.0
 """A connection that stands this long without being closed has been accepted."""
 _GRACE_S = 1.0
@@ -74,6 +76,7 @@ class Link:
                 with the first frame, else with the connection.
         """
         self._spec = spec
+        self._name = spec.name
         self._transport = transport
         self._dispatcher = dispatcher
         self._hub = hub
@@ -81,23 +84,20 @@ class Link:
         self._random = random
         self._expects_frames = expects_frames
         self._is_persistent = spec.connection == "persistent"
-
+        self._is_stream = (spec.framing.sent or spec.framing).type != "datagram"
+        """Whether bytes may be joined and cut; else each piece is a datagram or an envelope."""
         self._wanted = asyncio.Event()
         if self._is_persistent:
             self._wanted.set()
         self._retry_s = clock.now()
         """Before this time no attempt is made."""
-
         # Of the present connection.
         self._ended: asyncio.Future[str] | None = None
         """None while not connected; its result says why the connection ended."""
         self._close_reason: str | None = None
         """Set when the engine has closed the line: what arrives now is nobody's."""
-        self._outgoing: list[tuple[bytes, bytes]] = []
-        """What is written, and what the traffic shows of it."""
-        self._queued_bytes = 0
-        self._has_output = asyncio.Event()
         self._heard_s = 0.0
+        self._is_reader_waiting = False
 
         self._is_overdue = False
         """The robot took a request and has not said anything since."""
@@ -106,11 +106,14 @@ class Link:
         if not self._is_persistent:
             self.tried.set()
         self._report = LinkReport(spec.name, transport.address, hub, clock)
+        self._outgoing = Outgoing(
+            transport, self._report, hub, clock, self._end, is_stream=self._is_stream
+        )
 
     @property
     def is_full(self) -> bool:
         """Whether so much waits to be written that no new command should be taken."""
-        return self._queued_bytes > MAX_QUEUED_BYTES // 2
+        return self._outgoing.is_full
 
     def want_open(self) -> None:
         """Connect, as soon as the back-off allows it."""
@@ -128,30 +131,34 @@ class Link:
         if reason:
             self._end(reason)
         else:
-            self._has_output.set()
+            self._outgoing.wake()
 
     @property
     def is_connected(self) -> bool:
         """Whether the transport is open."""
         return self._ended is not None
 
-    def queue(self, data: bytes, *, is_secret: bool = False) -> None:
-        """Write `data` with the next turn of the loop; secret bytes are shown to nobody."""
-        if self._ended is None or self._ended.done() or self._close_reason is not None:
-            return
-        if self._queued_bytes + len(data) > MAX_QUEUED_BYTES:
-            dropped = self._queued_bytes + len(data)
-            self._end(f"the robot takes no more bytes; {dropped} waiting ones were dropped")
-            return
-        self._outgoing.append((data, REDACTED if is_secret else data))
-        self._queued_bytes += len(data)
-        self._has_output.set()
+    def queue(self, data: Payload, *, is_secret: bool = False) -> None:
+        """Write `data` with the next `publish`; secret bytes are shown to nobody."""
+        ended = self._ended
+        if ended is not None and self._close_reason is None and not ended.done():
+            self._outgoing.put(data, is_secret=is_secret)
+
+    def send(self, data: Payload, *, is_secret: bool = False) -> None:
+        """Do what `queue` and `publish` do, for the only thing that is to be written now."""
+        ended = self._ended
+        if ended is not None and self._close_reason is None and not ended.done():
+            self._outgoing.put_now(data, is_secret=is_secret)
+        self._report.publish()
 
     def heard(self) -> None:
         """A good frame arrived: whatever was wrong is over."""
+        if self._report.is_well and not self._is_overdue:
+            return
         self._report.attempts = 0
         self._is_overdue = False
         self._report.show("live")
+        self._report.publish()
 
     def count(self, fault: Fault) -> None:
         """Count something that was not as declared, and tell of it now and then."""
@@ -165,7 +172,8 @@ class Link:
         self._end(reason)
 
     def publish(self) -> None:
-        """Put the state into the hub, if anything about it has changed."""
+        """Write what is queued, if that needs no waiting; show the state, if it has changed."""
+        self._outgoing.flush()
         self._report.publish()
 
     async def run(self) -> None:
@@ -216,10 +224,13 @@ class Link:
         """Serve the open connection until it ends, and draw the conclusions."""
         self._ended = asyncio.get_running_loop().create_future()
         self._close_reason = None
-        self._outgoing.clear()
-        self._queued_bytes = 0
-        self._has_output.clear()
         self._heard_s = self._clock.now()
+        self._is_reader_waiting = False
+        transport, prompt = self._transport, None
+        if self._is_stream and isinstance(transport, Prompt):
+            prompt = transport
+            prompt.divert(self._take_now)
+        self._outgoing.reset(prompt)
         self._greet()
         self._dispatcher.start(self._spec.name)
         self.tried.set()
@@ -250,9 +261,8 @@ class Link:
     def _conclude(self, reason: str) -> None:
         """Take note of how a connection ended."""
         asked = self._close_reason
-        is_flushed = not self._queued_bytes
-        self._outgoing.clear()
-        self._queued_bytes = 0
+        is_flushed = self._outgoing.is_written
+        self._outgoing.reset()
         if asked is None:
             self._lose("lost", reason)
             self._tell_closed(reason)
@@ -301,56 +311,66 @@ class Link:
             self._end(self._mistake(bug))
 
     async def _read(self) -> None:
-        spent = 0
+        spent, size = 0, _LEAST_SLICE_BYTES
         while True:
+            self._is_reader_waiting = True
             data = await self._transport.receive()
-            for start in range(0, len(data), SLICE_BYTES):
-                part = data[start : start + SLICE_BYTES]
+            self._is_reader_waiting = False
+            if isinstance(data, Envelope) or not self._is_stream:
+                self._take(data)
+                await asyncio.sleep(0)
+                continue
+            at = 0
+            while at < len(data):
+                part = data[at : at + size]
+                at += len(part)
+                began_s = self._clock.now()
                 self._take(part)
+                took_s = self._clock.now() - began_s
                 spent += len(part) + _CHUNK_COST
-                if spent >= SLICE_BYTES:
+                if spent >= size or took_s > SLICE_S:
                     spent = 0
                     await asyncio.sleep(0)
+                if took_s > SLICE_S:
+                    size = max(size // 2, _LEAST_SLICE_BYTES)
+                elif took_s < SLICE_S / 2:
+                    size = min(size * 2, SLICE_BYTES)
 
-    def _take(self, data: bytes) -> None:
-        if self._ended is None or self._ended.done() or self._close_reason is not None:
-            return  # of a connection that is over for the engine
-        self._heard_s = self._clock.now()
-        self._report.saw("received", data)
-        self._dispatcher.receive(self._spec.name, data)
+    def _take_now(self, data: bytes) -> bool:
+        """Take what has just arrived, unless it is much or something else comes first."""
+        if len(data) > _LEAST_SLICE_BYTES or not self._is_reader_waiting:
+            return False
+        ended = self._ended
+        if ended is None or self._close_reason is not None or ended.done():
+            return True  # of a connection that is over for the engine
+        try:
+            self._pass_on(data)
+        except Exception as bug:  # supervisor, as in `_open`
+            self._end(self._mistake(bug))
+        return True
+
+    def _take(self, data: Payload) -> None:
+        ended = self._ended
+        if ended is not None and self._close_reason is None and not ended.done():
+            self._pass_on(data)
+
+    def _pass_on(self, data: Payload) -> None:
+        now = self._heard_s = self._clock.now()
+        if self._hub.traffic_watchers:
+            self._report.saw("received", data)
+        self._dispatcher.receive(self._name, data, now)
 
     async def _write(self) -> None:
-        while True:
-            await self._has_output.wait()
-            self._has_output.clear()
-            if self._outgoing:
-                data, shown = map(b"".join, zip(*self._outgoing, strict=True))
-                self._outgoing.clear()
-                with self._watched():
-                    await self._transport.send(data)
-                self._queued_bytes -= len(data)
-                self._report.saw("sent", shown)
-            if self._close_reason is not None and not self._outgoing:
-                self._end("")
-
-    @contextmanager
-    def _watched(self) -> Iterator[None]:
-        """Give the robot `STUCK_S` to take what is being written."""
-        reason = f"the robot has taken no bytes for {STUCK_S:g} s"
-        alarm = self._clock.call_at(self._clock.now() + STUCK_S, lambda: self._end(reason))
-        try:
-            yield
-        finally:
-            alarm.cancel()
+        await self._outgoing.run(lambda: self._close_reason is not None)
 
     def _end(self, reason: str) -> None:
         if self._ended is not None and not self._ended.done():
             self._ended.set_result(reason)
 
-    def _set_alarms(self) -> list["_Repeating"]:
-        alarms = [_Repeating(self._clock, SETTLE_S, self._settled)]
+    def _set_alarms(self) -> list[Repeating]:
+        alarms = [Repeating(self._clock, SETTLE_S, self._settled)]
         if self._spec.timeouts.idle_s is not None:
-            alarms.append(_Repeating(self._clock, self._spec.timeouts.idle_s, self._check_idle))
+            alarms.append(Repeating(self._clock, self._spec.timeouts.idle_s, self._check_idle))
         return alarms
 
     def _settled(self) -> float | None:
@@ -377,20 +397,3 @@ class Link:
         """Log what no transport should raise, and return the line for people."""
         log.error("%s failed in an unexpected way", self._transport.address, exc_info=bug)
         return f"the transport failed in an unexpected way ({type(bug).__name__}: {bug})"
-
-
-class _Repeating:
-    """An alarm whose action returns the seconds to the next call, or None for the last one."""
-
-    def __init__(self, clock: Clock, delay_s: float, action: Callable[[], float | None]) -> None:
-        self._clock = clock
-        self._action = action
-        self._alarm: Alarm = clock.call_at(clock.now() + delay_s, self._ring)
-
-    def cancel(self) -> None:
-        self._alarm.cancel()
-
-    def _ring(self) -> None:
-        delay_s = self._action()
-        if delay_s is not None:
-            self._alarm = self._clock.call_at(self._clock.now() + delay_s, self._ring)

@@ -10,9 +10,10 @@ from typing import Final
 from urc.config.part import shown_duration
 from urc.config.values import shown
 from urc.expressions import Template
+from urc.model.codec import traffic_of
 from urc.model.driver import Argument, Command, Driver, TransportSpec
 from urc.model.profile import Profile, Setting
-from urc.model.values import Limits, Signal, Value
+from urc.model.values import Limits, Reading, Signal
 from urc.problems import UrcError, printable
 from urc.protocol.encode import build_encode
 from urc.protocol.forms import CodecContext
@@ -128,7 +129,13 @@ def _commands(driver: Driver) -> Iterator[str]:
         yield from _what_goes_out(command, driver.transports.get(command.transport))
         if command.confirm is not None:
             asked = _plain(command.confirm.text) or "yes"
-            yield f"- asks first ({command.confirm.level}): {asked}"
+            two = ", two people" if command.confirm.is_two_person else ""
+            yield f"- asks first ({command.confirm.level}{two}): {asked}"
+        for argument in command.arguments.values():
+            for value, one in argument.confirm.items():
+                two = ", two people" if one.is_two_person else ""
+                what = f"{_code(argument.name)} {_code(value)}"
+                yield f"- asks before {what} ({one.level}{two}): {_plain(one.text)}"
         for requirement in command.requires:
             yield f"- needs {_code(requirement.condition.source)}: {_plain(requirement.text)}"
         if command.verify is not None:
@@ -163,7 +170,7 @@ def _constant_bytes(command: Command, spec: TransportSpec | None) -> bytes | Non
         encode = build_encode(
             command.send, build_framing(spec.framing), CodecContext(spec.encoding)
         )
-        return encode({})
+        return traffic_of(encode({}))
     except UrcError:
         return None  # a counter, for one: it is not the same every time
 
@@ -242,7 +249,7 @@ def _range(low: float | None, high: float | None, otherwise: str) -> str:
     return otherwise if high is None else f"{high:g} or less"
 
 
-def _value(value: Value) -> str:
+def _value(value: Reading) -> str:
     return value if isinstance(value, str) else shown(value)
 
 

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from typing import Literal
 
+from urc.model.codec import Envelope, Payload, traffic_of
 from urc.protocol.events import Fault
 from urc.runtime.clock import Clock
 from urc.runtime.hub import Hub, LinkState, LinkStatus, Note, Traffic
@@ -68,6 +69,11 @@ class LinkReport:
         self.faults = 0
         self.publish()
 
+    @property
+    def is_well(self) -> bool:
+        """Whether a good frame would change nothing."""
+        return self.state == "live" and not self.attempts and not self._detail
+
     def show(self, state: LinkState, detail: str = "") -> None:
         """Take a state; a change of it is noted, a change of its detail is only shown."""
         if state == self.state and detail == self._detail:
@@ -99,10 +105,12 @@ class LinkReport:
         more = f" (and {untold} more like it)" if untold else ""
         self._hub.note(Note(self._clock.now(), level, self._transport, text + more))
 
-    def saw(self, direction: Literal["sent", "received"], data: bytes) -> None:
+    def saw(self, direction: Literal["sent", "received"], data: Payload) -> None:
         """Record traffic while somebody watches."""
         if self._hub.traffic_watchers:
-            self._hub.saw(Traffic(self._clock.now(), self._transport, direction, data))
+            envelope = data if isinstance(data, Envelope) else None
+            shown, now = traffic_of(data), self._clock.now()
+            self._hub.saw(Traffic(now, self._transport, direction, shown, envelope))
 
     def publish(self) -> None:
         """Put the state into the hub, if anything about it has changed."""

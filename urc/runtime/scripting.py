@@ -66,7 +66,7 @@ class ConnectedRobot:
         """Made by `connect`."""
         self.session = session
 
-    async def command(self, name: str, /, **arguments: Value) -> dict[str, Reading]:
+    async def command(self, name: str, /, **arguments: Reading) -> dict[str, Reading]:
         """Run a command and return the values of its reply; the wait is bounded.
 
         Raises:

@@ -3,13 +3,15 @@
 import asyncio
 from collections.abc import Callable, Mapping
 from contextlib import suppress
+from functools import partial
 from itertools import count
 from random import random as random_share
 from types import TracebackType
+from typing import TYPE_CHECKING, Literal
 
 from urc.model.driver import Driver
 from urc.model.profile import Profile
-from urc.model.values import Value
+from urc.model.values import NOTHING, Reading, Value
 from urc.problems import UrcError
 from urc.protocol.bounds import GOOD_BYE_S, longest_s
 from urc.protocol.engine import Engine
@@ -18,13 +20,22 @@ from urc.registry import Table
 from urc.runtime.clock import Clock, LoopClock, within
 from urc.runtime.dispatcher import Dispatcher
 from urc.runtime.hub import Hub
+from urc.runtime.lines import make_transports
 from urc.runtime.link import Link
-from urc.runtime.settings import options_of, resolve_settings
-from urc.transports.base import Transport
+from urc.runtime.motion import Frames
+from urc.runtime.settings import resolve_settings
 
-__all__ = ["CommandFailed", "Session", "resolve_settings"]
+if TYPE_CHECKING:
+    from urc.runtime.guarding import GuardedMovers
+
+__all__ = ["CommandFailed", "Motion", "Session", "resolve_settings"]
+
+Motion = Literal["none", "here", "guarded"]
+"""Who writes motion: nobody; this process; a guard, which stops the robot when this one cannot."""
 
 _LOOK_S = 0.02
+new = tuple.__new__
+"""Makes a named tuple without the detour through its class: this is done for every command."""
 _GRACE_S = 2.0
 """What a command may take beyond all its declared waits together."""
 
@@ -57,6 +68,7 @@ class Session:
         *,
         clock: Clock | None = None,
         random: Callable[[], float] = random_share,
+        motion: Motion = "none",
     ) -> None:
         """Prepare everything; nothing is opened yet.
 
@@ -66,6 +78,7 @@ class Session:
             transports: the table of transports.
             clock: the time; the running loop's when left out.
             random: a number from 0 to below 1, for the jitter of the back-off.
+            motion: who writes held commands, if anybody is to hold them.
 
         Raises:
             UrcError: a setting has no value, or a transport cannot be made with those given.
@@ -79,14 +92,29 @@ class Session:
         self.hub = Hub(driver.signals)
         self._clock: Clock = clock or LoopClock()
         engine = Engine(driver, self.settings)
-        self._dispatcher = Dispatcher(engine, self.hub, self._clock, driver.commands)
+        self.frames: Frames = engine.motions
+        """Makes the frames of held commands."""
+        self.movers: GuardedMovers | None = None
+        """Who writes them; None where nothing is held."""
+        if motion != "none" and any(one.hold is not None for one in driver.commands.values()):
+            from urc.runtime.guarding import take_reins  # 20 ms: only for what can be driven
+
+            self.movers = take_reins(
+                driver, self.settings, transports, self._clock, is_guarded=motion == "guarded"
+            )
+        self._dispatcher = Dispatcher(
+            engine, self.hub, self._clock, driver.commands, partial(_limit_s, driver)
+        )
         self._links: dict[str, Link] = {}
+        made = (
+            make_transports(driver, self.settings, transports)
+            if self.movers is None
+            else self.movers.transports
+        )
         for name, spec in driver.transports.items():
-            factory = transports[spec.type].load()
-            transport: Transport = factory(options_of(spec, self.settings))
             link = Link(
                 spec,
-                transport,
+                made[name],
                 self._dispatcher,
                 self.hub,
                 clock=self._clock,
@@ -95,12 +123,16 @@ class Session:
             )
             self._dispatcher.attach(name, link)
             self._links[name] = link
+        self._untried = set(self._links)
+        """Lines whose first attempt may not have ended yet."""
         self._numbers = count(1)
         self._group = asyncio.TaskGroup()
         self._tasks: list[asyncio.Task[None]] = []
 
     async def __aenter__(self) -> "Session":
         await self._group.__aenter__()
+        if self.movers is not None:
+            self.movers.start()
         self._tasks = [self._group.create_task(link.run()) for link in self._links.values()]
         self._dispatcher.wind_up()
         return self
@@ -111,7 +143,21 @@ class Session:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        await self._say_goodbye()
+        try:
+            if self.movers is not None:
+                self.movers.stop_all()  # before anything is said in good order
+            await self._say_goodbye()
+            await self._end(kind, error, trace)
+        finally:
+            if self.movers is not None:
+                await self.movers.finish()
+
+    async def _end(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
         self._dispatcher.stop("the session was closed")
         for task in self._tasks:
             task.cancel()
@@ -136,7 +182,13 @@ class Session:
         while any(link.is_connected for link in polite) and self._clock.now() < until:
             await self._clock.sleep(_LOOK_S)
 
-    async def command(self, name: str, arguments: Mapping[str, Value] | None = None) -> Replied:
+    async def command(
+        self,
+        name: str,
+        arguments: Mapping[str, Reading] | None = None,
+        *,
+        confirmed_by: tuple[str, ...] = (),
+    ) -> Replied:
         """Run a command and return its reply; the wait is always bounded.
 
         A command that comes while a persistent line is connected for the first time waits for it.
@@ -144,45 +196,38 @@ class Session:
         Args:
             name: as in the driver.
             arguments: name → value; those left out take their defaults.
+            confirmed_by: people who said yes to it, where two must.
 
         Raises:
             CommandFailed: it was refused here or by the robot, timed out, or the robot is gone.
         """
-        await self._first_attempt(name)
-        request = Request(next(self._numbers), name, arguments or {})
-        answer = self._dispatcher.command(request)
-        limit_s = self._longest_wait(name)
-
-        def expire() -> None:
-            if not answer.done():
-                answer.set_result(_late(request, limit_s))
-
-        alarm = self._clock.call_at(self._clock.now() + limit_s, expire)
+        if self._untried:
+            await self._first_attempt(name)
+        request = new(Request, (next(self._numbers), name, arguments or NOTHING, confirmed_by))
         try:
-            outcome = await answer
-        finally:
-            alarm.cancel()
+            outcome = await self._dispatcher.command(request)
+        except asyncio.CancelledError:
             self._dispatcher.forget(request.id)
+            raise
         if isinstance(outcome, Failed):
             raise CommandFailed(outcome.code, outcome.message)
         return outcome
 
     async def _first_attempt(self, name: str) -> None:
+        """Wait until the line of a command has been tried, well or not, for as long as may take."""
+        self._untried = {one for one in self._untried if not self._links[one].tried.is_set()}
         command = self.profile.driver.commands.get(name)
-        if command is not None and not self._links[command.transport].tried.is_set():
-            timeouts = self.profile.driver.transports[command.transport].timeouts
-            with suppress(TimeoutError):  # then the engine says that it is not connected
-                async with within(self._clock, timeouts.connect_s + _GRACE_S):
-                    await self._links[command.transport].tried.wait()
-
-    def _longest_wait(self, name: str) -> float:
-        """Return the seconds in which the engine itself must have given an answer."""
-        return longest_s(self.profile.driver, name) + _GRACE_S
+        if command is None or command.transport not in self._untried:
+            return
+        timeouts = self.profile.driver.transports[command.transport].timeouts
+        with suppress(TimeoutError):  # then the engine says that it is not connected
+            async with within(self._clock, timeouts.connect_s + _GRACE_S):
+                await self._links[command.transport].tried.wait()
 
 
-def _late(request: Request, limit_s: float) -> Failed:
-    text = f"no outcome within {limit_s:g} s"
-    return Failed(request.id, request.command, "timed-out", text)
+def _limit_s(driver: Driver, name: str) -> float:
+    """Return how long the declaration lets a command take, and a little more."""
+    return longest_s(driver, name) + _GRACE_S
 
 
 def _expects_frames(driver: Driver, transport: str) -> bool:

@@ -11,11 +11,12 @@ from ipaddress import ip_address
 from pathlib import Path
 from types import MappingProxyType
 
-from urc.expressions import ExpressionError, Template
+from urc.expressions import ExpressionError
 from urc.model.driver import TransportSpec
 from urc.model.profile import Profile, Setting
 from urc.model.values import Value
 from urc.problems import UrcError, printable
+from urc.protocol.json_text_form import filled
 
 __all__ = ["environment_name", "options_of", "parse_setting", "resolve_settings"]
 
@@ -106,19 +107,16 @@ def parse_setting(setting: Setting, text: str, *, allows_any_port: bool = False)
             return _path(text, found)
 
 
-def options_of(spec: TransportSpec, settings: Mapping[str, Value]) -> dict[str, Value]:
+def options_of(spec: TransportSpec, settings: Mapping[str, Value]) -> dict[str, object]:
     """Return the options of a transport, its templates evaluated with ``settings``.
 
     Raises:
         UrcError: a template needs a setting that has no value, or fails on the one it has.
     """
-    options: dict[str, Value] = {}
+    options: dict[str, object] = {}
     for name, option in spec.options.items():
-        if not isinstance(option, Template):
-            options[name] = option
-            continue
         try:
-            options[name] = option.evaluate({"settings": settings})
+            options[name] = filled(option, {"settings": settings})
         except ExpressionError as problem:
             raise UrcError(f"transports.{spec.name}.{name}: {problem}") from problem
     return options

@@ -9,12 +9,14 @@ import yaml
 from urc.model.driver import Command, Driver, TransportSpec
 from urc.model.interface import Grid, Interface, Slot, WidgetUse
 from urc.model.profile import Profile, Setting
-from urc.model.values import Alarm, Limits, Sample, Signal, Value
+from urc.model.values import Alarm, Limits, Reading, Sample, Signal, Value
 from urc.model.widget import Port, Widget
 from urc.protocol.events import Replied
 from urc.runtime.clock import Clock, LoopClock
 from urc.runtime.hub import Hub, LinkState, LinkStatus, Note
+from urc.runtime.motion import Movers
 from urc.shipped import shipped
+from urc.testing.movers import FakeFrames, FakeMovers
 
 __all__ = ["FakeRobot", "dashboard_profile", "option_defaults", "plain_widget"]
 
@@ -40,7 +42,13 @@ def plain_widget(name: str, inputs: Sequence[str], folder: Path | None = None) -
         each: Port(each, types, is_required=known.get(each, {}).get("required", True))
         for each in {**known, **dict.fromkeys(inputs)}
     }
-    return Widget(name, name.title(), place, ports, options=declared.get("options", {}))
+    outputs = {
+        each: Port(
+            each, is_held=port.get("hold", False), arguments=tuple(port.get("arguments", {}))
+        )
+        for each, port in declared.get("outputs", {}).items()
+    }
+    return Widget(name, name.title(), place, ports, outputs, options=declared.get("options", {}))
 
 
 def option_defaults(widget: Widget) -> dict[str, object]:
@@ -103,8 +111,10 @@ class FakeRobot:
         self.hub = Hub(profile.driver.signals)
         self.opened = 0
         self.is_open = False
-        self.commands: list[tuple[str, dict[str, Value]]] = []
-        self.on_command: Callable[[str, Mapping[str, Value]], Mapping[str, Value]] | None = None
+        self.commands: list[tuple[str, dict[str, Reading]]] = []
+        self.frames = FakeFrames(profile.driver)
+        self.movers: Movers | None = FakeMovers(self.clock)
+        self.on_command: Callable[[str, Mapping[str, Reading]], Mapping[str, Value]] | None = None
         """Makes a command's reply, or raises what the session would; None: nothing is returned."""
 
     def open(self) -> AbstractAsyncContextManager["FakeRobot"]:
@@ -122,7 +132,7 @@ class FakeRobot:
         finally:
             self.is_open = False
 
-    async def command(self, name: str, arguments: Mapping[str, Value]) -> Replied:
+    async def command(self, name: str, arguments: Mapping[str, Reading]) -> Replied:
         """Keep the command, and answer as the test says."""
         self.commands.append((name, dict(arguments)))
         values = self.on_command(name, arguments) if self.on_command else {}

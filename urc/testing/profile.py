@@ -13,7 +13,7 @@ from urc.model.driver import (
     Timeouts,
     TransportSpec,
 )
-from urc.model.profile import Profile, Setting, SimulatorRule
+from urc.model.profile import Profile, Reaction, Setting, SimulatorRule
 from urc.model.values import Signal
 from urc.patterns import compile_pattern
 from urc.testing.codec import regex, text
@@ -76,7 +76,9 @@ def line_profile(
         polls=polls,
     )
     rule = SimulatorRule(
-        "wire", compile_pattern(f"^{QUESTION}$"), compile_template("{{ (now | int) % 100 }}")
+        "wire",
+        compile_pattern(f"^{QUESTION}$"),
+        reactions=(Reaction(send=text("{{ (now | int) % 100 }}")),),
     )
     return Profile(
         name="liner",

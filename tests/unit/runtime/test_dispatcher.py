@@ -6,8 +6,9 @@ from collections.abc import Sequence
 import pytest
 
 from urc.protocol.events import Event, Failed, Fault, Replied, Request
-from urc.runtime.dispatcher import MAX_WAITING, Dispatcher
+from urc.runtime.dispatcher import Dispatcher
 from urc.runtime.hub import Hub
+from urc.runtime.waiting import MAX_WAITING
 from urc.testing.clock import FakeClock
 
 pytestmark = pytest.mark.anyio
@@ -15,6 +16,8 @@ pytestmark = pytest.mark.anyio
 
 class BrokenEngine:
     """Raises in every verb, and always wants to be called at once."""
+
+    calm_s = 0.0
 
     def __init__(self) -> None:
         self.calls = 0
@@ -62,6 +65,8 @@ class Port:
 
     def queue(self, data: bytes, *, is_secret: bool = False) -> None: ...
 
+    def send(self, data: bytes, *, is_secret: bool = False) -> None: ...
+
     def heard(self) -> None: ...
 
     def count(self, fault: Fault) -> None: ...
@@ -72,10 +77,14 @@ class Port:
         self.reasons.append(reason)
 
 
+def limit_s(command: str) -> float:
+    return 10.0
+
+
 async def test_mistake_in_the_engine_is_told_and_the_line_begun_anew() -> None:
     """Our own bug is one error line, not the end of the session, and the timer goes on slowly."""
     clock, hub, engine, port = FakeClock(), Hub({}), BrokenEngine(), Port()
-    dispatcher = Dispatcher(engine, hub, clock, {})
+    dispatcher = Dispatcher(engine, hub, clock, {}, limit_s)
     dispatcher.attach("wire", port)
     dispatcher.start("wire")
     expected = "URC made a mistake (ZeroDivisionError): please report it with the log"
@@ -89,7 +98,7 @@ async def test_mistake_in_the_engine_is_told_and_the_line_begun_anew() -> None:
 async def test_engine_that_is_always_due_does_not_hold_the_loop() -> None:
     """Ticks that leave work overdue come at most a thousand times a second."""
     clock, engine = FakeClock(), GreedyEngine()
-    dispatcher = Dispatcher(engine, Hub({}), clock, {})
+    dispatcher = Dispatcher(engine, Hub({}), clock, {}, limit_s)
     dispatcher.wind_up()
     await clock.advance(0.1)
     assert 50 < engine.calls <= 102
@@ -97,7 +106,7 @@ async def test_engine_that_is_always_due_does_not_hold_the_loop() -> None:
 
 async def test_waiting_commands_are_bounded() -> None:
     """One more than may wait is refused at once; a stop fails all that wait."""
-    dispatcher = Dispatcher(GreedyEngine(), Hub({}), FakeClock(), {})
+    dispatcher = Dispatcher(GreedyEngine(), Hub({}), FakeClock(), {}, limit_s)
     waiting = [dispatcher.command(Request(n, "ask")) for n in range(MAX_WAITING)]
     refused = await dispatcher.command(Request(MAX_WAITING, "ask"))
     assert isinstance(refused, Failed)

@@ -1,0 +1,339 @@
+"""Hands in a real browser: what is held moves, and each way of letting go stops."""
+
+import asyncio
+import os
+import signal
+from collections.abc import Awaitable, Callable
+from pathlib import Path
+
+import pytest
+from playwright.async_api import Page
+
+from tests.e2e.browser import LOCALE, PAGE_TIMEOUT_MS, running_browser
+from tests.e2e.conftest import PageMaker
+from tests.e2e.dashboards import until
+from tests.e2e.motion.driving import (
+    LEASE_S,
+    LEFT,
+    RIGHT,
+    UP,
+    Wire,
+    centre,
+    driven,
+    fingers_on,
+    fire,
+    moved,
+    opened,
+    push,
+    text_of,
+)
+
+pytestmark = pytest.mark.anyio
+
+STILL_S = 0.4
+"""Longer than a lease: whoever still ticked would be seen."""
+
+
+async def stays_still(robot: Wire) -> None:
+    """Nothing is written for longer than any lease, though the hand is still there."""
+    count = len(robot.line.written)
+    await asyncio.sleep(STILL_S)
+    assert robot.after(count) == []
+
+
+async def test_a_held_stick_moves_and_letting_go_stops(new_page: PageMaker) -> None:
+    """It moves as far as it is pushed, for as long as it is held; then there is silence."""
+    async with driven() as (robot, address):
+        page = await opened(new_page, address)
+        await push(page)
+        await robot.until_moving()
+        assert 0 < robot.values("drive")["speed"] <= 2
+        count = len(robot.line.written)
+        await asyncio.sleep(2 * LEASE_S)
+        assert len(moved(robot.after(count))) >= 5, "a hand at rest still holds"
+        await page.mouse.up()
+        await robot.until_stopped()
+        await stays_still(robot)
+        assert await text_of(page, "[data-who]").text_content() == "● You drive"
+
+
+Letting = Callable[[Page], Awaitable[object]]
+
+
+def script(text: str) -> Letting:
+    """Return what lets something happen in the page."""
+    return lambda page: fire(page, text)
+
+
+async def press_the_other_button(page: Page) -> None:
+    """A menu, as the second button of a mouse opens one."""
+    await page.mouse.down(button="right")
+
+
+HIDDEN = """
+Object.defineProperty(document, "hidden", { configurable: true, get: () => true });
+Object.defineProperty(document, "visibilityState", { configurable: true, get: () => "hidden" });
+document.dispatchEvent(new Event("visibilitychange"));
+"""
+LOST_CAPTURE = f"""
+(() => {{
+  const el = document.querySelector("{LEFT}");
+  for (let id = 0; id < 64; id += 1) {{
+    if (el.hasPointerCapture(id)) el.releasePointerCapture(id);
+  }}
+}})()
+"""
+CANCELLED = f"""
+(() => {{
+  const el = document.querySelector("{LEFT}");
+  for (let pointerId = 0; pointerId < 64; pointerId += 1) {{
+    if (el.hasPointerCapture(pointerId)) {{
+      el.dispatchEvent(new PointerEvent("pointercancel", {{ pointerId, bubbles: true }}));
+    }}
+  }}
+}})()
+"""
+
+WAYS: dict[str, Letting] = {
+    "pointerup": lambda page: page.mouse.up(),
+    "pointercancel": script(CANCELLED),
+    "lostpointercapture": script(LOST_CAPTURE),
+    "blur": script("window.dispatchEvent(new Event('blur'))"),
+    "hidden": script(HIDDEN),
+    "pagehide": script("window.dispatchEvent(new PageTransitionEvent('pagehide'))"),
+    "freeze": script("document.dispatchEvent(new Event('freeze'))"),
+    "resize": lambda page: page.set_viewport_size({"width": 900, "height": 700}),
+    "rotation": script("window.dispatchEvent(new Event('orientationchange'))"),
+    "full screen": script("document.documentElement.requestFullscreen().catch(() => {})"),
+    "context menu": press_the_other_button,
+    "pad lost": script("window.dispatchEvent(new Event('gamepaddisconnected'))"),
+}
+
+
+@pytest.mark.parametrize("way", WAYS)
+async def test_each_way_of_letting_go_is_neutral_and_ends_the_gesture(
+    new_page: PageMaker, way: str
+) -> None:
+    """The stop comes at once, not when the lease runs out; the hand that stays moves nothing."""
+    async with driven() as (robot, address):
+        page = await opened(new_page, address)
+        await push(page)
+        await robot.until_moving()
+        await WAYS[way](page)
+        await robot.until_stopped()
+        assert "expired" not in robot.line.reasons, "it did not wait for the lease to run out"
+        await page.mouse.move(*(await centre(page, LEFT)), steps=5)
+        await stays_still(robot)
+
+
+async def test_a_new_gesture_moves_again_after_each_of_them(new_page: PageMaker) -> None:
+    """Whoever let go without wanting to, just takes hold again."""
+    async with driven() as (robot, address):
+        page = await opened(new_page, address)
+        for _ in range(3):
+            await push(page)
+            await robot.until_moving()
+            await fire(page, "window.dispatchEvent(new Event('blur'))")
+            await robot.until_stopped()
+            assert "the window lost the focus" in (
+                await text_of(page, "[data-cell='0'] .joystick-note").text_content() or ""
+            )
+            await page.mouse.up()
+
+
+async def test_two_sticks_and_a_button_move_at_once_by_touch(new_page: PageMaker) -> None:
+    """Three fingers: two axes of one command, and another command; each is let go by itself."""
+    async with driven() as (robot, address):
+        page = await opened(new_page, address, "tablet")
+        hands = await fingers_on(page)
+        places = [await centre(page, selector) for selector in (LEFT, RIGHT, UP)]
+        for finger, (x, y) in enumerate(places):
+            await hands.put(finger, x, y)
+        await hands.put(0, places[0][0], places[0][1] - 40)
+        await hands.put(1, places[1][0] - 40, places[1][1])
+        await until(
+            lambda: (
+                all(value > 0 for value in robot.values("drive").values())
+                and robot.values("lift").get("rate") == 0.5
+            )
+        )
+        await hands.lift(1)
+        await until(lambda: robot.values("drive")["turn"] == 0)
+        assert robot.values("drive")["speed"] > 0, "the other stick is still held"
+        assert "drive stop" not in robot.line.texts
+        await hands.lift(0)
+        await robot.until_stopped("drive")
+        count = len(robot.line.written)
+        await until(lambda: len(moved(robot.after(count), "lift")) > 3)
+        await hands.lift(2)
+        await robot.until_stopped("lift")
+        await stays_still(robot)
+
+
+async def test_arrow_keys_hold_a_stick_that_has_the_focus(new_page: PageMaker) -> None:
+    """Pressed it runs, let go it stops; a key that repeats is one press."""
+    async with driven() as (robot, address):
+        page = await opened(new_page, address)
+        await page.focus(LEFT)
+        await page.keyboard.down("ArrowUp")
+        await page.keyboard.down("ArrowUp")
+        await robot.until_moving()
+        assert robot.values("drive") == {"speed": 1.0, "turn": 0.0}
+        await page.keyboard.up("ArrowUp")
+        await robot.until_stopped()
+        await page.keyboard.down("ArrowDown")
+        await until(lambda: robot.values("drive").get("speed") == -1.0)
+        await page.keyboard.press("Tab")
+        await robot.until_stopped()
+        await stays_still(robot)
+
+
+PAD = """
+window.pad = { connected: true, mapping: "standard", axes: [0, 0, 0, 0],
+  buttons: Array.from({ length: 17 }, () => ({ pressed: false })) };
+navigator.getGamepads = () => [window.pad];
+window.dispatchEvent(new Event("gamepadconnected"));
+"""
+
+
+async def test_a_gamepad_moves_only_while_its_shoulder_button_is_held(
+    new_page: PageMaker,
+) -> None:
+    """Pressed with the stick at rest, it holds; off its centre the press does not count."""
+    use = Wire().profile.slots["left"]
+    async with driven(robot=Wire(use._replace(options={**use.options, "pad": "left"}))) as (
+        robot,
+        address,
+    ):
+        page = await opened(new_page, address)
+        await fire(page, PAD + "window.pad.axes[1] = -0.5;")
+        await stays_still(robot)
+        await fire(page, "window.pad.buttons[4].pressed = true")
+        await stays_still(robot)
+        await fire(page, "window.pad.axes[1] = 0")
+        await stays_still(robot)
+        await fire(page, "window.pad.buttons[4].pressed = false")
+        await asyncio.sleep(0.1)
+        await fire(page, "window.pad.buttons[4].pressed = true")
+        await until(lambda: robot.values("drive") == {"speed": 0, "turn": 0})
+        await fire(page, "window.pad.axes[1] = -0.5")
+        await robot.until_moving()
+        await fire(page, "window.pad.connected = false")
+        await robot.until_stopped()
+        await stays_still(robot)
+
+
+async def test_a_dialog_stops_within_the_lease_and_nothing_resumes(new_page: PageMaker) -> None:
+    """While `alert` is open the page draws nothing, so it sends nothing."""
+    async with driven() as (robot, address):
+        page = await opened(new_page, address)
+        closing = asyncio.Event()
+
+        async def keep(dialog: object) -> None:
+            await closing.wait()
+            await dialog.accept()  # type: ignore[attr-defined]  # Playwright's dialog
+
+        page.on("dialog", keep)
+        await push(page)
+        await robot.until_moving()
+        last = robot.line.ticked_s
+        opening = asyncio.create_task(fire(page, "setTimeout(() => alert('?'), 0)"))
+        await robot.until_stopped()
+        stopped_s = robot.line.written[-1][0]
+        assert stopped_s - max(last, robot.line.ticked_s) <= LEASE_S + 0.05
+        closing.set()
+        await opening
+        await stays_still(robot)
+
+
+async def test_a_page_that_is_busy_stops_within_the_lease(new_page: PageMaker) -> None:
+    """Three seconds of work on the page's thread: no tick, and none of them caught up on."""
+    async with driven() as (robot, address):
+        page = await opened(new_page, address)
+        await push(page)
+        await robot.until_moving()
+        busy = asyncio.create_task(
+            fire(page, "{ const end = performance.now() + 3000; while (performance.now() < end); }")
+        )
+        stopped_s = await robot.until_stopped()
+        assert stopped_s - robot.line.ticked_s <= LEASE_S + 0.05
+        await busy
+        await stays_still(robot)
+        note = await text_of(page, "[data-cell='0'] .joystick-note").text_content() or ""
+        assert note.startswith("◆ "), "it says why nothing moves"
+        await page.mouse.up()
+        await push(page)
+        await robot.until_moving()
+        await page.mouse.up()
+
+
+def renderers_of(browser: int) -> list[int]:
+    """Return the processes that draw the pages of a browser."""
+    found = []
+    for place in Path("/proc").iterdir():
+        if place.name.isdigit():
+            try:
+                words = (place / "cmdline").read_bytes()
+                parents = (place / "stat").read_text().rsplit(")", 1)[1].split()
+            except OSError:
+                continue
+            if b"--type=renderer" in words and is_below(int(parents[1]), browser):
+                found.append(int(place.name))
+    return found
+
+
+def is_below(process: int, ancestor: int) -> bool:
+    """Return whether a process was started by another, however far above."""
+    while process > 1:
+        if process == ancestor:
+            return True
+        try:
+            text = Path(f"/proc/{process}/stat").read_text()
+        except OSError:
+            return False
+        process = int(text.rsplit(")", 1)[1].split()[1])
+    return False
+
+
+@pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="needs /proc to find a renderer")
+async def test_a_renderer_that_stands_still_stops_within_the_lease() -> None:
+    """SIGSTOP is what a device that goes to sleep does to a page; the robot does not wait."""
+    async with driven() as (robot, address), running_browser() as browser:
+        page = await (await browser.new_context(locale=LOCALE)).new_page()
+        page.set_default_timeout(PAGE_TIMEOUT_MS)
+        await page.goto(address)
+        await page.wait_for_selector("[data-cell='0'] .joystick[data-phase='idle']")
+        await push(page)
+        await robot.until_moving()
+        frozen = renderers_of(os.getpid())
+        assert frozen
+        for process in frozen:
+            os.kill(process, signal.SIGSTOP)
+        try:
+            stopped_s = await robot.until_stopped()
+            assert stopped_s - robot.line.ticked_s <= LEASE_S + 0.05
+        finally:
+            for process in frozen:
+                os.kill(process, signal.SIGCONT)
+        await stays_still(robot)
+
+
+async def test_ticks_are_skipped_while_the_socket_is_full(new_page: PageMaker) -> None:
+    """What would wait behind other bytes is not sent at all; the newest goes when it is free."""
+    async with driven() as (robot, address):
+        page = await opened(new_page, address)
+        await fire(
+            page,
+            "window.real = Object.getOwnPropertyDescriptor(WebSocket.prototype, 'bufferedAmount');"
+            "Object.defineProperty(WebSocket.prototype, 'bufferedAmount',"
+            " { configurable: true, get: () => 1 })",
+        )
+        await push(page)
+        await asyncio.sleep(STILL_S)
+        assert robot.line.texts == []
+        await fire(
+            page, "Object.defineProperty(WebSocket.prototype, 'bufferedAmount', window.real)"
+        )
+        await robot.until_moving()
+        await page.mouse.up()
+        await robot.until_stopped()

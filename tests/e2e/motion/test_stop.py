@@ -1,0 +1,199 @@
+"""STOP: on pointer-down, by whoever is there, by either way, and over a restart."""
+
+import asyncio
+import json
+from pathlib import Path
+
+import pytest
+from playwright.async_api import Page, Route
+
+from tests.e2e.conftest import PageMaker
+from tests.e2e.dashboards import until, until_attribute, until_text
+from tests.e2e.motion.driving import LEFT, STOP, Wire, centre, driven, moved, opened, push
+
+pytestmark = pytest.mark.anyio
+
+NOTE = "[data-stop-note]"
+DONE = "✓ sent ✓ confirmed ✓ latched"
+
+
+async def touch(page: Page) -> None:
+    """Touch STOP with another finger, without letting go."""
+    await page.dispatch_event(STOP, "pointerdown", {"button": 0, "pointerId": 7})
+
+
+async def test_stop_acts_when_it_is_touched_and_latches(new_page: PageMaker) -> None:
+    """While a stick is held: the robot stops, the stick is dead, and a reset moves nothing."""
+    async with driven() as (robot, address):
+        page = await opened(new_page, address)
+        await push(page)
+        await robot.until_moving()
+        began_s = robot.clock.now()
+        await touch(page)
+        stopped_s = await robot.until_stopped()
+        assert stopped_s - began_s < 0.25, "not when the lease runs out"
+        await until_text(page, NOTE, DONE)
+        await until_text(page, "[data-who]", "■ Stopped by you")
+        count = len(robot.line.written)
+        await asyncio.sleep(0.4)
+        assert moved(robot.after(count)) == {}
+        await page.evaluate("document.querySelector('[data-verb=reset]').click()")
+        await until_text(page, "[data-who]", "Nobody drives")
+        await asyncio.sleep(0.4)
+        assert robot.after(count) == [], "the same hand is still there"
+        await page.mouse.up()
+        await push(page)
+        await robot.until_moving()
+        await page.mouse.up()
+
+
+async def test_escape_and_the_click_of_a_screen_reader_stop_too(new_page: PageMaker) -> None:
+    """From anywhere on the page, and without a pointer."""
+    async with driven() as (robot, address):
+        page = await opened(new_page, address)
+        await page.keyboard.press("Escape")
+        await until_text(page, NOTE, DONE)
+        assert set(robot.line.texts) == {"drive stop", "lift stop"}
+        await page.click("[data-verb='reset']")
+        await until_text(page, "[data-who]", "Nobody drives")
+        count = len(robot.line.written)
+        await page.evaluate(f"document.querySelector('{STOP}').click()")
+        await until_text(page, NOTE, DONE)
+        assert set(robot.after(count)) == {"drive stop", "lift stop"}
+
+
+async def test_stop_of_somebody_else_stops_who_drives(new_page: PageMaker) -> None:
+    """It needs no lease; the driver sees who it was."""
+    async with driven() as (robot, address):
+        driver, other = await opened(new_page, address), await opened(new_page, address)
+        await push(driver)
+        await robot.until_moving()
+        await other.click(STOP)
+        await robot.until_stopped()
+        await until_text(driver, "[data-who]", "■ Stopped by screen 2")
+        await driver.mouse.up()
+        count = len(robot.line.written)
+        await push(driver)
+        note = "[data-cell='0'] .joystick-note"
+        await until_text(driver, note, "◆ stopped by screen 2: reset it first")
+        await driver.mouse.up()
+        assert robot.after(count) == []
+
+
+async def test_stop_goes_by_a_request_when_the_socket_is_blocked(new_page: PageMaker) -> None:
+    """No WebSocket at all: the page says NO LINK, and STOP reaches the robot all the same."""
+    async with driven() as (robot, address):
+        page = await new_page()
+        await page.add_init_script(
+            "window.WebSocket = class extends EventTarget {"
+            " static OPEN = 1; readyState = 0; bufferedAmount = 0; close() {} send() {} }"
+        )
+        await page.goto(address)
+        await until_text(page, NOTE, "▲ NO LINK")
+        await touch(page)
+        await until_text(page, NOTE, DONE)
+        assert set(robot.line.texts) == {"drive stop", "lift stop"}
+
+
+async def test_stop_goes_the_other_way_when_the_socket_says_nothing(new_page: PageMaker) -> None:
+    """A line that is up and swallows everything: after 0.3 s a request is made as well."""
+    async with driven() as (robot, address):
+        page = await opened(new_page, address)
+        await page.evaluate("WebSocket.prototype.send = () => {}")
+        await touch(page)
+        await robot.until_stopped()
+        await until_text(page, NOTE, DONE)
+
+
+async def test_no_link_is_said_when_stop_cannot_be_delivered(new_page: PageMaker) -> None:
+    """Neither way: nobody may believe that the robot was stopped."""
+    async with driven() as (robot, address):
+        page = await opened(new_page, address)
+        new_page.allow(page, lambda text: "/stop" in text)
+
+        async def refuse(route: Route) -> None:
+            await route.abort()
+
+        await page.route("**/api/v1/robots/*/stop", refuse)
+        await page.evaluate("WebSocket.prototype.send = () => {}")
+        await touch(page)
+        await until_text(page, NOTE, "▲ NO LINK: stop it by hand")
+        await until_attribute(page, STOP, "data-phase", "failed")
+        assert robot.line.texts == []
+
+
+async def test_a_robot_that_is_lost_is_told_as_no_link_and_stopped_when_it_is_back(
+    new_page: PageMaker,
+) -> None:
+    """Latched at once, confirmed only when its line has taken the stop."""
+    async with driven() as (robot, address):
+        page = await opened(new_page, address)
+        robot.line.is_up = False
+        robot.link("lost")
+        await until_text(page, NOTE, "▲ NO LINK")
+        await touch(page)
+        await until_text(page, NOTE, "▲ NO LINK, latched")
+        robot.line.is_up = True
+        robot.line.step()
+        robot.link("live")
+        await until_text(page, NOTE, DONE)
+        assert robot.line.texts == ["drive stop", "lift stop"]
+
+
+async def test_a_latched_stop_holds_over_a_restart(new_page: PageMaker, tmp_path: Path) -> None:
+    """Another server, the same data: still stopped, and only a reset lets it be driven."""
+    async with driven(tmp_path) as (_, address):
+        page = await opened(new_page, address)
+        await touch(page)
+        await until_text(page, NOTE, DONE)
+        kept = tmp_path / "latches" / "puppet.latch.json"
+        await until(lambda: kept.exists() and json.loads(kept.read_text())["latched_by"] != "")
+        new_page.allow(page, lambda text: "WebSocket" in text)
+    async with driven(tmp_path, Wire()) as (robot, address):
+        page = await opened_latched(new_page, address)
+        await push(page)
+        await asyncio.sleep(0.3)
+        await page.mouse.up()
+        assert robot.line.texts == []
+        await page.click("[data-verb='reset']")
+        await until_text(page, "[data-who]", "Nobody drives")
+        assert robot.line.texts == [], "a reset starts nothing, and stops nothing"
+        await push(page)
+        await robot.until_moving()
+        await page.mouse.up()
+
+
+async def opened_latched(new_page: PageMaker, address: str) -> Page:
+    """Open the page of a robot that is stopped."""
+    page = await new_page()
+    await page.goto(address)
+    await page.wait_for_function(
+        "() => document.querySelector('[data-who]').textContent.startsWith('■ Stopped by')"
+    )
+    return page
+
+
+@pytest.mark.parametrize("size", ["phone", "tablet", "desktop"])
+async def test_stop_is_on_the_screen_and_nothing_lies_over_it(
+    new_page: PageMaker, size: str
+) -> None:
+    """At least 64 px high, wherever the page is scrolled to, and its middle is its own."""
+    async with driven() as (_, address):
+        page = await opened(new_page, address, size)
+        for scroll in (0, 10_000):
+            await page.evaluate("y => scrollTo(0, y)", scroll)
+            box = await page.locator(STOP).bounding_box()
+            view = page.viewport_size
+            assert box is not None
+            assert view is not None
+            assert box["height"] >= 64
+            assert box["width"] >= 64
+            assert box["y"] >= 0
+            assert box["y"] + box["height"] <= view["height"]
+            place = [box["x"] + box["width"] / 2, box["y"] + box["height"] / 2]
+            top = "([x, y]) => document.elementFromPoint(x, y).matches('[data-stop-button]')"
+            assert await page.evaluate(top, place)
+        x, y = await centre(page, LEFT)
+        assert await page.evaluate(
+            "([x, y]) => document.elementFromPoint(x, y).closest('.joystick-pad') !== null", [x, y]
+        )

@@ -1,0 +1,380 @@
+"""A line in the guard: motion where it is clear, stops before anything, and first when it is back."""
+
+import asyncio
+from collections.abc import AsyncIterator
+
+import pytest
+
+from urc.guard import wire
+from urc.guard.client import LineSpec, LocalGuard
+from urc.model.codec import Envelope, Payload
+from urc.motion.hold import Terms
+from urc.testing.clock import FakeClock, settle
+from urc.transports.base import ConnectFailed, PeerClosed, Transport, TransportError
+
+pytestmark = pytest.mark.anyio
+
+STOP = b"stop"
+TERMS = Terms(STOP, period_s=0.02)
+
+
+class Wire:
+    """A robot's line that takes what it is told to take."""
+
+    address = "wire"
+
+    def __init__(self) -> None:
+        self.written: list[Payload] = []
+        self.aborts = 0
+        self.opens = 0
+        self.is_open = False
+        self.refusal = ""
+        self.arriving: asyncio.Queue[Payload | TransportError] = asyncio.Queue()
+
+    async def open(self, timeout_s: float) -> None:
+        self.opens += 1
+        if self.refusal:
+            raise ConnectFailed(self.refusal)
+        self.is_open = True
+        self.arriving = asyncio.Queue()
+
+    async def receive(self) -> Payload:
+        found = await self.arriving.get()
+        if isinstance(found, TransportError):
+            raise found
+        return found
+
+    async def send(self, data: Payload) -> None:
+        self.written.append(data)
+
+    async def close(self) -> None:
+        self.is_open = False
+
+    def cut(self, reason: str = "the line broke") -> None:
+        self.arriving.put_nowait(PeerClosed(reason))
+
+
+class CountedWire(Wire):
+    """One that tells what is unsent, and takes bytes at once."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.is_stuck = False
+        self.stuck_bytes = 0
+
+    def offer(self, data: bytes) -> bool:
+        self.written.append(data)
+        if self.is_stuck:
+            self.stuck_bytes += len(data)
+        return True
+
+    def unsent(self) -> int:
+        return self.stuck_bytes
+
+    async def abort(self) -> None:
+        self.aborts += 1
+        self.stuck_bytes = 0
+        self.is_stuck = False
+        await self.close()
+
+
+class SlowWire(Wire):
+    """One on which sending waits while it is stuck, and nothing else is known."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.flowing = asyncio.Event()
+        self.flowing.set()
+
+    async def send(self, data: Payload) -> None:
+        await self.flowing.wait()
+        self.written.append(data)
+
+
+class Rig:
+    """A guard of one line, and the engine's side of it."""
+
+    def __init__(self, robot: Wire, *, stalled_s: float = 0.25, is_strict: bool = False) -> None:
+        self.robot = robot
+        self.clock = FakeClock()
+        make = wire.Make("wire", "", {}, [], "", stalled_s, is_strict)
+        line: Transport = robot
+        self.guard = LocalGuard([LineSpec(make, line)], self.clock)
+        self.guard.start()
+        self.transport = self.guard.transports["wire"]
+
+    async def drive(self, terms: Terms = TERMS) -> None:
+        await self.transport.open(1.0)
+        self.guard.arm("wire", "drive", terms)
+        self.tick(b"go 1")
+        await settle()
+
+    def tick(self, data: Payload) -> None:
+        self.guard.tick("drive", data)
+
+    async def stops(self) -> list[tuple[str, str]]:
+        async with asyncio.timeout(1.0):
+            return list(await self.guard.stops())
+
+
+@pytest.fixture
+async def rigs() -> AsyncIterator[list[Rig]]:
+    made: list[Rig] = []
+    yield made
+    for rig in made:
+        finishing = asyncio.ensure_future(rig.guard.finish())
+        while not finishing.done():
+            await rig.clock.advance(0.1)
+
+
+@pytest.fixture
+async def rig(rigs: list[Rig]) -> Rig:
+    rigs.append(Rig(CountedWire()))
+    return rigs[-1]
+
+
+async def test_tick_is_written_at_once(rig: Rig) -> None:
+    await rig.transport.open(1.0)
+    rig.guard.arm("wire", "drive", TERMS)
+    rig.tick(b"go")
+    assert rig.robot.written == [b"go"]
+
+
+async def test_lease_that_runs_out_stops(rig: Rig) -> None:
+    await rig.drive()
+    await rig.clock.advance(0.249)
+    assert rig.robot.written == [b"go 1"]
+    await rig.clock.advance(0.01)
+    assert rig.robot.written == [b"go 1", STOP]
+    assert await rig.stops() == [("drive", "expired")]
+    rig.tick(b"go 2")
+    await rig.clock.advance(60.0)
+    assert rig.robot.written == [b"go 1", STOP], "idle is silent, and nothing goes on by itself"
+
+
+async def test_release_stops_and_may_go_on(rig: Rig) -> None:
+    await rig.drive()
+    rig.guard.release("drive")
+    await rig.clock.advance(0.1)
+    rig.tick(b"go 2")
+    await settle()
+    assert rig.robot.written == [b"go 1", STOP, b"go 2"]
+    assert await rig.stops() == [("drive", "released")]
+
+
+async def test_tick_that_waited_too_long_renews_nothing(rig: Rig) -> None:
+    """A guard that was frozen finds old ticks in the pipe; each is as old as it is."""
+    await rig.drive()
+    await rig.clock.advance(0.24)
+    rig.guard._post(wire.Tick("drive", 9, b"old", rig.clock.now() - 0.3))
+    await rig.clock.advance(0.02)
+    assert rig.robot.written == [b"go 1", STOP]
+
+
+async def test_newest_waits_while_bytes_are_unsent(rig: Rig) -> None:
+    """For a moment they may be: acknowledgements are put off. Then nothing more is written."""
+    robot = rig.robot
+    assert isinstance(robot, CountedWire)
+    robot.is_stuck = True
+    await rig.drive()
+    for number in range(2, 6):
+        await rig.clock.advance(0.04)
+        rig.tick(b"go %d" % number)
+    await settle()
+    assert robot.written == [b"go 1", b"go 2", b"go 3", b"go 4"]
+    robot.stuck_bytes = 0
+    robot.is_stuck = False
+    await rig.clock.advance(0.01)
+    assert robot.written[-1] == b"go 5"
+
+
+async def test_nothing_at_all_may_be_unsent_where_opening_is_dear(rigs: list[Rig]) -> None:
+    robot = CountedWire()
+    rig = Rig(robot, stalled_s=1.0, is_strict=True)
+    rigs.append(rig)
+    robot.is_stuck = True
+    await rig.drive()
+    await rig.clock.advance(0.04)
+    rig.tick(b"go 2")
+    assert robot.written == [b"go 1"]
+    await rig.clock.advance(0.4)
+    assert robot.written == [b"go 1", STOP], "the stop goes out with it"
+    assert robot.aborts == 0
+
+
+async def test_stalled_line_is_reset_and_the_stop_is_first(rig: Rig) -> None:
+    robot = rig.robot
+    assert isinstance(robot, CountedWire)
+    await rig.drive()
+    robot.is_stuck = True
+    for number in range(2, 9):
+        await rig.clock.advance(0.05)
+        rig.tick(b"go %d" % number)
+    await rig.clock.advance(0.05)
+    assert robot.aborts == 1
+    assert robot.written.index(STOP) == len(robot.written) - 1
+    assert robot.opens == 2
+    with pytest.raises(PeerClosed, match="has taken nothing for 250 ms while it moved"):
+        await rig.transport.receive()
+    assert await rig.stops() == [("drive", "revoked")]
+
+
+async def test_line_that_only_waits_is_reset_too(rigs: list[Rig]) -> None:
+    robot = SlowWire()
+    rig = Rig(robot)
+    rigs.append(rig)
+    await rig.drive()
+    assert robot.written == [b"go 1"]
+    robot.flowing.clear()
+    rig.tick(b"go 2")
+    for _ in range(8):
+        await rig.clock.advance(0.05)
+        rig.tick(b"go 3")
+    robot.flowing.set()
+    await rig.clock.advance(0.1)
+    assert robot.opens == 2
+    assert robot.written == [b"go 1", STOP]
+
+
+async def test_cut_line_is_opened_by_the_guard_itself(rig: Rig) -> None:
+    """And is kept for the engine, which gets it at its next attempt."""
+    await rig.drive()
+    rig.robot.refusal = "nothing listens"
+    assert isinstance(rig.robot, CountedWire)
+    rig.robot.cut()
+    await rig.clock.advance(1.0)
+    assert rig.robot.opens > 10
+    assert rig.robot.written == [b"go 1"]
+    rig.robot.refusal = ""
+    await rig.clock.advance(0.1)
+    assert rig.robot.written == [b"go 1", STOP]
+    opens = rig.robot.opens
+    await rig.transport.open(1.0)
+    assert rig.robot.opens == opens
+    await rig.transport.send(b"hello")
+    assert rig.robot.written == [b"go 1", STOP, b"hello"]
+
+
+async def test_engine_waits_for_a_rescue_as_for_any_robot(rig: Rig) -> None:
+    await rig.drive()
+    rig.robot.refusal = "nothing listens"
+    rig.robot.cut()
+    await rig.clock.advance(0.1)
+    opening = asyncio.ensure_future(rig.transport.open(0.5))
+    await rig.clock.advance(0.4)
+    assert not opening.done()
+    await rig.clock.advance(0.2)
+    with pytest.raises(ConnectFailed, match="nothing listens"):
+        await opening
+    opening = asyncio.ensure_future(rig.transport.open(0.5))
+    await rig.clock.advance(0.2)
+    rig.robot.refusal = ""
+    await rig.clock.advance(0.1)
+    await opening
+    assert rig.robot.written == [b"go 1", STOP]
+
+
+async def test_rescued_line_that_nobody_wants_is_closed(rig: Rig) -> None:
+    await rig.drive()
+    rig.robot.cut()
+    await rig.clock.advance(0.1)
+    assert rig.robot.is_open
+    await rig.clock.advance(10.0)
+    await asyncio.sleep(6.2)  # bounded by the loop's own time
+    assert not rig.robot.is_open
+
+
+async def test_rescue_has_an_end(rig: Rig) -> None:
+    """A robot that is gone for good is left to the engine; the stop stays owed."""
+    await rig.drive()
+    rig.robot.refusal = "nothing listens"
+    rig.robot.cut()
+    await rig.clock.advance(100.0)
+    opens = rig.robot.opens
+    await rig.clock.advance(100.0)
+    assert rig.robot.opens == opens
+    rig.robot.refusal = ""
+    await rig.transport.open(1.0)
+    assert rig.robot.written == [b"go 1", STOP]
+
+
+async def test_line_that_was_at_rest_is_left_to_the_engine(rig: Rig) -> None:
+    await rig.drive()
+    rig.guard.release("drive")
+    await rig.clock.advance(0.1)
+    rig.robot.cut()
+    await rig.clock.advance(5.0)
+    assert rig.robot.opens == 1
+
+
+async def test_stop_on_a_closed_line_is_the_first_thing_on_it(rig: Rig) -> None:
+    rig.guard.stop([("wire", "drive", TERMS)])
+    await rig.clock.advance(1.0)
+    assert rig.robot.opens == 0, "nothing moved: nobody is in a hurry"
+    await rig.transport.open(1.0)
+    assert rig.robot.written == [STOP]
+    assert await rig.stops() == [("drive", "revoked")]
+
+
+async def test_stop_needs_no_motion(rig: Rig) -> None:
+    await rig.transport.open(1.0)
+    rig.guard.stop([("wire", "drive", TERMS), ("wire", "turn", TERMS._replace(stop=b"halt"))])
+    assert rig.robot.written == [STOP, b"halt"]
+    assert await rig.stops() == [("drive", "stopped"), ("turn", "stopped")]
+
+
+async def test_stop_is_repeated_where_it_may_be_lost(rig: Rig) -> None:
+    await rig.drive(TERMS._replace(is_lossy=True))
+    rig.guard.release("drive")
+    await rig.clock.advance(5.0)
+    assert rig.robot.written == [b"go 1"] + [STOP] * 11
+    assert await rig.stops() == [("drive", "released")]
+
+
+async def test_closing_stops_before(rig: Rig) -> None:
+    await rig.drive()
+    await rig.transport.close()
+    assert rig.robot.written == [b"go 1", STOP]
+    assert not rig.robot.is_open
+
+
+async def test_end_of_the_guard_stops_before(rig: Rig) -> None:
+    await rig.drive()
+    finishing = asyncio.ensure_future(rig.guard.finish())
+    while not finishing.done():
+        await rig.clock.advance(0.05)
+    assert rig.robot.written == [b"go 1", STOP]
+    assert not rig.robot.is_open
+
+
+async def test_messages_are_motion_too(rigs: list[Rig]) -> None:
+    """A transport of messages takes envelopes, and says nothing of bytes."""
+    go, halt = Envelope("publish", {"topic": "/v"}, {"x": 1}), Envelope("publish", {}, {"x": 0})
+    rig = Rig(Wire())
+    rigs.append(rig)
+    await rig.transport.open(1.0)
+    rig.guard.arm("wire", "drive", TERMS._replace(stop=halt))
+    rig.tick(go)
+    await settle()
+    rig.guard.release("drive")
+    await settle()
+    assert rig.robot.written == [go, halt]
+
+
+async def test_new_guard_opens_and_stops_what_moved(rig: Rig) -> None:
+    """It is told what the one before it cannot tell any more."""
+    rig.guard._post(wire.Owe("wire", "drive", TERMS))
+    await rig.clock.advance(0.1)
+    assert rig.robot.opens == 1
+    assert rig.robot.written == [STOP]
+
+
+async def test_two_controls_stop_before_either_moves(rig: Rig) -> None:
+    await rig.drive()
+    rig.guard.arm("wire", "turn", TERMS._replace(stop=b"halt"))
+    await rig.clock.advance(0.24)
+    rig.guard.tick("turn", b"left")
+    await rig.clock.advance(0.011)
+    rig.guard.tick("turn", b"right")
+    await rig.clock.advance(0.05)
+    assert rig.robot.written[:3] == [b"go 1", b"left", STOP]

@@ -1,0 +1,177 @@
+"""The engine's side of a line in the guard: what belongs to an earlier connection is nobody's."""
+
+import asyncio
+
+import pytest
+
+from urc.guard import wire
+from urc.guard.line import WINDOW_BYTES
+from urc.guard.proxy import GuardedTransport
+from urc.model.codec import Envelope
+from urc.transports.base import ConnectFailed, PeerClosed, Prompt, TransportError
+
+pytestmark = pytest.mark.anyio
+
+
+class Guard:
+    """Answers as it is told."""
+
+    def __init__(self, *, is_there: bool = True) -> None:
+        self.said: list[wire.ToGuard] = []
+        self.is_there = is_there
+        self.answers = True
+        self.line = GuardedTransport("wire", "tcp robot:1", self.post, self.ready)
+
+    def post(self, said: wire.ToGuard) -> None:
+        self.said.append(said)
+        if not self.answers:
+            return
+        if isinstance(said, wire.Open):
+            self.tell(wire.Opened("wire", said.turn, "tcp robot:2"))
+        elif isinstance(said, wire.Close):
+            self.tell(wire.Closed("wire", said.turn))
+
+    def tell(self, said: wire.FromGuard, size: int = 0) -> None:
+        self.line.take(said, size)
+
+    async def ready(self) -> None:
+        if not self.is_there:
+            await asyncio.Event().wait()
+
+    def credits(self) -> list[int]:
+        return [said.amount for said in self.said if isinstance(said, wire.Credit)]
+
+
+async def test_opening_tells_where_it_leads() -> None:
+    guard = Guard()
+    await guard.line.open(1.0)
+    assert guard.line.address == "tcp robot:2"
+    assert isinstance(guard.line, Prompt)
+
+
+async def test_refusal_is_told_in_the_robots_words() -> None:
+    guard = Guard()
+    guard.answers = False
+    opening = asyncio.ensure_future(guard.line.open(1.0))
+    await asyncio.sleep(0)
+    await asyncio.sleep(0)
+    guard.tell(wire.OpenFailed("wire", 1, "nothing listens on robot:1"))
+    with pytest.raises(ConnectFailed, match="nothing listens on robot:1"):
+        await opening
+
+
+async def test_opening_ends_in_its_time_without_a_guard() -> None:
+    guard = Guard(is_there=False)
+    with pytest.raises(ConnectFailed, match=r"no answer from tcp robot:1 within 0\.01 s"):
+        await guard.line.open(0.01)
+
+
+async def test_old_connections_say_nothing() -> None:
+    guard = Guard()
+    await guard.line.open(1.0)
+    await guard.line.close()
+    await guard.line.open(1.0)
+    guard.tell(wire.Received("wire", 1, b"old"), 3)
+    guard.tell(wire.Lost("wire", 1, "old"))
+    guard.tell(wire.Received("wire", 2, b"new"), 3)
+    assert await guard.line.receive() == b"new"
+
+
+async def test_what_came_before_the_end_is_still_given() -> None:
+    guard = Guard()
+    await guard.line.open(1.0)
+    guard.tell(wire.Received("wire", 1, b"last words"), 10)
+    guard.tell(wire.Lost("wire", 1, "the robot closed the line"))
+    assert await guard.line.receive() == b"last words"
+    with pytest.raises(PeerClosed, match="the robot closed the line"):
+        await guard.line.receive()
+    with pytest.raises(PeerClosed, match="the robot closed the line"):
+        await guard.line.send(b"x")
+
+
+async def test_guard_is_told_what_was_taken() -> None:
+    """In large pieces: a line that is not read must not be read any further in there either."""
+    guard = Guard()
+    await guard.line.open(1.0)
+    size = WINDOW_BYTES // 8
+    guard.tell(wire.Received("wire", 1, b"a"), size)
+    guard.tell(wire.Received("wire", 1, b"b"), size)
+    assert guard.credits() == []
+    await guard.line.receive()
+    assert guard.credits() == []
+    await guard.line.receive()
+    assert guard.credits() == [2 * size]
+
+
+async def test_what_the_sink_takes_is_told_too() -> None:
+    guard = Guard()
+    await guard.line.open(1.0)
+    seen: list[bytes] = []
+
+    def sink(data: bytes) -> bool:
+        seen.append(data)
+        return True
+
+    guard.line.divert(sink)
+    guard.tell(wire.Received("wire", 1, b"a"), WINDOW_BYTES)
+    assert seen == [b"a"]
+    assert guard.credits() == [WINDOW_BYTES]
+
+
+async def test_sending_waits_until_it_was_handed_over() -> None:
+    guard = Guard()
+    await guard.line.open(1.0)
+    sending = asyncio.ensure_future(guard.line.send(b"x"))
+    await asyncio.sleep(0)
+    assert not sending.done()
+    guard.tell(wire.Sent("wire", 1, 1))
+    await sending
+
+
+async def test_what_cannot_be_sent_is_told_to_the_sender() -> None:
+    guard = Guard()
+    await guard.line.open(1.0)
+    sending = asyncio.ensure_future(guard.line.send(b"x"))
+    await asyncio.sleep(0)
+    guard.tell(wire.Refused("wire", 1, 1, "too many bytes for one datagram", False))
+    with pytest.raises(TransportError, match="too many bytes"):
+        await sending
+
+
+async def test_offers_have_an_end() -> None:
+    """What nobody waits for is bounded."""
+    guard = Guard()
+    await guard.line.open(1.0)
+    taken = sum(guard.line.offer(b"x" * 1024) for _ in range(1000))
+    assert 0 < taken < 100
+    assert guard.line.is_clogged
+    guard.tell(wire.Sent("wire", 1, taken))
+    assert guard.line.offer(b"x")
+    guard.tell(wire.Sent("wire", 1, taken + 1))
+    await guard.line.close()
+
+
+async def test_unfit_message_is_refused_here() -> None:
+    guard = Guard()
+    await guard.line.open(1.0)
+
+    def post(said: object) -> None:
+        raise OverflowError("integer out of range")
+
+    guard.line._post = post
+    with pytest.raises(TransportError, match="cannot be passed on"):
+        await guard.line.send(Envelope("publish", {}, 1 << 80))
+
+
+async def test_death_of_the_guard_ends_everything() -> None:
+    guard = Guard()
+    await guard.line.open(1.0)
+    receiving = asyncio.ensure_future(guard.line.receive())
+    sending = asyncio.ensure_future(guard.line.send(b"x"))
+    await asyncio.sleep(0)
+    guard.line.lost("the guard ended")
+    for waiting in (receiving, sending):
+        with pytest.raises(PeerClosed, match="the guard ended"):
+            await waiting
+    guard.answers = False
+    await guard.line.close()  # of nothing: it waits for nobody

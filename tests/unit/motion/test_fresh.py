@@ -1,0 +1,57 @@
+"""Old inputs, and inputs played back, are refused without any clock but the server's."""
+
+from urc.motion.fresh import Freshness, Input
+from urc.motion.stall import StallWatch
+
+
+def test_an_input_that_echoes_a_fresh_tick_is_taken_once() -> None:
+    fresh = Freshness()
+    echo = fresh.issue(10.0)
+    assert fresh.refusal(Input(epoch=3, number=1, echo=echo), 3, 10.1) == ""
+    assert fresh.refusal(Input(3, 1, echo), 3, 10.1) == "it is not newer than the last one"
+
+
+def test_an_input_that_lay_in_a_buffer_is_refused() -> None:
+    fresh = Freshness()
+    echo = fresh.issue(10.0)
+    assert fresh.refusal(Input(3, 1, echo), 3, 10.401) == "it is 401 ms old"
+
+
+def test_an_input_of_another_lease_is_refused() -> None:
+    fresh = Freshness()
+    echo = fresh.issue(10.0)
+    assert "lease 2" in fresh.refusal(Input(2, 1, echo), 3, 10.0)
+
+
+def test_ticks_are_remembered_in_a_bounded_way() -> None:
+    fresh = Freshness()
+    first = fresh.issue(0.0)
+    for number in range(1000):
+        fresh.issue(number / 1000)
+    assert fresh.refusal(Input(1, 1, first), 1, 0.0) == "it answers no tick of this server"
+
+
+def test_everything_recorded_and_played_back_is_refused() -> None:
+    fresh, recorded = Freshness(), []
+    for number in range(500):
+        now = number * 0.05
+        given = Input(1, number, fresh.issue(now))
+        assert fresh.refusal(given, 1, now) == ""
+        recorded.append(given)
+    assert all(fresh.refusal(given, epoch, 25.0) for given in recorded for epoch in (1, 2))
+
+
+def test_a_line_is_stalled_when_bytes_stay_for_a_quarter_of_a_second() -> None:
+    watch = StallWatch()
+    assert not watch.saw(10, 1.0)
+    assert watch.deadline == 1.25
+    assert not watch.saw(10, 1.249)
+    assert watch.saw(4, 1.25)
+
+
+def test_a_line_that_was_clear_in_between_is_not_stalled() -> None:
+    watch = StallWatch()
+    watch.saw(10, 1.0)
+    watch.saw(0, 1.1)
+    assert not watch.saw(10, 1.3)
+    assert watch.deadline == 1.55

@@ -1,0 +1,184 @@
+"""One robot, one driver."""
+
+from hypothesis import settings
+from hypothesis import strategies as st
+from hypothesis.stateful import RuleBasedStateMachine, invariant, rule
+
+from tests.effort import examples
+from urc.motion.lease import Changed, Client, Lease, LeaseState, Refused, Role
+
+ANNA = Client("a", "Anna")
+BERT = Client("b", "Bert")
+CARL = Client("c", "Carl", role="engineer")
+EVE = Client("e", "Eve", role="viewer")
+
+
+def test_whoever_comes_first_drives_and_the_others_are_told_who() -> None:
+    lease = Lease()
+    taken = lease.take(ANNA, 0.0)
+    assert isinstance(taken, Changed)
+    assert taken.must_stop
+    assert lease.take(BERT, 0.0) == Refused("Anna has the controls")
+    assert lease.refusal("a", taken.state.epoch) == ""
+    assert lease.refusal("b", taken.state.epoch) == "Anna has the controls"
+
+
+def test_an_input_of_an_earlier_lease_is_refused() -> None:
+    lease = Lease()
+    lease.take(ANNA, 0.0)
+    before = lease.state.epoch
+    lease.leave("a")
+    lease.take(ANNA, 1.0)
+    assert lease.refusal("a", before) == "the controls were taken anew meanwhile"
+
+
+def test_a_request_without_an_answer_is_granted_when_its_time_is_over() -> None:
+    lease = Lease()
+    lease.take(ANNA, 0.0)
+    lease.ask(BERT, 1.0)
+    assert lease.deadline == 11.0
+    assert lease.expire(10.9) is None
+    given = lease.expire(11.0)
+    assert given is not None
+    assert given.must_stop
+    assert given.state.holder == BERT
+
+
+def test_the_holder_may_keep_the_controls() -> None:
+    lease = Lease()
+    lease.take(ANNA, 0.0)
+    lease.ask(BERT, 1.0)
+    lease.touch(1.0)
+    kept = lease.answer("a", 2.0, is_granted=False)
+    assert isinstance(kept, Changed)
+    assert not kept.must_stop
+    assert lease.expire(11.0) is None
+    assert lease.state.holder == ANNA
+
+
+def test_a_request_lasts_3_to_60_seconds() -> None:
+    for asked_s, waits_s in ((0.1, 3.0), (20.0, 20.0), (1e9, 60.0)):
+        lease = Lease()
+        lease.take(ANNA, 0.0)
+        lease.ask(BERT, 0.0, asked_s)
+        assert lease.state.asked_until == waits_s
+
+
+def test_only_an_engineer_takes_the_controls_by_force() -> None:
+    lease = Lease()
+    lease.take(ANNA, 0.0)
+    assert isinstance(lease.force(BERT, 1.0), Refused)
+    taken = lease.force(CARL, 1.0)
+    assert isinstance(taken, Changed)
+    assert taken.must_stop
+    assert taken.state.holder == CARL
+
+
+def test_a_viewer_stops_the_robot_and_cannot_drive_or_reset_it() -> None:
+    lease = Lease()
+    assert isinstance(lease.take(EVE, 0.0), Refused)
+    assert lease.stop(EVE.name).must_stop
+    assert isinstance(lease.reset(EVE), Refused)
+
+
+def test_stop_latches_until_somebody_resets_it_on_purpose() -> None:
+    lease = Lease()
+    lease.take(ANNA, 0.0)
+    lease.stop("Eve")
+    assert lease.take(ANNA, 1.0) == Refused("stopped by Eve: reset it first")
+    assert lease.force(CARL, 1.0) == Refused("stopped by Eve: reset it first")
+    reset = lease.reset(ANNA)
+    assert isinstance(reset, Changed)
+    assert reset.state.holder is None
+    assert isinstance(lease.take(ANNA, 2.0), Changed)
+
+
+def test_a_latch_survives_a_restart_and_a_holder_does_not() -> None:
+    lease = Lease()
+    lease.take(ANNA, 0.0)
+    again = Lease(lease.state)
+    assert again.state.holder is None
+    assert again.state.epoch > lease.state.epoch
+    lease.stop("Eve")
+    assert Lease(lease.state).refusal("a", 0) == "stopped by Eve: reset it first"
+
+
+def test_a_holder_who_goes_silent_gives_the_controls_back() -> None:
+    lease = Lease()
+    lease.take(ANNA, 0.0)
+    lease.touch(30.0)
+    assert lease.expire(89.9) is None
+    left = lease.expire(90.0)
+    assert left is not None
+    assert left.must_stop
+    assert left.state.holder is None
+
+
+ROLES: list[Role] = ["viewer", "driver", "engineer", "admin"]
+
+
+class ThreeClients(RuleBasedStateMachine):
+    """Three clients do whatever they like; the wire must never have two holders."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.lease = Lease()
+        self.now = 0.0
+        self.on_wire: tuple[str, int] | None = None
+        """Whose motion the robot obeys, as of the last change that began with a stop."""
+
+    def note(self, outcome: Changed | Refused | None) -> None:
+        if not isinstance(outcome, Changed):
+            return
+        holder = outcome.state.holder
+        now = None if holder is None else (holder.id, outcome.state.epoch)
+        if not outcome.must_stop:
+            assert now == self.on_wire, "the holder changed without a stop"
+        self.on_wire = now
+
+    @rule(who=st.integers(0, 2), role=st.sampled_from(ROLES), wait=st.floats(0.0, 30.0),
+          verb=st.sampled_from(["take", "ask", "force", "leave", "stop", "reset", "yes", "no",
+                                "wait", "touch", "restart"]))  # fmt: skip
+    def step(self, who: int, role: Role, wait: float, verb: str) -> None:
+        client, lease = Client(f"c{who}", f"C{who}", role), self.lease
+        self.now += wait
+        match verb:
+            case "take":
+                self.note(lease.take(client, self.now))
+            case "ask":
+                self.note(lease.ask(client, self.now, wait))
+            case "force":
+                self.note(lease.force(client, self.now))
+            case "leave":
+                self.note(lease.leave(client.id))
+            case "stop":
+                self.note(lease.stop(client.name))
+            case "reset":
+                self.note(lease.reset(client))
+            case "yes" | "no":
+                self.note(lease.answer(client.id, self.now, is_granted=verb == "yes"))
+            case "wait":
+                self.note(lease.expire(self.now))
+            case "touch":
+                lease.touch(self.now)
+            case "restart":
+                self.lease = Lease(lease.state)
+                self.on_wire = None
+
+    @invariant()
+    def only_the_holder_moves_the_robot(self) -> None:
+        state: LeaseState = self.lease.state
+        allowed = [
+            (client, epoch)
+            for client in ("c0", "c1", "c2")
+            for epoch in range(max(0, state.epoch - 3), state.epoch + 2)
+            if not self.lease.refusal(client, epoch)
+        ]
+        assert len(allowed) <= 1
+        assert allowed in ([], [self.on_wire])
+
+
+ThreeClients.TestCase.settings = settings(
+    max_examples=examples(200), stateful_step_count=50, deadline=None
+)
+TestThreeClients = ThreeClients.TestCase

@@ -1,0 +1,72 @@
+"""What survives a restart: whole or not at all, and never in the way of stopping."""
+
+import errno
+import json
+from pathlib import Path
+
+import pytest
+
+from urc.motion.lease import Client, LeaseState
+from urc.runtime.latch import LatchFile
+
+pytestmark = pytest.mark.anyio
+
+
+async def test_what_was_kept_is_found_again(tmp_path: Path) -> None:
+    """The latch and the epoch; nobody keeps the controls over a restart."""
+    file = LatchFile(tmp_path / "new" / "folder", "puppet")
+    assert file.load() == LeaseState()
+    file.keep(LeaseState(7, Client("a"), None, 0.0, "ann"))
+    await file.settle()
+    assert LatchFile(tmp_path / "new" / "folder", "puppet").load() == LeaseState(
+        7, latched_by="ann"
+    )
+    assert len(list((tmp_path / "new" / "folder").iterdir())) == 1, "no half file is left behind"
+
+
+async def test_of_many_states_the_newest_is_kept(tmp_path: Path) -> None:
+    """A slow disk writes fewer of them, and the last one."""
+    file = LatchFile(tmp_path, "puppet")
+    for epoch in range(200):
+        file.keep(LeaseState(epoch))
+    await file.settle()
+    assert file.load().epoch == 199
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        *("", "{", "[]", "7", "\x00" * 64),
+        '{"epoch": 1}',
+        '{"epoch": "1", "latched_by": ""}',
+        '{"epoch": -1, "latched_by": ""}',
+        '{"epoch": true, "latched_by": ""}',
+    ],
+)
+def test_a_file_that_says_nothing_means_stopped(tmp_path: Path, text: str) -> None:
+    """Nobody knows whether it was latched, so it is."""
+    (tmp_path / "puppet.latch.json").write_text(text)
+    assert "cannot be read" in LatchFile(tmp_path, "puppet").load().latched_by
+
+
+async def test_a_full_disk_is_told_and_harms_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The old file stays whole, and the next write that can be made is made."""
+    file = LatchFile(tmp_path, "puppet")
+    file.keep(LeaseState(1, latched_by="ann"))
+    await file.settle()
+
+    def full(descriptor: int) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    with monkeypatch.context() as patched:
+        patched.setattr("os.fsync", full)
+        file.keep(LeaseState(2))
+        await file.settle()
+        assert file.fault == "No space left on device"
+    assert json.loads((tmp_path / "puppet.latch.json").read_text())["epoch"] == 1
+    assert len(list(tmp_path.iterdir())) == 1
+    file.keep(LeaseState(3))
+    await file.settle()
+    assert (file.fault, file.load().epoch) == ("", 3)

@@ -1,0 +1,90 @@
+"""The guard's process: ``python -m urc.guard DESCRIPTOR``, started by `urc.guard.client` alone."""
+
+import asyncio
+import gc
+import logging
+import os
+import signal
+import socket
+import sys
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from typing import Final
+
+from urc.guard import wire
+from urc.guard.host import FINISH_S, Host
+from urc.guard.pipe import Pipe
+
+__all__ = ["BEAT_S", "main"]
+
+BEAT_S: Final = 0.1
+_GRACE_S: Final = 0.7
+
+
+class _Clock:
+    """This machine's monotonic time, which the engine's process has, too."""
+
+    def __init__(self, loop: asyncio.AbstractEventLoop) -> None:
+        self._loop = loop
+
+    now = staticmethod(time.monotonic)
+
+    async def sleep(self, seconds: float) -> None:
+        await asyncio.sleep(seconds)
+
+    def call_at(self, time_s: float, action: Callable[[], None]) -> asyncio.TimerHandle:
+        return self._loop.call_later(max(0.0, time_s - time.monotonic()), action)
+
+
+async def _guard(line: socket.socket) -> None:
+    loop = asyncio.get_running_loop()
+    over = asyncio.Event()
+    for number in (signal.SIGTERM, signal.SIGHUP):
+        loop.add_signal_handler(number, over.set)
+
+    def emit(said: wire.FromGuard) -> int:
+        return pipe.post(said)
+
+    host = Host(emit, _Clock(loop))
+    pipe = Pipe(
+        line,
+        wire.encoder(),
+        wire.decoder_of_guard(),
+        take=host.take,
+        settle=host.settle,
+        gone=over.set,
+    )
+    due_s = loop.time()
+
+    def beat() -> None:
+        nonlocal due_s
+        late_s = loop.time() - due_s
+        if not pipe.is_backed_up:
+            pipe.post(wire.Beat(late_s))
+        due_s = loop.time() + BEAT_S
+        loop.call_at(due_s, beat)
+
+    beat()
+    await over.wait()
+    with suppress(TimeoutError):
+        async with asyncio.timeout(FINISH_S + _GRACE_S):
+            await host.finish()
+    pipe.close()
+    logging.shutdown()
+    os._exit(0)  # a library's thread or task that does not end must not keep the process
+
+
+def main() -> None:
+    """Guard the lines of one robot until the pipe ends, or SIGTERM."""
+    # Ctrl-C reaches every process of the terminal: the server says what is to be done about it.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    logging.basicConfig(format="%(levelname)s: guard: %(message)s", level=logging.WARNING)
+    line = socket.socket(fileno=int(sys.argv[1]))
+    gc.collect()
+    gc.freeze()  # what is loaded by now stays: no need to look through it again
+    asyncio.run(_guard(line))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,237 @@
+"""One end of the pipe between the engine's process and the guard.
+
+A message is its length in four bytes and then itself. Writing never waits: what the pipe does not
+take is kept, urgent things before others, and of what may be replaced only the newest. What is
+kept is bounded by whoever posts: replies by the credit of their lines, requests by what may be
+under way.
+"""
+
+import asyncio
+import socket
+from collections import deque
+from collections.abc import Callable
+from typing import Any
+
+import msgspec
+
+__all__ = ["Pipe"]
+
+_HEAD = 4
+_READ_BYTES = 65536
+_AT_ONCE = 64
+"""Messages that are handled before others have their turn on the loop."""
+UNFIT = (TypeError, OverflowError, NotImplementedError, msgspec.MsgspecError)
+"""What `post` raises for a message that cannot be passed on."""
+
+
+class Pipe:
+    """Reads and writes messages on a connected socket, which it owns."""
+
+    def __init__(
+        self,
+        line: socket.socket,
+        encoder: msgspec.msgpack.Encoder,
+        decoder: msgspec.msgpack.Decoder[Any],
+        *,
+        take: Callable[[Any], None],
+        settle: Callable[[], None],
+        gone: Callable[[], None],
+    ) -> None:
+        """Begin to read; needs a running loop that watches sockets.
+
+        Args:
+            line: connected.
+            encoder: of what is posted.
+            decoder: of what arrives.
+            take: has each message.
+            settle: called after those that came together.
+            gone: called once, when the other side is gone.
+        """
+        line.setblocking(False)
+        self._line = line
+        self._encode = encoder.encode_into
+        self._decode = decoder.decode
+        self._take = take
+        self._settle = settle
+        self._gone = gone
+        self._loop = asyncio.get_running_loop()
+        self._frame = bytearray(256)
+        self._space = memoryview(bytearray(_READ_BYTES))
+        self._held = bytearray()
+        self._is_behind = False
+        """More messages have come than are handled at once."""
+        self._rest = b""
+        """Of a message of which the pipe has taken a part."""
+        self._urgent: deque[bytes] = deque()
+        self._queue: deque[bytes] = deque()
+        self._newest: dict[str, bytes] = {}
+        self._is_writing = False
+        self.is_open = True
+        self.taken_bytes = 0
+        """Size of the message that is being taken, as `post` returned it on the other side."""
+        self._loop.add_reader(line, self._readable)
+
+    @property
+    def is_backed_up(self) -> bool:
+        """Whether the other side does not take what is posted as fast as it comes."""
+        return self._is_writing
+
+    def post(self, message: object, *, slot: str = "", is_urgent: bool = False) -> int:
+        """Write a message, now or as soon as the pipe takes it; return its size in bytes.
+
+        Args:
+            message: of the encoder's kind.
+            slot: of what only the newest counts, this takes the place of what waits there.
+            is_urgent: it goes before everything that waits.
+
+        Raises:
+            UNFIT: there is something in it that no message can carry.
+        """
+        frame = self._frame
+        self._encode(message, frame, _HEAD)
+        size = len(frame) - _HEAD
+        frame[:_HEAD] = size.to_bytes(_HEAD, "little")
+        if not self.is_open:
+            return size
+        if not self._is_writing:
+            taken = self._write(frame)
+            if taken == len(frame):
+                return size
+            if taken:
+                self._rest = bytes(frame[taken:])
+                self._watch()
+                return size
+        data = bytes(frame)
+        if slot:
+            self._newest[slot] = data
+        else:
+            (self._urgent if is_urgent else self._queue).append(data)
+        self._watch()
+        return size
+
+    def drop(self, slot: str) -> None:
+        """Forget what waits in a slot."""
+        self._newest.pop(slot, None)
+
+    def close(self) -> None:
+        """Close at once; `gone` is not called any more. May be called twice."""
+        if self.is_open:
+            self.is_open = False
+            self._loop.remove_reader(self._line)
+            self._loop.remove_writer(self._line)
+            self._line.close()
+
+    def end(self) -> None:
+        """Let the other side know that nothing more will come."""
+        if self.is_open:
+            try:
+                self._line.shutdown(socket.SHUT_WR)
+            except OSError:
+                self._lose()
+
+    # -- writing
+
+    def _write(self, data: bytes | bytearray) -> int:
+        try:
+            return self._line.send(data)
+        except (BlockingIOError, InterruptedError):
+            return 0
+        except OSError:
+            self._loop.call_soon(self._lose)
+            return len(data)
+
+    def _watch(self) -> None:
+        if not self._is_writing and self.is_open:
+            self._is_writing = True
+            self._loop.add_writer(self._line, self._writable)
+
+    def _writable(self) -> None:
+        while self.is_open:
+            data = self._rest or self._next()
+            if not data:
+                self._is_writing = False
+                self._loop.remove_writer(self._line)
+                return
+            taken = self._write(data)
+            self._rest = data[taken:]
+            if self._rest:
+                return
+
+    def _next(self) -> bytes:
+        for waiting in (self._urgent, self._queue):
+            if waiting:
+                return waiting.popleft()
+        if self._newest:
+            return self._newest.pop(next(iter(self._newest)))
+        return b""
+
+    # -- reading
+
+    def _readable(self) -> None:
+        if self._is_behind or not self.is_open:
+            return
+        try:
+            count = self._line.recv_into(self._space)
+        except (BlockingIOError, InterruptedError):
+            return
+        except OSError:
+            count = 0
+        if not count:
+            self._lose()
+        elif self._held:
+            self._held += self._space[:count]
+            self._read_held()
+        else:
+            done = self._handle(self._space[:count])
+            if done < count:
+                self._held += self._space[done:count]
+                self._look_behind()
+
+    def _read_held(self) -> None:
+        done = self._handle(memoryview(bytes(self._held)) if _is_whole(self._held) else _NONE)
+        del self._held[:done]
+        self._look_behind()
+
+    def _look_behind(self) -> None:
+        """Let others have their turn where whole messages are left over."""
+        is_behind = _is_whole(self._held) and self.is_open
+        if is_behind:
+            self._loop.call_soon(self._go_on)
+        if is_behind is not self._is_behind:
+            self._is_behind = is_behind
+            if is_behind:
+                self._loop.remove_reader(self._line)
+            elif self.is_open:
+                self._loop.add_reader(self._line, self._readable)
+
+    def _go_on(self) -> None:
+        if self.is_open:
+            self._read_held()
+
+    def _handle(self, data: memoryview) -> int:
+        """Take the whole messages in `data`; return how many bytes they are."""
+        at, size = 0, len(data)
+        for _ in range(_AT_ONCE):
+            if at + _HEAD > size or not self.is_open:
+                break
+            end = at + _HEAD + int.from_bytes(data[at : at + _HEAD], "little")
+            if end > size:
+                break
+            self.taken_bytes = end - at - _HEAD
+            self._take(self._decode(data[at + _HEAD : end]))
+            at = end
+        if at:
+            self._settle()
+        return at
+
+    def _lose(self) -> None:
+        if self.is_open:
+            self.close()
+            self._gone()
+
+
+_NONE = memoryview(b"")
+
+
+def _is_whole(held: bytearray) -> bool:
+    return len(held) >= _HEAD and len(held) >= _HEAD + int.from_bytes(held[:_HEAD], "little")

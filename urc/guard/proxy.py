@@ -1,0 +1,240 @@
+"""A transport whose real one lives elsewhere: the five members, by messages.
+
+What it is told of an earlier connection it does not take: each has its turn.
+"""
+
+import asyncio
+from collections import deque
+from collections.abc import Awaitable, Callable
+from typing import Final
+
+from urc.guard import wire
+from urc.guard.line import WINDOW_BYTES
+from urc.guard.pipe import UNFIT
+from urc.model.codec import Payload, size_of
+from urc.transports.base import ConnectFailed, PeerClosed, TransportError
+
+__all__ = ["GuardedTransport"]
+
+_CLOSED: Final = "the line is closed"
+_OPEN_GRACE_S: Final = 0.7
+_CLOSE_S: Final = 1.0
+_CREDIT_BYTES: Final = WINDOW_BYTES // 4
+_OFFERED_BYTES: Final = 65536
+"""What may be under way that nobody waits for."""
+_CLOGGED_BYTES: Final = 4096
+
+Post = Callable[[wire.ToGuard], object]
+
+
+class GuardedTransport:
+    """One line, opened as often as it is needed. Also a `Prompt`."""
+
+    def __init__(self, name: str, address: str, post: Post, ready: Callable[[], Awaitable[None]]):
+        """Prepare.
+
+        Args:
+            name: of the line.
+            address: where it leads, for people.
+            post: passes a message on; never waits.
+            ready: returns when there is somebody who takes it.
+        """
+        self._name = name
+        self._address = address
+        self._post = post
+        self._ready = ready
+        self._turn = 0
+        self._is_open = False
+        self._is_known = False
+        """Whether the guard may have something of this turn."""
+        self._opening: asyncio.Future[str] | None = None
+        self._closing: asyncio.Future[None] | None = None
+        self._ended = _CLOSED
+        self._inbox: deque[tuple[Payload, int]] = deque()
+        self._arrived = asyncio.Event()
+        self._sink: Callable[[bytes], bool] | None = None
+        self._taken_bytes = 0
+        """Not told to the guard yet."""
+        self._number = 0
+        self._under_way: deque[tuple[int, int, asyncio.Future[None] | None]] = deque()
+        """Number, size, and who waits for it."""
+        self._under_way_bytes = 0
+
+    @property
+    def address(self) -> str:
+        """Where it leads, for people."""
+        return self._address
+
+    async def open(self, timeout_s: float) -> None:
+        """Connect, or raise `ConnectFailed` within `timeout_s` seconds."""
+        await self.close()
+        self._turn += 1
+        self._opening = asyncio.get_running_loop().create_future()
+        try:
+            async with asyncio.timeout(timeout_s + _OPEN_GRACE_S):
+                await self._ready()
+                self._is_known = True
+                self._post(wire.Open(self._name, self._turn, timeout_s))
+                fault = await self._opening
+        except TimeoutError as late:
+            text = f"no answer from {self._address} within {timeout_s:g} s"
+            raise ConnectFailed(text) from late
+        finally:
+            self._opening = None
+            if not self._is_open:
+                self._is_known = False
+                self._post(wire.Close(self._name, self._turn))
+        if fault:
+            raise ConnectFailed(fault)
+
+    async def receive(self) -> Payload:
+        """Return what arrived next; raise `PeerClosed` when no more will come."""
+        while not self._inbox:
+            if not self._is_open:
+                raise PeerClosed(self._ended)
+            self._arrived.clear()
+            await self._arrived.wait()
+        data, size = self._inbox.popleft()
+        self._count(size)
+        return data
+
+    async def send(self, data: Payload) -> None:
+        """Hand `data` over, waiting while the line is full; raise `TransportError` if it broke."""
+        if not self._is_open:
+            raise PeerClosed(self._ended)
+        taken: asyncio.Future[None] = asyncio.get_running_loop().create_future()
+        self._put(data, taken)
+        await taken
+
+    async def close(self) -> None:
+        """Close at once. Never raises, may be called twice."""
+        self._end(_CLOSED)
+        self._ended = _CLOSED
+        self._inbox.clear()
+        if not self._is_known:
+            return
+        self._is_known = False
+        self._closing = closing = asyncio.get_running_loop().create_future()
+        self._post(wire.Close(self._name, self._turn))
+        await asyncio.wait({closing}, timeout=_CLOSE_S)
+
+    # -- a `Prompt`
+
+    def offer(self, data: bytes) -> bool:
+        """Pass `data` on; return whether it was taken."""
+        if not self._is_open or self._under_way_bytes + len(data) > _OFFERED_BYTES:
+            return False
+        self._put(data, None)
+        return True
+
+    @property
+    def is_clogged(self) -> bool:
+        """Whether so much is under way that one should wait for it."""
+        return self._under_way_bytes > _CLOGGED_BYTES
+
+    def divert(self, sink: Callable[[bytes], bool]) -> None:
+        """Let `sink` have what arrives, until the line is closed."""
+        self._sink = sink
+
+    # -- what is told
+
+    def lost(self, reason: str) -> None:
+        """Take note that the guard is gone, and every line with it."""
+        self._end(reason)
+        self._is_known = False
+        if self._opening is not None and not self._opening.done():
+            self._opening.set_result(reason)
+        self._closed()
+
+    def take(self, said: wire.FromGuard, size: int) -> None:
+        """Take what is said of this line; it counts for `size` bytes, here and in the guard."""
+        match said:
+            case wire.Received(turn=turn, data=data) if turn == self._turn and self._is_open:
+                self._received(data, size)
+            case wire.Sent(turn=turn, number=number) if turn == self._turn:
+                self._sent(number)
+            case wire.Opened(turn=turn) if turn == self._turn and self._opening is not None:
+                self._opened(said.address)
+            case wire.OpenFailed(turn=turn) if turn == self._turn and self._opening is not None:
+                if not self._opening.done():
+                    self._opening.set_result(said.message)
+            case wire.Refused(turn=turn) if turn == self._turn:
+                kind = PeerClosed if said.is_closed else TransportError
+                self._sent(said.number, kind(said.message))
+            case wire.Lost(turn=turn, message=message) if turn == self._turn:
+                self._end(message)
+            case wire.Closed(turn=turn) if turn == self._turn:
+                self._closed()
+
+    def _opened(self, address: str) -> None:
+        self._address = address
+        self._is_open = True
+        self._ended = ""
+        self._sink = None
+        self._inbox.clear()
+        self._taken_bytes = self._number = 0
+        if self._opening is not None and not self._opening.done():
+            self._opening.set_result("")
+
+    def _closed(self) -> None:
+        if self._closing is not None and not self._closing.done():
+            self._closing.set_result(None)
+
+    def _received(self, data: Payload, size: int) -> None:
+        if (
+            self._sink is not None
+            and not self._inbox
+            and isinstance(data, bytes)
+            and self._sink(data)
+        ):
+            self._count(size)
+            return
+        self._inbox.append((data, size))
+        self._arrived.set()
+
+    def _count(self, size: int) -> None:
+        """Tell the guard, now and then, how much was taken."""
+        self._taken_bytes += size
+        if self._taken_bytes >= _CREDIT_BYTES and self._is_open:
+            amount, self._taken_bytes = self._taken_bytes, 0
+            self._post(wire.Credit(self._name, self._turn, amount))
+
+    def _put(self, data: Payload, taken: asyncio.Future[None] | None) -> None:
+        self._number += 1
+        size = size_of(data)
+        self._under_way.append((self._number, size, taken))
+        self._under_way_bytes += size
+        try:  # noted before: the answer may come at once
+            self._post(wire.Send(self._name, self._turn, self._number, data))
+        except UNFIT as fault:
+            self._under_way.pop()
+            self._under_way_bytes -= size
+            raise TransportError(f"this message cannot be passed on ({fault})") from fault
+
+    def _sent(self, number: int, fault: TransportError | None = None) -> None:
+        while self._under_way and self._under_way[0][0] <= number:
+            at, size, taken = self._under_way.popleft()
+            self._under_way_bytes -= size
+            if taken is None:
+                if fault is not None and at == number:
+                    self._end(str(fault))
+                continue
+            if taken.done():
+                continue
+            if fault is not None and at == number:
+                taken.set_exception(fault)
+            else:
+                taken.set_result(None)
+
+    def _end(self, reason: str) -> None:
+        """Let everybody who waits know that it is over; the first reason stays."""
+        if not self._is_open:
+            return
+        self._is_open = False
+        self._ended = reason
+        self._arrived.set()
+        for _, _, taken in self._under_way:
+            if taken is not None and not taken.done():
+                taken.set_exception(PeerClosed(reason))
+        self._under_way.clear()
+        self._under_way_bytes = 0

@@ -1,0 +1,258 @@
+"""The held commands of one line: writes what they have to say, and sees that the line takes it.
+
+Theory of operation. `step` asks every mover what is due: stops first, whatever waits, then motion
+where the line is clear. It is called after everything that was told, and by an alarm at the next
+time that matters; between a write and the moment when the other side has acknowledged it, that is
+every few milliseconds, because nobody tells when the kernel has got rid of its bytes.
+
+*In doubt* is a control of which something was written that may not have arrived. When the line is
+cut, it is owed a stop.
+"""
+
+from collections.abc import Callable
+from typing import Final
+
+from urc.guard.lane import Clock, Lane, Ring
+from urc.model.codec import Payload, size_of
+from urc.motion.hold import Mover, Reason, Terms
+from urc.motion.stall import IN_FLIGHT_S, StallWatch
+from urc.transports.base import Transport, TransportError
+
+__all__ = ["Reins"]
+
+_LOOK_S: Final = 0.005
+"""How often one looks at a line that is not clear; nothing is due sooner than that."""
+
+
+class Reins:
+    """The movers of one line."""
+
+    def __init__(
+        self,
+        transport: Transport,
+        clock: Clock,
+        *,
+        stalled_s: float,
+        is_strict: bool,
+        told: Callable[[str, Reason, int], None],
+        failed: Callable[[str], None],
+    ) -> None:
+        """Prepare; nothing is written before `begin`.
+
+        Args:
+            transport: where everything goes. It may have ``unsent()``, the bytes that have not left
+                for good, and ``offer(data)``, which hands over without waiting.
+            clock: the time.
+            stalled_s: age of unsent bytes at which the line counts as stalled.
+            is_strict: motion waits until nothing at all is unsent.
+            told: has each stop that was written: control, reason, number of its newest tick.
+            failed: told why when the line is stalled, or takes nothing any more.
+        """
+        self._clock = clock
+        self._unsent: Callable[[], int] | None = getattr(transport, "unsent", None)
+        self._offer: Callable[[bytes], bool] | None = getattr(transport, "offer", None)
+        self._is_strict = is_strict
+        self._told = told
+        self._failed = failed
+        self._watch = StallWatch(stalled_s)
+        self.lane: Lane[tuple[str, bool]] = Lane(transport, clock, self._sent)
+        """For what cannot be handed over at once."""
+        self._movers: dict[str, Mover] = {}
+        self._numbers: dict[str, int] = {}
+        self._doubtful: set[str] = set()
+        self._is_open = False
+        self._alarm: Ring | None = None
+        self._alarm_s = 0.0
+
+    @property
+    def owes(self) -> bool:
+        """Whether a control is to be stopped as soon as the line is open again."""
+        return any(mover.owes_stop for mover in self._movers.values())
+
+    @property
+    def is_settled(self) -> bool:
+        """Whether nothing moves, and every stop was handed over, as often as it is to be."""
+        return self.lane.is_idle and all(one.state == "idle" for one in self._movers.values())
+
+    @property
+    def is_in_doubt(self) -> bool:
+        """Whether something may not have arrived."""
+        return bool(self._doubtful)
+
+    # -- what controls are told
+
+    def arm(self, control: str, terms: Terms) -> None:
+        """Take ticks of `control`."""
+        self._mover(control, terms).arm()
+
+    def tick(self, control: str, number: int, data: Payload, at_s: float) -> None:
+        """Take sampled input of the time `at_s`."""
+        mover = self._movers.get(control)
+        if mover is None:
+            return
+        self._numbers[control] = number
+        now = self._clock.now()
+        if now - at_s < mover.terms.lease_s:  # else it waited so long that it renews nothing
+            mover.tick(data, min(at_s, now))
+
+    def release(self, control: str) -> None:
+        """Stop what was let go."""
+        mover = self._movers.get(control)
+        if mover is not None:
+            mover.stop("released", self._clock.now())
+
+    def stop(self, control: str, terms: Terms) -> None:
+        """Stop `control`, whether it moves or not."""
+        mover = self._movers.get(control)
+        if mover is None:
+            mover = self._mover(control, terms)
+        mover.stop("stopped", self._clock.now())
+        if not self._is_open:
+            mover.cut()
+
+    def owe(self, control: str, terms: Terms) -> None:
+        """Take note that `control` may be moving: it is stopped as soon as the line is open."""
+        self._mover(control, terms).cut(is_doubtful=True)
+
+    def stop_all(self) -> None:
+        """Stop what moves, because the line is to be closed."""
+        now = self._clock.now()
+        for mover in self._movers.values():
+            if mover.state == "moving":
+                mover.stop("revoked", now)
+            mover.is_armed = False
+
+    def _mover(self, control: str, terms: Terms) -> Mover:
+        mover = self._movers.get(control)
+        if mover is None:
+            mover = self._movers[control] = Mover(terms)
+        else:
+            mover.renew(terms)
+        return mover
+
+    # -- the line
+
+    def begin(self) -> None:
+        """Take note that the line is open: what is owed is written first."""
+        self._is_open = True
+        self._watch.reset()
+        now = self._clock.now()
+        for mover in self._movers.values():
+            mover.restored(now)
+        self.step()
+
+    def cut(self) -> None:
+        """Take note that the line is closed: nothing that waits is kept."""
+        self._is_open = False
+        for control, is_stop in self.lane.end():
+            if is_stop:
+                self._doubtful.add(control)
+        for control, mover in self._movers.items():
+            mover.cut(is_doubtful=control in self._doubtful)
+        self._doubtful.clear()
+        if self._alarm is not None:
+            self._alarm.cancel()
+            self._alarm = None
+
+    def step(self) -> None:
+        """Write what is due."""
+        if not self._is_open:
+            return
+        now = self._clock.now()
+        is_moving = False
+        for control, mover in self._movers.items():
+            if mover.must_stop(now):
+                data = mover.due(now, is_clear=False)
+                if data is not None:
+                    self._write(control, data, now, is_stop=True)
+            elif mover.is_waiting:
+                is_moving = True
+        if is_moving:
+            self._move(now)
+        self._set_alarm(now)
+
+    def _move(self, now: float) -> None:
+        for control, mover in self._movers.items():
+            if mover.is_waiting and self._is_clear(now):
+                data = mover.due(now, is_clear=True)
+                if data is not None:
+                    self._write(control, data, now, is_stop=False)
+
+    def _is_clear(self, now: float) -> bool:
+        if not self.lane.is_idle:
+            return False
+        if self._unsent is None or not (self._doubtful or self._is_strict):
+            return True  # all that was written has gone: asking the system would take its time
+        unsent = self._unsent()
+        self._watch.saw(unsent, now)
+        return not unsent or (not self._is_strict and self._watch.age_s(now) < IN_FLIGHT_S)
+
+    def _write(self, control: str, data: Payload, now: float, *, is_stop: bool) -> None:
+        if is_stop and self._unsent is not None:
+            self._watch.saw(self._unsent(), now)
+        offer = self._offer
+        if offer is None or type(data) is not bytes or not self.lane.is_idle or not offer(data):
+            self._doubtful.add(control)
+            self.lane.put(data, (control, is_stop))
+        elif is_stop:
+            self._tell(control)
+        if self._unsent is not None:
+            self._watch.wrote(size_of(data), now)
+            self._doubtful.add(control)
+
+    def _sent(self, tag: tuple[str, bool], fault: TransportError | None) -> None:
+        control, is_stop = tag
+        if fault is not None:
+            self._doubtful.add(control)
+            self._failed(str(fault))
+            return
+        if self._unsent is None:
+            self._doubtful.discard(control)
+        if is_stop:
+            self._tell(control)
+        self.step()
+
+    def _tell(self, control: str) -> None:
+        mover = self._movers[control]
+        if mover.reason is not None and not mover.is_told:
+            mover.is_told = True
+            self._told(control, mover.reason, self._numbers.get(control, 0))
+
+    # -- time
+
+    def _set_alarm(self, now: float) -> None:
+        at_s = now + _LOOK_S
+        if not self._doubtful and self.lane.is_idle:
+            # What is due already waits for the line to be clear.
+            dues = [one.deadline for one in self._movers.values() if one.state != "idle"]
+            at_s = max(at_s, min((due for due in dues if due is not None), default=float("inf")))
+            if at_s == float("inf"):
+                return
+        if self._alarm is not None and self._alarm_s <= at_s:
+            return  # one that rings early finds nothing to do, and is set anew
+        if self._alarm is not None:
+            self._alarm.cancel()
+        self._alarm_s = at_s
+        self._alarm = self._clock.call_at(at_s, self._ring)
+
+    def _ring(self) -> None:
+        self._alarm = None
+        if not self._is_open:
+            return
+        now = self._clock.now()
+        if self._is_stalled(now):
+            limit_ms = self._watch.limit_s * 1000
+            self._failed(f"the robot has taken nothing for {limit_ms:.0f} ms while it moved")
+            return
+        self.step()
+
+    def _is_stalled(self, now: float) -> bool:
+        since = self.lane.busy_since_s
+        if since is not None and now - since >= self._watch.limit_s:
+            return True
+        if not self._doubtful or self._unsent is None:
+            return False
+        unsent = self._unsent()
+        if not unsent and self.lane.is_idle:
+            self._doubtful.clear()
+        return self._watch.saw(unsent, now)

@@ -1,0 +1,68 @@
+"""Is an input fresh? Without trusting anybody's clock.
+
+The server numbers its own ticks and tells them to every page; an input echoes the newest number
+that its page has seen, the epoch of its lease, and counts itself. So one that lay in a buffer, was
+recorded and played back, or belongs to an earlier lease is refused, however the clocks stand.
+"""
+
+from collections import deque
+from typing import Final, NamedTuple
+
+__all__ = ["OLDEST_S", "Freshness", "Input"]
+
+OLDEST_S: Final = 0.4
+"""An input that echoes an older tick is refused."""
+_KEPT: Final = 64
+
+
+class Input(NamedTuple):
+    """What a page sends with every tick of a held control."""
+
+    epoch: int
+    """Of the lease."""
+    number: int
+    """Counts up with every tick of this page."""
+    echo: int
+    """Newest tick of the server that the page has seen."""
+
+
+class Freshness:
+    """The server's ticks, and the newest input of one page."""
+
+    def __init__(self, first: int = 1) -> None:
+        """Begin with nothing issued.
+
+        Args:
+            first: number of the first tick; one that nobody can guess refuses what was recorded
+                before a restart.
+        """
+        self._issued: deque[tuple[int, float]] = deque(maxlen=_KEPT)
+        self._number = first - 1
+        self._newest: dict[str, int] = {}
+
+    def issue(self, now: float) -> int:
+        """Return the number of a tick that is told to the page now."""
+        self._number += 1
+        self._issued.append((self._number, now))
+        return self._number
+
+    def refusal(self, given: Input, epoch: int, now: float, of: str = "") -> str:
+        """Return why an input is not taken, or "" and remember it.
+
+        Args:
+            given: what the page sent with it.
+            epoch: of the lease that holds now.
+            now: the time.
+            of: the control: the inputs of one may overtake those of another.
+        """
+        if given.epoch != epoch:
+            return f"it belongs to lease {given.epoch}, and this is {epoch}"
+        if given.number <= self._newest.get(of, -1):
+            return "it is not newer than the last one"
+        issued_at = next((at for number, at in self._issued if number == given.echo), None)
+        if issued_at is None:
+            return "it answers no tick of this server"
+        if now - issued_at > OLDEST_S:
+            return f"it is {(now - issued_at) * 1000:.0f} ms old"
+        self._newest[of] = given.number
+        return ""

@@ -1,0 +1,179 @@
+"""The lease of one robot: who may drive it.
+
+Theory of operation. One client holds the lease or nobody does. Every change of the holder, and
+every stop, raises the epoch and begins with a stop on the wire; whatever carries an older epoch is
+refused, so that nobody drives on by accident. A holder who goes silent loses the lease. STOP needs
+no lease and latches: nothing moves until somebody resets it on purpose, and a reset moves nothing.
+"""
+
+from typing import Final, Literal, NamedTuple
+
+__all__ = ["Changed", "Client", "Lease", "LeaseState", "Refused", "Role"]
+
+Role = Literal["viewer", "driver", "engineer", "admin"]
+_RANK: Final = {"viewer": 0, "driver": 1, "engineer": 2, "admin": 3}
+SILENT_S: Final = 60.0
+"""A holder who does not touch anything for this long gives the lease back."""
+SHORTEST_REQUEST_S: Final = 3.0
+REQUEST_S: Final = 10.0
+LONGEST_REQUEST_S: Final = 60.0
+
+
+class Client(NamedTuple):
+    """Somebody at a screen."""
+
+    id: str
+    """Unique while connected."""
+    name: str = ""
+    """For the others."""
+    role: Role = "driver"
+
+
+class LeaseState(NamedTuple):
+    """What everybody may see, and what survives a restart."""
+
+    epoch: int = 0
+    holder: Client | None = None
+    asked_by: Client | None = None
+    """Who wants it next."""
+    asked_until: float = 0.0
+    latched_by: str = ""
+    """Who pressed STOP; "" while nothing is latched."""
+
+
+class Changed(NamedTuple):
+    """The lease is another one now."""
+
+    state: LeaseState
+    must_stop: bool
+    """A stop goes out before anything of the new state does."""
+
+
+class Refused(NamedTuple):
+    """Nothing was changed."""
+
+    message: str
+    """Why, for people; names the holder where that is the reason."""
+
+
+class Lease:
+    """The lease of one robot."""
+
+    def __init__(self, state: LeaseState | None = None) -> None:
+        """Go on from `state`, as kept over a restart: the latch holds, the holder does not."""
+        kept = state or LeaseState()
+        self.state = LeaseState(epoch=kept.epoch + 1, latched_by=kept.latched_by)
+        self._touched_at = 0.0
+
+    @property
+    def deadline(self) -> float | None:
+        """When `expire` has something to do; None when time alone changes nothing."""
+        if self.state.holder is None:
+            return None
+        silent_at = self._touched_at + SILENT_S
+        return min(silent_at, self.state.asked_until) if self.state.asked_by else silent_at
+
+    def refusal(self, client: str, epoch: int) -> str:
+        """Return why motion of a client is refused, or ""."""
+        state = self.state
+        if state.latched_by:
+            return f"stopped by {state.latched_by}: reset it first"
+        if state.holder is None:
+            return "nobody has the controls: take them first"
+        if state.holder.id != client:
+            return f"{_called(state.holder)} has the controls"
+        if epoch != state.epoch:
+            return "the controls were taken anew meanwhile"
+        return ""
+
+    def touch(self, now: float) -> None:
+        """Take note that the holder is at work."""
+        self._touched_at = now
+
+    def take(self, client: Client, now: float) -> Changed | Refused:
+        """Give a free lease to `client`."""
+        state = self.state
+        if _RANK[client.role] < _RANK["driver"]:
+            return Refused("viewers cannot drive")
+        if state.latched_by:
+            return Refused(f"stopped by {state.latched_by}: reset it first")
+        if state.holder is not None and state.holder.id != client.id:
+            return Refused(f"{_called(state.holder)} has the controls")
+        return self._give(client, now)
+
+    def ask(self, client: Client, now: float, for_s: float = REQUEST_S) -> Changed | Refused:
+        """Ask the holder for the lease; without an answer in time it is handed over."""
+        state = self.state
+        if state.holder is None or state.holder.id == client.id:
+            return self.take(client, now)
+        if _RANK[client.role] < _RANK["driver"]:
+            return Refused("viewers cannot drive")
+        if state.asked_by is not None and state.asked_by.id != client.id:
+            return Refused(f"{_called(state.asked_by)} asks for the controls already")
+        for_s = min(max(for_s, SHORTEST_REQUEST_S), LONGEST_REQUEST_S)
+        self.state = state._replace(asked_by=client, asked_until=now + for_s)
+        return Changed(self.state, must_stop=False)
+
+    def answer(self, client: str, now: float, *, is_granted: bool) -> Changed | Refused:
+        """Let the holder hand the lease over, or keep it."""
+        state = self.state
+        if state.holder is None or state.holder.id != client or state.asked_by is None:
+            return Refused("nobody asks you for the controls")
+        if is_granted:
+            return self._give(state.asked_by, now)
+        self.state = state._replace(asked_by=None, asked_until=0.0)
+        return Changed(self.state, must_stop=False)
+
+    def force(self, client: Client, now: float) -> Changed | Refused:
+        """Take the lease from whoever holds it; that is for engineers."""
+        if _RANK[client.role] < _RANK["engineer"]:
+            return Refused("taking the controls by force needs an engineer")
+        if self.state.latched_by:
+            return Refused(f"stopped by {self.state.latched_by}: reset it first")
+        return self._give(client, now)
+
+    def leave(self, client: str) -> Changed | None:
+        """Take note that a client gave the lease back, or is gone; None when it had no part."""
+        state = self.state
+        if state.holder is not None and state.holder.id == client:
+            self.state = LeaseState(epoch=state.epoch + 1, latched_by=state.latched_by)
+            return Changed(self.state, must_stop=True)
+        if state.asked_by is not None and state.asked_by.id == client:
+            self.state = state._replace(asked_by=None, asked_until=0.0)
+            return Changed(self.state, must_stop=False)
+        return None
+
+    def stop(self, by: str) -> Changed:
+        """Stop and latch: never refused."""
+        state = self.state
+        self.state = LeaseState(epoch=state.epoch + 1, latched_by=state.latched_by or by)
+        return Changed(self.state, must_stop=True)
+
+    def reset(self, client: Client) -> Changed | Refused:
+        """Let the robot be driven again, by whoever takes the lease next; starts nothing."""
+        if _RANK[client.role] < _RANK["driver"]:
+            return Refused("viewers can stop the robot, and cannot reset it")
+        if not self.state.latched_by:
+            return Refused("nothing is stopped")
+        self.state = LeaseState(epoch=self.state.epoch + 1)
+        return Changed(self.state, must_stop=False)
+
+    def expire(self, now: float) -> Changed | None:
+        """Do what time alone does: hand over to who asked, take it from who went silent."""
+        state = self.state
+        if state.holder is None:
+            return None
+        if state.asked_by is not None and now >= state.asked_until:
+            return self._give(state.asked_by, now)
+        if now >= self._touched_at + SILENT_S:
+            return self.leave(state.holder.id)
+        return None
+
+    def _give(self, client: Client, now: float) -> Changed:
+        self._touched_at = now
+        self.state = LeaseState(epoch=self.state.epoch + 1, holder=client)
+        return Changed(self.state, must_stop=True)
+
+
+def _called(client: Client) -> str:
+    return client.name or "somebody else"

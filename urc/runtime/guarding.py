@@ -1,0 +1,142 @@
+"""The movers of a session: its lines behind the guard, and the backend of its `MotionDesk`."""
+
+import logging
+from collections.abc import Mapping, Sequence
+from typing import Final
+
+from urc.guard import wire
+from urc.guard.client import CAN_GUARD, Client, Guard, LineSpec, LocalGuard
+from urc.model.codec import Payload
+from urc.model.driver import Driver
+from urc.model.values import Value
+from urc.motion.hold import Mover, Reason, Terms
+from urc.motion.stall import STALLED_S, WAITED_S
+from urc.problems import UrcError
+from urc.registry import Table
+from urc.runtime.clock import Clock
+from urc.runtime.lines import Made, make_lines
+from urc.runtime.motion import is_lossy
+from urc.transports.base import Transport
+
+__all__ = ["GuardedMovers", "take_reins"]
+
+_DEAR: Final = frozenset(("ssh", "serial", "mqtt", "rosbridge"))
+"""Kinds of line that are not reset lightly: opening them afresh takes long, or cannot be done."""
+
+log = logging.getLogger(__name__)
+
+
+class GuardedMovers:
+    """What a desk moves and stops; both ways of `Motion`."""
+
+    def __init__(self, driver: Driver, client: Client) -> None:
+        """Prepare; nothing runs before `start`.
+
+        Args:
+            driver: whose held commands these are.
+            client: of the guard.
+        """
+        self._driver = driver
+        self.client = client
+        self._armed: dict[str, Terms] = {}
+
+    @property
+    def transports(self) -> Mapping[str, Transport]:
+        """The lines, for the links of the session."""
+        return self.client.transports
+
+    def start(self) -> None:
+        """Begin; needs a running loop."""
+        self.client.start()
+
+    def stop_all(self) -> None:
+        """Stop what may be moving."""
+        self.stop({name: terms.stop for name, terms in self._armed.items()})
+
+    async def finish(self) -> None:
+        """Stop what may be moving, close every line, and leave nothing behind."""
+        await self.client.finish()
+
+    # -- `urc.runtime.motion.Movers`
+
+    def arm(self, command: str, terms: Terms) -> None:
+        """Take ticks of `command` from now on.
+
+        Raises:
+            UrcError: nothing would ever stop it under these terms.
+        """
+        try:
+            Mover(terms)
+        except ValueError as fault:
+            raise UrcError(f"{command}: {fault}") from fault
+        self._armed[command] = terms
+        self.client.arm(self._driver.commands[command].transport, command, terms)
+
+    def tick(self, command: str, data: Payload) -> None:
+        """Renew the lease of `command`; `data` is its newest frame."""
+        self.client.tick(command, data)
+
+    def release(self, command: str) -> None:
+        """Stop `command`, which was let go."""
+        self.client.release(command)
+
+    def stop(self, stops: Mapping[str, Payload]) -> None:
+        """Stop at once, whatever moves; these are the stop frames of all held commands."""
+        if stops:
+            self.client.stop([self._stop_of(command, frame) for command, frame in stops.items()])
+
+    async def stops(self) -> Sequence[tuple[str, Reason]]:
+        """Wait for the next stop frames that were written: command, and why it stopped."""
+        return await self.client.stops()
+
+    def _stop_of(self, command: str, frame: Payload) -> tuple[str, str, Terms]:
+        known = self._driver.commands[command]
+        terms = self._armed.get(command)
+        if terms is None:
+            period_s = known.hold.repeat_s if known.hold is not None else STALLED_S
+            lossy = is_lossy(self._driver, known.transport)
+            terms = Terms(frame, period_s=period_s, is_lossy=lossy)
+        return known.transport, command, terms
+
+
+def take_reins(
+    driver: Driver,
+    settings: Mapping[str, Value],
+    table: Table,
+    clock: Clock,
+    *,
+    is_guarded: bool,
+) -> GuardedMovers:
+    """Return the movers of a robot, with its lines.
+
+    Args:
+        driver: as loaded.
+        settings: a value for every setting.
+        table: the kinds of transport.
+        clock: the time, where there is no process of its own.
+        is_guarded: whether there is.
+
+    Raises:
+        UrcError: a transport cannot be made with these settings.
+    """
+    lines = [_line(made) for made in make_lines(driver, settings, table).values()]
+    if is_guarded and CAN_GUARD:
+        return GuardedMovers(driver, Guard(lines))
+    if is_guarded:
+        log.warning("there is no guard on this system: a server that hangs stops nothing")
+    return GuardedMovers(driver, LocalGuard(lines, clock))
+
+
+def _line(made: Made) -> LineSpec:
+    setup, spec = made.setup, made.spec
+    is_dear = spec.type in _DEAR or bool(spec.via)
+    make = wire.Make(
+        line=setup.name,
+        factory=made.factory,
+        options=dict(setup.options),
+        subscriptions=[(one.topic, dict(one.attributes)) for one in setup.subscriptions],
+        via=spec.via,
+        stalled_s=WAITED_S if is_dear else STALLED_S,
+        is_strict=is_dear,
+    )
+    return LineSpec(make, made.transport)

@@ -1,0 +1,99 @@
+"""What of a lease survives a restart: the latch and the epoch, in one small file.
+
+Writing may take long, or fail on a full disk; stopping waits for neither. So the newest state is
+written by a thread of its own turn, and what could not be written is told, not raised.
+"""
+
+import asyncio
+import json
+import logging
+import os
+import tempfile
+from contextlib import suppress
+from pathlib import Path
+
+from urc.motion.lease import LeaseState
+
+__all__ = ["LatchFile"]
+
+_MOST_BYTES = 4096
+_LONGEST_NAME = 200
+
+log = logging.getLogger(__name__)
+
+
+class LatchFile:
+    """The file of one robot. `keep` from the event loop; `load` before it."""
+
+    def __init__(self, folder: Path, robot: str) -> None:
+        """Choose the file; nothing is read or written yet."""
+        self._file = folder / f"{robot}.latch.json"
+        self._newest: LeaseState | None = None
+        self._writing: asyncio.Task[None] | None = None
+        self.fault = ""
+        """Why the newest state could not be kept; "" when it is, or will be."""
+
+    def load(self) -> LeaseState:
+        """Return what was kept.
+
+        A file that cannot be read, or holds anything else, means latched: nobody knows what was.
+        """
+        try:
+            with self._file.open("rb") as file:
+                found = json.loads(file.read(_MOST_BYTES))
+            epoch, by = found["epoch"], found["latched_by"]
+            if type(epoch) is int and epoch >= 0 and type(by) is str:
+                return LeaseState(epoch=epoch, latched_by=by[:_LONGEST_NAME])
+        except FileNotFoundError:
+            return LeaseState()
+        except (OSError, ValueError, KeyError, TypeError) as error:
+            log.warning("%s cannot be read (%s): the robot stays stopped", self._file, error)
+            return LeaseState(latched_by="URC, whose record of the last stop cannot be read")
+        log.warning("%s is no record of a stop: the robot stays stopped", self._file)
+        return LeaseState(latched_by="URC, whose record of the last stop cannot be read")
+
+    def keep(self, state: LeaseState) -> None:
+        """Write `state` soon; only the newest counts. Returns at once."""
+        self._newest = state
+        if self._writing is None or self._writing.done():
+            self._writing = asyncio.get_running_loop().create_task(self._write())
+
+    async def settle(self) -> None:
+        """Wait until the newest state is written, or could not be."""
+        if self._writing is not None:
+            await self._writing
+
+    async def _write(self) -> None:
+        while self._newest is not None:
+            state, self._newest = self._newest, None
+            try:
+                await asyncio.to_thread(self._replace, state)
+            except OSError as error:
+                fault = error.strerror or str(error)
+                if fault != self.fault:
+                    log.warning("the stop latch cannot be kept over a restart: %s", fault)
+                self.fault = fault
+            else:
+                self.fault = ""
+
+    def _replace(self, state: LeaseState) -> None:
+        """Put a whole new file in the place of the old one: a crash leaves one of the two."""
+        self._file.parent.mkdir(parents=True, exist_ok=True)
+        text = json.dumps({"epoch": state.epoch, "latched_by": state.latched_by[:_LONGEST_NAME]})
+        handle, name = tempfile.mkstemp(prefix=".latch-", dir=self._file.parent)
+        try:
+            with os.fdopen(handle, "w", encoding="utf-8") as file:
+                file.write(text)
+                file.flush()
+                os.fsync(file.fileno())
+            os.replace(name, self._file)
+        except OSError:
+            with suppress(OSError):
+                os.unlink(name)
+            raise
+        if hasattr(os, "O_DIRECTORY"):
+            folder = os.open(self._file.parent, os.O_RDONLY | os.O_DIRECTORY)
+            try:
+                os.fsync(folder)
+            finally:
+                os.close(folder)

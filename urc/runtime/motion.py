@@ -1,0 +1,305 @@
+"""Who drives one robot, and what its held commands do: the desk between screens and the movers.
+
+Theory of operation. Screens send ticks of sampled input and releases. The desk asks the lease who
+may drive, the freshness of that screen whether the tick is new, the engine whether the arguments
+are good, and hands the frame to the movers, which own the wire and its time limits. The first tick
+of a gesture arms the control: the stop frame is rendered then, so that stopping needs neither the
+engine nor the document any more.
+
+A control that stopped for any reason but a release is closed until its screen has released it: a
+stick that is still held when the link heals moves nothing.
+
+A desk outlives the sessions of its robot: the latch holds while nobody is connected. `attach` gives
+it the engine and the movers of a session, `detach` takes them away.
+
+Synchronous; time is passed in. Whoever owns the movers reports their stops by `stopped`.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from secrets import randbelow
+from typing import Protocol
+
+from urc.model.codec import Payload
+from urc.model.driver import Driver
+from urc.model.values import Reading
+from urc.motion.fresh import Freshness, Input
+from urc.motion.hold import Reason, Terms
+from urc.motion.lease import REQUEST_S, Changed, Client, Lease, LeaseState, Refused
+from urc.problems import UrcError
+
+__all__ = ["Frames", "MotionDesk", "Movers", "Verb", "is_lossy"]
+
+Verb = str
+"""``take``, ``ask``, ``yes``, ``no``, ``force``, ``leave`` or ``reset``."""
+MOST_SCREENS = 256
+_FIRST_TICKS = 2**31
+_NO_ROBOT = "the robot is not connected"
+LET_GO = "it was stopped: let go, then begin anew"
+_TAKE_ANEW = "it was stopped: take the controls anew"
+
+
+class Frames(Protocol):
+    """What is asked of the engine: `urc.protocol.motions.Motions`."""
+
+    def stop_frame(self, command: str) -> Payload:
+        """Return what stops the motion of a held command; raise `UrcError` when it cannot."""
+
+    def motion_frame(self, command: str, arguments: Mapping[str, Reading], now: float) -> Payload:
+        """Return the frame of a held command; raise `UrcError` that says why not."""
+
+
+class Movers(Protocol):
+    """Who owns the wire: the guard process, or this one."""
+
+    def arm(self, command: str, terms: Terms) -> None:
+        """Take ticks of `command` from now on, under these terms."""
+
+    def tick(self, command: str, data: Payload) -> None:
+        """Renew the lease of `command`; `data` is its newest frame."""
+
+    def release(self, command: str) -> None:
+        """Stop `command`, which was let go."""
+
+    def stop(self, stops: Mapping[str, Payload]) -> None:
+        """Stop at once, whatever moves; these are the stop frames of all held commands."""
+
+    async def stops(self) -> Sequence[tuple[str, Reason]]:
+        """Wait for the next stop frames that were written: command, and why it stopped.
+
+        In their order, at least one. Being cancelled loses none. A control that `stop` stopped is
+        told with ``stopped`` even when it did not move: it says that the robot's line took it.
+        """
+
+
+@dataclass(slots=True)
+class _Control:
+    """One held command, as its screen knows it."""
+
+    is_armed: bool = False
+    needs_release: bool = False
+    closed_epoch: int = -1
+    """Lease in which it stopped by itself: it goes on in a later one only."""
+
+
+@dataclass(slots=True)
+class _Screen:
+    client: Client
+    freshness: Freshness = field(default_factory=lambda: Freshness(randbelow(_FIRST_TICKS) + 1))
+
+
+class MotionDesk:
+    """The controls of one robot."""
+
+    def __init__(self, driver: Driver, *, kept: LeaseState | None = None) -> None:
+        """Begin with nobody at the controls, and no robot connected.
+
+        Args:
+            driver: its commands with ``hold`` are the controls.
+            kept: the lease as it was before a restart: a latched stop stays latched.
+        """
+        self.lease = Lease(kept)
+        self._frames: Frames | None = None
+        self._movers: Movers | None = None
+        self._holds = {name: one for name, one in driver.commands.items() if one.hold is not None}
+        self._is_lossy = {
+            name: is_lossy(driver, one.transport) for name, one in self._holds.items()
+        }
+        self._controls = {name: _Control() for name in self._holds}
+        self._screens: dict[str, _Screen] = {}
+        self._unconfirmed: set[str] = set()
+        self.on_change: Callable[[LeaseState], None] = _ignore
+        """Told of every new state of the lease, and when a stop is confirmed."""
+
+    @property
+    def can_move(self) -> bool:
+        """Whether the driver has any held command."""
+        return bool(self._holds)
+
+    @property
+    def is_confirmed(self) -> bool:
+        """Whether the robot's lines have taken the stop of everything that was to stop."""
+        return not self._unconfirmed
+
+    @property
+    def deadline(self) -> float | None:
+        """When `expire` has something to do."""
+        return self.lease.deadline
+
+    # -- the robot
+
+    def attach(self, frames: Frames, movers: Movers) -> None:
+        """Take a session's engine and movers; a stop that is still owed goes out."""
+        self._frames, self._movers = frames, movers
+        if self._unconfirmed:
+            self._movers.stop(self._stop_frames(self._holds))
+
+    def detach(self) -> None:
+        """Take note that the session is over: its movers stop what moves, and nothing is armed."""
+        self._frames = self._movers = None
+        for control in self._controls.values():
+            if control.is_armed:
+                self._close(control)
+
+    # -- screens
+
+    def join(self, client: Client) -> None:
+        """Take note of a screen; raise `UrcError` when there are too many."""
+        if len(self._screens) >= MOST_SCREENS:
+            raise UrcError(f"{MOST_SCREENS} screens show this robot already")
+        self._screens[client.id] = _Screen(client)
+
+    def part(self, client: str) -> None:
+        """Take note that a screen is gone: what it held stops."""
+        self._screens.pop(client, None)
+        self._settle(self.lease.leave(client))
+
+    def beat(self, client: str, now: float) -> int:
+        """Return the number of the tick that this screen is told now, to be echoed."""
+        return self._screens[client].freshness.issue(now)
+
+    # -- the lease
+
+    def drive(self, client: str, verb: Verb, now: float, for_s: float = REQUEST_S) -> str:
+        """Do what a screen wants with the lease; return why not, or ""."""
+        who, lease = self._screens[client].client, self.lease
+        if verb == "take":
+            outcome: Changed | Refused | None = lease.take(who, now)
+        elif verb == "ask":
+            outcome = lease.ask(who, now, for_s)
+        elif verb in ("yes", "no"):
+            outcome = lease.answer(client, now, is_granted=verb == "yes")
+        elif verb == "force":
+            outcome = lease.force(who, now)
+        elif verb == "leave":
+            outcome = lease.leave(client)
+        elif verb == "reset":
+            outcome = lease.reset(who)
+        else:
+            return f"the controls know no {verb!r}"
+        if isinstance(outcome, Refused):
+            return outcome.message
+        self._settle(outcome)
+        return ""
+
+    def stop(self, by: str) -> None:
+        """Stop the robot and latch; whoever says so, and whatever else goes on."""
+        self._unconfirmed = set(self._holds)
+        if self._movers is not None:
+            self._movers.stop(self._stop_frames(self._holds))
+        self._settle(self.lease.stop(by), is_stopped=True)
+
+    def expire(self, now: float) -> None:
+        """Do what time alone does."""
+        self._settle(self.lease.expire(now))
+
+    # -- motion
+
+    def tick(
+        self, client: str, command: str, arguments: Mapping[str, Reading], given: Input, now: float
+    ) -> str:
+        """Take a tick of sampled input; return why it was refused, or ""."""
+        control, screen = self._controls.get(command), self._screens.get(client)
+        if control is None or screen is None:
+            return f"{command!r} is no held command of this robot"
+        epoch = self.lease.state.epoch
+        refusal = self.lease.refusal(client, given.epoch) or screen.freshness.refusal(
+            given, epoch, now, command
+        )
+        if refusal:
+            return refusal
+        if control.needs_release or epoch <= control.closed_epoch:
+            return LET_GO if control.needs_release else _TAKE_ANEW
+        frames, movers = self._frames, self._movers
+        if frames is None or movers is None:
+            return _NO_ROBOT
+        try:
+            data = frames.motion_frame(command, arguments, now)
+            if not control.is_armed:
+                movers.arm(command, self._terms(command, frames))
+                control.is_armed = True
+        except UrcError as error:
+            if control.is_armed:
+                movers.release(command)
+            self._close(control)
+            return str(error)
+        self.lease.touch(now)
+        movers.tick(command, data)
+        return ""
+
+    def release(self, client: str, command: str) -> None:
+        """Take note that a control was let go; only its holder's word counts."""
+        holder = self.lease.state.holder
+        control = self._controls.get(command)
+        if control is None or holder is None or holder.id != client:
+            return
+        control.needs_release = False
+        if control.is_armed and self._movers is not None:
+            self._movers.release(command)
+
+    def stopped(self, command: str, reason: Reason) -> None:
+        """Take note of what the movers report: the stop of a control was written."""
+        control = self._controls.get(command)
+        if control is None:
+            return
+        if reason not in ("released", "stopped"):
+            self._close(control)
+        if reason != "released" and command in self._unconfirmed:
+            self._unconfirmed.discard(command)
+            if self.is_confirmed:
+                self.on_change(self.lease.state)
+
+    def _close(self, control: _Control) -> None:
+        """Take no tick of a control until it was let go, and the lease was taken anew."""
+        control.is_armed = False
+        control.needs_release = True
+        control.closed_epoch = self.lease.state.epoch
+
+    def _terms(self, command: str, frames: Frames) -> Terms:
+        hold = self._holds[command].hold
+        assert hold is not None  # noqa: S101 - `_holds` has no others
+        return Terms(
+            frames.stop_frame(command),
+            period_s=hold.repeat_s,
+            lease_s=hold.lease_s,
+            is_lossy=self._is_lossy[command],
+        )
+
+    def _settle(self, outcome: Changed | None, *, is_stopped: bool = False) -> None:
+        if outcome is None:
+            return
+        if outcome.must_stop:
+            if not is_stopped:
+                self._stop_what_moves()
+            for control in self._controls.values():
+                control.is_armed = control.needs_release = False
+        self.on_change(outcome.state)
+
+    def _stop_what_moves(self) -> None:
+        armed = [name for name, control in self._controls.items() if control.is_armed]
+        if armed and self._movers is not None:
+            self._movers.stop(self._stop_frames(armed))
+
+    def _stop_frames(self, commands: Sequence[str] | Mapping[str, object]) -> dict[str, Payload]:
+        """Return the stop frames; one that cannot be made must not keep back the others."""
+        made: dict[str, Payload] = {}
+        for name in commands:
+            try:
+                if self._frames is not None:
+                    made[name] = self._frames.stop_frame(name)
+            except UrcError:
+                continue  # told by `urc validate`; what is armed has its own already
+        return made
+
+
+_LOSSY = frozenset(("udp", "serial", "mqtt", "rosbridge"))
+"""Kinds of line on which one stop may be lost on the way."""
+
+
+def is_lossy(driver: Driver, transport: str) -> bool:
+    """Return whether what is written to a line may be lost on the way without anybody noticing."""
+    return driver.transports[transport].type in _LOSSY
+
+
+def _ignore(state: LeaseState) -> None:
+    """Nobody wants to know."""

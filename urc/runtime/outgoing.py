@@ -1,0 +1,171 @@
+"""What is to be written on one line: joined, bounded, and shown in the traffic once it is written.
+
+Bytes wait for the writer's own task. On a transport that is a `Prompt` they do not, unless others
+wait before them: they go straight to the kernel, in the call that queues them or in the next
+`flush`. Whatever the kernel does not take at once is left to the task, which has time to wait.
+"""
+
+import asyncio
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+from urc.model.codec import Payload, size_of
+from urc.runtime.clock import Clock
+from urc.runtime.hub import Hub
+from urc.runtime.report import REDACTED, LinkReport
+from urc.transports.base import Prompt, Transport
+
+__all__ = ["MAX_QUEUED_BYTES", "STUCK_S", "Outgoing"]
+
+MAX_QUEUED_BYTES = 262_144
+"""Bytes that may wait to be written; with more the line is given up, and says so."""
+STUCK_S = 5.0
+"""A robot that takes no byte for this long is gone."""
+
+
+class Outgoing:
+    """The way out of one line. What does not work ends the connection, through `give_up`."""
+
+    def __init__(
+        self,
+        transport: Transport,
+        report: LinkReport,
+        hub: Hub,
+        clock: Clock,
+        give_up: Callable[[str], None],
+        *,
+        is_stream: bool,
+    ) -> None:
+        """Prepare it.
+
+        Args:
+            transport: takes what is written.
+            report: shows it.
+            hub: knows whether anybody watches.
+            clock: the time.
+            give_up: ends the connection for a reason.
+            is_stream: whether bytes may be joined; else each piece is a datagram or an envelope.
+        """
+        self._transport = transport
+        self._report = report
+        self._hub = hub
+        self._clock = clock
+        self._give_up = give_up
+        self._is_stream = is_stream
+        self._prompt: Prompt | None = None
+        self._waiting: list[tuple[Payload, Payload]] = []
+        """What is written, and what the traffic shows of it."""
+        self._bytes = 0
+        self._has_some = asyncio.Event()
+        self._is_idle = False
+        """Whether the writer waits for something to write."""
+
+    @property
+    def is_full(self) -> bool:
+        """Whether so much waits that no new command should be taken."""
+        return self._bytes > MAX_QUEUED_BYTES // 2
+
+    @property
+    def is_written(self) -> bool:
+        """Whether everything has been handed over."""
+        return not self._bytes
+
+    def reset(self, prompt: Prompt | None = None) -> None:
+        """Begin anew, with nothing waiting; `prompt` is the transport, if it is one."""
+        self._prompt = prompt
+        self._waiting.clear()
+        self._bytes = 0
+        self._has_some.clear()
+        self._is_idle = False
+
+    def put(self, data: Payload, *, is_secret: bool = False) -> None:
+        """Write `data` with the next `flush` or turn of the loop; secrets are shown to nobody."""
+        size = size_of(data)
+        if self._bytes + size > MAX_QUEUED_BYTES:
+            dropped = self._bytes + size
+            self._give_up(f"the robot takes no more bytes; {dropped} waiting ones were dropped")
+            return
+        self._waiting.append((data, REDACTED if is_secret else data))
+        self._bytes += size
+        if self._prompt is None:
+            self._has_some.set()
+
+    def put_now(self, data: Payload, *, is_secret: bool = False) -> None:
+        """Do what `put` and `flush` do, in one step where nothing waits."""
+        prompt = self._prompt
+        is_free = self._is_idle and not self._waiting and not self._has_some.is_set()
+        if prompt is not None and is_free and type(data) is bytes and prompt.offer(data):
+            if self._hub.traffic_watchers:
+                self._report.saw("sent", REDACTED if is_secret else data)
+            if prompt.is_clogged:
+                self._wait_for_rest()
+            return
+        self.put(data, is_secret=is_secret)
+        self.flush()
+
+    def flush(self) -> None:
+        """Write what waits past the writer, where that needs no waiting."""
+        prompt = self._prompt
+        if prompt is None or not self._waiting:
+            return
+        if not self._is_idle or self._has_some.is_set():
+            self._has_some.set()
+            return
+        data, shown = self._next()
+        if not isinstance(data, bytes) or not prompt.offer(data):
+            self._waiting.append((data, shown))
+            self._has_some.set()  # the writer finds out why
+            return
+        self._bytes = 0
+        self._report.saw("sent", shown)
+        if prompt.is_clogged:
+            self._wait_for_rest()
+
+    def wake(self) -> None:
+        """Let the writer look again: the line is to be closed once all is written."""
+        self._has_some.set()
+
+    async def run(self, is_closing: Callable[[], bool]) -> None:
+        """Write what waits, until cancelled; give up, for no reason, when all is written and done.
+
+        Raises:
+            TransportError: it cannot be written.
+        """
+        while True:
+            self._is_idle = True
+            await self._has_some.wait()
+            self._is_idle = False
+            self._has_some.clear()
+            while self._waiting:
+                data, shown = self._next()
+                with self._watched():
+                    await self._transport.send(data)
+                self._bytes -= size_of(data)
+                self._report.saw("sent", shown)
+            if is_closing() and not self._waiting:
+                self._give_up("")
+
+    def _wait_for_rest(self) -> None:
+        """Let the writer see to it that what the kernel has not taken goes, in time."""
+        self._waiting.append((b"", b""))
+        self._has_some.set()
+
+    def _next(self) -> tuple[Payload, Payload]:
+        """Take what is sent at once, and what is shown of it: all of a stream, else one item."""
+        if not self._is_stream:
+            return self._waiting.pop(0)
+        if len(self._waiting) == 1:
+            return self._waiting.pop()
+        data, shown = zip(*self._waiting, strict=True)
+        self._waiting.clear()
+        return b"".join(data), b"".join(shown)
+
+    @contextmanager
+    def _watched(self) -> Iterator[None]:
+        """Give the robot `STUCK_S` to take what is being written."""
+        reason = f"the robot has taken no bytes for {STUCK_S:g} s"
+        alarm = self._clock.call_at(self._clock.now() + STUCK_S, lambda: self._give_up(reason))
+        try:
+            yield
+        finally:
+            alarm.cancel()

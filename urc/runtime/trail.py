@@ -1,0 +1,204 @@
+"""What one robot's controls leave in the audit: two lines for each motion, not one for each tick.
+
+Floor 4, synchronous; time is passed in. A motion is told when it begins and when it ends, with its
+first and its last values; a refusal that comes again and again is told once a second, with its
+count. So the audit answers "why did it move?" and does not grow with every stick.
+"""
+
+import json
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import Final
+
+from urc.model.codec import Payload, traffic_of
+from urc.model.values import Reading
+from urc.motion.lease import Client, LeaseState
+from urc.runtime.audit import Entry, shown
+
+__all__ = ["Trail"]
+
+HIDDEN: Final = "•••"
+_NOBODY: Final = Client("", "", "viewer")
+_AGAIN_S: Final = 1.0
+"""How often the same refusal is told."""
+_MOST_KEPT: Final = 64
+"""Refusals that are counted at once."""
+
+
+@dataclass(slots=True)
+class _Motion:
+    client: Client
+    epoch: int
+    began_s: float
+    count: int = 0
+    arguments: Mapping[str, Reading] = field(default_factory=dict)
+    data: Payload = b""
+
+
+@dataclass(slots=True)
+class _Refusal:
+    told_s: float
+    count: int = 0
+
+
+class Trail:
+    """The audit of one robot."""
+
+    def __init__(
+        self,
+        robot: str,
+        note: Callable[[Entry], None],
+        *,
+        utc: Callable[[], float],
+        secrets: Iterable[str] = (),
+    ) -> None:
+        """Begin.
+
+        Args:
+            robot: its name.
+            note: takes the entries; must not wait.
+            utc: the time of day, in seconds since 1970.
+            secrets: texts that no entry may hold, such as the values of secret settings.
+        """
+        self._robot = robot
+        self._note = note
+        self._utc = utc
+        self._secrets = tuple(one for one in secrets if one)
+        self._motions: dict[str, _Motion] = {}
+        self._refusals: dict[tuple[str, str, str], _Refusal] = {}
+        self._lease = LeaseState()
+
+    def moved(
+        self,
+        client: Client,
+        epoch: int,
+        command: str,
+        arguments: Mapping[str, Reading],
+        data: Payload,
+        now: float,
+    ) -> None:
+        """Take note of a tick that was taken, and the frame that it became."""
+        motion = self._motions.get(command)
+        if motion is None or motion.client != client or motion.epoch != epoch:
+            self.stopped(command, "taken over", now)
+            motion = self._motions[command] = _Motion(client, epoch, now)
+            self._put(
+                "moved",
+                client,
+                epoch=epoch,
+                command=command,
+                arguments=self._arguments(arguments),
+                data=self._data(data),
+                outcome="begins",
+            )
+        motion.count += 1
+        motion.arguments, motion.data = arguments, data
+
+    def stopped(self, command: str, reason: str, now: float) -> None:
+        """Take note that a control stopped, and why."""
+        motion = self._motions.pop(command, None)
+        if motion is None:
+            return
+        self._put(
+            "stopped",
+            motion.client,
+            epoch=motion.epoch,
+            command=command,
+            arguments=self._arguments(motion.arguments),
+            data=self._data(motion.data),
+            outcome=reason,
+            times=motion.count,
+            lasted_s=round(now - motion.began_s, 3),
+        )
+
+    def refused(self, client: Client, about: str, message: str, now: float) -> None:
+        """Take note that a tick of the control, or a wish, `about` was refused."""
+        key = (client.id, about, message)
+        known = self._refusals.get(key)
+        if known is None:
+            while len(self._refusals) >= _MOST_KEPT:
+                self._refusals.pop(next(iter(self._refusals)))
+            known = self._refusals[key] = _Refusal(now - _AGAIN_S)
+        known.count += 1
+        if now - known.told_s >= _AGAIN_S:
+            outcome = self._hidden(message)
+            self._put("refused", client, command=about, outcome=outcome, times=known.count)
+            known.told_s, known.count = now, 0
+
+    def leased(self, state: LeaseState, now: float) -> None:
+        """Take note of a new state of the lease: who has the controls, and whether STOP latched."""
+        before, self._lease = self._lease, state
+        if state.latched_by and not before.latched_by:
+            self._put("STOP", _NOBODY, epoch=state.epoch, outcome=f"by {state.latched_by}")
+        elif before.latched_by and not state.latched_by:
+            self._put("reset", _NOBODY, epoch=state.epoch, outcome="may be driven again")
+        if state.holder != before.holder:
+            who = state.holder or before.holder or _NOBODY
+            outcome = "has the controls" if state.holder else "gave the controls back"
+            self._put("lease", who, epoch=state.epoch, outcome=outcome)
+        if state.asked_by is not None and state.asked_by != before.asked_by:
+            self._put("lease", state.asked_by, epoch=state.epoch, outcome="asks for the controls")
+
+    def ran(
+        self,
+        client: Client,
+        command: str,
+        arguments: Mapping[str, Reading],
+        outcome: str,
+        data: Payload = b"",
+    ) -> None:
+        """Take note of a command that is not held, and what it came to: ``done`` or why not."""
+        self._put(
+            "ran",
+            client,
+            command=command,
+            arguments=self._arguments(arguments),
+            data=self._data(data),
+            outcome=self._hidden(outcome),
+        )
+
+    def _put(
+        self,
+        what: str,
+        who: Client,
+        *,
+        epoch: int = 0,
+        command: str = "",
+        arguments: str = "",
+        data: str = "",
+        outcome: str = "",
+        times: int = 1,
+        lasted_s: float = 0.0,
+    ) -> None:
+        entry = Entry(
+            at=self._utc(),
+            robot=self._robot,
+            what=what,
+            who=who.name,
+            role=who.role if who is not _NOBODY else "",
+            client=who.id,
+            epoch=epoch,
+            command=command,
+            arguments=arguments,
+            data=data,
+            outcome=outcome,
+            times=times,
+            lasted_s=lasted_s,
+        )
+        self._note(entry)
+
+    def _arguments(self, arguments: Mapping[str, Reading]) -> str:
+        return self._hidden(json.dumps(dict(arguments), default=repr, ensure_ascii=False))
+
+    def _data(self, data: Payload) -> str:
+        shown_bytes = traffic_of(data)
+        if any(secret.encode() in shown_bytes for secret in self._secrets):
+            return HIDDEN
+        return shown(shown_bytes) if shown_bytes else ""
+
+    def _hidden(self, text: str) -> str:
+        """Return a text without the secrets, also where JSON has written them with escapes."""
+        for secret in self._secrets:
+            for form in (secret, json.dumps(secret, ensure_ascii=False)[1:-1]):
+                text = text.replace(form, HIDDEN)
+        return text

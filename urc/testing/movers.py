@@ -1,0 +1,109 @@
+"""A robot's line for motion without a line: what is written, when, and frames that can be read."""
+
+import asyncio
+from collections.abc import Callable, Mapping, Sequence
+
+from urc.model.codec import Payload
+from urc.model.driver import Driver
+from urc.model.values import Reading
+from urc.motion.hold import Mover, Reason, Terms
+from urc.problems import UrcError
+from urc.protocol.encode import check_arguments
+from urc.runtime.clock import Alarm, Clock
+
+__all__ = ["FakeFrames", "FakeMovers"]
+
+
+class FakeFrames:
+    """Frames of held commands as text: ``drive speed=0.5 turn=0``, and ``drive stop``."""
+
+    def __init__(self, driver: Driver) -> None:
+        self.driver = driver
+        self.refusal = ""
+        """Why there is no frame; "" when there is."""
+
+    def stop_frame(self, command: str) -> Payload:
+        """Return what stops it."""
+        return f"{command} stop".encode()
+
+    def motion_frame(self, command: str, arguments: Mapping[str, Reading], now: float) -> Payload:
+        """Return its arguments, checked as the engine checks them."""
+        if self.refusal:
+            raise UrcError(self.refusal)
+        values = check_arguments(self.driver.commands[command], arguments)
+        return " ".join(
+            (command, *(f"{name}={value!r}" for name, value in values.items()))
+        ).encode()
+
+
+class FakeMovers:
+    """Real movers over a line that takes everything at once, for as long as `is_up`."""
+
+    def __init__(self, clock: Clock, write: Callable[[bytes], None] | None = None) -> None:
+        self.written: list[tuple[float, str]] = []
+        """When, and what; also of a line that is down, nothing."""
+        self.reasons: list[Reason] = []
+        """Of the stops, in their order."""
+        self.ticked_s = float("-inf")
+        """When the newest tick was taken."""
+        self.is_up = True
+        self._clock = clock
+        self._write = write
+        self._movers: dict[str, Mover] = {}
+        self._alarm: Alarm | None = None
+        self._stops: asyncio.Queue[tuple[str, Reason]] = asyncio.Queue()
+
+    @property
+    def texts(self) -> list[str]:
+        """What was written."""
+        return [text for _, text in self.written]
+
+    def arm(self, command: str, terms: Terms) -> None:
+        """Take ticks from now on."""
+        mover = self._movers.get(command)
+        if mover is None or mover.state == "idle":
+            mover = self._movers[command] = Mover(terms)
+        mover.arm()
+
+    def tick(self, command: str, data: Payload) -> None:
+        """Renew the lease."""
+        if self._movers[command].tick(data, self._clock.now()):
+            self.ticked_s = self._clock.now()
+        self.step()
+
+    def release(self, command: str) -> None:
+        """Let go."""
+        if command in self._movers:
+            self._movers[command].stop("released", self._clock.now())
+        self.step()
+
+    def stop(self, stops: Mapping[str, Payload]) -> None:
+        """Stop everything."""
+        for command, frame in stops.items():
+            mover = self._movers.setdefault(command, Mover(Terms(frame, period_s=0.05)))
+            mover.stop("stopped", self._clock.now())
+        self.step()
+
+    async def stops(self) -> Sequence[tuple[str, Reason]]:
+        """Wait for stops that were written."""
+        return [await self._stops.get()]
+
+    def step(self) -> None:
+        """Write what is due; also after the line is up again."""
+        now = self._clock.now()
+        for command, mover in self._movers.items():
+            while self.is_up and (data := mover.due(now, is_clear=True)) is not None:
+                self._put(data, now)
+                if data == mover.terms.stop and mover.reason is not None:
+                    self.reasons.append(mover.reason)
+                    self._stops.put_nowait((command, mover.reason))
+        if self._alarm is not None:
+            self._alarm.cancel()
+        dues = [mover.deadline for mover in self._movers.values() if mover.deadline is not None]
+        self._alarm = self._clock.call_at(min(dues), self.step) if dues and self.is_up else None
+
+    def _put(self, data: Payload, now: float) -> None:
+        if isinstance(data, bytes):
+            self.written.append((now, data.decode()))
+            if self._write is not None:
+                self._write(data)

@@ -1,0 +1,292 @@
+"""The rig: programs that play robots, operators and the link between them, and a server amid them.
+
+All of them are processes of their own, and all stamp what they do by one clock, the machine's
+monotonic one, so that times of different programs can be compared. A program ends when its
+standard input does: none outlives the test that started it, whatever becomes of that.
+
+Linux only. `Relay` needs root and /dev/net/tun; see `can_relay`.
+"""
+
+import contextlib
+import json
+import os
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import IO, NamedTuple, Self, cast
+
+__all__ = [
+    "SERVER_ADDRESS",
+    "Heard",
+    "Operators",
+    "Program",
+    "Relay",
+    "Robots",
+    "Server",
+    "can_relay",
+]
+
+HERE = Path(__file__).resolve().parent
+ROOT = HERE.parents[1]
+SERVER_ADDRESS = "10.77.0.2"
+"""Of side ``b`` of the relay, see `urc.testing.rig_relay`."""
+READY_S = 40.0
+ANSWER_S = 10.0
+END_S = 5.0
+
+
+class Program:
+    """One process that is told orders by lines, and tells what happens by lines."""
+
+    def __init__(self, arguments: Sequence[str], *, inside: Sequence[str] = ()) -> None:
+        """Start it.
+
+        Args:
+            arguments: what to run.
+            inside: what starts it elsewhere, as `Relay.inside` returns it.
+        """
+        self.lines: list[str] = []
+        """All that it said, standard error included."""
+        self.changed = threading.Condition()
+        self._has_ended = False
+        self._process = subprocess.Popen(  # noqa: S603 - tests name what is run
+            [*inside, *arguments],
+            cwd=ROOT,
+            env=os.environ | {"PYTHONUNBUFFERED": "1", "PYTHONDONTWRITEBYTECODE": "1"},
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            encoding="utf-8",
+            errors="replace",
+        )
+        self._orders = cast("IO[str]", self._process.stdin)
+        self._told = cast("IO[str]", self._process.stdout)
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._reader.start()
+
+    def __enter__(self) -> Self:
+        """Return it; it ends with the block."""
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """End it."""
+        self.close()
+
+    @property
+    def pid(self) -> int:
+        """Its process id, while it runs."""
+        return self._process.pid
+
+    @property
+    def is_running(self) -> bool:
+        """Whether it has not ended yet."""
+        return self._process.poll() is None
+
+    def order(self, text: str) -> None:
+        """Write one line to it."""
+        self._orders.write(text + "\n")
+        self._orders.flush()
+
+    def wait_until(self, is_so: Callable[[], bool], timeout_s: float, what: str) -> None:
+        """Wait until something that it says makes `is_so` true; fail when time runs out."""
+        with self.changed:
+            self.changed.wait_for(lambda: is_so() or self._has_ended, timeout_s)
+            if not is_so():
+                said = "\n".join(self.lines[-20:]) or "(nothing)"
+                raise AssertionError(f"{what}: not within {timeout_s:g} s; it said:\n{said}")
+
+    def wait_for(self, word: str, timeout_s: float = ANSWER_S, *, after: int = 0) -> list[str]:
+        """Return the words of the first line that begins with `word`, from line `after` on."""
+
+        def found() -> list[str]:
+            lines = (line.split() for line in self.lines[after:])
+            return next((words for words in lines if words[:1] == [word]), [])
+
+        self.wait_until(lambda: bool(found()), timeout_s, f"a line with {word!r}")
+        return found()
+
+    def signal(self, number: int) -> None:
+        """Send it a signal."""
+        self._process.send_signal(number)
+
+    def close(self) -> None:
+        """End it, by force when it does not end by itself. May be called twice."""
+        with contextlib.suppress(BrokenPipeError):  # it has ended already
+            self._orders.close()
+        self._end()
+        self._reader.join(END_S)
+        self._told.close()
+
+    def _end(self) -> None:
+        try:
+            self._process.wait(END_S)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+
+    def _read(self) -> None:
+        for line in self._told:
+            with self.changed:
+                self.lines.append(line.rstrip("\n"))
+                self.take(self.lines[-1])
+                self.changed.notify_all()
+        with self.changed:
+            self._has_ended = True
+            self.changed.notify_all()
+
+    def take(self, line: str) -> None:
+        """Take note of a line, in the reader's thread; for those who know what it means."""
+
+
+def _script(name: str, *arguments: str) -> list[str]:
+    # -P: else its own folder comes first on the path, where names of the standard library stand.
+    return [sys.executable, "-PSE", str(HERE / name), *arguments]
+
+
+class Heard(NamedTuple):
+    """A line that a robot heard."""
+
+    time_ns: int
+    """When its first byte came."""
+    text: str
+
+
+class Robots(Program):
+    """Some robots in one process, see `urc.testing.rig_robot`."""
+
+    def __init__(self, places: Sequence[str], *, inside: Sequence[str] = ()) -> None:
+        self.heard: list[list[Heard]] = [[] for _ in places]
+        """Of each robot."""
+        self.late: list[tuple[int, float]] = []
+        """When the robots' own process was not woken in time, and by how many milliseconds."""
+        self.visits: list[list[tuple[int, bool]]] = [[] for _ in places]
+        """Of each robot: when, and whether a connection was made or ended."""
+        super().__init__(_script("rig_robot.py", *places), inside=inside)
+        self.ports = [int(port) for port in self.wait_for("ready")[1:]]
+
+    def take(self, line: str) -> None:
+        """Sort what they tell."""
+        words = line.split(" ", 3)
+        if words[0] == "line":
+            self.heard[int(words[1])].append(Heard(int(words[2]), words[3]))
+        elif words[0] == "late":
+            self.late.append((int(words[1]), int(words[2]) / 1000))
+        elif words[0] in ("open", "gone"):
+            self.visits[int(words[1])].append((int(words[2]), words[0] == "open"))
+
+    def since(self, robot: int, time_ns: int) -> list[Heard]:
+        """Return what a robot heard from then on."""
+        with self.changed:
+            return [one for one in self.heard[robot] if one.time_ns >= time_ns]
+
+    def latest_ms(self, from_ns: int, until_ns: int) -> float:
+        """Return by how much their process was late at worst between two times."""
+        with self.changed:
+            found = [late for time_ns, late in self.late if from_ns <= time_ns <= until_ns]
+        return max(found, default=0.0)
+
+
+class Operators(Program):
+    """Pages and their ends, see `urc.testing.rig_operator`."""
+
+    def __init__(self, *, inside: Sequence[str] = ()) -> None:
+        self.news: dict[tuple[str, int], str] = {}
+        """(word, number of the plan) → the rest of the line."""
+        super().__init__(_script("rig_operator.py"), inside=inside)
+
+    def take(self, line: str) -> None:
+        """Sort what they tell."""
+        word, _, rest = line.partition(" ")
+        number, _, rest = rest.partition(" ")
+        if number.isdigit():
+            self.news[word, int(number)] = rest
+
+    def start(self, plan: Mapping[str, object]) -> None:
+        """Let a page live by a plan, whose fields are those of `rig_operator.Plan`."""
+        self.order(json.dumps(plan))
+
+    def await_told(self, word: str, number: int, timeout_s: float = 15.0) -> str:
+        """Return what was told with `word` about a plan; fail when it failed."""
+
+        def is_told() -> bool:
+            return (word, number) in self.news or ("failed", number) in self.news
+
+        self.wait_until(is_told, timeout_s, f"{word!r} of plan {number}")
+        if (word, number) not in self.news:
+            raise AssertionError(f"plan {number}: {self.news['failed', number]}")
+        return self.news[word, number]
+
+    def kill(self, number: int) -> None:
+        """End the page of a plan, and wait until it has ended."""
+        self.order(json.dumps({"kill": number}))
+        self.wait_until(lambda: ("ended", number) in self.news, ANSWER_S, f"end of {number}")
+
+
+def can_relay() -> bool:
+    """Return whether `Relay` works here: Linux, root, and a TUN device."""
+    is_root = sys.platform == "linux" and os.geteuid() == 0
+    return is_root and os.access("/dev/net/tun", os.R_OK | os.W_OK)
+
+
+class Relay(Program):
+    """A link between two network namespaces, see `urc.testing.rig_relay`."""
+
+    def __init__(self) -> None:
+        self._done = 0
+        super().__init__(_script("rig_relay.py"))
+        _, *found = self.wait_for("ready")
+        self._descriptors = dict(zip("ab", found, strict=True))
+
+    def take(self, line: str) -> None:
+        """Count the orders that were carried out."""
+        self._done += line.startswith("done")
+
+    def inside(self, side: str) -> tuple[str, ...]:
+        """Return what starts a program at side ``a`` or ``b``."""
+        return ("nsenter", f"--net=/proc/{self.pid}/fd/{self._descriptors[side]}", "--")
+
+    def do(self, *orders: str) -> int:
+        """Carry out orders such as ``cut a``; return when the last was, in nanoseconds."""
+        wanted = self._done + len(orders)
+        self.order("\n".join(orders))
+        self.wait_until(lambda: self._done >= wanted, ANSWER_S, f"order {orders}")
+        return int(next(line for line in reversed(self.lines) if line.startswith("done"))[5:])
+
+
+class Server(Program):
+    """A real ``urc serve``."""
+
+    def __init__(
+        self,
+        profiles: Sequence[Path],
+        data: Path,
+        *options: str,
+        host: str = "127.0.0.1",
+        inside: Sequence[str] = (),
+    ) -> None:
+        command = [sys.executable, "-m", "urc.cli.main", "serve", *map(str, profiles)]
+        command += ["--host", host, "--port", "0", "--data-dir", str(data), *options]
+        self.host = host
+        super().__init__(command, inside=inside)
+        url = self.wait_for("dashboard", READY_S)[1]
+        self.port = int(url.rstrip("/").rpartition(":")[2])
+
+    def _end(self) -> None:
+        if self.is_running:
+            self._process.terminate()  # it listens to no standard input
+        super()._end()
+
+
+def now_ns() -> int:
+    """Return the time of the one clock."""
+    return time.monotonic_ns()

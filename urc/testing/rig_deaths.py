@@ -1,0 +1,206 @@
+"""The eight ways in which an operator vanishes, many times over, and how soon the robot hears it.
+
+A *bout* lets one page drive each of the rig's robots, all at once, and die. What the robots heard
+then tells everything: each value of the motion is the time at which its tick was sent.
+"""
+
+import random
+import time
+from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
+from pathlib import Path
+from types import TracebackType
+from typing import NamedTuple, Self
+
+from urc.testing.rig import SERVER_ADDRESS, Heard, Operators, Relay, Robots, Server
+
+__all__ = ["BOUND_MS", "DEATHS", "LEASE_MS", "LINK_DEATHS", "Rig", "Trial", "lane_profile"]
+
+LEASE_MS = 250.0
+BOUND_MS = LEASE_MS + 50.0
+"""The first stop byte is to reach the robot within this time of the last accepted tick."""
+LINK_DEATHS = ("black-hole", "interface-down")
+"""Those that need the relay."""
+DEATHS = ("close", "kill", "freeze", "block", "reset", "kick", *LINK_DEATHS)
+HEALED_S = 0.4
+"""How long it is looked whether a healed link brings motion back."""
+STOP_WITHIN_S = 3.0
+
+_PROFILE = """\
+urc: 1
+kind: robot
+name: lane-{lane}
+title: Lane {lane}
+summary: A robot of the rig. It stamps what it hears.
+transports:
+  wire: {{ type: {kind}, host: {host}, port: {port}, framing: {{ type: {framing} }} }}
+commands:
+  go:
+    send: "M {{{{ t }}}}"
+    args: {{ t: {{ type: integer, min: 0 }} }}
+    hold: {{ repeat: 50ms, lease: 250ms, release: {{ t: 0 }}, watchdog: none }}
+"""
+
+
+def lane_profile(lane: int, host: str, port: int, kind: str = "tcp") -> str:
+    """Return the document of one robot of the rig: ``M TIME`` moves it, ``M 0`` stops it."""
+    framing = "delimiter, tx: LF, rx: LF" if kind == "tcp" else "datagram"
+    return _PROFILE.format(lane=lane, kind=kind, host=host, port=port, framing=framing)
+
+
+class Trial(NamedTuple):
+    """One death."""
+
+    death: str
+    stop_ms: float
+    """From the sending of the last tick that had an effect, to the first byte of the stop."""
+    fault: str
+    """What must not happen, and did; "" when nothing."""
+    late_ms: float
+    """By how much the robots' own process was not woken in time meanwhile: a busy machine."""
+
+    @property
+    def is_good(self) -> bool:
+        """Whether the contract was kept."""
+        return not self.fault and self.stop_ms <= BOUND_MS
+
+    @property
+    def is_excused(self) -> bool:
+        """Whether this machine itself was later than the trial was: it says nothing then."""
+        return not self.fault and 0 < self.stop_ms - BOUND_MS <= self.late_ms
+
+
+class Rig:
+    """Some robots, a real server, and pages that die; with a relay between them where one is."""
+
+    def __init__(
+        self, folder: Path, *, lanes: int = 20, has_relay: bool = False, options: Sequence[str] = ()
+    ) -> None:
+        """Start everything.
+
+        Args:
+            folder: for the documents and the server's data.
+            lanes: robots, and pages at once.
+            has_relay: put a link between pages and server that can be cut; needs root.
+            options: of ``urc serve``.
+        """
+        self._dice = random.Random(5)  # noqa: S311 - the same phases in every run
+        self._numbers = 0
+        self._programs = ExitStack()
+        try:
+            enter = self._programs.enter_context
+            self.relay = enter(Relay()) if has_relay else None
+            here = self.relay.inside("a") if self.relay else ()
+            there = self.relay.inside("b") if self.relay else ()
+            self.host = SERVER_ADDRESS if self.relay else "127.0.0.1"
+            self.robots = enter(Robots(["tcp:127.0.0.1:0"] * lanes, inside=there))
+            files = [folder / f"lane-{lane}.yaml" for lane in range(lanes)]
+            for lane, file in enumerate(files):
+                text = lane_profile(lane, "127.0.0.1", self.robots.ports[lane])
+                file.write_text(text, "utf-8")
+            self.server = enter(
+                Server(files, folder / "data", *options, host=self.host, inside=there)
+            )
+            self.operators = enter(Operators(inside=here))
+        except BaseException:
+            self._programs.close()
+            raise
+
+    def __enter__(self) -> Self:
+        """Return it; everything ends with the block."""
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """End everything."""
+        self._programs.close()
+
+    def bout(self, death: str) -> list[Trial]:
+        """Let one page on each robot die; return what came of it."""
+        began_ns = time.monotonic_ns()
+        pages = self._begin(death)
+        self._let_die(death, pages)
+        heard = {lane: self._await_stop(lane, began_ns) for lane in pages}
+        self._heal(death, pages)
+        for number in pages.values():
+            self.operators.kill(number)
+        return [
+            self._judge(death, lane, began_ns, heard[lane], number)
+            for lane, number in pages.items()
+        ]
+
+    def _begin(self, death: str) -> Mapping[int, int]:
+        pages: dict[int, int] = {}
+        for lane in range(len(self.robots.heard)):
+            self._numbers += 1
+            pages[lane] = self._numbers
+            plan = {
+                "number": self._numbers,
+                "host": self.host,
+                "port": self.server.port,
+                "robot": f"lane-{lane}",
+                "death": "outside" if death in LINK_DEATHS else death,
+                "drive_s": 0.3 + self._dice.random() * 0.2,
+            }
+            self.operators.start(plan)
+        return pages
+
+    def _let_die(self, death: str, pages: Mapping[int, int]) -> None:
+        for number in pages.values():
+            self.operators.await_told("dying", number)
+            if death == "black-hole":
+                self._link().do(f"cut {self.operators.await_told('port', number)}")
+        if death == "interface-down":
+            self._link().do("down a")
+
+    def _heal(self, death: str, pages: Mapping[int, int]) -> None:
+        """Bring the link back: what the pages' kernels kept arrives now, and must move nothing."""
+        if death == "black-hole":
+            self._link().do(*(f"heal {self.operators.news['port', one]}" for one in pages.values()))
+        elif death == "interface-down":
+            self._link().do("up a")
+        if death in LINK_DEATHS:
+            time.sleep(HEALED_S)
+
+    def _link(self) -> Relay:
+        if self.relay is None:
+            raise ValueError("this rig has no relay")
+        return self.relay
+
+    def _await_stop(self, lane: int, began_ns: int) -> int:
+        """Wait until a robot has heard motion, and then a stop; return how many lines that was."""
+
+        def is_still() -> bool:
+            texts = [one.text for one in self.robots.since(lane, began_ns)]
+            return len(texts) > 1 and texts[-1] == "M 0"
+
+        try:
+            self.robots.wait_until(is_still, STOP_WITHIN_S, f"the stop of lane {lane}")
+        except AssertionError:
+            return 0
+        return len(self.robots.since(lane, began_ns))
+
+    def _judge(self, death: str, lane: int, began_ns: int, until_stop: int, number: int) -> Trial:
+        heard = self.robots.since(lane, began_ns)
+        moved = [place for place, one in enumerate(heard) if one.text != "M 0"]
+        stop = next((one for one in heard[moved[-1] + 1 :] if one.text == "M 0"), None) if (
+            moved
+        ) else None  # fmt: skip
+        if stop is None:
+            said = self.operators.news["dying", number].partition(" ")[2]
+            fault = "no stop came" if moved else f"nothing moved ({said})"
+            return Trial(death, float("inf"), fault, 0.0)
+        sent_ns = int(heard[moved[-1]].text[2:]) * 1000
+        fault = "" if moved[-1] < until_stop else "it moved again after the stop"
+        late_ms = self.robots.latest_ms(sent_ns, stop.time_ns + 20_000_000)
+        return Trial(death, (stop.time_ns - sent_ns) / 1e6, fault or _order(heard), late_ms)
+
+
+def _order(heard: Sequence[Heard]) -> str:
+    """Return "" when no value came that is older than one before it."""
+    sent = [int(one.text[2:]) for one in heard if one.text != "M 0"]
+    return "" if sent == sorted(sent) else "an older value came after a newer one"

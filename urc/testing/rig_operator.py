@@ -1,0 +1,332 @@
+"""People at screens, and how they vanish: a program of its own, which imports nothing of URC.
+
+Reads one plan a line from standard input, as JSON, and forks a process for each: a page that takes
+the controls, ticks every 50 ms, and dies in the way that the plan says. What it does is told on
+standard output, one line each, with times of the monotonic clock in nanoseconds::
+
+    pid NUMBER PID          the process of plan NUMBER
+    port NUMBER PORT        the port from which it is connected: what a relay may cut
+    driving NUMBER TIME     the first tick was sent
+    dying NUMBER TIME TEXT  now; and what the server refused last, if anything
+    failed NUMBER TEXT      it could not drive
+    ended NUMBER TIME       it was killed by order, a plan ``{"kill": NUMBER}``
+
+The value of every tick is the time at which it was sent, in microseconds: a robot that hears it
+knows how old it is. Ends when its standard input does, and ends every process that it forked.
+"""
+
+import base64
+import contextlib
+import ctypes
+import json
+import os
+import select
+import signal
+import socket
+import struct
+import sys
+import time
+from typing import Any, NamedTuple
+
+TICK_NS = 50_000_000
+ANSWER_S = 10.0
+LONGEST_LIFE_S = 40.0
+_PR_SET_PDEATHSIG = 1
+FLOOD = 400
+"""Messages at once for which a server throws a page out."""
+
+
+class Plan(NamedTuple):
+    """What one page is to do."""
+
+    number: int
+    host: str
+    port: int
+    robot: str
+    death: str
+    """``close``, ``kill``, ``freeze``, ``block``, ``reset``, ``kick``, or ``outside``: it drives on
+    while somebody else cuts a line."""
+    drive_s: float
+    """How long it drives before."""
+    command: str = "go"
+    argument: str = "t"
+
+
+class Page:
+    """A WebSocket client that does what the dashboard's own page does."""
+
+    def __init__(self, plan: Plan) -> None:
+        self.plan = plan
+        self.epoch = -1
+        self.beat = -1
+        self.you = ""
+        self.is_mine = False
+        self.is_latched = False
+        self.is_live = False
+        """Whether the robot is connected: a page's controls are off before."""
+        self.holder = ""
+        self.refusal = ""
+        self.has_let_go = False
+        self.is_closed = False
+        self.sent = 0
+        self._rest = b""
+        self.socket = socket.create_connection((plan.host, plan.port), ANSWER_S)
+        self.socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        self._shake_hands()
+
+    def _shake_hands(self) -> None:
+        plan = self.plan
+        place = f"{plan.host}:{plan.port}"
+        key = base64.b64encode(os.urandom(16)).decode()
+        head = (
+            f"GET /ws?robot={plan.robot} HTTP/1.1\r\nHost: {place}\r\nOrigin: http://{place}\r\n"
+            "Upgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\n"
+            f"Sec-WebSocket-Key: {key}\r\n\r\n"
+        )
+        self.socket.sendall(head.encode())
+        answer = b""
+        while b"\r\n\r\n" not in answer:
+            data = self.socket.recv(65536)
+            if not data:
+                raise ConnectionError("the server hung up")
+            answer += data
+        first, self._rest = answer.split(b"\r\n\r\n", 1)
+        if b" 101 " not in first.split(b"\r\n")[0]:
+            raise ConnectionError(first.split(b"\r\n")[0].decode("latin-1"))
+        self.socket.setblocking(False)
+        self._sort()  # the first messages may have come along
+
+    def say(self, message: dict[str, Any]) -> bool:
+        """Send a message if the line takes it at once; return whether it did."""
+        return self._frame(1, json.dumps(message).encode())
+
+    def close(self) -> None:
+        """Say good-bye and go, as a closed tab does."""
+        self._frame(8, struct.pack("!H", 1001))
+        self.socket.close()
+
+    def _frame(self, kind: int, data: bytes) -> bool:
+        mask = os.urandom(4)
+        size = bytes([0x80 | len(data)]) if len(data) < 126 else b"\xfe" + struct.pack(
+            "!H", len(data)
+        )  # fmt: skip
+        masked = bytes(byte ^ mask[place % 4] for place, byte in enumerate(data))
+        try:
+            self.socket.sendall(bytes([0x80 | kind]) + size + mask + masked)
+        except BlockingIOError:
+            return False
+        except OSError:
+            self.is_closed = True
+            return False
+        return True
+
+    def wait(self, until_ns: int) -> None:
+        """Take what comes until then."""
+        while not self.is_closed:
+            left_s = (until_ns - time.monotonic_ns()) / 1e9
+            if left_s <= 0 or not select.select([self.socket], [], [], left_s)[0]:
+                return
+            self.hear()
+        time.sleep(max(0.0, (until_ns - time.monotonic_ns()) / 1e9))
+
+    def hear(self) -> None:
+        """Take what has come."""
+        try:
+            data = self.socket.recv(65536)
+        except BlockingIOError:
+            return
+        except OSError:
+            data = b""
+        if not data:
+            self.is_closed = True
+            return
+        self._rest += data
+        self._sort()
+
+    def _sort(self) -> None:
+        while (cut := _frame_of(self._rest)) is not None:
+            kind, body, self._rest = cut
+            if kind == 1:
+                self._take(json.loads(body))
+            elif kind == 8:
+                self.is_closed = True
+            elif kind == 9:
+                self._frame(10, body)
+
+    def _take(self, message: dict[str, Any]) -> None:
+        kind = message.get("t")
+        if kind == "lease":
+            holder = message.get("holder") or {}
+            self.you, self.epoch = message["you"], message["epoch"]
+            self.holder = holder.get("id", "")
+            self.is_mine = bool(self.you) and self.holder == self.you
+            self.is_latched = bool(message.get("latched"))
+        elif kind == "links":
+            self.is_live = all(one["state"] == "live" for one in message["links"])
+        elif kind == "beat":
+            self.beat = message["n"]
+        elif kind in ("refused", "error"):
+            self.refusal = message.get("message", "")
+
+    def tick(self) -> None:
+        """Send a sample of what is held: the time."""
+        self.sent += 1
+        self.say(
+            {
+                "t": "tick",
+                "command": self.plan.command,
+                "epoch": self.epoch,
+                "number": self.sent,
+                "echo": self.beat,
+                "arguments": {self.plan.argument: time.monotonic_ns() // 1000},
+            }
+        )
+
+    def let_go(self) -> None:
+        """Hold nothing any more."""
+        self.has_let_go = True
+        self.say({"t": "release", "command": self.plan.command})
+
+    def take_controls(self) -> None:
+        """Have the lease, a beat and a robot; raise `TimeoutError` when that takes too long."""
+        until_ns = time.monotonic_ns() + int(ANSWER_S * 1e9)
+        asked_ns = 0
+        while not (self.is_mine and self.is_live and self.beat >= 0):
+            now_ns = time.monotonic_ns()
+            if now_ns > until_ns or self.is_closed:
+                raise TimeoutError(f"no controls: {self.refusal or 'no answer'}")
+            # Whoever had them before is going just now: asked again until they are free.
+            if self.you and not self.is_mine and now_ns - asked_ns > TICK_NS:
+                verb = "reset" if self.is_latched else "take"
+                self.say({"t": "drive", "verb": verb})
+                asked_ns = now_ns
+            self.wait(now_ns + TICK_NS // 5)
+
+
+def _frame_of(data: bytes) -> tuple[int, bytes, bytes] | None:
+    """Return kind, body and what follows of the first whole frame; None while it is not whole."""
+    if len(data) < 2:
+        return None
+    head, size = 2, data[1] & 0x7F
+    if size >= 126:
+        wide = 2 if size == 126 else 8
+        head += wide
+        if len(data) < head:
+            return None
+        size = int.from_bytes(data[2:head], "big")
+    if len(data) < head + size:
+        return None
+    return data[0] & 0x0F, data[head : head + size], data[head + size :]
+
+
+def tell(*words: object) -> None:
+    """Write one line in one piece: the processes share the pipe."""
+    os.write(1, (" ".join(map(str, words)) + "\n").encode())
+
+
+def live(plan: Plan) -> None:
+    """Be one page from its first byte to its end."""
+    page = Page(plan)
+    signal.signal(signal.SIGUSR1, lambda *_: page.let_go())
+    tell("port", plan.number, page.socket.getsockname()[1])
+    page.take_controls()
+    began_ns = time.monotonic_ns()
+    tell("driving", plan.number, began_ns)
+    _drive(page, began_ns, began_ns + int(plan.drive_s * 1e9))
+    tell("dying", plan.number, time.monotonic_ns(), page.refusal)
+    _die(page, plan.death)
+
+
+def _drive(page: Page, next_ns: int, until_ns: int) -> None:
+    """Tick on a grid of 50 ms until then."""
+    while next_ns < until_ns:
+        page.wait(next_ns)
+        if not page.has_let_go:
+            page.tick()
+        next_ns += TICK_NS
+    page.wait(until_ns)
+
+
+def _die(page: Page, death: str) -> None:
+    end_ns = time.monotonic_ns() + int(LONGEST_LIFE_S * 1e9)
+    if death == "close":
+        page.close()
+    elif death == "kill":
+        os.kill(os.getpid(), signal.SIGKILL)
+    elif death == "freeze":
+        os.kill(os.getpid(), signal.SIGSTOP)
+    elif death == "reset":
+        page.socket.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+        page.socket.close()
+    elif death == "kick":
+        for _ in range(FLOOD):
+            page.say({"t": "ping", "c": 0})
+        page.wait(end_ns)
+    elif death == "block":
+        page.wait(end_ns)  # the socket lives, the page's thread samples nothing
+    else:
+        _drive(page, time.monotonic_ns(), end_ns)
+
+
+def start(plan: Plan) -> int:
+    """Fork the process of a plan; return its id."""
+    child = os.fork()
+    if child:
+        tell("pid", plan.number, child)
+        return child
+    try:
+        _end_with_parent()
+        os.close(0)
+        live(plan)
+    except Exception as error:
+        tell("failed", plan.number, f"{type(error).__name__}: {error}")
+    finally:
+        os._exit(0)
+
+
+def _end_with_parent() -> None:
+    """Let the kernel end this process with its parent: a frozen one cannot end itself."""
+    with contextlib.suppress(OSError, AttributeError):
+        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+
+
+def _reap(children: dict[int, int]) -> None:
+    """Forget those that have ended: their ids may be somebody else's soon."""
+    for number, child in list(children.items()):
+        if os.waitpid(child, os.WNOHANG)[0]:
+            del children[number]
+
+
+def _kill(children: dict[int, int], number: int) -> None:
+    child = children.pop(number, None)
+    if child is not None:
+        os.kill(child, signal.SIGKILL)  # not reaped, so that the id is still its own
+        os.waitpid(child, 0)
+    tell("ended", number, time.monotonic_ns())
+
+
+def main() -> None:
+    """Fork a page for every plan, until standard input ends; ``{"kill": NUMBER}`` ends one.
+
+    ``{"let_go": NUMBER}`` lets it hold nothing any more, and live on.
+    """
+    children: dict[int, int] = {}
+    try:
+        for line in sys.stdin:
+            order = json.loads(line)
+            _reap(children)
+            if "kill" in order:
+                _kill(children, order["kill"])
+            elif "let_go" in order:
+                os.kill(children[order["let_go"]], signal.SIGUSR1)
+            else:
+                plan = Plan(**order)
+                children[plan.number] = start(plan)
+    finally:
+        _reap(children)
+        for number in list(children):
+            _kill(children, number)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,207 @@
+"""A link between two network namespaces that can be slow, lossy, or cut: a program of its own.
+
+Linux and root only; it needs /dev/net/tun and nothing of URC. ``python rig_relay.py`` makes two
+namespaces, a TUN device in each, and moves packets between them: side ``a`` is 10.77.0.1, side
+``b`` 10.77.0.2, and each has a loopback of its own. Other programs enter by
+``nsenter --net=/proc/PID/fd/FD``. Told on standard output::
+
+    ready FD_A FD_B         descriptors of the two namespaces in this process
+    done TIME               the order before was carried out, monotonic nanoseconds
+
+Orders, one a line of standard input, times in milliseconds::
+
+    delay MS | jitter MS | loss PERCENT
+    cut | heal              the whole link
+    cut a | cut b           only what comes from that side
+    cut PORT | heal PORT    only packets from or to that TCP or UDP port
+    down a | up a           the network interface of a side
+
+Ends when its standard input does; the namespaces end with the last program inside.
+"""
+
+import ctypes
+import fcntl
+import heapq
+import os
+import random
+import selectors
+import socket
+import struct
+import sys
+import time
+from dataclasses import dataclass, field
+
+CLONE_NEWNET = 0x40000000
+TUNSETIFF = 0x400454CA
+IFF_TUN_NO_PI = 0x1001
+SIOCSIFADDR, SIOCSIFNETMASK, SIOCGIFFLAGS, SIOCSIFFLAGS = 0x8916, 0x891C, 0x8913, 0x8914
+IFF_UP = 1
+SIDES = ("a", "b")
+ADDRESSES = {"a": "10.77.0.1", "b": "10.77.0.2"}
+DEVICE = b"tun0"
+MOST_WAITING = 4096
+"""Packets under way; more are lost, as on any link."""
+
+
+@dataclass
+class Side:
+    """One end of the link."""
+
+    name: str
+    namespace: int
+    """Descriptor of its network namespace."""
+    tun: int
+    control: socket.socket
+    """A socket inside, by which its interfaces are set."""
+
+
+@dataclass
+class Weather:
+    """What the link is like."""
+
+    delay_ns: int = 0
+    jitter_ns: int = 0
+    loss: float = 0.0
+    is_cut: dict[str, bool] = field(default_factory=lambda: {"a": False, "b": False})
+    """Side → whether what comes from it is lost."""
+    ports: set[int] = field(default_factory=set)
+
+
+def made(name: str) -> Side:
+    """Put this process into a new namespace, and return it with its device up."""
+    if ctypes.CDLL(None, use_errno=True).unshare(CLONE_NEWNET) != 0:
+        raise OSError(ctypes.get_errno(), "a network namespace cannot be made; it needs root")
+    tun = os.open("/dev/net/tun", os.O_RDWR | os.O_NONBLOCK)
+    fcntl.ioctl(tun, TUNSETIFF, struct.pack("16sH", DEVICE, IFF_TUN_NO_PI))
+    control = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    _address(control, SIOCSIFADDR, ADDRESSES[name])
+    _address(control, SIOCSIFNETMASK, "255.255.255.0")
+    side = Side(name, os.open("/proc/self/ns/net", os.O_RDONLY), tun, control)
+    switch(side, b"lo", is_up=True)
+    switch(side, DEVICE, is_up=True)
+    return side
+
+
+def _address(control: socket.socket, request: int, address: str) -> None:
+    packed = struct.pack("HH4s8x", socket.AF_INET, 0, socket.inet_aton(address))
+    fcntl.ioctl(control, request, struct.pack("16s16s", DEVICE, packed))
+
+
+def switch(side: Side, device: bytes, *, is_up: bool) -> None:
+    """Switch an interface of a side on or off."""
+    answer = fcntl.ioctl(side.control, SIOCGIFFLAGS, struct.pack("16sh14x", device, 0))
+    flags = struct.unpack("16sh14x", answer)[1]
+    flags = flags | IFF_UP if is_up else flags & ~IFF_UP
+    fcntl.ioctl(side.control, SIOCSIFFLAGS, struct.pack("16sh14x", device, flags))
+
+
+def ports_of(packet: bytes) -> tuple[int, int]:
+    """Return the two ports of a TCP or UDP packet over IPv4; zeros for any other."""
+    if packet[0] >> 4 != 4 or packet[9] not in (socket.IPPROTO_TCP, socket.IPPROTO_UDP):
+        return 0, 0
+    head = (packet[0] & 0x0F) * 4
+    if len(packet) < head + 4:
+        return 0, 0
+    source, target = struct.unpack_from("!HH", packet, head)
+    return source, target
+
+
+class Relay:
+    """The loop that moves packets."""
+
+    def __init__(self) -> None:
+        self.weather = Weather()
+        self._dice = random.Random(7)  # noqa: S311 - the same losses in every run
+        self._sides = {name: made(name) for name in SIDES}
+        self._waiting: list[tuple[int, int, str, bytes]] = []
+        self._numbers = 0
+        self._orders = b""
+        self._selector = selectors.DefaultSelector()
+        for side in self._sides.values():
+            self._selector.register(side.tun, selectors.EVENT_READ, side)
+        self._selector.register(0, selectors.EVENT_READ)
+        tell("ready", *(side.namespace for side in self._sides.values()))
+
+    def run(self) -> None:
+        """Move packets until standard input ends."""
+        while True:
+            wait_s = None
+            if self._waiting:
+                wait_s = max(0.0, (self._waiting[0][0] - time.monotonic_ns()) / 1e9)
+            for key, _ in self._selector.select(wait_s):
+                if key.fd != 0:
+                    self._take(key.data)
+                elif not self._obey():
+                    return
+            self._deliver()
+
+    def _take(self, side: Side) -> None:
+        for _ in range(64):
+            try:
+                packet = os.read(side.tun, 65536)
+            except OSError:  # nothing more, or the interface is down
+                return
+            weather = self.weather
+            lost = weather.is_cut[side.name] or len(self._waiting) >= MOST_WAITING
+            lost = lost or not weather.ports.isdisjoint(ports_of(packet))
+            if lost or (weather.loss and self._dice.random() < weather.loss):
+                continue
+            due_ns = time.monotonic_ns() + weather.delay_ns
+            if weather.jitter_ns:
+                due_ns += self._dice.randrange(weather.jitter_ns)
+            self._numbers += 1
+            other = "b" if side.name == "a" else "a"
+            heapq.heappush(self._waiting, (due_ns, self._numbers, other, packet))
+
+    def _deliver(self) -> None:
+        now_ns = time.monotonic_ns()
+        while self._waiting and self._waiting[0][0] <= now_ns:
+            _, _, name, packet = heapq.heappop(self._waiting)
+            try:
+                os.write(self._sides[name].tun, packet)
+            except OSError:
+                continue  # its interface is down: lost
+
+    def _obey(self) -> bool:
+        data = os.read(0, 65536)
+        *orders, self._orders = (self._orders + data).split(b"\n")
+        for order in orders:
+            self._do(order.decode().split())
+            tell("done", time.monotonic_ns())
+        return bool(data)
+
+    def _do(self, words: list[str]) -> None:
+        verb, what = words[0], words[1] if len(words) > 1 else ""
+        weather = self.weather
+        if verb == "delay":
+            weather.delay_ns = int(float(what) * 1e6)
+        elif verb == "jitter":
+            weather.jitter_ns = int(float(what) * 1e6)
+        elif verb == "loss":
+            weather.loss = float(what) / 100
+        elif verb in ("down", "up"):
+            switch(self._sides[what], DEVICE, is_up=verb == "up")
+        elif what.isdigit():
+            (weather.ports.add if verb == "cut" else weather.ports.discard)(int(what))
+        else:
+            for side in [what] if what else SIDES:
+                weather.is_cut[side] = verb == "cut"
+            if verb == "cut":  # what is under way is lost, too
+                self._waiting = [one for one in self._waiting if not weather.is_cut[_from(one)]]
+                heapq.heapify(self._waiting)
+
+
+def _from(one: tuple[int, int, str, bytes]) -> str:
+    return "b" if one[2] == "a" else "a"
+
+
+def tell(*words: object) -> None:
+    """Write one line."""
+    os.write(1, (" ".join(map(str, words)) + "\n").encode())
+
+
+if __name__ == "__main__":
+    try:
+        Relay().run()
+    except OSError as error:
+        sys.exit(f"rig_relay: {error}")
