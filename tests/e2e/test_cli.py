@@ -195,6 +195,33 @@ def test_simulated_robot_needs_no_settings(urc_process: Start, tmp_path: Path) -
     assert robot.errors == []
 
 
+def test_simulated_robot_tells_what_it_cannot_answer(urc_process: Start) -> None:
+    """Once at once, the rest counted; what is known is answered all the while."""
+    robot = urc_process("simulate", PUPPET, "--set", "port=0")
+    port = int(robot.wait_for(r"^listening wire tcp 127\.0\.0\.1:(\d+)$")[1])
+    for _ in range(3):
+        with socket.create_connection(("127.0.0.1", port), timeout=TIMEOUT_S) as client:
+            client.sendall(b"Give me the batery %\nGive me the battery %\n")
+            assert re.fullmatch(rb"\d{1,2}\n", client.recv(100))
+    assert robot.interrupt() == 0
+    complaint = "wire: no rule takes 'Give me the batery %', and the driver never sends it"
+    assert robot.errors == [complaint, f"{complaint} (2 more times)"]
+
+
+def test_simulated_robot_hangs_up_where_a_rule_says_so(urc_process: Start, tmp_path: Path) -> None:
+    """What it said before is on its way first, the answer that waits included."""
+    rude = tmp_path / "rude.yaml"
+    then = "[{ after: 100ms, send: bye, close: true }]"
+    rules = f"simulator:\n  wire: [{{ match: '^quit$', send: bye, then: {then} }}]\n"
+    rude.write_text(BOT.partition("simulator:")[0] + rules, encoding="utf-8")
+    robot = urc_process("simulate", str(rude))
+    port = int(robot.wait_for(r"^listening wire tcp 127\.0\.0\.1:(\d+)$")[1])
+    with socket.create_connection(("127.0.0.1", port), timeout=TIMEOUT_S) as client:
+        client.sendall(b"quit\n")
+        assert client.makefile("rb").read() == b"bye\nbye\n"
+    assert robot.interrupt() == 0
+
+
 # -- send
 
 

@@ -14,11 +14,11 @@ from typing import IO, Any
 
 import pytest
 
+from scripts.needs import LANGUAGE_SERVER
 from scripts.node import node_executable
 from urc.config.shape import KINDS, read_schema
 
 ROOT = Path(__file__).resolve().parents[2]
-SERVER = ROOT / "node_modules" / "yaml-language-server" / "bin" / "yaml-language-server"
 TIMEOUT_S = 30
 
 ROBOT = """\
@@ -128,8 +128,7 @@ CAPABILITIES = {
 def server() -> Iterator[LanguageServer]:
     node = node_executable()
     assert node is not None
-    assert SERVER.is_file(), "./dev test brings the language server"
-    started = LanguageServer([node, str(SERVER), "--stdio"])
+    started = LanguageServer([node, str(LANGUAGE_SERVER), "--stdio"])
     try:
         started.request(
             "initialize", processId=None, rootUri=ROOT.as_uri(), capabilities=CAPABILITIES
@@ -181,6 +180,7 @@ def description(pointer: str, file: str = "driver.schema.json") -> str:
 
 
 @pytest.mark.needs("node")
+@pytest.mark.needs("language-server")
 def test_empty_line_is_completed_with_the_keys_of_its_place(server: LanguageServer) -> None:
     """The keys of a signal and of a poll, as a schema beside the named one describes them."""
     opened = Opened(server, ROBOT.replace("    |\n", "    \n"))
@@ -199,6 +199,7 @@ def test_empty_line_is_completed_with_the_keys_of_its_place(server: LanguageServ
 
 
 @pytest.mark.needs("node")
+@pytest.mark.needs("language-server")
 def test_misspelt_key_is_found_and_the_right_one_offered(server: LanguageServer) -> None:
     """Underlined where it stands; completion at its place has the key that was meant."""
     opened = Opened(server, ROBOT.replace("    |\n", ""))
@@ -214,6 +215,7 @@ def test_misspelt_key_is_found_and_the_right_one_offered(server: LanguageServer)
 
 
 @pytest.mark.needs("node")
+@pytest.mark.needs("language-server")
 def test_hover_tells_what_a_key_is(server: LanguageServer) -> None:
     """What a framing of this type is, with an example, two references away."""
     opened = Opened(server, ROBOT.replace("    |\n", ""))

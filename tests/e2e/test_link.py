@@ -156,7 +156,7 @@ async def test_emulated_robot_answers_a_session(is_per_request: bool) -> None:
     settings = {"host": "127.0.0.1", "port": 0}
     async with (
         serve(profile, settings, now=lambda: 1_700_000_045.5) as listening,
-        connected(profile, listening["wire"][1]) as session,
+        connected(profile, listening["wire"].port) as session,
     ):
         assert (await session.command("ask")).values == {"battery": 45}
 
@@ -328,7 +328,7 @@ async def test_emulated_robot_survives_its_clients() -> None:
     profile = quick_profile(is_per_request=True)
     settings = {"host": "127.0.0.1", "port": 0}
     async with serve(profile, settings, now=lambda: 7.0) as listening:
-        host, port = listening["wire"]
+        host, port = listening["wire"].host, listening["wire"].port
         assert host == "127.0.0.1"
         ask = b"Give me the battery %\n"
         assert await converse(port, bytes(range(256)) * 100) == b""
@@ -354,7 +354,7 @@ async def test_netcat_reads_the_emulated_robot() -> None:
         netcat = await asyncio.create_subprocess_exec(
             "nc",
             "127.0.0.1",
-            str(listening["wire"][1]),
+            str(listening["wire"].port),
             stdin=asyncio.subprocess.PIPE,
             stdout=asyncio.subprocess.PIPE,
         )

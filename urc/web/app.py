@@ -8,24 +8,29 @@ from collections.abc import AsyncIterator, Iterable, Mapping
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
 from http import HTTPStatus
+from ipaddress import ip_address
+from pathlib import Path
 
 from starlette.applications import Starlette
 from starlette.exceptions import HTTPException
-from starlette.requests import Request
+from starlette.requests import HTTPConnection, Request
 from starlette.responses import HTMLResponse, JSONResponse, RedirectResponse, Response
 from starlette.routing import Route, WebSocketRoute
 from starlette.types import ASGIApp
 from starlette.websockets import WebSocket
 
 from urc import __version__
+from urc.runtime.latch import LatchFile
 from urc.shipped import vendored
 from urc.web import wire
 from urc.web.assets import STATIC, Assets, folder_assets, import_map, widget_assets
+from urc.web.dev import Dev, no_dev_routes
+from urc.web.dev_watch import Remake
 from urc.web.pages import Head, error_page, menu_page, robot_page
 from urc.web.policy import Policy
 from urc.web.robots import LINGER_S, Robot, Station, missing_settings
 from urc.web.server import serve
-from urc.web.socket import Client
+from urc.web.socket import Client, Guest
 
 __all__ = ["Robot", "build_app", "serve"]
 
@@ -37,6 +42,8 @@ def build_app(
     *,
     allowed_hosts: Iterable[str] = (),
     linger_s: float = LINGER_S,
+    data: Path | None = None,
+    remake: Mapping[str, Remake] | None = None,
 ) -> Starlette:
     """Return the application that serves `robots`.
 
@@ -44,14 +51,20 @@ def build_app(
         robots: by the name in their URL.
         allowed_hosts: names it answers to, besides addresses, ``localhost`` and ``*.local``.
         linger_s: how long a robot stays connected after its last client has gone, in seconds.
+        data: folder in which a stop is kept over a restart; None: it is not.
+        remake: makes each robot anew when its document is saved, and turns the dev pages on; None:
+            there are none.
 
     Raises:
         UrcError: two robots bring different widgets of one name.
     """
     vendor = vendored()
     routes = _Routes(
-        robots=robots,
-        stations={name: Station(robot, linger_s=linger_s) for name, robot in robots.items()},
+        robots=dict(robots),
+        stations={
+            name: Station(robot, linger_s=linger_s, latch=_latch(data, robot))
+            for name, robot in robots.items()
+        },
         modules=import_map(vendor),
         static=folder_assets(STATIC),
         vendor=folder_assets(vendor) if vendor else Assets(),
@@ -59,24 +72,40 @@ def build_app(
             widget for robot in robots.values() for widget in robot.profile.widgets.values()
         ),
     )
-    return _Dashboard(routes, frozenset(allowed_hosts))
+    dev = remake and Dev(
+        routes.stations,
+        remake,
+        lambda name, robot: routes.renew(name, robot, _latch(data, robot)),
+        lambda connection: not _guest(connection).place,
+    )
+    return _Dashboard(routes, frozenset(allowed_hosts), dev or None)
+
+
+def _latch(data: Path | None, robot: Robot) -> LatchFile | None:
+    can_move = any(command.hold for command in robot.profile.driver.commands.values())
+    return LatchFile(data / "latches", robot.profile.name) if data and can_move else None
 
 
 class _Dashboard(Starlette):
     """Starlette with the page policy outermost, so that its own error answers pass through it."""
 
-    def __init__(self, routes: "_Routes", allowed_hosts: frozenset[str]) -> None:
+    def __init__(
+        self, routes: "_Routes", allowed_hosts: frozenset[str], dev: Dev | None = None
+    ) -> None:
         self._allowed_hosts = allowed_hosts
+        routes.dev = dev
         super().__init__(
             routes=[
                 Route("/", routes.menu),
                 Route("/robots/{name}/", routes.robot),
                 Route("/healthz", routes.health),
+                Route("/api/v1/robots/{name}/stop", routes.stop, methods=["POST"]),
                 Route("/favicon.ico", routes.favicon),
                 Route("/static/{file:path}", routes.static_file),
                 Route("/vendor/{file:path}", routes.vendor_file),
                 Route("/widgets/{file:path}", routes.widget_file),
                 WebSocketRoute("/ws", routes.socket),
+                *(dev.routes() if dev else no_dev_routes()),
             ],
             exception_handlers={HTTPException: _told, 404: _told, 405: _told, Exception: _broken},
             lifespan=routes.lifespan,
@@ -87,27 +116,40 @@ class _Dashboard(Starlette):
         return Policy(super().build_middleware_stack(), allowed_hosts=self._allowed_hosts)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class _Routes:
-    robots: Mapping[str, Robot]
+    robots: dict[str, Robot]
     stations: Mapping[str, Station]
     modules: Mapping[str, object]
     static: Assets
     vendor: Assets
     widgets: Assets
+    dev: Dev | None = None
+
+    def renew(self, name: str, robot: Robot, latch: LatchFile | None) -> None:
+        """Go on with another version of a robot; raise `UrcError` when its widgets clash."""
+        others = [each for other, each in self.robots.items() if other != name]
+        brought = [w for each in (*others, robot) for w in each.profile.widgets.values()]
+        self.widgets = widget_assets(brought)
+        self.robots[name] = robot
+        self.stations[name].replace(robot, latch)
 
     @asynccontextmanager
     async def lifespan(self, _: Starlette) -> AsyncIterator[None]:
         """Keep one supervisor a robot for as long as the server runs."""
         async with asyncio.TaskGroup() as group:
             tasks = [group.create_task(station.run()) for station in self.stations.values()]
+            if self.dev:
+                tasks.append(group.create_task(self.dev.run()))
             yield
             for task in tasks:
                 task.cancel()
 
     async def menu(self, request: Request) -> Response:
         head = Head(request.state.nonce, "URC")
-        return HTMLResponse(menu_page(head, self.robots), headers=_PAGE)
+        return HTMLResponse(
+            menu_page(head, self.robots, is_dev=self.dev is not None), headers=_PAGE
+        )
 
     async def robot(self, request: Request) -> Response:
         name = request.path_params["name"]
@@ -121,11 +163,31 @@ class _Routes:
         interface = interfaces.get(wanted)
         if interface is None:
             raise HTTPException(404, "This robot has no interface of that name.")
-        html = robot_page(request.state.nonce, name, robot.profile, interface, self.modules)
+        is_watching = "watch" in request.query_params
+        html = robot_page(
+            request.state.nonce,
+            name,
+            robot.profile,
+            interface,
+            self.modules,
+            is_watching=is_watching,
+        )
         return HTMLResponse(html, headers=_PAGE)
 
     async def health(self, _: Request) -> Response:
         return JSONResponse({"status": "ok", "version": __version__}, headers=_PAGE)
+
+    async def stop(self, request: Request) -> Response:
+        """Stop a robot and latch, for a page whose socket is down."""
+        station = self.stations.get(request.path_params["name"])
+        if station is None:
+            return JSONResponse({"error": "no robot of that name is served here"}, 404, _PAGE)
+        if not station.controls.desk.can_move:
+            return JSONResponse({"error": "this robot has nothing that is held"}, 409, _PAGE)
+        station.controls.stop(_guest(request).place or "a screen of this machine")
+        is_confirmed = await station.deliver_stop()
+        by = station.controls.desk.lease.state.latched_by
+        return JSONResponse({"latched": by, "confirmed": is_confirmed}, headers=_PAGE)
 
     async def favicon(self, request: Request) -> Response:
         return self.static.respond("favicon.svg", request)
@@ -147,7 +209,23 @@ class _Routes:
         if station is None:
             await websocket.close(wire.CLOSE_NO_ROBOT, "no robot of that name is served here")
             return
-        await Client(websocket, station, websocket.scope["state"].get("flow")).serve()
+        flow = websocket.scope["state"].get("flow")
+        await Client(websocket, station, flow, _guest(websocket)).serve()
+
+
+def _guest(connection: HTTPConnection) -> Guest:
+    """Return who asks: whoever sits at this machine may do more; a page may choose to watch only.
+
+    Until people sign in, this is all that is known of them.
+    """
+    host = connection.client.host if connection.client else ""
+    try:
+        is_here = ip_address(host.partition("%")[0]).is_loopback
+    except ValueError:
+        is_here = False
+    if "watch" in connection.query_params:
+        return Guest("" if is_here else host, "viewer")
+    return Guest("", "engineer") if is_here else Guest(host, "driver")
 
 
 async def _told(request: Request, error: Exception) -> Response:

@@ -24,7 +24,8 @@ from urc.model.values import Signal, Value
 from urc.model.widget import Widget
 from urc.shipped import shipped
 from urc.web.layout import grid_css
-from urc.web.robots import HELD, Robot, missing_settings, needs_holding
+from urc.web.outputs import motion_lines, output_config
+from urc.web.robots import Robot, missing_settings
 
 __all__ = [
     "Card",
@@ -83,6 +84,8 @@ class Card:
     rows: tuple[SettingRow, ...]
     missing: tuple[str, ...]
     """Names of the settings that keep Connect disabled."""
+    dev_url: str = ""
+    """Of its dev page; "" where there are none."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,6 +131,12 @@ class RobotPage:
     tabs: tuple[Tab, ...]
     """Empty when there is only one interface."""
     cells: tuple[Cell, ...]
+    stop_url: str
+    """Where STOP goes when the socket is down."""
+    lines: str
+    """JSON list of the transports that carry motion; "[]" for a robot that does not move."""
+    can_move: bool
+    """Whether the controls and STOP are shown."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -162,9 +171,10 @@ class WidgetContext:
     missing, so that a widget can leave out what would do nothing."""
 
 
-def menu_page(head: Head, robots: Mapping[str, Robot]) -> str:
+def menu_page(head: Head, robots: Mapping[str, Robot], *, is_dev: bool = False) -> str:
     """Return the menu."""
-    return render("menu.html.j2", MenuPage(head, tuple(map(_card, robots, robots.values()))))
+    cards = tuple(_card(name, robot, is_dev=is_dev) for name, robot in robots.items())
+    return render("menu.html.j2", MenuPage(head, cards))
 
 
 def robot_page(
@@ -173,8 +183,19 @@ def robot_page(
     profile: Profile,
     interface: Interface,
     modules: Mapping[str, object],
+    *,
+    is_watching: bool = False,
 ) -> str:
-    """Return the page of one interface; `modules` is the import map."""
+    """Return the page of one interface.
+
+    Args:
+        nonce: of this response.
+        name: of the robot in its URL.
+        profile: what it is.
+        interface: one of its interfaces.
+        modules: the import map.
+        is_watching: the page is never to drive.
+    """
     uses = _uses(profile, interface)
     slots = tuple(uses)
     widgets = dict.fromkeys(use.widget for use in uses.values())
@@ -185,20 +206,27 @@ def robot_page(
         widget_styles=tuple(f"/widgets/{quote(widget)}/widget.css" for widget in widgets),
         grid_css=grid_css(interface, slots),
     )
-    url = f"/robots/{quote(name, safe='')}/"
+    place = quote(name, safe="")
+    url, watch = f"/robots/{place}/", "&watch" if is_watching else ""
+    lines = motion_lines(profile.driver)
     tabs = tuple(
-        Tab(each.title or each.name, f"{url}?interface={quote(each.name)}", each is interface)
+        Tab(
+            each.title or each.name, f"{url}?interface={quote(each.name)}{watch}", each is interface
+        )
         for each in profile.interfaces.values()
     )
     page = RobotPage(
         head=head,
         title=profile.title,
-        socket=f"/ws?robot={quote(name, safe='')}",
+        socket=f"/ws?robot={place}{watch}",
         tabs=tabs if len(tabs) > 1 else (),
         cells=tuple(
             _cell(index, use, profile, is_background=slot == interface.background)
             for index, (slot, use) in enumerate(uses.items())
         ),
+        stop_url=f"/api/v1/robots/{place}/stop",
+        lines=json.dumps(lines),
+        can_move=bool(lines),
     )
     return render("robot.html.j2", page)
 
@@ -208,8 +236,8 @@ def error_page(nonce: str, status: int, message: str) -> str:
     return render("error.html.j2", ErrorPage(Head(nonce, f"{status}"), status, message))
 
 
-def render(template: str, page: MenuPage | RobotPage | ErrorPage) -> str:
-    """Return a page's HTML."""
+def render(template: str, page: object) -> str:
+    """Return a page's HTML; `page` is the dataclass that the template is documented with."""
     return _pages().get_template(template).render(page=page)
 
 
@@ -244,28 +272,6 @@ def _called(command: str, driver: Driver) -> str:
     return (known and known.title) or _spoken(command)
 
 
-def _output(command: str, driver: Driver) -> dict[str, object]:
-    """Return what ``output.js`` must know of one binding."""
-    known = driver.commands.get(command)
-    line = known.transport if known else ""
-    spec = driver.transports.get(line)
-    # A line that is only made for a command is tried again by the next command, and by nothing
-    # else: one that is lost must not keep anybody from giving it.
-    is_made_for_it = (
-        spec is not None
-        and spec.connection == "per_request"
-        and not any(poll.transport == line for poll in driver.polls)
-    )
-    return {
-        "command": command,
-        "names": {},
-        "fixed": {},
-        "line": "" if is_made_for_it else line,
-        "refusal": HELD if needs_holding(driver, command) else "",
-        "isAnswered": known is not None and (known.reply is not None or bool(known.steps)),
-    }
-
-
 def _cell(index: int, use: WidgetUse, profile: Profile, *, is_background: bool) -> Cell:
     widget = profile.widgets[use.widget]
     context = widget_context(use, widget, profile, uid=f"cell-{index}")
@@ -280,9 +286,7 @@ def _cell(index: int, use: WidgetUse, profile: Profile, *, is_background: bool) 
         "widget": use.widget,
         "title": context.title,
         "inputs": dict(use.inputs),
-        "outputs": {
-            name: _output(command, profile.driver) for name, command in use.outputs.items()
-        },
+        "outputs": {name: output_config(use, name, widget, profile.driver) for name in use.outputs},
         "options": dict(context.options),
     }
     return Cell(index, json.dumps(config), html, error, is_background)
@@ -298,7 +302,7 @@ def _uses(profile: Profile, interface: Interface) -> dict[str, WidgetUse]:
     return {name: use for name, use in found.items() if use is not None}
 
 
-def _card(name: str, robot: Robot) -> Card:
+def _card(name: str, robot: Robot, *, is_dev: bool) -> Card:
     profile = robot.profile
     missing = missing_settings(robot)
     rows = tuple(
@@ -307,7 +311,8 @@ def _card(name: str, robot: Robot) -> Card:
     )
     url = f"/robots/{quote(name, safe='')}/"
     names = tuple(setting.name for setting in missing)
-    return Card(profile.title or name, profile.summary, url, rows, names)
+    dev_url = f"{url}dev" if is_dev else ""
+    return Card(profile.title or name, profile.summary, url, rows, names, dev_url)
 
 
 def _row(setting: Setting, value: Value, is_missing: bool) -> SettingRow:

@@ -14,11 +14,14 @@ from typing import Protocol
 
 from urc.model.driver import Driver
 from urc.model.profile import Profile, Setting
-from urc.model.values import Value
+from urc.model.values import Reading, Value
 from urc.problems import UrcError
 from urc.protocol.events import Replied
 from urc.runtime.clock import Clock, LoopClock
 from urc.runtime.hub import Hub
+from urc.runtime.latch import LatchFile
+from urc.runtime.motion import Frames, Movers
+from urc.web.controls import Controls
 from urc.web.fanout import Fanout
 
 __all__ = [
@@ -36,6 +39,9 @@ LINGER_S = 2.0
 OPEN_TIMEOUT_S = 10.0
 RETRY_S = 1.0
 CLIENTS = 256
+STOP_WITHIN_S = 1.0
+"""How long somebody who stops a robot without a socket waits to hear that it was reached."""
+_LOOK_S = 0.01
 HELD = "this command moves the robot for as long as it is held, and nothing here can hold it"
 
 log = logging.getLogger(__name__)
@@ -48,7 +54,15 @@ class SessionLike(Protocol):
     def hub(self) -> Hub:
         """Latest values and link states."""
 
-    async def command(self, name: str, arguments: Mapping[str, Value]) -> Replied:
+    @property
+    def frames(self) -> Frames:
+        """What makes the frames of held commands."""
+
+    @property
+    def movers(self) -> Movers | None:
+        """Who writes them; None where the robot has no held command."""
+
+    async def command(self, name: str, arguments: Mapping[str, Reading]) -> Replied:
         """Run one command and return its reply; raise `CommandFailed` when there is none."""
 
 
@@ -103,13 +117,25 @@ class Station:
         *,
         linger_s: float = LINGER_S,
         clock: Clock | None = None,
+        latch: LatchFile | None = None,
     ) -> None:
+        """Wait for the first client.
+
+        Args:
+            robot: whose session it is.
+            linger_s: how long it stays open after the last client has gone, in seconds.
+            clock: the time.
+            latch: keeps a stop over a restart.
+        """
         self.robot = robot
         self.clock: Clock = clock or LoopClock()
+        self.controls = Controls(robot.profile.driver, self.clock, latch)
         self._linger_s = linger_s
         self._visitors = 0
         self._stirred = asyncio.Event()
         self._next: asyncio.Future[Live] | None = None
+        self._is_open = False
+        self._successor: tuple[Robot, LatchFile | None] | None = None
 
     @property
     def is_full(self) -> bool:
@@ -135,10 +161,43 @@ class Station:
         except TimeoutError:
             raise SessionFailed("the robot's session did not open in time") from None
 
+    async def deliver_stop(self) -> bool:
+        """Wait a moment for the stop to reach the robot, connecting it when nobody looks at it."""
+        desk = self.controls.desk
+        end_s = self.clock.now() + STOP_WITHIN_S
+        with self.visit():
+            while not desk.is_confirmed and self.clock.now() < end_s:
+                await self.clock.sleep(_LOOK_S)
+        return desk.is_confirmed
+
+    @property
+    def is_at_rest(self) -> bool:
+        """Whether nobody has the controls and every stop has reached the robot."""
+        desk = self.controls.desk
+        return desk.lease.state.holder is None and desk.is_confirmed
+
+    def replace(self, robot: Robot, latch: LatchFile | None = None) -> None:
+        """Go on with another version of the robot; an open session ends, and the next is its own.
+
+        For a robot that `is_at_rest`: it is disconnected meanwhile.
+        """
+        self._successor = (robot, latch)
+        if not self._is_open:
+            self._succeed()
+        self._stirred.set()
+
+    def _succeed(self) -> None:
+        self._is_open = False
+        if self._successor is not None:
+            (self.robot, latch), self._successor = self._successor, None
+            self.controls.renew(self.robot.profile.driver, latch)
+
     async def run(self) -> None:
         """Supervise for ever; ends by being cancelled."""
         while True:
+            self._succeed()
             await self._wait_for(present=True)
+            self._is_open = True
             try:
                 async with self.robot.open_session() as session:
                     await self._serve(session)
@@ -156,10 +215,14 @@ class Station:
         self._coming().set_result(live)
         try:
             async with asyncio.TaskGroup() as group:
-                flushing = group.create_task(live.fanout.run())
+                tasks = [
+                    group.create_task(work)
+                    for work in (live.fanout.run(), self.controls.serve(session))
+                ]
                 await self._until_deserted()
                 self._next = None  # who comes from here on waits for the next session
-                flushing.cancel()
+                for task in tasks:
+                    task.cancel()
         finally:
             self._next = None
             live.ended.set()
@@ -170,15 +233,15 @@ class Station:
             await self._wait_for(present=False)
             end_s = self.clock.now() + self._linger_s
             alarm = self.clock.call_at(end_s, self._stirred.set)
-            while not self._visitors and self.clock.now() < end_s:
+            while not self._visitors and self.clock.now() < end_s and not self._successor:
                 self._stirred.clear()
                 await self._stirred.wait()
             alarm.cancel()
-            if not self._visitors:
+            if not self._visitors or self._successor:
                 return
 
     async def _wait_for(self, *, present: bool) -> None:
-        while (self._visitors > 0) is not present:
+        while (self._visitors > 0) is not present and not self._successor:
             self._stirred.clear()
             await self._stirred.wait()
 

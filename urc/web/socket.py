@@ -9,13 +9,15 @@ import asyncio
 import logging
 import math
 from collections import deque
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 from starlette.types import Message
 from starlette.websockets import WebSocketDisconnect
 
+from urc.motion.lease import Role
 from urc.runtime.session import CommandFailed
 from urc.web import wire
+from urc.web.controls import Seat
 from urc.web.robots import (
     HELD,
     Live,
@@ -24,10 +26,13 @@ from urc.web.robots import (
     missing_settings,
     needs_holding,
 )
+from urc.web.wire_drive import Drive, Driving, Release, Stop, Tick
 
-__all__ = ["Allowance", "Client", "Flow", "Line"]
+__all__ = ["Allowance", "Client", "Flow", "Guest", "Line"]
 
 MESSAGES_PER_S = 100
+TICKS_PER_S = 2000
+"""Ticks of held controls are thinned, not refused: only a flood of them closes the line."""
 BAD_MESSAGES = 10
 COMMANDS_AT_ONCE = 16
 COMMAND_TIMEOUT_S = 30.0
@@ -79,19 +84,36 @@ class Allowance:
         return True
 
 
+class Guest(NamedTuple):
+    """Who is at the other end."""
+
+    place: str = ""
+    """Address, for the others; "" for this machine."""
+    role: Role = "driver"
+
+
 class Client:
     """Talks to one page until either side is done."""
 
-    def __init__(self, line: Line, station: Station, flow: Flow | None = None) -> None:
+    def __init__(
+        self,
+        line: Line,
+        station: Station,
+        flow: Flow | None = None,
+        guest: Guest = Guest(),  # noqa: B008 - it cannot be changed
+    ) -> None:
         self._line = line
         self._station = station
         self._flow = flow
+        self._guest = guest
+        self._seat: Seat | None = None
         self._news = asyncio.Event()
         self._answers: deque[str] = deque()
         self._pong = ""
         self._closing: tuple[int, str] | None = None
         self._commands: set[asyncio.Task[None]] = set()
         self._allowance = Allowance(MESSAGES_PER_S, station.clock.now())
+        self._ticks = Allowance(TICKS_PER_S, station.clock.now())
         self.bad_messages = 0
 
     def wake(self) -> None:
@@ -131,7 +153,9 @@ class Client:
 
     async def _converse(self, live: Live, first: Message | None) -> None:
         live.fanout.listeners.add(self)
+        controls = self._station.controls
         try:
+            self._seat = controls.sit(self._guest.place, self._guest.role, self.wake)
             async with asyncio.TaskGroup() as group:
                 writing = group.create_task(self._write(live))
                 reading = group.create_task(self._read(live, group, first))
@@ -147,6 +171,8 @@ class Client:
             if self._flow:
                 self._flow.abort()
         finally:
+            if self._seat is not None:
+                controls.rise(self._seat)
             live.fanout.listeners.discard(self)
 
     async def _refuse(self, code: int, reason: str) -> None:
@@ -169,7 +195,7 @@ class Client:
                 async with asyncio.timeout(STALL_S):
                     await self._flow.drained()
             self._news.clear()
-            for text in (*live.fanout.take(place), *self._take_answers()):
+            for text in (*live.fanout.take(place), *self._take_controls(), *self._take_answers()):
                 async with asyncio.timeout(STALL_S):
                     await self._line.send_text(text)
             if live.ended.is_set() and not self._closing:
@@ -178,6 +204,9 @@ class Client:
                 await self._line.close(*self._closing)
                 return
             await self._news.wait()
+
+    def _take_controls(self) -> list[str]:
+        return self._station.controls.take(self._seat) if self._seat is not None else []
 
     def _take_answers(self) -> list[str]:
         answers = list(self._answers)
@@ -198,20 +227,33 @@ class Client:
 
     def _take(self, message: Message, live: Live, group: asyncio.TaskGroup) -> None:
         now_s = self._station.clock.now()
-        if not self._allowance.take(now_s):
-            self._close(wire.CLOSE_TOO_FAST, f"more than {MESSAGES_PER_S} messages a second")
+        if not self._ticks.take(now_s):
+            self._close(wire.CLOSE_TOO_FAST, f"more than {TICKS_PER_S} messages a second")
             return
+        asked: wire.Inbound | None = None
+        fault = ""
         try:
             asked = wire.decode(message.get("text") or message.get("bytes") or "")
         except wire.BadMessage as error:
-            self._count_bad(str(error))
-            return
-        if isinstance(asked, wire.Ping):
+            fault = str(error)
+        if isinstance(asked, (Tick, Release, Stop)):
+            self._hear(asked)  # a stop is not counted: it is taken, however much else was said
+        elif not self._allowance.take(now_s):
+            self._close(wire.CLOSE_TOO_FAST, f"more than {MESSAGES_PER_S} messages a second")
+        elif asked is None:
+            self._count_bad(fault)
+        elif isinstance(asked, Drive):
+            self._hear(asked)
+        elif isinstance(asked, wire.Ping):
             if math.isfinite(asked.c):
                 self._pong = wire.encode_pong(asked, now_s)
                 self.wake()
         else:
             self._start(asked, live, group)
+
+    def _hear(self, said: Driving) -> None:
+        if self._seat is not None:
+            self._station.controls.hear(self._seat, said)
 
     def _count_bad(self, reason: str) -> None:
         self.bad_messages += 1

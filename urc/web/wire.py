@@ -13,8 +13,14 @@ Server → page, by ``t``::
     pong    the answer to a ping
     error   a message of the page that could not be used, or why the socket is about to close
 
-Page → server: ``ping`` and ``run``. The types below bound their nesting: anything deeper than an
-argument map of plain values is refused by the decoder without being read further.
+    lease   who has the controls, who asks for them, and whether a stop is latched
+    beat    a number for the screen that has the controls, every 50 ms: its ticks echo it
+    stopped a control stopped without being let go: nothing moves before a new gesture
+    refused a tick, or a wish about the controls, was not taken
+
+Page → server: ``ping``, ``run``, and for the controls ``drive``, ``tick``, ``release`` and
+``stop``. The types below bound their nesting: anything deeper than an argument map of plain values
+is refused by the decoder without being read further.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -25,6 +31,8 @@ from urc.model.driver import Command, Driver, Poll
 from urc.model.profile import Profile
 from urc.model.values import Reading, Sample, Signal
 from urc.runtime.hub import LinkStatus, Note
+from urc.web.wire_drive import Drive, Release, Stop, Tick
+from urc.web.wire_text import Outbound, cut, encoded, milliseconds
 
 __all__ = [
     "CLOSE_BAD_MESSAGES",
@@ -51,8 +59,6 @@ __all__ = [
 VERSION = 1
 INBOUND_BYTES = 64 * 1024
 """Longest message taken from a page."""
-TEXT_CHARACTERS = 4096
-"""Longest text value sent to a page; a longer one is cut and ends in an ellipsis."""
 _EXACT = 2**53 - 1  # beyond it a browser's numbers skip integers
 
 CLOSE_BAD_MESSAGES = 4400
@@ -65,10 +71,6 @@ CLOSE_FULL = 4503
 
 class BadMessage(Exception):
     """A page sent something that is no message; the text says what was expected."""
-
-
-class _Outbound(msgspec.Struct, tag_field="t", omit_defaults=True, frozen=True):
-    pass
 
 
 class _Signal(msgspec.Struct, omit_defaults=True, frozen=True):
@@ -86,7 +88,7 @@ class _Signal(msgspec.Struct, omit_defaults=True, frozen=True):
     """Transports that bring it: when none of them is live, the value is old at once."""
 
 
-class _Hello(_Outbound, tag="hello", omit_defaults=False, frozen=True):
+class _Hello(Outbound, tag="hello", omit_defaults=False, frozen=True):
     version: int
     session: str
     """Changes when the robot was connected anew: the log's numbers begin again."""
@@ -97,7 +99,7 @@ class _Hello(_Outbound, tag="hello", omit_defaults=False, frozen=True):
     signals: list[_Signal]
 
 
-class _Values(_Outbound, tag="v", frozen=True):
+class _Values(Outbound, tag="v", frozen=True):
     n: int
     i: list[int]
     v: list[object]
@@ -115,7 +117,7 @@ class _Link(msgspec.Struct, frozen=True):
     faults: int
 
 
-class _Links(_Outbound, tag="links", omit_defaults=False, frozen=True):
+class _Links(Outbound, tag="links", omit_defaults=False, frozen=True):
     links: list[_Link]
 
 
@@ -126,13 +128,13 @@ class _Line(msgspec.Struct, frozen=True):
     text: str
 
 
-class _Log(_Outbound, tag="log", omit_defaults=False, frozen=True):
+class _Log(Outbound, tag="log", omit_defaults=False, frozen=True):
     first: int
     """Number of the first line in this session, from 0."""
     lines: list[_Line]
 
 
-class _Reply(_Outbound, tag="reply", frozen=True):
+class _Reply(Outbound, tag="reply", frozen=True):
     id: int
     ok: bool
     values: Mapping[str, object] | None = None
@@ -140,12 +142,12 @@ class _Reply(_Outbound, tag="reply", frozen=True):
     message: str = ""
 
 
-class _Pong(_Outbound, tag="pong", frozen=True):
+class _Pong(Outbound, tag="pong", frozen=True):
     c: float
     n: int
 
 
-class _Error(_Outbound, tag="error", frozen=True):
+class _Error(Outbound, tag="error", frozen=True):
     code: str
     message: str
 
@@ -156,18 +158,20 @@ class Ping(msgspec.Struct, tag_field="t", tag="ping", forbid_unknown_fields=True
     c: float
 
 
+_Scalar = bool | int | float | str
+
+
 class Run(msgspec.Struct, tag_field="t", tag="run", forbid_unknown_fields=True, frozen=True):
     """One command. The page chooses `id`; exactly one reply carries it."""
 
     id: int
     command: str
-    arguments: dict[str, bool | int | float | str | None] = {}
+    arguments: dict[str, bool | int | float | str | tuple[_Scalar, ...] | None] = {}
 
 
-Inbound = Ping | Run
+Inbound = Ping | Run | Drive | Tick | Release | Stop
 
 _decoder: msgspec.json.Decoder[Inbound] = msgspec.json.Decoder(Inbound)
-_encoder = msgspec.json.Encoder()
 
 
 def decode(text: str | bytes) -> Inbound:
@@ -184,13 +188,13 @@ def encode_hello(profile: Profile, session: str, now_s: float) -> str:
     """Return the first message: what every later index means."""
     sources = _sources(profile.driver)
     signals = profile.driver.signals
-    return _text(
+    return encoded(
         _Hello(
             version=VERSION,
             session=session,
             robot=profile.name,
             title=profile.title,
-            now=_ms(now_s),
+            now=milliseconds(now_s),
             names=tuple(signals),
             signals=[_signal(signal, sources.get(name, ())) for name, signal in signals.items()],
         )
@@ -200,12 +204,12 @@ def encode_hello(profile: Profile, session: str, now_s: float) -> str:
 def encode_values(samples: Sequence[Sample], index: Mapping[str, int], now_s: float) -> str:
     """Return one frame with the newest reading of each changed signal."""
     alarms = [sample.alarm for sample in samples]
-    return _text(
+    return encoded(
         _Values(
-            n=_ms(now_s),
+            n=milliseconds(now_s),
             i=[index[sample.signal] for sample in samples],
             v=[_plain(sample.value) for sample in samples],
-            a=[max(0, _ms(now_s - sample.time_s)) for sample in samples],
+            a=[max(0, milliseconds(now_s - sample.time_s)) for sample in samples],
             s=list(alarms) if any(alarms) else None,
         )
     )
@@ -213,15 +217,15 @@ def encode_values(samples: Sequence[Sample], index: Mapping[str, int], now_s: fl
 
 def encode_links(links: Iterable[LinkStatus], now_s: float) -> str:
     """Return the state of every transport."""
-    return _text(
+    return encoded(
         _Links(
             [
                 _Link(
                     transport=link.transport,
                     state=link.state,
                     address=link.address,
-                    since=max(0, _ms(now_s - link.since_s)),
-                    detail=_cut(link.detail),
+                    since=max(0, milliseconds(now_s - link.since_s)),
+                    detail=cut(link.detail),
                     attempts=link.attempts,
                     faults=link.faults,
                 )
@@ -234,10 +238,10 @@ def encode_links(links: Iterable[LinkStatus], now_s: float) -> str:
 def encode_log(notes: Iterable[Note], first: int, now_s: float) -> str:
     """Return lines of the log, the first of which has the number `first` in its session."""
     lines = [
-        _Line(max(0, _ms(now_s - note.time_s)), note.level, note.source, _cut(note.text))
+        _Line(max(0, milliseconds(now_s - note.time_s)), note.level, note.source, cut(note.text))
         for note in notes
     ]
-    return _text(_Log(first, lines))
+    return encoded(_Log(first, lines))
 
 
 def encode_reply(
@@ -245,43 +249,25 @@ def encode_reply(
 ) -> str:
     """Return the answer to a command: its values, or `code` and `message` when it failed."""
     if code:
-        return _text(_Reply(run.id, ok=False, code=code, message=_cut(message)))
+        return encoded(_Reply(run.id, ok=False, code=code, message=cut(message)))
     plain = {name: _plain(value) for name, value in (values or {}).items()}
-    return _text(_Reply(run.id, ok=True, values=plain))
+    return encoded(_Reply(run.id, ok=True, values=plain))
 
 
 def encode_pong(ping: Ping, now_s: float) -> str:
     """Return the answer to a ping."""
-    return _text(_Pong(ping.c, _ms(now_s)))
+    return encoded(_Pong(ping.c, milliseconds(now_s)))
 
 
 def encode_error(code: str, message: str) -> str:
     """Return why a message was not used, or why the socket closes."""
-    return _text(_Error(code, _cut(message)))
-
-
-def _text(message: msgspec.Struct) -> str:
-    try:
-        return _encoder.encode(message).decode()
-    except UnicodeEncodeError:
-        # A lone surrogate in a robot's text; it must not stop everybody's values.
-        return _encoder.encode(_repaired(msgspec.to_builtins(message))).decode()
-
-
-def _repaired(tree: object) -> object:
-    if isinstance(tree, str):
-        return tree.encode("utf-8", "replace").decode()
-    if isinstance(tree, (list, tuple)):
-        return [_repaired(item) for item in tree]
-    if isinstance(tree, dict):
-        return {_repaired(key): _repaired(value) for key, value in tree.items()}
-    return tree
+    return encoded(_Error(code, cut(message)))
 
 
 def _plain(value: object) -> object:
     """Return the value as a browser can hold it; of bytes, only how many there are."""
     if isinstance(value, str):
-        return _cut(value)
+        return cut(value)
     if type(value) is int and not -_EXACT <= value <= _EXACT:
         return str(value)
     if value is None or isinstance(value, (bool, int, float)):
@@ -292,15 +278,7 @@ def _plain(value: object) -> object:
         return {str(name): _plain(item) for name, item in value.items()}
     if isinstance(value, (list, tuple)):
         return [_plain(item) for item in value]
-    return _cut(str(value))
-
-
-def _cut(text: str) -> str:
-    return text if len(text) <= TEXT_CHARACTERS else text[: TEXT_CHARACTERS - 1] + "…"
-
-
-def _ms(seconds: float) -> int:
-    return round(seconds * 1000)
+    return cut(str(value))
 
 
 def _signal(signal: Signal, sources: tuple[str, ...]) -> _Signal:

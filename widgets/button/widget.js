@@ -27,7 +27,10 @@ export default {
     on(".button-yes", () => button.answer(true));
     on(".button-no", () => button.answer(false));
     const key = (/** @type {KeyboardEvent} */ event) => {
-      if (event.key === "Escape") button.answer(false);
+      if (event.key === "Escape" && button.phase === "asking") {
+        event.preventDefault(); // it means no, and not STOP
+        button.answer(false);
+      }
       // A key that is held down repeats its clicks: that is one tap.
       if (event.repeat && event.key === "Enter") event.preventDefault();
     };

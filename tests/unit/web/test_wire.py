@@ -162,7 +162,7 @@ def test_good_messages(text: str, message: wire.Inbound) -> None:
         '{"t":"ping","c":"1"}',
         '{"t":"ping","c":1,"extra":1}',
         '{"t":"run","id":"1","command":"go"}',
-        '{"t":"run","id":1,"command":"go","arguments":{"v":[1]}}',
+        '{"t":"run","id":1,"command":"go","arguments":{"v":[[1]]}}',
         '{"t":"run","id":1,"command":"go","arguments":{"v":{"w":1}}}',
         '{"t":"run","id":1,"command":"go","arguments":[]}',
         '{"t":"ping","c":1}{"t":"ping","c":1}',

@@ -7,9 +7,11 @@
  * which then shows a card; a cell that cannot be seen is sent nothing.
  *
  * @typedef {import("./types.js").Context} Context
+ * @typedef {import("./types.js").HoldSpec} HoldSpec
  * @typedef {import("./types.js").Instance} Instance
  * @typedef {import("./types.js").Outlet} Outlet
  * @typedef {import("./types.js").Reading} Reading
+ * @typedef {import("./types.js").StopState} StopState
  * @typedef {import("./types.js").Value} Value
  * @typedef {import("./types.js").WidgetModule} WidgetModule
  * @typedef {import("./output.js").Output} Output
@@ -27,16 +29,22 @@
  */
 import { argumentsOf } from "./output.js";
 
+/**
+ * @typedef {object} Doors Where what widgets do goes.
+ * @property {Run} run
+ * @property {() => void} wake asks for an animation frame
+ * @property {import("./input.js").Input} input
+ * @property {import("./stop.js").StopButton} stop
+ */
+
 class Cell {
   /**
    * @param {HTMLElement} el
-   * @param {Run} run
-   * @param {() => void} wake asks for an animation frame
+   * @param {Doors} doors
    */
-  constructor(el, run, wake) {
+  constructor(el, doors) {
     this.el = el;
-    this.run = run;
-    this.wake = wake;
+    this.doors = doors;
     /** @type {Config} */
     this.config = JSON.parse(el.dataset["config"] ?? "{}");
     this.inputs = Object.entries(this.config.inputs);
@@ -68,7 +76,7 @@ class Cell {
       if (this.end.signal.aborted) return;
       this.instance = instance ?? {};
       this.isMounted = true;
-      this.wake();
+      this.doors.wake();
     } catch (error) {
       this.fail(error);
     }
@@ -90,7 +98,18 @@ class Cell {
         if (bound === undefined) {
           return Promise.reject(new Error(`the output ${output} is not bound to a command`));
         }
-        return this.run(bound.command, argumentsOf(bound, args));
+        return this.doors.run(bound.command, argumentsOf(bound, args));
+      },
+      hold: (/** @type {string} */ output, /** @type {HoldSpec} */ spec) => {
+        const bound = Object.hasOwn(this.config.outputs, output)
+          ? this.config.outputs[output]
+          : undefined;
+        if (bound === undefined) throw new Error(`the output ${output} is not bound to a command`);
+        this.doors.input.hold(bound, spec, this.end.signal);
+      },
+      stop: () => this.doors.stop.press(),
+      onStop: (/** @type {(state: StopState) => void} */ listener) => {
+        this.doors.stop.follow(listener, this.end.signal);
       },
     });
   }
@@ -143,8 +162,9 @@ class Cell {
   outlets(store) {
     /** @type {Record<string, Outlet>} */
     const found = Object.create(null);
-    for (const [name, { line, refusal, isAnswered }] of this.outputs) {
-      const reason = refusal || store.hindrance(line);
+    for (const [name, { line, refusal, isAnswered, isHeld }] of this.outputs) {
+      const shared = refusal || store.hindrance(line, isHeld);
+      const reason = shared || (isHeld ? this.doors.input.refusal() : "");
       found[name] = { isReady: reason === "", reason, isAnswered };
     }
     return found;
@@ -185,13 +205,11 @@ class Cell {
 export class Host {
   /**
    * @param {Store} store
-   * @param {Run} run
-   * @param {() => void} wake asks for an animation frame
+   * @param {Doors} doors
    */
-  constructor(store, run, wake) {
+  constructor(store, doors) {
     this.store = store;
-    this.run = run;
-    this.wake = wake;
+    this.doors = doors;
     /** @type {Map<Element, Cell>} */
     this.cells = new Map();
     this.sight = new IntersectionObserver((entries) => {
@@ -199,14 +217,14 @@ export class Host {
         const cell = this.cells.get(entry.target);
         if (cell) cell.isVisible = entry.isIntersecting;
       }
-      this.wake();
+      this.doors.wake();
     });
     this.sizes = new ResizeObserver((entries) => {
       for (const entry of entries) {
         const cell = this.cells.get(entry.target);
         if (cell) cell.size = { width: entry.contentRect.width, height: entry.contentRect.height };
       }
-      this.wake();
+      this.doors.wake();
     });
   }
 
@@ -214,7 +232,7 @@ export class Host {
   mountAll(root) {
     for (const el of root.querySelectorAll("[data-config]")) {
       if (!(el instanceof HTMLElement)) continue;
-      const cell = new Cell(el, this.run, this.wake);
+      const cell = new Cell(el, this.doors);
       this.cells.set(el, cell);
       this.sight.observe(el);
       this.sizes.observe(el);

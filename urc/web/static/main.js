@@ -7,11 +7,20 @@
  */
 import { Alarms } from "./alarms.js";
 import { Badge, part } from "./badge.js";
+import { Controls } from "./controls.js";
+import { Drive } from "./drive.js";
 import { Host } from "./host.js";
+import { Input } from "./input.js";
 import { Panel } from "./panel.js";
 import { Socket } from "./socket.js";
+import { StopButton } from "./stop.js";
 import { Store } from "./store.js";
 
+/** What the server says of a stop that nobody's hand made. @type {Record<string, string>} */
+const STOPPED = {
+  expired: "too long without a sign of this page",
+  revoked: "the line to the robot was cut",
+};
 /** How often ages are looked at when nothing arrives. */
 const AGE_EVERY_MS = 250;
 
@@ -34,11 +43,20 @@ const socket = new Socket(address.href, {
   trip: wake,
   state(isUp) {
     store.setUp(isUp, performance.now());
-    if (!isUp) giveUpCommands();
+    if (!isUp) {
+      giveUpCommands();
+      drive.lost();
+      input.spendAll("the connection to URC was lost");
+    }
     wake();
   },
 });
-const host = new Host(store, run, wake);
+const drive = new Drive(socket, root.dataset["stop"] ?? "", wake);
+const input = new Input(drive);
+const stop = new StopButton(drive, input, store, JSON.parse(root.dataset["lines"] ?? "[]"));
+const bar = root.querySelector("[data-controls]");
+const controls = bar instanceof HTMLElement ? new Controls(bar, drive, stop) : null;
+const host = new Host(store, { run, wake, input, stop });
 
 /** Ask for the one animation frame in which everything is drawn. */
 function wake() {
@@ -54,6 +72,8 @@ function draw() {
   badge.frame(store, socket);
   panel.frame(store, socket.reason);
   alarms.frame(store, nowMs);
+  stop.frame();
+  controls?.frame(nowMs);
 }
 
 /** @param {any} message */
@@ -78,6 +98,23 @@ function take(message) {
       break;
     case "reply":
       settle(message);
+      break;
+    case "lease":
+      drive.setLease(message, nowMs);
+      input.leaseChanged();
+      break;
+    case "beat":
+      drive.beat = message.n;
+      return; // nothing to draw
+    case "stopped":
+      input.stopped(message.command, STOPPED[message.reason] ?? message.reason);
+      break;
+    case "refused":
+      if (message.command) input.stopped(message.command, message.message);
+      else {
+        drive.refused(message.message);
+        input.refused(message.message);
+      }
       break;
     case "error":
       console.warn(`URC: ${message.message}`);

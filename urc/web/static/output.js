@@ -4,14 +4,25 @@
  *
  * @typedef {import("./types.js").Value} Value
  *
+ * @typedef {object} Range Where -1, 0 and 1 of a widget lie in an argument of the command.
+ * @property {number} min
+ * @property {number} max
+ * @property {number} rest What stops it.
+ * @property {boolean} isWhole
+ *
  * @typedef {object} Output What an output of a widget is bound to.
  * @property {string} command
  * @property {Record<string, string>} names Argument of the command → argument of the output, where
  *   they are not called the same.
  * @property {Record<string, Value>} fixed Argument of the command → value that it always has.
+ * @property {Record<string, Range>} ranges Argument of the command → what a widget's -1 to 1 means.
+ * @property {Record<string, Value>} neutral Argument of the command → value that stops it, for those
+ *   that a hand may let go one by one.
  * @property {string} line The transport without which the command cannot be given; "" when one is
  *   made for each command.
  * @property {string} refusal Why a widget can never give it; "" when it can.
+ * @property {boolean} isHeld Whether it is motion, and given by holding.
+ * @property {number} leaseMs How long motion lasts when nothing is heard.
  * @property {boolean} isAnswered Whether the robot says that it was done.
  */
 
@@ -25,12 +36,27 @@
  * @param {Record<string, Value>} given by the names that the widget's manifest declares
  * @returns {Record<string, Value>}
  */
-export function argumentsOf({ names, fixed }, given) {
+export function argumentsOf({ names, fixed, ranges = {}, isHeld }, given) {
   const renamed = new Set(Object.values(names));
-  const pairs = Object.entries(given).filter(([name]) => !renamed.has(name));
+  // What a control that is held gives beyond what the command takes, it gives to nobody.
+  const pairs = Object.entries(given).filter(([name]) => !isHeld && !renamed.has(name));
   for (const [target, name] of Object.entries(names)) {
     const value = Object.hasOwn(given, name) ? given[name] : undefined;
     if (value !== undefined) pairs.push([target, value]);
   }
-  return Object.fromEntries([...pairs, ...Object.entries(fixed)]);
+  const scaled = pairs.map(([target, value]) => [target, scale(value, ranges[target])]);
+  return Object.fromEntries([...scaled, ...Object.entries(fixed)]);
+}
+
+/**
+ * @param {Value | undefined} value
+ * @param {Range | undefined} range
+ * @returns {Value}
+ */
+function scale(value, range) {
+  if (typeof value !== "number" || !range) return value ?? null;
+  const share = Math.min(1, Math.max(-1, value));
+  const end = share < 0 ? range.min : range.max;
+  const scaled = range.rest + Math.abs(share) * (end - range.rest);
+  return range.isWhole ? Math.round(scaled) : Math.round(scaled * 1e6) / 1e6;
 }

@@ -68,6 +68,11 @@ export class Socket {
     return true;
   }
 
+  /** Bytes that were handed to the browser and have not left it. */
+  get unsent() {
+    return this.line?.bufferedAmount ?? 0;
+  }
+
   connect() {
     clearTimeout(this.retry);
     const line = new WebSocket(this.url);

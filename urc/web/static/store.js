@@ -192,10 +192,13 @@ export class Store {
    * Why a command cannot be given now; "" when it can be tried.
    *
    * @param {string} transport the line that must not be lost; "" when one is made for each command
+   * @param {boolean} isMotion nothing waits for a line that is still being made
    */
-  hindrance(transport) {
+  hindrance(transport, isMotion = false) {
     if (!this.isUp) return "no connection to URC";
-    return this.links.get(transport)?.state === "lost" ? "the robot is not connected" : "";
+    const state = this.links.get(transport)?.state;
+    if (state === "lost") return "the robot is not connected";
+    return isMotion && transport && !isConnected(state) ? "the robot is not connected yet" : "";
   }
 
   /**

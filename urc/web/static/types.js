@@ -72,6 +72,45 @@
  * @property {string} [code]
  * @property {string} [message]
  *
+ * @typedef {object} Lease Who has the controls of the robot.
+ * @property {string} you This page.
+ * @property {string} name What the others call it.
+ * @property {number} epoch
+ * @property {{id: string, name: string} | null} holder
+ * @property {{id: string, name: string} | null} asker
+ * @property {number} left Milliseconds until the asker gets them.
+ * @property {string} latched Who pressed STOP; "" while nothing is latched.
+ * @property {boolean} confirmed Whether the robot's lines have taken the stop.
+ * @property {boolean} drives Whether this page may drive.
+ * @property {boolean} forces Whether it may take the controls from whoever has them.
+ *
+ * @typedef {object} Hand What holds a control, at this moment.
+ * @property {"pointer" | "keys" | "pad"} kind
+ * @property {number} x Where the pointer is, in CSS pixels of the window.
+ * @property {number} y
+ * @property {number} startX Where it went down.
+ * @property {number} startY
+ * @property {ReadonlySet<string>} keys Codes of the keys that are down, as "ArrowUp".
+ * @property {[number, number]} axes The stick of a gamepad: right and down are positive, -1 to 1.
+ *
+ * @typedef {"idle" | "asking" | "held" | "spent"} HoldPhase
+ *   asking: held, and the controls are not granted yet. spent: stopped or refused; nothing is sent
+ *   before it is let go and held anew.
+ *
+ * @typedef {object} HoldState
+ * @property {HoldPhase} phase
+ * @property {string} reason Why it is spent, for people.
+ * @property {Record<string, Value> | null} values What was sampled last; null while nothing holds it.
+ *
+ * @typedef {object} HoldSpec
+ * @property {HTMLElement} el What is held; it takes the focus.
+ * @property {string[]} keys Codes of the keys that hold it while it has the focus.
+ * @property {"" | "left" | "right"} [pad] Stick of a gamepad that moves it, while the shoulder
+ *   button beside it is down.
+ * @property {(hand: Hand) => Record<string, Value>} sample Returns the values by the names of the
+ *   output's arguments. Called in each animation frame while it is held; must be quick.
+ * @property {(state: HoldState) => void} show Called when any of it has changed.
+ *
  * @typedef {object} Context What a widget is given, and all it may use.
  * @property {HTMLElement} el Its rendered template's parent: the cell.
  * @property {Readonly<Record<string, unknown>>} options
@@ -80,7 +119,21 @@
  * @property {(output: string, args?: Record<string, Value>) => Promise<Record<string, Value>>} send
  *   Runs the command bound to the output, with arguments by the names of the widget's manifest;
  *   rejects with an Error that says why it was not done.
+ * @property {(output: string, spec: HoldSpec) => void} hold
+ *   Makes an element the grip of a held command: the page samples it, lets go, and says why.
+ * @property {() => void} stop Stops the robot, whoever drives it.
+ * @property {(listener: (state: StopState) => void) => void} onStop Calls the listener now, and
+ *   whenever what is known of STOP changes.
  * @property {AbortSignal} signal Aborted when the widget ends; give it to every listener.
+ *
+ * @typedef {object} StopState
+ * @property {"" | "sending" | "sent" | "confirmed" | "latched" | "failed"} phase How far STOP has
+ *   got: handed over, latched by the server, taken by the robot's line. "" while the robot may be
+ *   driven.
+ * @property {boolean} isLatched
+ * @property {boolean} isConfirmed
+ * @property {string} by Who pressed it.
+ * @property {string} fault Why it could not reach the robot now; "" when it can.
  *
  * @typedef {object} Instance
  * @property {(readings: Readonly<Record<string, Reading>>, outputs: Readonly<Record<string, Outlet>>) => void} [update]

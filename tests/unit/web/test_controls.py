@@ -1,0 +1,194 @@
+"""The controls as screens see them: seats, beats, thinned ticks, and what each is told."""
+
+import asyncio
+import json
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
+from typing import Any
+
+import pytest
+
+from tests.unit.runtime.test_motion import DRIVER
+from urc.motion.lease import Role
+from urc.testing.clock import FakeClock, settle
+from urc.testing.movers import FakeFrames, FakeMovers
+from urc.web import wire_drive as wire
+from urc.web.controls import BEAT_S, THINNED_S, Controls, Seat
+
+pytestmark = pytest.mark.anyio
+
+
+class Scene:
+    """Controls with a robot that is connected."""
+
+    def __init__(self) -> None:
+        self.clock = FakeClock()
+        self.controls = Controls(DRIVER, self.clock)
+        self.frames = FakeFrames(DRIVER)
+        self.movers = FakeMovers(self.clock)
+        self.told: dict[str, list[dict[str, Any]]] = {}
+        self.beats: dict[str, int] = {}
+        self._numbers = 0
+
+    def sit(self, place: str = "", role: Role = "driver") -> Seat:
+        """Sit down, and read what is told at once."""
+        seat = self.controls.sit(place, role, lambda: None)
+        self.told[seat.client.id] = []
+        self.read(seat)
+        return seat
+
+    def read(self, seat: Seat) -> list[dict[str, Any]]:
+        """Return what a screen is told now, beats apart."""
+        messages = [json.loads(text) for text in self.controls.take(seat)]
+        for message in messages:
+            if message["t"] == "beat":
+                self.beats[seat.client.id] = message["n"]
+        return [message for message in messages if message["t"] != "beat"]
+
+    def say(self, seat: Seat, verb: wire.Verb) -> None:
+        """Want something of the controls."""
+        self.controls.hear(seat, wire.Drive(verb))
+        self.read(seat)
+
+    def tick(self, seat: Seat, speed: Any = 0.5, command: str = "drive") -> None:
+        """Tick as a page does."""
+        self.read(seat)
+        self._numbers += 1
+        epoch, echo = self.controls.desk.lease.state.epoch, self.beats.get(seat.client.id, 0)
+        said = wire.Tick(command, epoch, self._numbers, echo, {"speed": speed})
+        self.controls.hear(seat, said)
+
+
+@asynccontextmanager
+async def scene() -> AsyncIterator[Scene]:
+    """Attach the robot; it is gone after the test."""
+    it = Scene()
+    task = asyncio.create_task(it.controls.serve(it))  # type: ignore[arg-type]  # it has both
+    await settle()
+    yield it
+    task.cancel()
+    await settle()
+
+
+async def test_everybody_is_told_of_every_change_and_only_the_holder_hears_beats() -> None:
+    """The newest lease only, however many there were since it was read."""
+    async with scene() as it:
+        ann, bob = it.sit(), it.sit("192.168.1.7")
+        it.say(ann, "take")
+        (lease,) = it.read(bob)
+        assert lease["holder"] == {"id": "s1", "name": "screen 1"}
+        assert (lease["you"], lease["name"]) == ("s2", "screen 2 at 192.168.1.7")
+        first = it.beats["s1"]
+        for _ in range(4):
+            await it.clock.advance(BEAT_S)
+            assert it.read(ann) == []
+        assert it.beats == {"s1": first + 4}
+        it.say(ann, "leave")
+        it.say(ann, "take")
+        it.say(ann, "leave")
+        assert [message["t"] for message in it.read(bob)] == ["lease"]
+        await it.clock.advance(1)
+        assert it.beats == {"s1": it.beats["s1"]}
+
+
+async def test_a_flood_is_thinned_and_its_last_value_arrives() -> None:
+    """A thousand ticks a second: at most the thinned rate is looked at, the newest of them."""
+    async with scene() as it:
+        ann = it.sit()
+        it.say(ann, "take")
+        looked: list[float] = []
+        tick: Callable[..., str] = it.controls.desk.tick
+
+        def counted(*words: Any) -> str:
+            looked.append(words[2]["speed"])
+            return tick(*words)
+
+        it.controls.desk.tick = counted  # type: ignore[method-assign]
+        for step in range(1000):
+            it.tick(ann, step / 1000)
+            await it.clock.advance(0.001)
+        await it.clock.advance(0.1)
+        assert len(looked) <= 1.0 / THINNED_S + 2
+        assert looked[-1] == 0.999
+        assert it.movers.texts[-1] == "drive speed=0.999"
+        assert len(it.movers.texts) <= 1.1 / 0.05 + 2, "the declared rate, on the wire"
+
+
+async def test_what_waits_is_forgotten_by_a_release_a_stop_and_a_page_that_goes() -> None:
+    """A thinned tick that comes after the hand has gone would move the robot again."""
+    async with scene() as it:
+        for end in ("release", "stop", "rise"):
+            ann = it.sit()
+            it.say(ann, "reset")
+            it.say(ann, "take")
+            it.tick(ann, 0.1)
+            it.tick(ann, 0.2)
+            it.tick(ann, 0.3)
+            if end == "release":
+                it.controls.hear(ann, wire.Release("drive"))
+            elif end == "stop":
+                it.controls.hear(ann, wire.Stop())
+            else:
+                it.controls.rise(ann)
+            count = len(it.movers.texts)
+            await it.clock.advance(1)
+            assert [text for text in it.movers.texts[count:] if "stop" not in text] == []
+            it.controls.rise(ann)
+
+
+async def test_a_stop_that_nobody_made_is_told_once_to_all() -> None:
+    """The lease ran out: the holder's page must let go, and the others may know."""
+    async with scene() as it:
+        ann, bob = it.sit(), it.sit()
+        it.say(ann, "take")
+        it.tick(ann)
+        await it.clock.advance(0.35)
+        told = {"t": "stopped", "command": "drive", "reason": "expired"}
+        assert told in it.read(ann)
+        assert told in it.read(bob)
+        assert it.movers.texts[-1] == "drive stop"
+
+
+async def test_a_refused_tick_is_told_unless_the_control_moves_all_the_same() -> None:
+    """One that came late among good ones is no news."""
+    async with scene() as it:
+        ann = it.sit()
+        it.say(ann, "take")
+        it.tick(ann)
+        await it.clock.advance(0.02)
+        epoch = it.controls.desk.lease.state.epoch
+        old = wire.Tick("drive", epoch, 0, it.beats["s1"])
+        it.controls.hear(ann, old)
+        assert [message for message in it.read(ann) if message["t"] == "refused"] == []
+        await it.clock.advance(1)
+        it.controls.hear(ann, old)
+        (told,) = [message for message in it.read(ann) if message["t"] == "refused"]
+        assert told["message"] == "it is not newer than the last one"
+        it.controls.hear(ann, wire.Tick("beep", epoch, 9, 9))
+        (told,) = it.read(ann)
+        assert told["message"] == "'beep' is no held command of this robot"
+
+
+async def test_a_hostile_page_makes_nothing_grow() -> None:
+    """Any number of names, wishes and ticks: what waits for a screen stays small."""
+    async with scene() as it:
+        ann = it.sit()
+        for step in range(5000):
+            it.controls.hear(ann, wire.Tick(f"drive{step}", 1, step, 1))
+            it.controls.hear(ann, wire.Drive("ask"))
+            it.controls.hear(ann, wire.Drive("yes"))
+            it.controls.hear(ann, wire.Release(f"drive{step}"))
+        assert len(ann.notices) <= 8
+        assert len(ann.pending) + len(ann.paces) + len(ann.alarms) <= 6
+
+
+async def test_a_silent_holder_loses_the_controls_and_a_request_is_granted() -> None:
+    """By time alone; the desk is asked at the right moment."""
+    async with scene() as it:
+        ann, bob = it.sit(), it.sit()
+        it.say(ann, "take")
+        it.controls.hear(bob, wire.Drive("ask", 3))
+        await it.clock.advance(3.1)
+        assert it.controls.desk.lease.state.holder == bob.client
+        await it.clock.advance(61)
+        assert it.controls.desk.lease.state.holder is None

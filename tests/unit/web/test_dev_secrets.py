@@ -1,0 +1,105 @@
+"""Secrets in the wire log: taken out of frames, texts and streams, however they arrive."""
+
+import base64
+
+import pytest
+
+from urc.model.codec import Envelope
+from urc.runtime.hub import Note, Traffic
+from urc.runtime.report import REDACTED
+from urc.web.dev_rows import Row, note_row, traffic_row
+from urc.web.dev_secrets import Blanker
+
+HIDDEN = "hunter2"
+KEY = ("wire", "received")
+
+
+def test_a_secret_is_taken_out_of_a_frame() -> None:
+    """Everywhere in it, and nothing else is."""
+    blanker = Blanker([HIDDEN])
+    assert blanker.whole(b"LOGIN a hunter2\nhunter2!") == (
+        b"LOGIN a " + REDACTED + b"\n" + REDACTED + b"!"
+    )
+    assert blanker.whole(b"hunter") == b"hunter"
+    assert Blanker([""]).whole(b"as it is") == b"as it is"
+
+
+def test_a_short_secret_blanks_the_whole_frame() -> None:
+    """Taking two letters out of everything would say which they are."""
+    assert Blanker(["42"]).whole(b"PIN 42\n") == REDACTED
+
+
+@pytest.mark.parametrize("before", ["", "u", "us", "user:"])
+def test_a_secret_inside_of_base64_is_found(before: str) -> None:
+    """As in a header for log-in, wherever in the text it begins."""
+    code = base64.b64encode(f"{before}correct horse battery".encode())
+    assert REDACTED in Blanker(["correct horse battery"]).whole(b"Basic " + code)
+
+
+def test_an_echo_letter_by_letter_is_never_shown() -> None:
+    """What may begin a secret waits; whatever else it turns out to be is shown."""
+    blanker = Blanker([HIDDEN])
+    shown = [blanker.stream(KEY, bytes([letter])) for letter in b"pw: hunter2\r\nhi"]
+    shown += [data for _, data in blanker.rest()]
+    assert b"".join(shown) == b"pw: " + REDACTED + b"\r\nhi"
+    assert all(b"hun" not in piece for piece in shown)
+
+
+def test_a_beginning_that_nothing_follows_is_blanked_too() -> None:
+    """Most of a password is as good as all of it; a letter or two are nothing."""
+    blanker = Blanker([HIDDEN])
+    assert blanker.stream(KEY, b"hunter") == b""
+    assert blanker.rest() == [(KEY, REDACTED)]
+    assert blanker.stream(KEY, b"oh") == b"o"
+    assert blanker.rest() == [(KEY, b"h")]
+    assert blanker.rest() == []
+
+
+def test_streams_are_told_apart() -> None:
+    """What one line says does not go on on another."""
+    blanker = Blanker([HIDDEN])
+    assert blanker.stream(("a", "sent"), b"hunt") == b""
+    assert blanker.stream(("b", "sent"), b"er2") == b"er2"
+
+
+def row_of(traffic: Traffic, *, is_stream: bool = False) -> Row:
+    """Return the row of a piece of traffic."""
+    row = traffic_row(traffic, Blanker([HIDDEN]), is_stream=is_stream)
+    assert row is not None
+    return row
+
+
+def test_a_message_is_shown_without_its_secret() -> None:
+    """Not in the address, not in the other attributes, not in the body, and not by its length."""
+    envelope = Envelope(
+        "request",
+        {"method": "GET", "path": f"/login/{HIDDEN}", "headers": {"x-key": HIDDEN}},
+        {"password": HIDDEN},
+    )
+    row = row_of(Traffic(1.0, "web", "sent", b"", envelope))
+    assert (row.verb, row.address) == ("request", "GET /login/‹secret›")
+    assert HIDDEN not in row.more + row.text
+    long = Envelope("request", {}, {"password": HIDDEN})
+    assert row_of(Traffic(1.0, "web", "sent", b"", long)).size == len(
+        '{"password": "‹secret›"}'.encode()
+    )
+
+
+def test_a_note_is_shown_without_a_secret() -> None:
+    """A fault may repeat what the robot said."""
+    row = note_row(Note(1.0, "warning", "wire", f"no-match: {HIDDEN}"), Blanker([HIDDEN]))
+    assert row.text == "no-match: ‹secret›"
+
+
+def test_a_picture_is_a_picture_and_its_size() -> None:
+    """A large one is only counted."""
+    small = b"\xff\xd8\xff" + bytes(2000)
+    row = row_of(Traffic(1.0, "cam", "received", b"", Envelope("message", {"topic": "/c"}, small)))
+    assert (row.picture, row.data, row.text) == (
+        "image/jpeg",
+        small,
+        "<2\u202f003 bytes, image/jpeg>",
+    )
+    row = row_of(Traffic(1.0, "cam", "received", b"\xff\xd8\xff" + bytes(100_000)))
+    assert (row.picture, row.data) == ("", b"")
+    assert row.text == "<100\u202f003 bytes, image/jpeg>"

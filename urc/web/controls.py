@@ -1,0 +1,286 @@
+"""The controls of one robot, as its screens see them: one desk, a seat for each screen.
+
+Floor 5. Nothing waits for anybody: what a seat is told is the newest lease, the newest beat, and
+one line for each control, taken when its own line is free. Ticks that come faster than any robot
+takes them are thinned: the newest wins, and the last one always arrives.
+"""
+
+from collections.abc import Callable
+from typing import Protocol
+
+from urc.model.driver import Driver
+from urc.motion.fresh import Input
+from urc.motion.hold import Reason
+from urc.motion.lease import Client, LeaseState, Role
+from urc.motion.pace import Pace
+from urc.runtime.clock import Alarm, Clock
+from urc.runtime.latch import LatchFile
+from urc.runtime.motion import Frames, MotionDesk, Movers
+from urc.web import wire_drive as wire
+
+__all__ = ["BEAT_S", "Controls", "Drivable", "Seat"]
+
+BEAT_S = 0.05
+"""How often the screen that has the controls is told a number, which its ticks echo."""
+THINNED_S = 0.01
+"""Mean time between two ticks of one control that are looked at, at least."""
+PATIENCE_S = 0.25
+"""A tick that came late is no news while the control moves all the same."""
+
+
+class Drivable(Protocol):
+    """The part of a session that the controls need."""
+
+    @property
+    def frames(self) -> Frames:
+        """The engine."""
+
+    @property
+    def movers(self) -> Movers | None:
+        """Who writes motion; None where the robot has no held command."""
+
+
+class Seat:
+    """One screen at the controls."""
+
+    def __init__(self, client: Client, wake: Callable[[], None]) -> None:
+        self.client = client
+        self.wake = wake
+        self.beat: int | None = None
+        self.notices: dict[str, str] = {}
+        """Control or verb → the newest line about it."""
+        self.seen = -1
+        """Number of the lease that it was told."""
+        self.pending: dict[str, wire.Tick] = {}
+        """Control → the newest tick that waits to be looked at."""
+        self.paces: dict[str, Pace] = {}
+        self.alarms: dict[str, Alarm] = {}
+        self.moved_s: dict[str, float] = {}
+        """Control → when a tick of it was last taken."""
+
+    def notice(self, key: str, text: str) -> None:
+        """Tell it; a newer line about the same replaces one that was not taken yet."""
+        self.notices[key] = text
+        self.wake()
+
+    def forget(self, command: str) -> None:
+        """Drop what waits of a control."""
+        self.pending.pop(command, None)
+        alarm = self.alarms.pop(command, None)
+        if alarm is not None:
+            alarm.cancel()
+
+
+class Controls:
+    """The desk of one robot, and who sits at it."""
+
+    def __init__(self, driver: Driver, clock: Clock, file: LatchFile | None = None) -> None:
+        """Take up the latch where it was.
+
+        Args:
+            driver: its commands with ``hold`` are the controls.
+            clock: the time.
+            file: keeps the latch over a restart; None: nothing does.
+        """
+        self.desk = MotionDesk(driver, kept=file.load() if file is not None else None)
+        self.desk.on_change = self._changed
+        self._driver = driver
+        self._clock = clock
+        self._file = file
+        self._seats: dict[str, Seat] = {}
+        self._guests = 0
+        self._number = 0
+        """Of the newest lease."""
+        self._beating: Alarm | None = None
+        self._expiring: Alarm | None = None
+
+    @property
+    def commands(self) -> tuple[str, ...]:
+        """Names of the held commands."""
+        return tuple(name for name, one in self._driver.commands.items() if one.hold is not None)
+
+    def renew(self, driver: Driver, file: LatchFile | None) -> None:
+        """Go on with another version of the driver, between two sessions.
+
+        A latched stop holds; nobody has the controls, and nothing that was armed still is.
+        """
+        kept = self.desk.lease.state
+        for seat in self._seats.values():
+            for command in list(seat.alarms):
+                seat.forget(command)
+            seat.paces.clear()
+        self._driver, self._file = driver, file
+        self.desk = MotionDesk(driver, kept=kept)
+        self.desk.on_change = self._changed
+        for seat in self._seats.values():
+            self.desk.join(seat.client)
+        self._changed(self.desk.lease.state)
+
+    # -- sessions
+
+    async def serve(self, session: Drivable) -> None:
+        """Let a session be driven for as long as this runs; ends by being cancelled."""
+        movers = session.movers
+        if movers is None or not self.desk.can_move:
+            return
+        self.desk.attach(session.frames, movers)
+        try:
+            while True:
+                for command, reason in await movers.stops():
+                    self._stopped(command, reason)
+        finally:
+            self.desk.detach()
+
+    # -- screens
+
+    def sit(self, place: str, role: Role, wake: Callable[[], None]) -> Seat:
+        """Give a screen its seat; raise `UrcError` when there are too many.
+
+        Args:
+            place: where it is, for the others: an address, or "" for this machine.
+            role: what it may do.
+            wake: called when there is something to take.
+        """
+        self._guests += 1
+        name = f"screen {self._guests}{f' at {place}' if place else ''}"
+        seat = Seat(Client(f"s{self._guests}", name, role), wake)
+        self.desk.join(seat.client)
+        self._seats[seat.client.id] = seat
+        return seat
+
+    def rise(self, seat: Seat) -> None:
+        """Take note that a screen is gone: what it held stops."""
+        for command in list(seat.alarms):
+            seat.forget(command)
+        self._seats.pop(seat.client.id, None)
+        self.desk.part(seat.client.id)
+
+    def take(self, seat: Seat) -> list[str]:
+        """Return the messages that bring a screen up to date."""
+        texts: list[str] = []
+        if not self.desk.can_move:
+            return texts
+        if seat.seen != self._number:
+            seat.seen = self._number
+            texts.append(self._lease_text(seat))
+        texts += seat.notices.values()
+        seat.notices.clear()
+        if seat.beat is not None:
+            texts.append(wire.encode_beat(seat.beat))
+            seat.beat = None
+        return texts
+
+    # -- what screens say
+
+    def hear(self, seat: Seat, said: wire.Driving) -> None:
+        """Do what a screen says."""
+        match said:
+            case wire.Tick():
+                self._thin(seat, said)
+            case wire.Release():
+                seat.forget(said.command)
+                seat.moved_s.pop(said.command, None)
+                self.desk.release(seat.client.id, said.command)
+            case wire.Stop():
+                self.stop(seat.client.name)
+            case wire.Drive():
+                self._drive(seat, said)
+
+    def stop(self, by: str) -> None:
+        """Stop and latch. Never refused."""
+        for seat in self._seats.values():
+            for command in list(seat.alarms):
+                seat.forget(command)
+        self.desk.stop(by)
+
+    def _drive(self, seat: Seat, said: wire.Drive) -> None:
+        now = self._clock.now()
+        reason = self.desk.drive(seat.client.id, said.verb, now, said.for_s)
+        if reason:
+            seat.notice(said.verb, wire.encode_refused(said.verb, "", reason))
+        self._set_expiry()
+
+    def _thin(self, seat: Seat, tick: wire.Tick) -> None:
+        if tick.command not in self.commands:
+            text = f"{tick.command!r} is no held command of this robot"
+            seat.notice("tick", wire.encode_refused("tick", "", text))
+            return
+        now = self._clock.now()
+        pace = seat.paces.setdefault(tick.command, Pace(THINNED_S))
+        if tick.command in seat.alarms or not pace.take(now):
+            seat.pending[tick.command] = tick
+            if tick.command not in seat.alarms:
+                alarm = self._clock.call_at(pace.free_at, lambda: self._ripe(seat, tick.command))
+                seat.alarms[tick.command] = alarm
+            return
+        self._tick(seat, tick, now)
+
+    def _ripe(self, seat: Seat, command: str) -> None:
+        seat.alarms.pop(command, None)
+        tick = seat.pending.pop(command, None)
+        if tick is not None:
+            now = self._clock.now()
+            seat.paces[command].take(now)
+            self._tick(seat, tick, now)
+
+    def _tick(self, seat: Seat, tick: wire.Tick, now: float) -> None:
+        given = Input(tick.epoch, tick.number, tick.echo)
+        command = tick.command
+        reason = self.desk.tick(seat.client.id, command, tick.arguments, given, now)
+        if not reason:
+            seat.moved_s[command] = now
+        elif now - seat.moved_s.get(command, float("-inf")) > PATIENCE_S or self._is_closed(given):
+            seat.notice(command, wire.encode_refused("tick", command, reason))
+
+    def _is_closed(self, given: Input) -> bool:
+        return given.epoch != self.desk.lease.state.epoch
+
+    # -- what follows
+
+    def _stopped(self, command: str, reason: Reason) -> None:
+        self.desk.stopped(command, reason)
+        if reason in ("released", "stopped"):
+            return  # the hand knows, or the lease says it
+        for seat in self._seats.values():
+            seat.moved_s.pop(command, None)
+            seat.notice(command, wire.encode_stopped(command, reason))
+
+    def _changed(self, state: LeaseState) -> None:
+        self._number += 1
+        if self._file is not None:
+            self._file.keep(state)
+        for seat in self._seats.values():
+            seat.wake()
+        self._set_expiry()
+        if state.holder is not None and self._beating is None:
+            self._beat()
+
+    def _beat(self) -> None:
+        """Tell the holder a number, and again in a while; nobody else is told any."""
+        self._beating = None
+        holder = self.desk.lease.state.holder
+        seat = self._seats.get(holder.id) if holder is not None else None
+        if seat is None:
+            return
+        now = self._clock.now()
+        seat.beat = self.desk.beat(seat.client.id, now)
+        seat.wake()
+        self._beating = self._clock.call_at(now + BEAT_S, self._beat)
+
+    def _set_expiry(self) -> None:
+        if self._expiring is not None:
+            self._expiring.cancel()
+        due = self.desk.deadline
+        self._expiring = None if due is None else self._clock.call_at(due, self._expire)
+
+    def _expire(self) -> None:
+        self._expiring = None
+        self.desk.expire(self._clock.now())
+        self._set_expiry()
+
+    def _lease_text(self, seat: Seat) -> str:
+        state = self.desk.lease.state
+        left_s = state.asked_until - self._clock.now() if state.asked_by is not None else 0.0
+        return wire.encode_lease(
+            state, seat.client, left_s=max(0.0, left_s), is_confirmed=self.desk.is_confirmed
+        )

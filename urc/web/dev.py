@@ -1,0 +1,132 @@
+"""The dev page of each robot: the wire log, the parser try-out, what a command would send.
+
+Floor 5. Only there when the server was started for it, and only for who sits at this machine: it
+shows everything that goes over a robot's lines. `urc.web.app` knows one `Dev`, or none.
+"""
+
+import asyncio
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import partial
+from urllib.parse import quote
+
+from starlette.exceptions import HTTPException
+from starlette.requests import HTTPConnection, Request
+from starlette.responses import HTMLResponse, Response
+from starlette.routing import BaseRoute, Route, WebSocketRoute
+from starlette.websockets import WebSocket
+
+from urc.web import wire
+from urc.web.dev_client import DevClient
+from urc.web.dev_watch import ProfileWatch, Remake
+from urc.web.pages import Head, render
+from urc.web.robots import Robot, Station
+
+__all__ = ["HOW_TO_TURN_ON", "Dev", "DevPage", "dev_url", "no_dev_routes"]
+
+HOW_TO_TURN_ON = "The dev page is off. Start URC with --dev to turn it on."
+_ONLY_HERE = "The dev page is only shown on the machine that runs URC."
+CLIENTS = 16
+"""Dev pages that may be open at a time."""
+
+
+@dataclass(frozen=True, slots=True)
+class DevPage:
+    """``dev.html.j2``: everything else is told by the two sockets."""
+
+    head: Head
+    title: str
+    url: str
+    """Of the robot's own page."""
+    values: str
+    """Path and query of the WebSocket with values and links, on which commands are given, too."""
+    socket: str
+    """Path of the dev page's own."""
+
+
+def dev_url(name: str) -> str:
+    """Return the path of a robot's dev page."""
+    return f"/robots/{quote(name, safe='')}/dev"
+
+
+def no_dev_routes() -> list[BaseRoute]:
+    """Return the routes of a server without dev pages: they say how to get them."""
+
+    async def tell(_: Request) -> Response:
+        raise HTTPException(404, HOW_TO_TURN_ON)
+
+    return [Route("/robots/{name}/dev", tell)]
+
+
+class Dev:
+    """The dev pages of all robots."""
+
+    def __init__(
+        self,
+        stations: Mapping[str, Station],
+        remake: Mapping[str, Remake],
+        take: Callable[[str, Robot], None],
+        is_here: Callable[[HTTPConnection], bool],
+    ) -> None:
+        """Watch nothing yet.
+
+        Args:
+            stations: by the name in their URL.
+            remake: makes the robot of a new version of its profile; by the same name.
+            take: goes on with that one; may raise `UrcError`.
+            is_here: tells whether a request comes from this machine.
+        """
+        self._is_here = is_here
+        self._open = 0
+        self._watches = {
+            name: ProfileWatch(station, remake[name], partial(take, name))
+            for name, station in stations.items()
+        }
+
+    async def run(self) -> None:
+        """Watch the documents for ever; ends by being cancelled."""
+        async with asyncio.TaskGroup() as group:
+            for watch in self._watches.values():
+                group.create_task(watch.run())
+
+    def routes(self) -> list[BaseRoute]:
+        """Return where the pages and their sockets are."""
+        return [
+            Route("/robots/{name}/dev", self._page),
+            WebSocketRoute("/robots/{name}/dev/ws", self._socket),
+        ]
+
+    async def _page(self, request: Request) -> Response:
+        name = request.path_params["name"]
+        watch = self._watches.get(name)
+        if watch is None:
+            raise HTTPException(404, "No robot of that name is served here.")
+        if not self._is_here(request):
+            raise HTTPException(403, _ONLY_HERE)
+        title = watch.station.robot.profile.title or name
+        quoted = quote(name, safe="")
+        page = DevPage(
+            head=Head(request.state.nonce, f"Dev: {title}"),
+            title=title,
+            url=f"/robots/{quoted}/",
+            values=f"/ws?robot={quoted}",
+            socket=f"{dev_url(name)}/ws",
+        )
+        return HTMLResponse(render("dev.html.j2", page), headers={"cache-control": "no-store"})
+
+    async def _socket(self, websocket: WebSocket) -> None:
+        await websocket.accept()
+        watch = self._watches.get(websocket.path_params["name"])
+        if watch is None:
+            await websocket.close(wire.CLOSE_NO_ROBOT, "no robot of that name is served here")
+        elif not self._is_here(websocket):
+            await websocket.close(wire.CLOSE_NO_ROBOT, _ONLY_HERE)
+        elif self._open >= CLIENTS:
+            await websocket.close(wire.CLOSE_FULL, f"{CLIENTS} dev pages are open already")
+        else:
+            self._open += 1
+            try:
+                flow = websocket.scope["state"].get("flow")
+                await DevClient(websocket, watch, flow).serve()
+            finally:
+                self._open -= 1

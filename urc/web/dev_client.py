@@ -1,0 +1,319 @@
+"""One dev page: it is told the traffic, and its questions are answered one after the other.
+
+Floor 5. The traffic of a page waits in a backlog of its own, of which the oldest goes first and is
+counted; a page that takes nothing for `STALL_S` is cut off. What it asks is answered beside the
+loop, a few questions at most at a time.
+"""
+
+import asyncio
+import logging
+from collections import deque
+from typing import NamedTuple
+
+from starlette.types import Message
+from starlette.websockets import WebSocketDisconnect
+
+from urc.config.messaging import MESSAGING
+from urc.model.profile import Profile
+from urc.model.values import Value
+from urc.problems import UrcError
+from urc.runtime.clock import within
+from urc.runtime.hub import Note, Tap, Traffic
+from urc.runtime.selftest import sample_settings
+from urc.web import dev_wire as wire
+from urc.web.dev_preview import Preview, preview
+from urc.web.dev_rows import Row, held_row, note_row, traffic_row
+from urc.web.dev_secrets import Blanker, stand_ins
+from urc.web.dev_tryout import pasted_bytes, try_out
+from urc.web.dev_watch import ProfileWatch
+from urc.web.robots import Robot, SessionFailed, missing_settings
+from urc.web.socket import STALL_S, Allowance, Flow, Line
+from urc.web.wire import (
+    CLOSE_BAD_MESSAGES,
+    CLOSE_TOO_FAST,
+    BadMessage,
+    Ping,
+    encode_error,
+    encode_pong,
+)
+
+__all__ = ["Backlog", "DevClient"]
+
+MESSAGES_PER_S = 20
+BAD_MESSAGES = 10
+QUESTIONS = 8
+MOST_ANSWERS = 32
+"""Answers that may wait to be sent."""
+ROWS_KEPT = 1000
+BYTES_KEPT = 1 << 20
+ROWS_AT_ONCE = 200
+BEHIND_S = 0.05
+"""Between two messages with rows: a robot that talks a thousand times a second is one of twenty."""
+HELD_S = 0.5
+"""After so long without more, what may have begun a secret is shown."""
+RETRY_S = 1.0
+
+log = logging.getLogger(__name__)
+
+
+class Backlog:
+    """Rows that a page has not been sent yet."""
+
+    def __init__(self) -> None:
+        self.first = 0
+        """Number of the oldest row."""
+        self._rows: deque[Row] = deque()
+        self._bytes = 0
+
+    def __len__(self) -> int:
+        return len(self._rows)
+
+    def put(self, row: Row) -> None:
+        """Take a row; the oldest go while there are too many."""
+        row.n = self.first + len(self._rows)
+        self._rows.append(row)
+        self._bytes += row.weight
+        while len(self._rows) > ROWS_KEPT or (self._bytes > BYTES_KEPT and len(self._rows) > 1):
+            self._pop()
+
+    def take(self) -> list[Row]:
+        """Return the oldest few, and keep them no longer."""
+        return [self._pop() for _ in range(min(ROWS_AT_ONCE, len(self._rows)))]
+
+    def _pop(self) -> Row:
+        row = self._rows.popleft()
+        self._bytes -= row.weight
+        self.first += 1
+        return row
+
+
+class _Known(NamedTuple):
+    """What questions are answered from: the version of the robot that runs."""
+
+    profile: Profile
+    settings: dict[str, Value]
+    """Of secrets only stand-ins, for missing ones samples."""
+
+
+class DevClient:
+    """Talks to one dev page until either side is done."""
+
+    def __init__(self, line: Line, watch: ProfileWatch, flow: Flow | None = None) -> None:
+        self._line = line
+        self._watch = watch
+        self._station = watch.station
+        self._clock = watch.station.clock
+        self._flow = flow
+        self._news = asyncio.Event()
+        self._backlog = Backlog()
+        self._answers: deque[str] = deque()
+        self._questions: asyncio.Queue[wire.Try | wire.Show] = asyncio.Queue(QUESTIONS)
+        self._closing: tuple[int, str] | None = None
+        self._allowance = Allowance(MESSAGES_PER_S, self._clock.now())
+        self._bad = 0
+        self._edition = -1
+
+    async def serve(self) -> None:
+        """Be this client from the accepted socket to its end."""
+        self._watch.listeners.add(self._news.set)
+        try:
+            async with asyncio.TaskGroup() as group:
+                ending = [group.create_task(work) for work in (self._read(), self._write())]
+                others = [group.create_task(work) for work in (self._follow(), self._answer())]
+                await asyncio.wait(ending, return_when=asyncio.FIRST_COMPLETED)
+                for task in (*ending, *others):
+                    task.cancel()
+        except* WebSocketDisconnect:
+            pass
+        except* TimeoutError:
+            log.warning("a dev page took nothing for %g s and was cut off", STALL_S)
+            if self._flow:
+                self._flow.abort()
+        finally:
+            self._watch.listeners.discard(self._news.set)
+
+    # -- traffic
+
+    async def _follow(self) -> None:
+        """Put what happens on the robot's lines into the backlog, session after session."""
+        while True:
+            if missing_settings(self._station.robot) or self._station.is_full:
+                await self._clock.sleep(RETRY_S)
+                continue
+            with self._station.visit():
+                try:
+                    live = await self._station.live()
+                except SessionFailed as error:
+                    self._put(note_row(self._note(str(error)), Blanker(())))
+                    await self._clock.sleep(RETRY_S)
+                    continue
+                robot = self._station.robot
+                with live.session.hub.tap(with_traffic=True) as tap:
+                    for note in live.session.hub.notes:
+                        self._put(note_row(note, Blanker.of(robot.profile, robot.settings)))
+                    listening = asyncio.ensure_future(self._listen(tap, robot))
+                    ended = asyncio.ensure_future(live.ended.wait())
+                    try:
+                        await asyncio.wait((listening, ended), return_when=asyncio.FIRST_COMPLETED)
+                    finally:
+                        listening.cancel()
+                        ended.cancel()
+
+    async def _listen(self, tap: Tap, robot: Robot) -> None:
+        blanker = Blanker.of(robot.profile, robot.settings)
+        specs = robot.profile.driver.transports
+        streams = {name for name, spec in specs.items() if spec.framing.type != "datagram"}
+        dropped = 0
+        while True:
+            try:
+                async with within(self._clock, HELD_S):
+                    await tap.filled()
+            except TimeoutError:
+                for key, data in blanker.rest():
+                    self._put(held_row(key, data, self._clock.now()))
+                continue
+            for one in tap.take():
+                if isinstance(one, Traffic):
+                    is_stream = one.transport in streams
+                    self._put(traffic_row(one, blanker, is_stream=is_stream))
+                elif isinstance(one, Note):
+                    self._put(note_row(one, blanker))
+            if tap.dropped > dropped:
+                lost, dropped = tap.dropped - dropped, tap.dropped
+                text = f"{lost} pieces of traffic were lost: they came faster than they are read"
+                self._put(note_row(self._note(text), blanker))
+
+    def _note(self, text: str) -> Note:
+        return Note(self._clock.now(), "warning", "URC", text)
+
+    def _put(self, row: Row | None) -> None:
+        if row is not None:
+            self._backlog.put(row)
+            self._news.set()
+
+    # -- writing
+
+    async def _write(self) -> None:
+        await self._send(wire.encode_hello(self._station.robot.profile.name, self._clock.now()))
+        while True:
+            self._news.clear()
+            for text in self._news_of_profile():
+                await self._send(text)
+            while self._answers:
+                await self._send(self._answers.popleft())
+            if self._closing:
+                await self._line.close(*self._closing)
+                return
+            if len(self._backlog):
+                first = self._backlog.first
+                rows = self._backlog.take()
+                await self._send(wire.encode_rows(rows, first, self._clock.now()))
+                await self._clock.sleep(BEHIND_S)
+            else:
+                await self._news.wait()
+
+    async def _send(self, text: str) -> None:
+        async with asyncio.timeout(STALL_S):
+            if self._flow:
+                await self._flow.drained()
+            await self._line.send_text(text)
+
+    def _news_of_profile(self) -> list[str]:
+        watch = self._watch
+        if watch.edition == self._edition:
+            return []
+        self._edition = watch.edition
+        robot = watch.robot
+        missing = ", ".join(setting.name for setting in missing_settings(robot))
+        told = watch.told or (f"is not connected: not set yet: {missing}" if missing else "")
+        text = wire.encode_profile(
+            robot.profile.driver,
+            MESSAGING,
+            edition=watch.edition,
+            state=watch.state,
+            file=watch.file,
+            told=told,
+            problems=watch.problems,
+        )
+        return [text]
+
+    # -- reading
+
+    async def _read(self) -> None:
+        message: Message = await self._line.receive()
+        while message["type"] != "websocket.disconnect":
+            if not self._closing:
+                self._take(message)
+            message = await self._line.receive()
+
+    def _take(self, message: Message) -> None:
+        now_s = self._clock.now()
+        if not self._allowance.take(now_s):
+            self._close(CLOSE_TOO_FAST, f"more than {MESSAGES_PER_S} messages a second")
+            return
+        try:
+            asked = wire.decode(message.get("text") or message.get("bytes") or "")
+        except BadMessage as error:
+            self._bad += 1
+            if self._bad >= BAD_MESSAGES:
+                self._close(CLOSE_BAD_MESSAGES, f"{BAD_MESSAGES} messages could not be used")
+            else:
+                self._say(encode_error("bad-message", str(error)))
+            return
+        if len(self._answers) > MOST_ANSWERS:
+            self._close(CLOSE_TOO_FAST, "the answers are not taken")
+            return
+        if isinstance(asked, Ping):
+            self._say(encode_pong(asked, now_s))
+            return
+        try:
+            self._questions.put_nowait(asked)
+        except asyncio.QueueFull:
+            self._say(_refused(asked, f"{QUESTIONS} questions wait to be answered"))
+
+    def _close(self, code: int, reason: str) -> None:
+        self._closing = (code, reason)
+        self._say(encode_error("closing", reason))
+
+    def _say(self, text: str) -> None:
+        self._answers.append(text)
+        self._news.set()
+
+    async def _answer(self) -> None:
+        """Answer what is asked, one question after the other, off the loop."""
+        while True:
+            asked = await self._questions.get()
+            robot = self._watch.robot
+            settings = sample_settings(robot.profile.settings) | dict(robot.settings)
+            known = _Known(robot.profile, stand_ins(robot.profile, settings))
+            self._say(await asyncio.to_thread(_answered, asked, known))
+
+
+def _answered(asked: wire.Try | wire.Show, known: _Known) -> str:
+    try:
+        return _tried(asked, known) if isinstance(asked, wire.Try) else _shown(asked, known)
+    except Exception as bug:  # a supervisor: a bug costs the answer
+        log.exception("a question of a dev page was not answered")
+        return _refused(asked, f"it failed inside URC ({type(bug).__name__}: {bug})")
+
+
+def _refused(asked: wire.Try | wire.Show, text: str) -> str:
+    if isinstance(asked, wire.Try):
+        return wire.encode_tried(asked.id, None, text)
+    return wire.encode_shown(asked.id, Preview(text))
+
+
+def _tried(asked: wire.Try, known: _Known) -> str:
+    spec = known.profile.driver.transports.get(asked.transport)
+    encoding = spec.encoding if spec else "utf-8"
+    try:
+        data = pasted_bytes(asked.text, is_hex=asked.hex, encoding=encoding)
+        found = try_out(known.profile.driver, known.settings, asked.transport, data, asked.topic)
+    except UrcError as error:
+        return wire.encode_tried(asked.id, None, str(error))
+    return wire.encode_tried(asked.id, found)
+
+
+def _shown(asked: wire.Show, known: _Known) -> str:
+    found = preview(known.profile.driver, known.settings, asked.command, asked.arguments)
+    return wire.encode_shown(asked.id, found)

@@ -1,0 +1,174 @@
+"""What a command would send: the exact bytes or messages, or the refusal in words. Sends nothing.
+
+Floor 5, pure. A command that waits for an answer before it goes on is shown with all the frames
+that its steps can write with what is known beforehand.
+"""
+
+from collections.abc import Iterator, Mapping
+from typing import NamedTuple
+
+from urc.expressions import COUNTERS, ExpressionError, Template
+from urc.model.codec import Payload, WriteSpec
+from urc.model.driver import Command, Driver
+from urc.model.flow import (
+    ExpectStep,
+    FailStep,
+    IfStep,
+    PromptStep,
+    RepeatStep,
+    RunStep,
+    SendStep,
+    SetStep,
+    Step,
+    UntilStep,
+    WaitStep,
+    all_steps,
+)
+from urc.problems import UrcError
+from urc.protocol.commands import questions
+from urc.protocol.encode import build_encode, check_arguments
+from urc.protocol.forms import CodecContext
+from urc.protocol.framing import build_framing
+from urc.protocol.gate import Counters
+
+__all__ = ["Preview", "Written", "preview"]
+
+MOST_FRAMES = 200
+MOST_WITHIN = 8
+"""Sequences that run one another."""
+
+
+class Written(NamedTuple):
+    """One line of a preview: a frame, or what happens between two of them."""
+
+    transport: str
+    """"" for what is no frame."""
+    payload: Payload
+    text: str
+    """What happens instead of a frame, or why it cannot be shown."""
+
+
+class Preview(NamedTuple):
+    """What a command would do."""
+
+    refusal: str
+    """Why it would be refused; "" when it would not."""
+    frames: tuple[Written, ...] = ()
+    questions: tuple[str, ...] = ()
+    """What people are asked before."""
+    requires: tuple[str, ...] = ()
+    """What must hold on the robot, which only the robot knows."""
+
+
+def preview(
+    driver: Driver,
+    settings: Mapping[str, object],
+    command: str,
+    arguments: Mapping[str, object],
+) -> Preview:
+    """Return what `command` would send with `arguments`.
+
+    Args:
+        driver: as loaded.
+        settings: value of every setting; what stands here for a secret is shown.
+        command: its name.
+        arguments: those that are given; the others take their defaults.
+    """
+    found = driver.commands.get(command)
+    if found is None:
+        return Preview(f"there is no command {command!r}; there are: {', '.join(driver.commands)}")
+    try:
+        values = check_arguments(found, arguments)
+        frames = tuple(_frames(driver, settings, found, values, 0))
+    except UrcError as error:
+        return Preview(str(error))
+    if not found.steps and frames and frames[0].text:
+        return Preview(frames[0].text)
+    return Preview(
+        "",
+        frames[:MOST_FRAMES],
+        tuple(one.text or f"Really {command}?" for one in questions(found, values)),
+        tuple(one.text for one in found.requires),
+    )
+
+
+def _frames(
+    driver: Driver,
+    settings: Mapping[str, object],
+    command: Command,
+    values: Mapping[str, object],
+    depth: int,
+) -> Iterator[Written]:
+    names = {"settings": settings, **values}
+    if not command.steps:
+        yield _written(driver, settings, command.transport, command.send, names)
+        return
+    for step in all_steps(command.steps):
+        if isinstance(step, SendStep):
+            if step.is_secret:
+                yield Written("", b"", f"sends something secret on {step.transport}")
+            else:
+                yield _written(driver, settings, step.transport, step.send, names)
+        elif isinstance(step, RunStep) and depth < MOST_WITHIN:
+            yield from _run(driver, settings, step, names, depth)
+        else:
+            yield Written("", b"", _in_words(step))
+
+
+def _run(
+    driver: Driver,
+    settings: Mapping[str, object],
+    step: RunStep,
+    names: Mapping[str, object],
+    depth: int,
+) -> Iterator[Written]:
+    yield Written("", b"", f"runs {step.command}")
+    inner = driver.commands[step.command]
+    try:
+        given = {
+            name: value.evaluate(names) if isinstance(value, Template) else value
+            for name, value in step.arguments.items()
+        }
+        yield from _frames(driver, settings, inner, check_arguments(inner, given), depth + 1)
+    except ExpressionError as error:
+        yield Written("", b"", f"what it is given is only known then: {error}")
+
+
+def _written(
+    driver: Driver,
+    settings: Mapping[str, object],
+    transport: str,
+    send: WriteSpec,
+    names: Mapping[str, object],
+) -> Written:
+    spec = driver.transports[transport]
+    context = CodecContext(spec.encoding, settings)
+    if COUNTERS in send.names:
+        names = {**names, COUNTERS: Counters().draw()}
+    try:
+        payload = build_encode(send, build_framing(spec.framing), context)(names)
+    except UrcError as error:
+        return Written(transport, b"", str(error))
+    return Written(transport, payload, "")
+
+
+def _in_words(step: Step) -> str:
+    match step:
+        case ExpectStep(transport):
+            return f"waits for an answer on {transport}"
+        case PromptStep(transport):
+            return f"waits for a prompt on {transport}"
+        case WaitStep(seconds):
+            return f"waits {seconds:g} s"
+        case UntilStep(condition):
+            return f"waits until {condition.source}"
+        case RepeatStep(_, times):
+            return f"repeats what follows, {times} times at most"
+        case SetStep(values):
+            return f"sets {', '.join(values)}"
+        case IfStep(condition):
+            return f"goes on only if {condition.source}, else by its other steps"
+        case FailStep():
+            return "ends without success"
+        case RunStep(command) | SendStep(command):
+            return f"runs {command}"

@@ -1,0 +1,129 @@
+"""Rows of the wire log: what is shown of each piece of traffic, and of each note.
+
+Floor 5, pure.
+"""
+
+import json
+
+import msgspec
+
+from urc.model.codec import Envelope
+from urc.runtime.hub import Note, Traffic
+from urc.web.dev_secrets import Blanker
+from urc.web.wire_text import cut
+
+__all__ = [
+    "SHOWN_BYTES",
+    "Row",
+    "fill",
+    "grouped",
+    "held_row",
+    "note_row",
+    "traffic_row",
+]
+
+SHOWN_BYTES = 4096
+"""Of one piece of traffic; the rest is only counted."""
+THUMBNAIL_BYTES = 48 * 1024
+"""Largest picture that is shown as one."""
+_PICTURES = {b"\x89PNG\r\n": "image/png", b"\xff\xd8\xff": "image/jpeg", b"GIF8": "image/gif"}
+_NAMES = ("topic", "action", "service", "method", "path", "url")
+"""Attributes that say where a message goes or comes from, in this order."""
+
+
+class Row(msgspec.Struct, omit_defaults=True):
+    """One line of the wire log."""
+
+    n: int
+    time_s: float
+    """Monotonic; the page gets the age."""
+    kind: str
+    """``sent``, ``received`` or ``note``."""
+    line: str
+    """Transport."""
+    size: int = 0
+    data: bytes = b""
+    verb: str = ""
+    address: str = ""
+    more: str = ""
+    """The other attributes of a message."""
+    text: str = ""
+    level: str = ""
+    picture: str = ""
+    """Media type, where `data` is a whole picture."""
+
+    @property
+    def weight(self) -> int:
+        """Bytes it takes, about."""
+        return 100 + len(self.data) + len(self.text) + len(self.more)
+
+
+def traffic_row(traffic: Traffic, blanker: Blanker, *, is_stream: bool) -> Row | None:
+    """Return the row of a piece of traffic; None while all of it may be part of a secret.
+
+    Args:
+        traffic: as recorded.
+        blanker: takes the secrets out.
+        is_stream: whether the next piece may go on where this one ends.
+    """
+    row = Row(0, traffic.time_s, traffic.direction, traffic.transport)
+    if traffic.envelope is not None:
+        fill(row, traffic.envelope, blanker)
+        return row
+    if is_stream:
+        data = blanker.stream((traffic.transport, traffic.direction), traffic.data)
+        if not data and traffic.data:
+            return None
+    else:
+        data = blanker.whole(traffic.data)
+    _fill_bytes(row, data)
+    return row
+
+
+def held_row(key: tuple[str, str], data: bytes, time_s: float) -> Row:
+    """Return the row of what was held back."""
+    row = Row(0, time_s, key[1], key[0])
+    _fill_bytes(row, data)
+    return row
+
+
+def note_row(note: Note, blanker: Blanker) -> Row:
+    """Return the row of a fault or a change of state."""
+    text = blanker.text(cut(note.text))
+    return Row(0, note.time_s, "note", note.source, level=note.level, text=text)
+
+
+def fill(row: Row, envelope: Envelope, blanker: Blanker) -> None:
+    """Write a message into a row: verb, address, the other attributes, and the body."""
+    named = [name for name in _NAMES if envelope.attributes.get(name) is not None]
+    told = [str(envelope.attributes[name]) for name in named]
+    row.verb, row.address = envelope.verb, blanker.text(cut(" ".join(told)))
+    more = [
+        f"{name}={value}"
+        for name, value in envelope.attributes.items()
+        if value is not None and name not in named
+    ]
+    row.more = blanker.text(cut(" ".join(more)))
+    body = envelope.body
+    if isinstance(body, bytes):
+        _fill_bytes(row, blanker.whole(body))
+    elif body is not None:
+        text = blanker.text(json.dumps(body, default=repr, ensure_ascii=False))
+        row.size = len(text.encode("utf-8", "replace"))
+        row.text = cut(text)
+
+
+def _fill_bytes(row: Row, data: bytes) -> None:
+    row.size = len(data)  # of what is shown: how long a secret is, is part of it
+    for head, kind in _PICTURES.items():
+        if data.startswith(head):
+            row.text = f"<{grouped(len(data))} bytes, {kind}>"
+            if len(data) <= THUMBNAIL_BYTES:
+                row.picture, row.data = kind, data
+            return
+    row.data = data[:SHOWN_BYTES]
+
+
+def grouped(number: int) -> str:
+    """Return a number with a narrow blank between thousands: ``12 345``."""
+    return f"{number:,}".replace(",", "\u202f")

@@ -1,0 +1,323 @@
+"""What a driver makes of bytes that somebody pastes: which frames, who takes them, or why nobody.
+
+Floor 5, pure: it builds readers of its own and touches no live robot. The order is that of the
+engine: a frame that answers nothing goes to the first message that takes it. Which reply it would
+be is told beside that, for here nobody has asked anything.
+"""
+
+import json
+import re
+from collections.abc import Iterator, Mapping
+from typing import NamedTuple
+
+from urc.config.messaging import MESSAGING
+from urc.model.codec import Envelope, ReadSpec
+from urc.model.driver import Driver, Reply, TransportSpec
+from urc.model.flow import ExpectStep, all_steps
+from urc.patterns import Pattern
+from urc.problems import UrcError
+from urc.protocol.answer import Answer, Ear, Matcher
+from urc.protocol.forms import BadItem, BadText, CodecContext, Frame, build_reader
+from urc.protocol.framing import FrameFault, build_framing
+from urc.protocol.readings import Readings
+from urc.protocol.topics import frame_of, topic_of
+
+__all__ = ["MOST_BYTES", "Finding", "Piece", "Taker", "pasted_bytes", "try_out"]
+
+MOST_BYTES = 64 * 1024
+MOST_PIECES = 200
+"""Frames of one try-out that are told of."""
+MOST_REASONS = 30
+_ESCAPES = {"n": b"\n", "r": b"\r", "t": b"\t", "0": b"\0", "e": b"\x1b", "\\": b"\\"}
+_ESCAPE = re.compile(r"\\(x[0-9A-Fa-f]{2}|.|$)", re.DOTALL)
+
+
+class Taker(NamedTuple):
+    """Somebody who takes a frame."""
+
+    kind: str
+    """``message``, ``reply``, or ``refusal``: an answer that means failure."""
+    names: tuple[str, ...]
+    """Who it is; several replies may look alike."""
+    fields: Mapping[str, object]
+    samples: tuple[tuple[str, object, str], ...]
+    """Signal, value, alarm."""
+    refused: tuple[str, ...]
+    """Values that are none, and why; of a refusal, what people are told."""
+
+
+class Piece(NamedTuple):
+    """One frame, or bytes that were none."""
+
+    start: int
+    """Where it begins in what was pasted, in bytes."""
+    end: int
+    data: bytes
+    """Its payload: without delimiter, length or checksum."""
+    fault: str
+    """Why the bytes are no frame; "" for a frame."""
+    takers: tuple[Taker, ...] = ()
+    reasons: tuple[str, ...] = ()
+    """Where nobody takes it: what each who was asked says."""
+
+
+class Finding(NamedTuple):
+    """All of it."""
+
+    size: int
+    pieces: tuple[Piece, ...]
+    left: int
+    """Bytes at the end that begin a frame and do not end it."""
+    more: int
+    """Frames beyond `MOST_PIECES`, which were not looked at."""
+
+
+class _Candidate(NamedTuple):
+    """Somebody who is asked about each frame."""
+
+    kind: str
+    name: str
+    read: ReadSpec
+    matcher: Matcher
+    ear: Ear | None
+
+
+def pasted_bytes(text: str, *, is_hex: bool, encoding: str) -> bytes:
+    r"""Return the bytes that somebody means by a text.
+
+    Args:
+        text: as pasted.
+        is_hex: pairs of hex digits; blanks, commas, colons and ``0x`` between them say nothing.
+            Else text, in which ``\n \r \t \0 \e \\`` and ``\xHH`` are bytes.
+        encoding: of the text.
+
+    Raises:
+        UrcError: it is neither, or too long; the message says where.
+    """
+    data = _from_hex(text) if is_hex else _from_text(text, encoding)
+    if len(data) > MOST_BYTES:
+        raise UrcError(f"{len(data)} bytes; {MOST_BYTES} are tried out at a time")
+    return data
+
+
+def try_out(
+    driver: Driver,
+    settings: Mapping[str, object],
+    transport: str,
+    data: bytes,
+    topic: str = "",
+) -> Finding:
+    """Return what the driver makes of `data`.
+
+    Args:
+        driver: as loaded.
+        settings: value of every setting.
+        transport: where it comes in.
+        data: bytes as the robot sends them; on a transport that carries messages, the body of one.
+        topic: where that message comes from; "": it is the answer to a request.
+
+    Raises:
+        UrcError: no such transport, or a body that is no JSON where nothing else can come.
+    """
+    spec = driver.transports.get(transport)
+    if spec is None:
+        raise UrcError(f"there is no transport {transport!r}; there are: {_all(driver.transports)}")
+    asked = _candidates(driver, spec, settings)
+    if spec.type in MESSAGING:
+        frame = frame_of(_envelope(spec, data, topic), spec.encoding)
+        takers, reasons = _take(frame, asked, spec, settings)
+        return Finding(len(data), (Piece(0, len(data), data, "", takers, reasons),), 0, 0)
+    pieces: list[Piece] = []
+    cut, left, more = _cut(spec, data)
+    for start, end, found in cut:
+        if isinstance(found, FrameFault):
+            pieces.append(Piece(start, end, data[start:end], f"{found.code}: {found.message}"))
+            continue
+        takers, reasons = _take(Frame(found, spec.encoding), asked, spec, settings)
+        pieces.append(Piece(start, end, found, "", takers, reasons))
+    return Finding(len(data), tuple(pieces), left, more)
+
+
+def _cut(
+    spec: TransportSpec, data: bytes
+) -> tuple[list[tuple[int, int, bytes | FrameFault]], int, int]:
+    """Return frames and faults with their places, the bytes left over, and frames not told of."""
+    decoder = build_framing(spec.framing).decoder()
+    decoder.push(data, 0.0)
+    cut: list[tuple[int, int, bytes | FrameFault]] = []
+    at = more = 0
+    while (found := decoder.next(0.0)) is not None:
+        end = max(at, len(data) - decoder.pending)
+        if len(cut) < MOST_PIECES:
+            cut.append((at, end, found))
+        else:
+            more += 1
+        at = end
+    if decoder.deadline is not None:  # silence ends it, and nothing follows what was pasted
+        for late in decoder.tick(decoder.deadline):
+            end = max(at, len(data) - decoder.pending)
+            cut.append((at, end, late))
+            at = end
+    return cut, decoder.pending, more
+
+
+def _envelope(spec: TransportSpec, data: bytes, topic: str) -> Envelope:
+    body: object = data
+    if spec.type == "rosbridge":  # its messages are data; the others bring bytes
+        try:
+            body = json.loads(data)
+        except (ValueError, RecursionError) as error:
+            raise UrcError(f"a message of {spec.type} is JSON: {error}") from None
+    if topic:
+        return Envelope("message", {"topic": topic}, body)
+    return Envelope("response", {"id": 1, "ok": True}, body)
+
+
+def _take(
+    frame: Frame, asked: list[_Candidate], spec: TransportSpec, settings: Mapping[str, object]
+) -> tuple[tuple[Taker, ...], tuple[str, ...]]:
+    takers: list[Taker] = []
+    for one in asked:
+        if one.kind == "message" and any(taker.kind == "message" for taker in takers):
+            continue  # the first one has it
+        taker = _taken(_anew(frame), one)
+        if taker is not None:
+            _add(takers, taker)
+    reasons: tuple[str, ...] = ()
+    if not takers:
+        told = [f"{one.name}: {_why_not(_anew(frame), one, spec, settings)}" for one in asked]
+        reasons = tuple(told[:MOST_REASONS]) or (f"nothing is read on {spec.name}",)
+    return tuple(takers), reasons
+
+
+def _add(takers: list[Taker], taker: Taker) -> None:
+    """Add a taker, to one that says the same if there is any."""
+    for place, other in enumerate(takers):
+        if other._replace(names=()) == taker._replace(names=()) and taker.kind != "message":
+            takers[place] = other._replace(names=(*other.names, *taker.names))
+            return
+    takers.append(taker)
+
+
+def _taken(frame: Frame, one: _Candidate) -> Taker | None:
+    if one.ear is None:
+        found = one.matcher.read(frame)
+    else:
+        offer = one.ear.offer(frame)
+        if offer is None:
+            return None
+        if offer.refusal:
+            return Taker("refusal", (one.name,), {}, (), (offer.refusal,))
+        found = offer.fields
+    if found is None:
+        return None
+    samples, refused = one.matcher.decode(found, 0.0)
+    told = tuple((each.signal, each.value, each.alarm) for each in samples)
+    return Taker(one.kind, (one.name,), dict(found), told, tuple(refused))
+
+
+def _why_not(
+    frame: Frame, one: _Candidate, spec: TransportSpec, settings: Mapping[str, object]
+) -> str:
+    """Return in words why a frame is another one."""
+    read = one.read
+    if read.topic is not None and (topic := topic_of(read, settings)) != frame.topic:
+        came = "an answer" if frame.topic is None else repr(frame.topic)
+        return f"it listens to {topic!r}, this is {came}"
+    context = CodecContext(spec.encoding, settings)
+    try:
+        found = build_reader(read._replace(when=None), context).read(frame)
+    except (BadItem, BadText) as error:
+        return str(error)
+    if found is not None and read.when is not None:
+        return f"its when is not true: {read.when.source}"
+    pattern = read.options.get("pattern")
+    if isinstance(pattern, Pattern):
+        return f"{pattern.source} does not match"
+    if read.lines is not None:
+        return "it has several lines, and they are not complete"
+    return f"it cannot be read as this {read.form}"
+
+
+def _candidates(
+    driver: Driver, spec: TransportSpec, settings: Mapping[str, object]
+) -> list[_Candidate]:
+    readings = Readings(driver.signals, {"settings": settings})
+    context = CodecContext(spec.encoding, settings)
+
+    def matcher(read: ReadSpec) -> Matcher:
+        return Matcher(build_reader(read, context), readings.decoder(read.fields))
+
+    found = [
+        _Candidate("message", f"message {one.name}", one.read, matcher(one.read), None)
+        for one in driver.messages.values()
+        if one.transport == spec.name
+    ]
+    for name, reply in _replies(driver, spec):
+        mine = matcher(reply.read)
+        faults = tuple((matcher(one.read), one.text) for one in reply.faults)
+        ear = Ear(Answer(mine, 0.0, reply.errors, faults, reply.read.lines))
+        found.append(_Candidate("reply", name, reply.read, mine, ear))
+    return found
+
+
+def _replies(driver: Driver, spec: TransportSpec) -> Iterator[tuple[str, Reply]]:
+    """Yield all that is waited for on a line, each stage and step as a reply of its own."""
+    asked = [(f"reply to {one.name}", one.transport, one.reply) for one in driver.commands.values()]
+    asked += [
+        (f"reply to poll {one.name}", one.transport, one.reply)
+        for one in driver.polls
+        if not one.run
+    ]
+    for name, transport, reply in asked:
+        if transport != spec.name or reply is None:
+            continue
+        yield name, reply
+        for number, stage in enumerate(reply.stages, 2):
+            yield f"{name}, stage {number}", Reply(stage.read, stage.errors, faults=stage.faults)
+    scripts = [(f"on_connect of {one.name}", one.on_connect) for one in driver.transports.values()]
+    scripts += [(f"steps of {one.name}", one.steps) for one in driver.commands.values()]
+    for name, script in scripts:
+        for step in all_steps(script):
+            if isinstance(step, ExpectStep) and step.transport == spec.name:
+                yield name, Reply(step.read, step.errors, faults=step.faults)
+
+
+def _anew(frame: Frame) -> Frame:
+    """Return the same frame, of which nobody has said anything."""
+    other = Frame(frame.payload, frame.encoding)
+    other.topic = frame.topic
+    return other
+
+
+def _from_hex(text: str) -> bytes:
+    digits = re.sub(r"0[xX]|[\s,:;]", " ", text).split()
+    for number, word in enumerate(digits, 1):
+        if len(word) % 2 or not re.fullmatch(r"[0-9A-Fa-f]+", word):
+            raise UrcError(f"hex: pairs of digits are expected, word {number} is {word[:20]!r}")
+    return bytes.fromhex("".join(digits))
+
+
+def _from_text(text: str, encoding: str) -> bytes:
+    data = bytearray()
+    at = 0
+    try:
+        for match in _ESCAPE.finditer(text):
+            data += text[at : match.start()].encode(encoding)
+            at = match.end()
+            word = match[1]
+            if len(word) == 3:
+                data.append(int(word[1:], 16))
+            elif word in _ESCAPES:
+                data += _ESCAPES[word]
+            else:
+                known = r"\n \r \t \0 \e \\ and \xHH"
+                raise UrcError(f"character {match.start() + 1}: there are {known}, found \\{word}")
+        return bytes(data + text[at:].encode(encoding))
+    except UnicodeEncodeError as error:
+        wrong = text[error.start : error.end]
+        raise UrcError(f"{wrong!r} cannot be written in {encoding}") from None
+
+
+def _all(names: Mapping[str, object]) -> str:
+    return ", ".join(names) or "none"

@@ -1,0 +1,142 @@
+"""Watches the documents of one robot and goes on with the new version whenever one is saved.
+
+Floor 5. A version that is broken changes nothing: the old one goes on, and the findings are told.
+One that is good waits until nobody has the controls, for the robot is disconnected in between.
+"""
+
+import asyncio
+import logging
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Literal, NamedTuple
+
+from urc.config.load import Shelf, check
+from urc.model.profile import Profile
+from urc.problems import Problem, UrcError, has_errors
+from urc.runtime.catalog import built_in_catalog
+from urc.runtime.changes import PERIOD_S, Watched
+from urc.runtime.selftest import exercise
+from urc.shipped import shipped
+from urc.web.robots import Robot, Station
+
+__all__ = ["Examined", "ProfileWatch", "Remake", "examine"]
+
+Remake = Callable[[Profile], Robot]
+"""Makes the robot of a new version of its profile; may raise `UrcError`."""
+State = Literal["running", "waiting", "broken"]
+
+log = logging.getLogger(__name__)
+
+
+class Examined(NamedTuple):
+    """What `urc validate` says of a file."""
+
+    profile: Profile | None
+    """None: it cannot be used."""
+    problems: tuple[Problem, ...]
+    files: tuple[str, ...]
+    """Every document that counts."""
+
+
+def examine(file: str) -> Examined:
+    """Check a document and run its own tests."""
+    checked = check(file, built_in_catalog(), Shelf(shipped("widgets")))
+    problems = checked.problems
+    if checked.profile is not None:
+        problems = (*problems, *exercise(checked.profile).problems)
+    return Examined(checked.profile, problems, checked.files)
+
+
+@dataclass(slots=True)
+class ProfileWatch:
+    """The documents of one robot."""
+
+    station: Station
+    remake: Remake
+    take: Callable[[Robot], None]
+    """Goes on with another version everywhere; may raise `UrcError`."""
+    state: State = "running"
+    told: str = ""
+    """What happened last, for people."""
+    problems: tuple[Problem, ...] = ()
+    edition: int = 0
+    """Grows with every change of what is told here."""
+    listeners: set[Callable[[], None]] = field(default_factory=set)
+    _next: Profile | None = None
+    _robot: Robot | None = None
+
+    @property
+    def robot(self) -> Robot:
+        """The newest version that was taken; the session of the one before it may be closing."""
+        return self._robot or self.station.robot
+
+    @property
+    def file(self) -> str:
+        """The robot's document."""
+        return self.robot.profile.file
+
+    async def run(self) -> None:
+        """Watch for ever; ends by being cancelled."""
+        sleep = self.station.clock.sleep
+        watched = Watched([self.file])
+        found = await asyncio.to_thread(examine, self.file)
+        self.problems = found.problems
+        self._tell("running", "")
+        while True:
+            watched.add(found.files)
+            while not watched.changed():
+                self._go_on()
+                await sleep(PERIOD_S)
+            await self._settled(watched)
+            watched = Watched((self.file, *found.files))  # before it is read
+            try:
+                found = await asyncio.to_thread(examine, self.file)
+                self._judge(found)
+            except Exception as bug:  # a supervisor: the old version goes on
+                log.exception("%s could not be looked at", self.file)
+                self._tell("broken", f"looking at it failed ({type(bug).__name__}: {bug})")
+
+    async def _settled(self, watched: Watched) -> None:
+        """Wait until nobody writes: a program may write a file in several steps."""
+        before: list[object] = []
+        while (now := watched.states()) != before:
+            before = now
+            await self.station.clock.sleep(PERIOD_S)
+
+    def _judge(self, found: Examined) -> None:
+        self.problems = found.problems
+        name = self.robot.profile.name
+        if found.profile is None:
+            self._next = None
+            self._tell("broken", "cannot be used; the version before it goes on")
+        elif found.profile.name != name:
+            self._next = None
+            text = f"it is called {found.profile.name!r} now, {name!r} goes on: restart to apply"
+            self._tell("broken", text)
+        else:
+            self._next = found.profile
+            if not self._go_on():
+                text = "is good, and waits until nobody drives and every stop has arrived"
+                self._tell("waiting", text)
+
+    def _go_on(self) -> bool:
+        """Go on with the new version, if there is one and the robot is at rest."""
+        if self._next is None or not self.station.is_at_rest:
+            return False
+        profile, self._next = self._next, None
+        try:
+            robot = self.remake(profile)
+            self.take(robot)
+        except UrcError as error:
+            self._tell("broken", f"cannot be used: {error}; the version before it goes on")
+            return True
+        self._robot = robot
+        failed = " with findings" if has_errors(self.problems) else ""
+        self._tell("running", f"was saved, and is running now{failed}")
+        return True
+
+    def _tell(self, state: State, told: str) -> None:
+        self.state, self.told = state, told
+        self.edition += 1
+        for wake in tuple(self.listeners):
+            wake()

@@ -1,0 +1,302 @@
+"""What goes over the dev page's own WebSocket: message shapes, and nothing else.
+
+Floor 5. JSON text both ways; bytes travel as base64. Server → page, by ``t``::
+
+    hello    once, first
+    profile  what the profile says now, whether it is the one that runs, and every finding
+    rows     the traffic and the notes, oldest first; numbers run on, a gap shows what was dropped
+    tried    the answer to `Try`
+    shown    the answer to `Show`
+    pong, error   as on the dashboard's own
+
+Page → server: ``ping``, ``try`` and ``show``.
+"""
+
+import json
+from collections.abc import Iterable, Mapping
+
+import msgspec
+
+from urc.model.codec import Envelope
+from urc.model.driver import Argument, Command, Driver
+from urc.problems import Problem, to_text
+from urc.web.dev_preview import Preview, Written
+from urc.web.dev_rows import SHOWN_BYTES, Row, fill, grouped
+from urc.web.dev_secrets import Blanker
+from urc.web.dev_tryout import Finding, Piece, Taker
+from urc.web.wire import INBOUND_BYTES, BadMessage, Ping
+from urc.web.wire_text import Outbound, cut, encoded, milliseconds
+
+__all__ = [
+    "Inbound",
+    "Show",
+    "Try",
+    "decode",
+    "encode_hello",
+    "encode_profile",
+    "encode_rows",
+    "encode_shown",
+    "encode_tried",
+]
+
+MOST_PROBLEMS = 100
+
+
+class Try(msgspec.Struct, tag_field="t", tag="try", forbid_unknown_fields=True, frozen=True):
+    """Asks what the driver makes of something pasted."""
+
+    id: int
+    transport: str
+    text: str
+    hex: bool = False
+    topic: str = ""
+
+
+_Scalar = bool | int | float | str
+
+
+class Show(msgspec.Struct, tag_field="t", tag="show", forbid_unknown_fields=True, frozen=True):
+    """Asks what a command would send."""
+
+    id: int
+    command: str
+    arguments: dict[str, bool | int | float | str | tuple[_Scalar, ...] | None] = {}
+
+
+Inbound = Ping | Try | Show
+_decoder: msgspec.json.Decoder[Inbound] = msgspec.json.Decoder(Inbound)
+
+
+def decode(text: str | bytes) -> Inbound:
+    """Return the message, or raise `BadMessage` saying what is wrong with it."""
+    if len(text) > INBOUND_BYTES:
+        raise BadMessage(f"longer than {INBOUND_BYTES} bytes")
+    try:
+        return _decoder.decode(text)
+    except (msgspec.MsgspecError, UnicodeError, RecursionError) as error:
+        raise BadMessage(str(error)) from error
+
+
+# -- to the page
+
+
+class _Hello(Outbound, tag="hello", omit_defaults=False, frozen=True):
+    robot: str
+    now: int
+
+
+class _Rows(Outbound, tag="rows", omit_defaults=False, frozen=True):
+    first: int
+    now: int
+    rows: list[Row]
+    """Their times in milliseconds, as ages: see `encode_rows`."""
+
+
+class _Found(msgspec.Struct, frozen=True):
+    severity: str
+    text: str
+    """Headline, source line, caret and hint, as `urc validate` prints them."""
+
+
+class _Argument(msgspec.Struct, frozen=True):
+    name: str
+    type: str
+    of: str
+    title: str
+    unit: str
+    min: float | None
+    max: float | None
+    choices: tuple[object, ...]
+    default: object
+    required: bool
+
+
+class _Command(msgspec.Struct, frozen=True):
+    name: str
+    title: str
+    transport: str
+    held: bool
+    steps: int
+    arguments: list[_Argument]
+
+
+class _Line(msgspec.Struct, frozen=True):
+    name: str
+    type: str
+    framing: str
+    encoding: str
+    messages: bool
+    """Whether it carries messages instead of bytes."""
+
+
+class _Profile(Outbound, tag="profile", omit_defaults=False, frozen=True):
+    edition: int
+    state: str
+    file: str
+    told: str
+    problems: list[_Found]
+    lines: list[_Line]
+    commands: list[_Command]
+
+
+class _Taker(msgspec.Struct, frozen=True):
+    kind: str
+    names: tuple[str, ...]
+    fields: dict[str, str]
+    samples: list[tuple[str, str, str]]
+    refused: tuple[str, ...]
+
+
+class _Piece(msgspec.Struct, frozen=True):
+    start: int
+    end: int
+    data: bytes
+    fault: str
+    takers: list[_Taker]
+    reasons: tuple[str, ...]
+
+
+class _Tried(Outbound, tag="tried", omit_defaults=False, frozen=True):
+    id: int
+    error: str = ""
+    size: int = 0
+    left: int = 0
+    more: int = 0
+    pieces: tuple[_Piece, ...] = ()
+
+
+class _Frame(msgspec.Struct, frozen=True):
+    transport: str
+    note: str = ""
+    data: bytes = b""
+    size: int = 0
+    verb: str = ""
+    address: str = ""
+    more: str = ""
+    text: str = ""
+
+
+class _Shown(Outbound, tag="shown", omit_defaults=False, frozen=True):
+    id: int
+    refusal: str
+    frames: list[_Frame]
+    questions: tuple[str, ...]
+    requires: tuple[str, ...]
+
+
+def encode_hello(robot: str, now_s: float) -> str:
+    """Return the first message."""
+    return encoded(_Hello(robot, milliseconds(now_s)))
+
+
+def encode_rows(rows: Iterable[Row], first: int, now_s: float) -> str:
+    """Return rows of the wire log, the first of which has the number `first`."""
+    aged = [
+        msgspec.structs.replace(row, time_s=max(0, milliseconds(now_s - row.time_s)))
+        for row in rows
+    ]
+    return encoded(_Rows(first, milliseconds(now_s), aged))
+
+
+def encode_profile(
+    driver: Driver,
+    messaging: Iterable[str],
+    *,
+    edition: int,
+    state: str,
+    file: str,
+    told: str,
+    problems: Iterable[Problem],
+) -> str:
+    """Return what the profile says, and what is wrong with the file.
+
+    Args:
+        driver: the one that runs.
+        messaging: types of transports that carry messages.
+        edition: grows with every change.
+        state: ``running``; ``waiting``: a new one is good and waits; ``broken``: it is not.
+        file: where it is read from.
+        told: what happened last, for people.
+        problems: all findings.
+    """
+    kinds = frozenset(messaging)
+    lines = [
+        _Line(one.name, one.type, one.framing.type, one.encoding, one.type in kinds)
+        for one in driver.transports.values()
+    ]
+    found = [_Found(one.severity, to_text(one)) for one in problems]
+    commands = [_command(one) for one in driver.commands.values()]
+    return encoded(_Profile(edition, state, file, told, found[:MOST_PROBLEMS], lines, commands))
+
+
+def encode_tried(number: int, finding: Finding | None, error: str = "") -> str:
+    """Return what became of something pasted."""
+    if finding is None:
+        return encoded(_Tried(number, cut(error)))
+    pieces = tuple(_piece(one) for one in finding.pieces)
+    return encoded(_Tried(number, "", finding.size, finding.left, finding.more, pieces))
+
+
+def encode_shown(number: int, shown: Preview) -> str:
+    """Return what a command would send."""
+    frames = [_frame(one) for one in shown.frames]
+    return encoded(_Shown(number, cut(shown.refusal), frames, shown.questions, shown.requires))
+
+
+def _command(command: Command) -> _Command:
+    return _Command(
+        command.name,
+        command.title,
+        command.transport,
+        command.hold is not None,
+        len(command.steps),
+        [_argument(one) for one in command.arguments.values()],
+    )
+
+
+def _argument(one: Argument) -> _Argument:
+    return _Argument(
+        one.name,
+        one.type,
+        one.of,
+        one.title,
+        one.unit,
+        one.min,
+        one.max,
+        tuple(one.choices),
+        one.default,
+        one.is_required,
+    )
+
+
+def _piece(piece: Piece) -> _Piece:
+    takers = [_taker(one) for one in piece.takers]
+    data = piece.data[:SHOWN_BYTES]
+    return _Piece(piece.start, piece.end, data, cut(piece.fault), takers, piece.reasons)
+
+
+def _taker(taker: Taker) -> _Taker:
+    fields = {name: _word(value) for name, value in taker.fields.items()}
+    samples = [(name, _word(value), alarm) for name, value, alarm in taker.samples]
+    return _Taker(taker.kind, taker.names, fields, samples, taker.refused)
+
+
+def _word(value: object) -> str:
+    if isinstance(value, (bytes, bytearray)) and len(value) > 64:
+        return f"<{grouped(len(value))} bytes>"
+    if isinstance(value, (Mapping, list, tuple)):
+        return cut(json.dumps(value, default=repr, ensure_ascii=False))
+    return cut(repr(value))
+
+
+def _frame(written: Written) -> _Frame:
+    payload = written.payload
+    if written.text:
+        return _Frame(written.transport, written.text)
+    if not isinstance(payload, Envelope):
+        return _Frame(written.transport, data=payload[:SHOWN_BYTES], size=len(payload))
+    row = Row(0, 0.0, "sent", written.transport)
+    fill(row, payload, Blanker(()))
+    return _Frame(
+        written.transport, "", row.data, row.size, row.verb, row.address, row.more, row.text
+    )

@@ -1,0 +1,267 @@
+// @ts-check
+/**
+ * The commands of a robot: their arguments, what they would send, and what became of them. Knows no
+ * socket.
+ *
+ * @typedef {import("./types.js").Value} Value
+ * @typedef {import("./dev_try.js").Line} Line
+ *
+ * @typedef {object} Argument
+ * @property {string} name
+ * @property {string} type
+ * @property {string} of
+ * @property {string} title
+ * @property {string} unit
+ * @property {number | null} min
+ * @property {number | null} max
+ * @property {Value[]} choices
+ * @property {unknown} default
+ * @property {boolean} required
+ *
+ * @typedef {object} Command
+ * @property {string} name
+ * @property {string} title
+ * @property {string} transport
+ * @property {boolean} held
+ * @property {number} steps
+ * @property {Argument[]} arguments
+ *
+ * @typedef {object} Frame
+ * @property {string} transport
+ * @property {string} note
+ * @property {string} data
+ * @property {number} size
+ * @property {string} verb
+ * @property {string} address
+ * @property {string} more
+ * @property {string} text
+ *
+ * @typedef {{refusal: string, frames: Frame[], questions: string[], requires: string[]}} Shown
+ *
+ * @typedef {object} Desk Where questions and commands go.
+ * @property {(message: object) => Promise<any>} ask
+ * @property {(command: string, args: Record<string, unknown>) => Promise<Record<string, unknown>>} run
+ */
+import { bytesOf, element, hexOf, listElement, sizeText, textOf, visible, wordsOf } from "./dev_bytes.js";
+
+export class Commands {
+  /**
+   * @param {HTMLElement} el
+   * @param {Desk} desk
+   */
+  constructor(el, desk) {
+    this.el = el;
+    this.desk = desk;
+    /** @type {Map<string, Line>} */
+    this.lines = new Map();
+    this.key = "";
+  }
+
+  /**
+   * @param {Command[]} commands
+   * @param {Line[]} lines
+   */
+  set(commands, lines) {
+    this.lines = new Map(lines.map((line) => [line.name, line]));
+    const key = JSON.stringify(commands);
+    if (key === this.key) return; // what somebody has filled in stays
+    this.key = key;
+    const none = element("p", "dev-quiet", "This robot has no command.");
+    this.el.replaceChildren(...(commands.length ? commands.map((one) => this.command(one)) : [none]));
+  }
+
+  /** @param {Command} command */
+  command(command) {
+    const el = element("details", "dev-command");
+    const summary = element("summary", "");
+    summary.append(element("span", "", command.name), element("span", "dev-quiet", about(command)));
+    const form = document.createElement("form");
+    form.className = "dev-form";
+    const fields = element("div", "dev-tools");
+    const inputs = command.arguments.map((argument) => field(argument));
+    fields.append(...inputs.map(({ label }) => label));
+    const buttons = element("div", "dev-tools");
+    const preview = button("Preview", "submit");
+    buttons.append(preview);
+    const result = element("div", "dev-result");
+    result.setAttribute("role", "status");
+    const given = () => {
+      /** @type {Record<string, unknown>} */
+      const values = {};
+      for (const { argument, read } of inputs) {
+        const value = read();
+        if (value !== undefined) values[argument.name] = value;
+      }
+      return values;
+    };
+    if (command.held) {
+      buttons.append(element("p", "dev-quiet", "It moves the robot while it is held: it is given on the interface."));
+    } else {
+      const send = button("Send", "button");
+      send.addEventListener("click", () => void this.send(command, given(), result));
+      buttons.append(send);
+    }
+    form.append(fields, buttons, result);
+    form.addEventListener("submit", (event) => {
+      event.preventDefault();
+      void this.preview(command, given(), result);
+    });
+    el.append(summary, form);
+    return el;
+  }
+
+  /**
+   * @param {Command} command
+   * @param {Record<string, unknown>} values
+   * @param {HTMLElement} result
+   * @returns {Promise<Shown | null>}
+   */
+  async preview(command, values, result) {
+    try {
+      const shown = await this.desk.ask({ t: "show", command: command.name, arguments: values });
+      result.replaceChildren(...this.shownElements(shown));
+      return shown;
+    } catch (error) {
+      result.replaceChildren(element("p", "dev-bad", `▲ ${wordsOf(error)}`));
+      return null;
+    }
+  }
+
+  /**
+   * @param {Command} command
+   * @param {Record<string, unknown>} values
+   * @param {HTMLElement} result
+   */
+  async send(command, values, result) {
+    const shown = await this.preview(command, values, result);
+    if (!shown || shown.refusal) return;
+    if (shown.questions.length === 0) {
+      await this.run(command, values, result);
+      return;
+    }
+    const yes = button("Yes, send it", "button");
+    yes.addEventListener("click", () => void this.run(command, values, result), { once: true });
+    result.append(yes);
+    yes.focus();
+  }
+
+  /**
+   * @param {Command} command
+   * @param {Record<string, unknown>} values
+   * @param {HTMLElement} result
+   */
+  async run(command, values, result) {
+    result.replaceChildren(element("p", "dev-quiet", "… waiting for the robot"));
+    try {
+      const reply = await this.desk.run(command.name, values);
+      const told = Object.entries(reply).map(([name, value]) => `${name} = ${JSON.stringify(value)}`);
+      result.replaceChildren(element("p", "", "✓ done"), listElement(told));
+    } catch (error) {
+      result.replaceChildren(element("p", "dev-bad", `▲ ${wordsOf(error)}`));
+    }
+  }
+
+  /** @param {Shown} shown */
+  shownElements(shown) {
+    if (shown.refusal) return [element("p", "dev-bad", `▲ refused: ${visible(shown.refusal)}`)];
+    const found = shown.frames.map((frame) => this.frameElement(frame));
+    found.push(...shown.requires.map((text) => element("p", "dev-caution", `◆ it requires: ${text}`)));
+    found.push(...shown.questions.map((text) => element("p", "dev-caution", `◆ it asks: ${text}`)));
+    return found;
+  }
+
+  /** @param {Frame} frame */
+  frameElement(frame) {
+    const el = element("div", "dev-piece");
+    if (frame.note) {
+      el.append(element("p", "dev-quiet", visible(frame.note)));
+      return el;
+    }
+    const bytes = bytesOf(frame.data);
+    const encoding = this.lines.get(frame.transport)?.encoding ?? "utf-8";
+    if (frame.verb) {
+      const address = [frame.verb, frame.address, frame.more].filter(Boolean).join(" ");
+      el.append(element("p", "", `on ${frame.transport}: ${visible(address)}`));
+      const body = frame.text ? visible(frame.text) : textOf(bytes, encoding);
+      if (body) el.append(element("code", "", body));
+      return el;
+    }
+    el.append(element("p", "dev-quiet", `on ${frame.transport}, ${sizeText(frame.size)}`));
+    el.append(element("p", "dev-hex", hexOf(bytes)), element("code", "", textOf(bytes, encoding)));
+    return el;
+  }
+}
+
+/** @param {Command} command */
+function about(command) {
+  const words = [command.title, command.steps ? `${command.steps} steps` : `on ${command.transport}`];
+  return [...words, command.held ? "held" : ""].filter(Boolean).join(" · ");
+}
+
+/**
+ * @param {string} text
+ * @param {"submit" | "button"} type
+ */
+function button(text, type) {
+  const el = document.createElement("button");
+  el.className = "urc-button";
+  el.type = type;
+  el.textContent = text;
+  return el;
+}
+
+/**
+ * @param {Argument} argument
+ * @returns {{argument: Argument, label: HTMLElement, read: () => unknown}}
+ */
+function field(argument) {
+  const label = element("label", "dev-field");
+  label.append(caption(argument));
+  const choices = argument.type === "boolean" ? [true, false] : argument.choices;
+  if (choices.length > 0 && argument.type !== "array") {
+    const select = document.createElement("select");
+    select.className = "dev-input";
+    if (!argument.required) select.append(new Option(`default: ${String(argument.default)}`, ""));
+    choices.forEach((choice, place) => select.append(new Option(String(choice), String(place))));
+    label.append(select);
+    return { argument, label, read: () => (select.value === "" ? undefined : choices[Number(select.value)]) };
+  }
+  const input = document.createElement("input");
+  input.className = "dev-input";
+  input.autocomplete = "off";
+  input.spellcheck = false;
+  if (argument.type === "number" || argument.type === "integer") input.inputMode = "decimal";
+  if (argument.default !== null) input.placeholder = JSON.stringify(argument.default);
+  if (argument.type === "array") input.placeholder ||= "[1, 2, 3]";
+  label.append(input);
+  return { argument, label, read: () => typed(argument, input.value) };
+}
+
+/** @param {Argument} argument */
+function caption(argument) {
+  const { min, max } = argument;
+  const range = min !== null && max !== null ? `${min} to ${max}` : min !== null ? `from ${min}` : max !== null ? `to ${max}` : "";
+  const kind = argument.type === "array" ? `list of ${argument.of}` : argument.type;
+  const words = [kind, range, argument.unit, argument.required ? "" : "optional"].filter(Boolean);
+  return `${argument.name} (${words.join(", ")})`;
+}
+
+/**
+ * Return what was written, as its type; what is none goes to the server as it is, which says so.
+ *
+ * @param {Argument} argument
+ * @param {string} text
+ */
+function typed(argument, text) {
+  if (text === "" && (argument.type !== "string" || !argument.required)) return undefined;
+  if (argument.type === "string") return text;
+  if (argument.type === "array") {
+    try {
+      return JSON.parse(text.trim().startsWith("[") ? text : `[${text}]`);
+    } catch {
+      return text;
+    }
+  }
+  const number = Number(text);
+  return text.trim() !== "" && Number.isFinite(number) ? number : text;
+}

@@ -1,0 +1,287 @@
+// @ts-check
+/**
+ * What hands do: held controls, sampled on the page's main thread, and every way of letting go.
+ *
+ * A grip is one thing that a hand holds: by one pointer, by keys, or by a gamepad. While it is held
+ * its widget is asked for the values in every animation frame, and a tick of them goes out every
+ * 50 ms, or sooner when they change. There is no timer that could go on when the page does not: a
+ * page that is hidden, frozen, blocked or gone draws no frames, so it sends nothing, and the server
+ * stops the robot.
+ *
+ * Whatever else happens to the page while a control is held means neutral, and the end of that
+ * gesture. After that, and after a stop or a refusal, nothing is sent before a new gesture.
+ *
+ * @typedef {import("./drive.js").Drive} Drive
+ * @typedef {import("./output.js").Output} Output
+ * @typedef {import("./types.js").HoldSpec} HoldSpec
+ * @typedef {import("./types.js").Value} Value
+ */
+import { Control, Grip } from "./grip.js";
+import { Pads } from "./pad.js";
+
+const TICK_MS = 50;
+/** So long the server may take to grant the controls. */
+const ASK_MS = 1500;
+
+export class Input {
+  /** @param {Drive} drive */
+  constructor(drive) {
+    this.drive = drive;
+    /** @type {Map<string, Control>} */
+    this.controls = new Map();
+    /** @type {Set<Grip>} */
+    this.grips = new Set();
+    this.pads = new Pads(() => this.run());
+    this.isRunning = false;
+    this.frameMs = 0;
+    /** Calls of the loop that was stopped last do nothing. */
+    this.round = 0;
+    this.watch();
+  }
+
+  /** Everything that means neutral, whoever holds what. */
+  watch() {
+    const all = (/** @type {string} */ why) => () => this.letGo(why);
+    addEventListener("blur", all("the window lost the focus"));
+    addEventListener("pagehide", all("the page was left"));
+    addEventListener("resize", all("the window changed its size"));
+    addEventListener("orientationchange", all("the screen was turned"));
+    screen.orientation?.addEventListener("change", all("the screen was turned"));
+    addEventListener("gamepaddisconnected", all("the gamepad is gone"));
+    document.addEventListener("freeze", all("the page was frozen"));
+    document.addEventListener("fullscreenchange", all("full screen began or ended"));
+    document.addEventListener("visibilitychange", () => {
+      if (document.hidden) this.letGo("the page was hidden");
+    });
+    document.addEventListener("contextmenu", (event) => {
+      const target = event.target;
+      for (const { spec } of this.grips) {
+        if (target instanceof Node && spec.el.contains(target)) event.preventDefault();
+      }
+      this.letGo("a menu was opened");
+    });
+  }
+
+  /**
+   * @param {Output} output
+   * @param {HoldSpec} spec
+   * @param {AbortSignal} signal
+   */
+  hold(output, spec, signal) {
+    const control = this.controls.get(output.command) ?? new Control(output.command);
+    this.controls.set(output.command, control);
+    const grip = new Grip(this, control, output, spec);
+    this.grips.add(grip);
+    grip.listen(signal);
+    grip.show(true);
+  }
+
+  /** @param {Grip} grip */
+  begin(grip) {
+    const { control } = grip;
+    control.grips.add(grip);
+    if (grip.output.refusal) this.spend(control, grip.output.refusal);
+    if (control.phase === "idle" || (control.phase === "spent" && control.grips.size === 1)) {
+      if (!grip.output.refusal) this.ask(control);
+    }
+    grip.show();
+    this.run();
+  }
+
+  /** @param {Control} control */
+  ask(control) {
+    const { drive } = this;
+    control.phase = "asking";
+    control.reason = "";
+    control.askedMs = performance.now();
+    control.sent = "";
+    const epoch = drive.lease?.epoch ?? -1;
+    if (drive.isMine && epoch > control.closedEpoch) return;
+    const refusal = this.refusal();
+    if (refusal || !drive.say("take")) this.spend(control, refusal || "no connection to URC");
+  }
+
+  /** Why nothing can be driven now; "" when it can be asked for. */
+  refusal() {
+    const { lease, isMine } = this.drive;
+    if (!lease) return "no connection to URC";
+    if (lease.latched) return `stopped by ${lease.latched}: reset it first`;
+    if (!lease.drives) return "this page only watches";
+    return lease.holder && !isMine ? `${lease.holder.name} has the controls` : "";
+  }
+
+  /** @param {Grip} grip */
+  end(grip) {
+    const { control } = grip;
+    control.grips.delete(grip);
+    if (control.grips.size === 0) {
+      this.release(control);
+      if (control.phase !== "spent") control.phase = "idle";
+    }
+    grip.show();
+  }
+
+  /** @param {Control} control */
+  release(control) {
+    if (!control.isReleaseOwed) return;
+    control.isReleaseOwed = false;
+    this.drive.socket.send({ t: "release", command: control.command });
+  }
+
+  /**
+   * End the gesture: what is held stays so without any effect, until it is let go.
+   *
+   * @param {Control} control
+   * @param {string} reason
+   */
+  spend(control, reason) {
+    control.phase = "spent";
+    control.reason = reason;
+    for (const grip of this.grips) if (grip.control === control) grip.show();
+  }
+
+  /**
+   * Let go of everything that is held.
+   *
+   * @param {string} reason
+   */
+  letGo(reason) {
+    for (const grip of this.grips) {
+      if (!grip.hand) continue;
+      grip.control.phase = "spent";
+      grip.control.reason = reason;
+      grip.drop(["pointer", "keys", "pad"]);
+    }
+  }
+
+  /** STOP was pressed, or the line is gone: no gesture survives that. @param {string} reason */
+  spendAll(reason) {
+    for (const control of this.controls.values()) {
+      if (control.grips.size > 0) this.spend(control, reason);
+    }
+  }
+
+  /**
+   * The server has stopped a control, or refused its ticks.
+   *
+   * @param {string} command
+   * @param {string} reason
+   */
+  stopped(command, reason) {
+    const control = this.controls.get(command);
+    if (!control) return;
+    control.closedEpoch = this.drive.lease?.epoch ?? control.closedEpoch;
+    control.isReleaseOwed = true;
+    this.spend(control, reason);
+    if (control.grips.size === 0) this.release(control);
+  }
+
+  /** The lease has changed: what was said about the last gesture is over. */
+  leaseChanged() {
+    for (const control of this.controls.values()) {
+      if (control.phase !== "spent" || control.grips.size > 0 || this.drive.isLatched) continue;
+      control.phase = "idle";
+      for (const grip of this.grips) if (grip.control === control) grip.show();
+    }
+  }
+
+  /** The server refused a wish. @param {string} reason */
+  refused(reason) {
+    for (const control of this.controls.values()) {
+      if (control.phase === "asking") this.spend(control, reason);
+    }
+  }
+
+  /** Sample from now on, for as long as something is held. */
+  run() {
+    if (this.isRunning) return;
+    this.isRunning = true;
+    this.frameMs = performance.now();
+    this.round += 1;
+    const { round } = this;
+    const frame = () => {
+      if (round !== this.round) return;
+      this.isRunning = this.step(performance.now());
+      if (this.isRunning) requestAnimationFrame(frame);
+    };
+    requestAnimationFrame(frame);
+  }
+
+  /**
+   * One frame.
+   *
+   * @param {number} nowMs
+   * @returns {boolean} whether there is to be another
+   */
+  step(nowMs) {
+    const gapMs = nowMs - this.frameMs;
+    this.frameMs = nowMs;
+    this.pads.step(this.grips);
+    for (const control of this.controls.values()) {
+      if (control.grips.size === 0) continue;
+      const leaseMs = Math.min(...[...control.grips].map((grip) => grip.output.leaseMs));
+      if (gapMs > leaseMs && control.phase === "held") {
+        this.spend(control, "the page was held up");
+        this.release(control);
+      }
+      this.stepOne(control, nowMs);
+      for (const grip of control.grips) grip.show();
+    }
+    return this.pads.isConnected || [...this.grips].some((grip) => grip.hand);
+  }
+
+  /**
+   * @param {Control} control
+   * @param {number} nowMs
+   */
+  stepOne(control, nowMs) {
+    const { drive } = this;
+    const lease = drive.lease;
+    if (control.phase === "asking") {
+      if (lease && drive.isMine && drive.beat && lease.epoch > control.closedEpoch) {
+        control.phase = "held";
+        control.epoch = lease.epoch;
+      } else if (nowMs - control.askedMs > ASK_MS) {
+        this.spend(control, "URC did not answer");
+      }
+    }
+    if (control.phase !== "held") return;
+    if (!lease || !drive.isMine || lease.epoch !== control.epoch) {
+      this.spend(control, this.refusal() || "the controls were taken anew");
+      return;
+    }
+    this.tick(control, nowMs);
+  }
+
+  /**
+   * @param {Control} control
+   * @param {number} nowMs
+   */
+  tick(control, nowMs) {
+    const { drive } = this;
+    /** @type {Record<string, Value>} */
+    let values = {};
+    for (const { output } of control.grips) values = { ...values, ...output.neutral };
+    for (const grip of control.grips) values = { ...values, ...grip.sample() };
+    const text = JSON.stringify(values);
+    if (text === control.sent && nowMs - control.sentMs < TICK_MS) return;
+    if (drive.socket.unsent > 0) return; // the newest goes when the line is free, not after others
+    drive.number += 1;
+    control.isReleaseOwed = drive.socket.send({
+      t: "tick",
+      command: control.command,
+      arguments: values,
+      epoch: control.epoch,
+      number: drive.number,
+      echo: drive.beat,
+    });
+    control.sent = text;
+    control.sentMs = nowMs;
+  }
+
+  /** @param {Grip} grip */
+  forget(grip) {
+    grip.drop(["pointer", "keys", "pad"]);
+    this.grips.delete(grip);
+  }
+}

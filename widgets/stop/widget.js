@@ -1,0 +1,58 @@
+// @ts-check
+/** @typedef {import("../../urc/web/static/types.js").Context} Context */
+/** @typedef {import("../../urc/web/static/types.js").Instance} Instance */
+/** @typedef {import("../../urc/web/static/types.js").StopState} StopState */
+
+export default {
+  /**
+   * @param {Context} ctx
+   * @returns {Instance}
+   */
+  mount({ el, stop, onStop, signal }) {
+    const root = find(el, ".stop");
+    const main = find(el, ".stop-main");
+    const note = find(el, ".stop-note");
+    let isPressed = false;
+    /** @param {StopState} state */
+    function show(state) {
+      const isCut = state.phase === "failed" || (state.fault !== "" && !state.isConfirmed);
+      root.setAttribute("data-phase", isCut ? "fault" : state.phase);
+      note.textContent = words(state, isCut);
+    }
+    // It acts when it is touched; a key has only the one moment, a screen reader only the click.
+    main.addEventListener("pointerdown", (event) => {
+      isPressed = event.button === 0;
+      if (isPressed) stop();
+    }, { signal });
+    main.addEventListener("click", () => {
+      if (!isPressed) stop();
+      isPressed = false;
+    }, { signal });
+    onStop(show);
+    return {};
+  },
+};
+
+/**
+ * @param {StopState} state
+ * @param {boolean} isCut
+ */
+function words({ phase, isLatched, isConfirmed, fault }, isCut) {
+  if (phase === "failed") return "▲ NO LINK: stop it by hand";
+  if (isCut) return `▲ NO LINK: ${fault}`;
+  if (isConfirmed) return "✓ sent ✓ confirmed ✓ latched";
+  if (isLatched) return "✓ sent ✓ latched";
+  if (phase === "") return "—";
+  return phase === "sent" ? "✓ sent" : "… sending";
+}
+
+/**
+ * @param {Element} root
+ * @param {string} selector
+ * @returns {HTMLElement}
+ */
+function find(root, selector) {
+  const found = root.querySelector(selector);
+  if (!(found instanceof HTMLElement)) throw new Error(`the template has no ${selector}`);
+  return found;
+}
