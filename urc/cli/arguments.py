@@ -4,6 +4,7 @@ Floor 6. A verb is a module with `EXAMPLE`, `add_arguments(parser)` and `run(arg
 """
 
 import argparse
+import ipaddress
 import os
 import re
 from collections.abc import Iterable
@@ -18,11 +19,13 @@ if TYPE_CHECKING:
     from urc.model.profile import Profile
 
 __all__ = [
+    "add_dev",
     "add_host",
     "add_port",
     "add_profile",
     "add_settings",
     "duration",
+    "is_loopback",
     "load",
     "parse",
     "port",
@@ -100,6 +103,23 @@ def add_host(parser: argparse.ArgumentParser) -> None:
         default="127.0.0.1",
         help="to listen on (default: this machine only)",
     )
+
+
+def add_dev(parser: argparse.ArgumentParser) -> None:
+    """Add `--dev`, which turns the dev pages on."""
+    parser.add_argument(
+        "--dev",
+        action="store_true",
+        help="a dev page for each robot: its traffic, a parser to try, reload on every save",
+    )
+
+
+def is_loopback(host: str) -> bool:
+    """Return whether only this machine reaches what listens on `host`."""
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return host == "localhost"
 
 
 def add_port(parser: argparse.ArgumentParser) -> None:

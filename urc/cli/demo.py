@@ -8,7 +8,8 @@ import webbrowser
 from collections.abc import Mapping
 from contextlib import suppress
 
-from urc.cli.arguments import add_host, add_port
+from urc.cli.arguments import add_dev, add_host, add_port, is_loopback
+from urc.cli.failures import Misuse
 from urc.problems import UrcError
 from urc.shipped import shipped
 
@@ -19,6 +20,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add where to listen, and whether a browser is opened."""
     add_host(parser)
     add_port(parser)
+    add_dev(parser)
     parser.add_argument("--no-browser", action="store_true", help="print the address only")
 
 
@@ -28,6 +30,8 @@ def run(arguments: argparse.Namespace) -> int:
     from urc.config.load import load_profile
     from urc.runtime.catalog import built_in_catalog
 
+    if arguments.dev and not is_loopback(arguments.host):
+        raise Misuse(f"--dev shows all traffic and is for this machine alone, not {arguments.host}")
     catalog = built_in_catalog()
     files = sorted(shipped("robots").glob("*.yaml"))
     profiles = [load_profile(file, catalog) for file in files]
@@ -44,6 +48,7 @@ def run(arguments: argparse.Namespace) -> int:
         Place(arguments.host, arguments.port),
         is_simulated=True,
         on_ready=announce,
+        settings_of=(lambda _: {}) if arguments.dev else None,
     )
 
 

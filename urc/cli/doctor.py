@@ -28,6 +28,9 @@ REQUIRED = {
     "roslibpy": "robots behind rosbridge",
 }
 OPTIONAL = {
+    "paho-mqtt": "robots behind an MQTT broker (pip install 'urc[mqtt]')",
+    "cbor2": "images from rosbridge without detours (pip install 'urc[cbor]')",
+    "zeroconf": "robots that announce themselves, for urc discover (pip install 'urc[mdns]')",
     "google-re2": "patterns that are not provably fast; without it they are refused",
     "uvloop": "a faster event loop (pip install 'urc[fast]')",
 }

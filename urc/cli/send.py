@@ -13,7 +13,7 @@ from urc.problems import UrcError
 if TYPE_CHECKING:
     from urc.model.driver import Argument, Command
     from urc.model.profile import Profile
-    from urc.model.values import Value
+    from urc.model.values import Reading, Value
     from urc.runtime.session import CommandFailed, Session
 
 EXAMPLE = "urc send my-robot.yaml set_speed speed=3 --set host=192.168.1.20"
@@ -45,8 +45,8 @@ def run(arguments: argparse.Namespace) -> int:
     return run_loop(_send(profile, settings, command, values))
 
 
-def _arguments(command: "Command", words: list[str]) -> dict[str, "Value"]:
-    values: dict[str, Value] = {}
+def _arguments(command: "Command", words: list[str]) -> dict[str, "Reading"]:
+    values: dict[str, Reading] = {}
     for word in words:
         name, equals, text = word.partition("=")
         if not equals:
@@ -58,8 +58,24 @@ def _arguments(command: "Command", words: list[str]) -> dict[str, "Value"]:
             raise Misuse(f"{command.name} has no argument {name!r}; {hint}")
         if name in values:
             raise Misuse(f"{name} is given twice")
-        values[name] = _value(argument, text)
+        if argument.type == "array":
+            values[name] = _elements(argument, text)
+        else:
+            values[name] = _value(argument, text)
     return values
+
+
+def _elements(argument: "Argument", text: str) -> tuple["Value", ...]:
+    """Return the elements of an array: ``1,2,3``, or ``["a, b", "c"]`` as JSON has it."""
+    if text.startswith("["):
+        import json
+
+        try:
+            return tuple(json.loads(text))
+        except (ValueError, RecursionError):
+            raise Misuse(f"{argument.name}: {text!r} is no list in JSON") from None
+    single = argument._replace(type=argument.of)
+    return tuple(_value(single, word.strip()) for word in text.split(",")) if text else ()
 
 
 def _value(argument: "Argument", text: str) -> "Value":
@@ -83,7 +99,7 @@ async def _send(
     profile: "Profile",
     settings: Mapping[str, "Value"],
     command: "Command",
-    values: Mapping[str, "Value"],
+    values: Mapping[str, "Reading"],
 ) -> int:
     from urc.runtime.catalog import built_in_catalog
     from urc.runtime.session import CommandFailed, Session

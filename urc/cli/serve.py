@@ -1,10 +1,17 @@
 """`urc serve`: the dashboard on real robots."""
 
 import argparse
-import ipaddress
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
 
-from urc.cli.arguments import add_host, add_port, add_settings, load
+from urc.cli.arguments import add_dev, add_host, add_port, add_settings, is_loopback, load
+from urc.cli.failures import Misuse
 from urc.cli.output import complain
+
+if TYPE_CHECKING:
+    from urc.model.profile import Profile
+    from urc.model.values import Value
 
 EXAMPLE = "urc serve robots/puppet.yaml --set host=192.168.1.20"
 
@@ -26,6 +33,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--simulate", action="store_true", help="emulate the robots instead of connecting"
     )
+    add_dev(parser)
+    parser.add_argument(
+        "--no-guard",
+        dest="has_guard",
+        action="store_false",
+        help="for debugging: write motion from this process; if it hangs, nothing stops a robot",
+    )
+    parser.add_argument(
+        "--data-dir",
+        dest="data",
+        metavar="FOLDER",
+        type=Path,
+        help="where a stop is kept over a restart, and what else URC remembers",
+    )
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -33,27 +54,36 @@ def run(arguments: argparse.Namespace) -> int:
     from urc.cli.dashboard import Place, run_dashboard
     from urc.cli.settings import settings_given
 
+    if arguments.dev and not is_loopback(arguments.host):
+        raise Misuse(f"--dev shows all traffic and is for this machine alone, not {arguments.host}")
     profiles = [load(word) for word in arguments.profiles]
     values = [values for values, _ in settings_given(profiles, arguments)]
-    if not _is_loopback(arguments.host):
+    if not is_loopback(arguments.host):
         complain(
             f"urc serve: {arguments.host} can be reached by others, and there is no sign-in yet:"
             " anyone on that network can drive these robots"
         )
+
+    def settings_of(saved: "Profile") -> Mapping[str, "Value"]:
+        others = [profile for profile in profiles if profile.name != saved.name]
+        return settings_given([saved, *others], arguments)[0][0]
+
+    if not arguments.has_guard:
+        complain("urc serve: no guard: a robot that moves is not stopped when this process hangs")
     return run_dashboard(
         list(zip(profiles, values, strict=True)),
-        Place(arguments.host, arguments.port, tuple(arguments.allowed_hosts)),
+        Place(
+            arguments.host,
+            arguments.port,
+            tuple(arguments.allowed_hosts),
+            arguments.data,
+            arguments.has_guard,
+        ),
         is_simulated=arguments.simulate,
         on_ready=_print_address,
+        settings_of=settings_of if arguments.dev else None,
     )
 
 
 def _print_address(url: str) -> None:
     print(f"dashboard {url}", flush=True)
-
-
-def _is_loopback(host: str) -> bool:
-    try:
-        return ipaddress.ip_address(host).is_loopback
-    except ValueError:
-        return host == "localhost"

@@ -2,16 +2,29 @@
 
 import argparse
 import asyncio
-from collections.abc import Mapping
-from typing import TYPE_CHECKING
+import logging
+import time
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Final
 
 from urc.cli.arguments import add_host, add_profile, load
+from urc.cli.output import complain
 
 if TYPE_CHECKING:
     from urc.model.profile import Profile
     from urc.model.values import Value
 
 EXAMPLE = "urc simulate robots/puppet.yaml --set port=6789"
+
+_SOURCE: Final = "urc.simulator.twin"
+"""Where an emulated robot tells of frames that it cannot answer."""
+_AGAIN_S: Final = 10.0
+"""The same is told again after this time, with how often it happened."""
+_LINES_A_SECOND: Final = 5
+_LAST_LINES: Final = 10
+"""Different complaints told at the end."""
+_KINDS_MOST: Final = 200
+"""Different complaints that are kept apart; beyond them the oldest is forgotten."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -37,10 +50,76 @@ def run(arguments: argparse.Namespace) -> int:
 async def _simulate(profile: "Profile", settings: Mapping[str, "Value"], host: str) -> int:
     from urc.simulator.server import serve
 
-    async with serve(profile, settings, host) as listening:
-        for name, (address, port) in listening.items():
-            kind = profile.driver.transports[name].type
-            shown = f"[{address}]" if ":" in address else address
-            print(f"listening {name} {kind} {shown}:{port}", flush=True)
-        await asyncio.Event().wait()
+    log, complaints = logging.getLogger(_SOURCE), Complaints(complain)
+    before = log.level, log.propagate
+    log.setLevel(logging.INFO)
+    log.propagate = False
+    log.addHandler(complaints)
+    try:
+        async with serve(profile, settings, host) as listening:
+            for name, place in listening.items():
+                print(f"listening {name} {place.text}", flush=True)
+            await asyncio.Event().wait()
+    finally:
+        log.removeHandler(complaints)
+        log.level, log.propagate = before
+        complaints.finish()
     return 0
+
+
+class Complaints(logging.Handler):
+    """Tells of what an emulated robot could not answer: one line each, the same ones counted.
+
+    Args:
+        tell: prints one line.
+        clock: seconds; only differences count.
+    """
+
+    def __init__(
+        self, tell: Callable[[str], None], clock: Callable[[], float] = time.monotonic
+    ) -> None:
+        super().__init__(logging.INFO)
+        self._tell = tell
+        self._clock = clock
+        self._counts: dict[str, int] = {}
+        """Complaint → how often it came since it was told."""
+        self._told_at: dict[str, float] = {}
+        self._forgotten = 0
+        """How many were neither told nor are still counted by themselves."""
+        self._second = float("-inf")
+        self._lines = 0
+        """Lines told in the second that began at `_second`."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Count a complaint, and tell it unless it was told a moment ago."""
+        text = record.getMessage()
+        if text not in self._counts and len(self._counts) >= _KINDS_MOST:
+            oldest = next(iter(self._counts))
+            self._forgotten += self._counts.pop(oldest)
+            self._told_at.pop(oldest, None)
+        self._counts[text] = self._counts.get(text, 0) + 1
+        now = self._clock()
+        if now - self._told_at.get(text, float("-inf")) >= _AGAIN_S and self._may_tell(now):
+            count = self._counts[text]
+            self._tell(text if count == 1 else f"{text} ({count} times)")
+            self._counts[text] = 0
+            self._told_at[text] = now
+
+    def finish(self) -> None:
+        """Tell what was only counted so far, the most frequent ones by themselves."""
+        left = sorted(self._counts.items(), key=lambda item: -item[1])
+        for text, count in left[:_LAST_LINES]:
+            if count:
+                again = "more " if text in self._told_at else ""
+                self._tell(f"{text} ({count} {again}time{'s' if count > 1 else ''})")
+        others = self._forgotten + sum(count for _, count in left[_LAST_LINES:])
+        if others:
+            self._tell(f"{others} other frames were not answered")
+        self._counts.clear()
+        self._forgotten = 0
+
+    def _may_tell(self, now: float) -> bool:
+        if now - self._second >= 1.0:
+            self._second, self._lines = now, 0
+        self._lines += 1
+        return self._lines <= _LINES_A_SECOND

@@ -1,0 +1,63 @@
+"""What `urc simulate` tells of frames that its robot cannot answer."""
+
+import logging
+
+from urc.cli.simulate import Complaints
+
+
+class Teller:
+    """Complaints with a clock that is turned by hand, and what they said."""
+
+    def __init__(self) -> None:
+        self.lines: list[str] = []
+        self.now = 0.0
+        self.complaints = Complaints(self.lines.append, lambda: self.now)
+
+    def hear(self, text: str, times: int = 1) -> list[str]:
+        """Let something be complained of; return what is told."""
+        for _ in range(times):
+            record = logging.LogRecord("x", logging.INFO, "", 0, "%s: %s", ("wire", text), None)
+            self.complaints.handle(record)
+        return self.said()
+
+    def said(self) -> list[str]:
+        told, self.lines[:] = list(self.lines), []
+        return told
+
+
+def test_a_complaint_is_told_once_and_then_counted() -> None:
+    """The first at once; the others with their number, not before ten seconds are over."""
+    teller = Teller()
+    assert teller.hear("no rule takes 'x'") == ["wire: no rule takes 'x'"]
+    assert teller.hear("no rule takes 'x'", 41) == []
+    teller.now = 10.0
+    assert teller.hear("no rule takes 'x'") == ["wire: no rule takes 'x' (42 times)"]
+    assert teller.hear("no rule takes 'x'", 2) == []
+    teller.complaints.finish()
+    assert teller.said() == ["wire: no rule takes 'x' (2 more times)"]
+
+
+def test_a_flood_of_different_ones_is_told_at_a_measured_pace() -> None:
+    """Five lines a second; the rest comes at the end, and none is lost without a word."""
+    teller = Teller()
+    told = [line for place in range(20) for line in teller.hear(f"odd {place}")]
+    assert told == [f"wire: odd {place}" for place in range(5)]
+    teller.now = 1.0
+    assert teller.hear("odd 7") == ["wire: odd 7 (2 times)"]
+    teller.complaints.finish()
+    rest = [place for place in range(5, 20) if place != 7]
+    assert teller.said() == [
+        *(f"wire: odd {place} (1 time)" for place in rest[:10]),
+        "4 other frames were not answered",
+    ]
+
+
+def test_what_is_kept_does_not_grow() -> None:
+    """A client that says something else every time costs a bounded number of lines and bytes."""
+    teller = Teller()
+    told = [line for place in range(1000) for line in teller.hear(f"odd {place}")]
+    assert len(told) == 5
+    teller.complaints.finish()
+    *lines, last = teller.said()
+    assert len(lines) == 10
+    assert last == "985 other frames were not answered"
