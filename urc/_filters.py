@@ -107,6 +107,10 @@ def _is_string(value: Any) -> bool:
     return isinstance(value, str)
 
 
+def _is_none(value: Any) -> bool:
+    return value is None
+
+
 def _is_defined(look: Callable[[], Any]) -> bool:
     try:
         look()
@@ -189,6 +193,13 @@ def _pad(value: Any, width: Any, fill: Any = "0") -> str:
     return _text(value).rjust(places, filler)
 
 
+def _sign(value: Any) -> str:
+    text = _text(value).strip()
+    if not text.removeprefix("-").removeprefix("+")[:1].isdigit():
+        raise ValueError(f"a number is expected, found {_short(value)}")
+    return text if text[0] in "+-" else f"+{text}"
+
+
 class Filter(NamedTuple):
     """A filter of the language: its function, and how many arguments follow the subject."""
 
@@ -212,6 +223,7 @@ FILTERS: dict[str, Filter] = {
     "replace": Filter(_replace, (2, 2)),
     "roll": Filter(_rotation.roll, (0, 0)),
     "round": Filter(_round, (0, 1)),
+    "sign": Filter(_sign, (0, 0)),
     "string": Filter(_text, (0, 0)),
     "trim": Filter(lambda value: _require_text(value).strip(), (0, 0)),
     "upper": Filter(lambda value: _require_text(value).upper(), (0, 0)),
@@ -227,7 +239,7 @@ FILTERS |= {name: Filter(*one) for name, one in _lists.LIST_FILTERS.items()}
 FILTERS |= {name: Filter(*one) for name, one in _cuts.CUT_FILTERS.items()}
 
 _OPERATORS = (_add, _sub, _mul, _div, _floordiv, _mod, _pow, _item, _join)
-_TESTS = (_is_defined, _is_number, _is_string)
+_TESTS = (_is_defined, _is_none, _is_number, _is_string)
 
 SCOPE: dict[str, Any] = {"__builtins__": {}}
 """The only names that compiled Python can reach."""

@@ -364,10 +364,8 @@ class _Parser:
             python = f"_{token.text}({subject}, {self._pattern(token)!r})"
         elif token.text == "in":
             python = f"({subject} in {self._unary()})"
-        elif token.text in ("number", "string"):
+        elif token.text in ("number", "string", "none"):
             python = f"_is_{token.text}({subject})"
-        elif token.text == "none":
-            python = f"({subject} is None)"
         else:
             python = f"(_mod({subject}, 2) == {int(token.text == 'odd')})"
         return f"(not {python})" if is_negated else python

@@ -4,6 +4,7 @@ import re
 from pathlib import Path
 
 import pytest
+import yaml
 
 from urc.config.load import check
 from urc.config.shape import read_schema
@@ -19,7 +20,7 @@ BLOCKS = re.findall(r"^```yaml\n(.*?)^```$", PAGE, re.MULTILINE | re.DOTALL)
 @pytest.mark.parametrize("block", BLOCKS, ids=range(len(BLOCKS)))
 def test_robot_of_the_page_passes_its_tests(block: str, tmp_path: Path) -> None:
     """Without a finding, and with nothing left out."""
-    file = tmp_path / "robot.yaml"
+    file = tmp_path / f"{yaml.safe_load(block)['name']}.yaml"
     file.write_text(block, "utf-8")
     checked = check(file, built_in_catalog())
     assert [to_text(one) for one in checked.problems] == []

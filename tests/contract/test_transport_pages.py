@@ -40,7 +40,7 @@ def test_page_has_a_robot_to_start_from(page: Path) -> None:
 @pytest.mark.parametrize("block", ROBOTS, ids=str)
 def test_robot_of_a_page_is_without_a_finding(block: Block, tmp_path: Path) -> None:
     """Not even a warning, and its tests pass."""
-    path = tmp_path / "robot.yaml"
+    path = tmp_path / f"{yaml.safe_load(block.text)['name']}.yaml"
     path.write_text(block.text, "utf-8")
     checked = check(str(path), built_in_catalog(), Shelf(tmp_path / "widgets"))
     assert [str(problem) for problem in checked.problems] == []

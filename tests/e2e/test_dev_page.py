@@ -2,8 +2,6 @@
 
 import asyncio
 import json
-from collections.abc import AsyncIterator, Callable
-from contextlib import asynccontextmanager
 from pathlib import Path
 
 import pytest
@@ -15,116 +13,10 @@ from websockets.typing import Origin
 from tests.e2e.browser import Size
 from tests.e2e.conftest import PageMaker
 from tests.e2e.dashboards import until
-from tests.e2e.processes import UrcProcess
+from tests.e2e.dev_pages import LAMP, PICTURE, ROBOT, WORD, Start, served
 from tests.e2e.transports.test_mqtt import broker, publish
 
 pytestmark = pytest.mark.anyio
-
-WORD = "hunter2"
-ROBOT = """\
-urc: 1
-kind: robot
-name: bell
-title: Bell
-settings:
-  password: { type: string, secret: true }
-transports:
-  wire:
-    type: tcp
-    host: 127.0.0.1
-    port: PORT
-    framing: { type: delimiter, tx: CRLF, rx: CRLF }
-    on_connect:
-      - { send: "LOGIN {{ settings.password }}", redact: true }
-      - { expect: '^WELCOME$' }
-signals:
-  battery: { type: integer, unit: "%", limits: { low: 20 } }
-messages:
-  level: { from: wire, regex: '^BAT (?P<battery>\\d+)$' }
-commands:
-  ring:
-    title: Ring the bell
-    args: { times: { type: integer, min: 1, max: 9, default: 1 } }
-    send: "RING {{ times }}"
-    reply: { regex: '^OK$' }
-  melt: { send: MELT, confirm: { text: It will not be a bell any more. } }
-"""
-LAMP = """\
-urc: 1
-kind: robot
-name: lamp
-title: Lamp
-settings:
-  password: { type: string, secret: true }
-  port: { type: port, default: 1883 }
-transports:
-  broker:
-    type: mqtt
-    host: 127.0.0.1
-    port: "{{ settings.port }}"
-    username: me
-    password: "{{ settings.password }}"
-signals:
-  lit: { type: boolean }
-messages:
-  state: { subscribe: { topic: lamp/state }, json: { lit: on } }
-commands:
-  switch:
-    args: { lit: { type: boolean } }
-    send: { publish: { topic: lamp/set, qos: 1, json: { on: "{{ lit }}" } } }
-"""
-
-Start = Callable[..., UrcProcess]
-
-
-class Bell:
-    """A robot that echoes what it is told, letter by letter, and answers."""
-
-    def __init__(self) -> None:
-        self.lines: list[bytes] = []
-        self.writers: list[asyncio.StreamWriter] = []
-
-    async def talk(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        """Serve one connection."""
-        self.writers.append(writer)
-        try:
-            while line := await reader.readline():
-                self.lines.append(line)
-                if line.startswith(b"LOGIN"):
-                    for letter in line:
-                        writer.write(bytes([letter]))
-                        await writer.drain()
-                    writer.write(b"WELCOME\r\nBAT 12\r\n")
-                else:
-                    writer.write(b"OK\r\n")
-                await writer.drain()
-        except ConnectionError:
-            pass
-        finally:
-            writer.close()
-
-
-@asynccontextmanager
-async def served(
-    page: Page, start: Start, folder: Path, *options: str
-) -> AsyncIterator[tuple[Bell, Path, str]]:
-    """Open the dev page of a bell; give the robot, its document and the server's address."""
-    bell = Bell()
-    server = await asyncio.start_server(bell.talk, "127.0.0.1", 0)
-    port = server.sockets[0].getsockname()[1]
-    file = folder / "bell.yaml"
-    file.write_text(ROBOT.replace("PORT", str(port)), "utf-8")
-    words = ("serve", str(file), "--set", f"password={WORD}", "--port", "0")
-    process = start(*words, "--dev", "--data-dir", str(folder / "data"), *options)
-    address = (await process.wait_for_async(r"(http://\S+)"))[1]
-    await page.goto(f"{address}robots/bell/dev")
-    try:
-        yield bell, file, address
-    finally:
-        await page.goto("about:blank")  # before the server goes: nothing of it is missed then
-        server.close()
-        for writer in bell.writers:
-            writer.transport.abort()
 
 
 async def test_the_traffic_is_shown_without_its_secret(
@@ -304,6 +196,16 @@ async def test_messages_are_shown_with_verb_and_address(
         await talk_over_the_broker(page, port)
 
 
+async def publish_bytes(port: int, topic: str, data: bytes) -> None:
+    """Say something that is no text."""
+    process = await asyncio.create_subprocess_exec(
+        "mosquitto_pub", "-p", str(port), "-t", topic, "-s", stdin=asyncio.subprocess.PIPE
+    )
+    async with asyncio.timeout(10):
+        await process.communicate(data)
+    assert process.returncode == 0
+
+
 async def talk_over_the_broker(page: Page, port: int) -> None:
     """Say something, hear something, try something."""
     connected = page.locator(".dev-row", has_text="connecting to mqtt")
@@ -319,6 +221,12 @@ async def talk_over_the_broker(page: Page, port: int) -> None:
     await publish(port, "lamp/state", '{"on": true}')
     received = page.locator(".dev-row[data-kind='received']")
     await expect(received.first).to_contain_text("message lamp/state")
+    await publish_bytes(port, "lamp/state", PICTURE)
+    picture = page.locator(".dev-row img")
+    await expect(picture).to_have_count(1)
+    await page.wait_for_function("document.querySelector('.dev-row img').naturalWidth === 1")
+    shown = page.locator(".dev-row", has=page.locator("img"))
+    await expect(shown).to_contain_text(f"<{len(PICTURE)} bytes, image/png>")
     await page.get_by_label("Topic").fill("lamp/state")
     await page.get_by_label("What the robot sends").fill('{"on": false}')
     await page.get_by_role("button", name="Try").click()

@@ -74,6 +74,7 @@ async def _serve(
 ) -> int:
     async with AsyncExitStack() as stack:
         transports = built_in_catalog().transports
+        motion: Motion = "guarded" if place.has_guard else "here"
         robots: dict[str, Robot] = {}
         for original, known in profiles:
             profile, settings = original, known
@@ -81,24 +82,26 @@ async def _serve(
                 # What only a real robot needs to be told, nobody must fill in for its twin.
                 settings = sample_settings(profile.settings) | dict(known)
                 profile = await stack.enter_async_context(stand_in(profile, settings))
-            motion: Motion = "guarded" if place.has_guard else "here"
             session = partial(Session, profile, settings, transports, motion=motion)
             robots[profile.name] = Robot(profile, settings, session)
         data = place.data or data_folder()
-        remake = settings_of and dict.fromkeys(robots, _remaker(settings_of, is_simulated))
+        remake = settings_of and dict.fromkeys(robots, _remaker(settings_of, is_simulated, motion))
         app = build_app(robots, allowed_hosts=place.allowed_hosts, data=data, remake=remake)
         await serve(app, host=place.host, port=place.port, on_ready=on_ready)
     return 0
 
 
-def _remaker(settings_of: SettingsOf, is_simulated: bool) -> Callable[[Profile], Robot]:
+def _remaker(
+    settings_of: SettingsOf, is_simulated: bool, motion: Motion
+) -> Callable[[Profile], Robot]:
     """Return what makes the robot of a profile that was saved anew."""
     transports = built_in_catalog().transports
 
     def remake(profile: Profile) -> Robot:
         known = settings_of(profile)
         if not is_simulated:
-            return Robot(profile, known, partial(Session, profile, known, transports))
+            session = partial(Session, profile, known, transports, motion=motion)
+            return Robot(profile, known, session)
         settings = sample_settings(profile.settings) | dict(known)
         return Robot(profile, settings, partial(_with_twin, profile, settings))
 
@@ -106,7 +109,7 @@ def _remaker(settings_of: SettingsOf, is_simulated: bool) -> Callable[[Profile],
     async def _with_twin(profile: Profile, settings: Mapping[str, Value]) -> AsyncIterator[Session]:
         async with (
             stand_in(profile, settings) as redirected,
-            Session(redirected, settings, transports) as session,
+            Session(redirected, settings, transports, motion=motion) as session,
         ):
             yield session
 

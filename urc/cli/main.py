@@ -21,6 +21,7 @@ VERBS: dict[str, str] = {
     "watch": "print a robot's signals as JSON lines",
     "send": "run one command and print its reply",
     "trust": "show the host key of an SSH server, and keep it if it is right",
+    "audit": "who made a robot move, as JSON lines",
     "discover": "robots on the network, serial ports, and the topics of a rosbridge",
     "schema": "print the JSON Schema of a kind of document",
     "doctor": "what works on this machine, and what is missing",

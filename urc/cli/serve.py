@@ -45,7 +45,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         dest="data",
         metavar="FOLDER",
         type=Path,
-        help="where a stop is kept over a restart, and what else URC remembers",
+        help="where a stop is kept over a restart, the audit, and what else URC remembers",
     )
 
 

@@ -1,6 +1,8 @@
 """The keys of a conversion, on a signal or on a field of one frame."""
 
+import re
 from itertools import pairwise
+from math import isfinite
 from typing import Final
 
 from urc.config.part import Findings, Part
@@ -11,6 +13,7 @@ __all__ = ["CONVERSION_KEYS", "parse_conversion", "parse_states"]
 
 CONVERSION_KEYS: Final = ("base", "scale", "offset", "polynomial", "points", "not_available")
 """Beside ``states``."""
+_A_NUMBER: Final = re.compile(r"[+-]?(0|[1-9][0-9]*)(\.[0-9]+)?([eE][+-]?[0-9]{1,3})?")
 _OF_NUMBERS: Final = ("base", "scale", "offset", "polynomial", "points")
 
 
@@ -34,12 +37,25 @@ def parse_conversion(part: Part, findings: Findings, kind: str = "number") -> Co
                     hint="only integer and number are computed with",
                 )
     absent = tuple(inner.data for inner in part.listed("not_available"))
+    if kind in ("integer", "number"):
+        absent = (*absent, *(number for one in absent for number in _numbers_in(one)))
     return Conversion(
         base=part.integer("base") or 0,
         not_available=absent,
         polynomial=_polynomial(part, findings),
         points=_points(part.get("points"), findings),
     )
+
+
+def _numbers_in(absent: object) -> tuple[float, ...]:
+    """Return the number that quoted text stands for, if any: some forms read numbers, some text.
+
+    Leading zeros are a spelling that only text has: ``"000"`` does not mean 0.
+    """
+    if not isinstance(absent, str) or _A_NUMBER.fullmatch(absent) is None:
+        return ()
+    number = float(absent)
+    return (number,) if isfinite(number) else ()
 
 
 def parse_states(part: Part, kind: str, findings: Findings) -> tuple[tuple[str, str], ...]:

@@ -26,7 +26,7 @@ def link_test(
         _check_polls(part, driver, findings)
         steps = _link_steps(part, test.steps, driver, findings)
     else:
-        _check_purpose(part, test, findings)
+        _check_purpose(part, test, driver, findings)
         steps = ()
     _check_transports(part, driver, findings)
     _check_run(part, test.run, test.arguments, driver, findings, may_fail=test.fails is not None)
@@ -41,14 +41,21 @@ def link_test(
     )
 
 
-def _check_purpose(part: Part, test: DocumentTest, findings: Findings) -> None:
+def _check_purpose(part: Part, test: DocumentTest, driver: Driver, findings: Findings) -> None:
     text = ""
     if not test.feed and test.run is None and test.reply_to is None:
         text = "'feed' or 'run' is missing: this test does nothing"
-    elif not test.expect and not test.sent and test.fails is None:
+    elif not (test.expect or test.sent or test.fails is not None or _is_answered(test, driver)):
         text = "'expect', 'sent' or 'fails' is missing: this test cannot fail"
     if text:
         findings.error(part, "missing-key", text, key=True)
+
+
+def _is_answered(test: DocumentTest, driver: Driver) -> bool:
+    """Return whether a command is asked and answered: it has to be done, which is a check."""
+    asked = test.run if test.run is not None else test.reply_to
+    command = driver.commands.get(asked) if isinstance(asked, str) else None
+    return bool(test.feed) and command is not None and command.reply is not None
 
 
 _COMES: Final = ("message", "response", "feedback")

@@ -9,7 +9,14 @@ from urc.model.driver import FramingSpec, Reply
 from urc.model.flow import ErrorReply, Stage
 from urc.patterns import Pattern
 
-__all__ = ["implied_reply", "parse_errors", "parse_reply", "parse_stage", "refuse"]
+__all__ = [
+    "implied_reply",
+    "parse_errors",
+    "parse_own_framing",
+    "parse_reply",
+    "parse_stage",
+    "refuse",
+]
 
 _OF_THE_WHOLE = ("match", "stages", "framing")
 """Keys that belong to the reply, not to one of its stages."""
@@ -19,8 +26,7 @@ def parse_reply(part: Part | None, findings: Findings, context: FormContext) -> 
     """Return the reply at `part`; None when there is none."""
     if part is None:
         return None
-    if "framing" in part.data:
-        context = context._replace(framing=None)
+    own, context = parse_own_framing(part, findings, context)
     stages = part.listed("stages")
     for inner in stages:
         refuse(inner, _OF_THE_WHOLE, "belongs to the whole reply", findings)
@@ -29,7 +35,7 @@ def parse_reply(part: Part | None, findings: Findings, context: FormContext) -> 
         refuse(part, beside, "belongs to one of the stages", findings)
     first, *others = [parse_stage(inner, findings, context) for inner in stages or [part]]
     errors, faults = parse_errors(part, findings, context) if stages else ((), ())
-    framing, match = part.get("framing"), part.get("match")
+    match = part.get("match")
     return Reply(
         read=first.read,
         errors=(*first.errors, *errors),
@@ -40,7 +46,7 @@ def parse_reply(part: Part | None, findings: Findings, context: FormContext) -> 
             one._replace(errors=(*one.errors, *errors), faults=(*one.faults, *faults))
             for one in others
         ),
-        framing=_framing(framing, findings, context) if framing else None,
+        framing=own,
     )
 
 
@@ -88,10 +94,20 @@ def refuse(part: Part, keys: tuple[str, ...], why: str, findings: Findings) -> N
             findings.error(part, "misplaced-key", f"'{key}' {why}", at=key, key=True)
 
 
-def _framing(part: Part, findings: Findings, context: FormContext) -> FramingSpec | None:
+def parse_own_framing(
+    part: Part, findings: Findings, context: FormContext
+) -> tuple[FramingSpec | None, FormContext]:
+    """Return the framing that an answer brings, and what its forms must know: it is not the line's.
+
+    It is None where it brings none.
+    """
+    inner = part.get("framing")
+    if inner is None:
+        return None, context
     if context.catalog is None:
-        return None  # in a document that has no transports, which was reported
-    return parse_framing(part, context.encoding, findings, context.catalog)
+        return None, context  # in a document that has no transports, which was reported
+    spec = parse_framing(inner, context.encoding, findings, context.catalog)
+    return spec, context._replace(framing=None)
 
 
 def _read(part: Part, findings: Findings, context: FormContext) -> ReadSpec:

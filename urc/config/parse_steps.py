@@ -3,7 +3,7 @@
 from typing import Final, NamedTuple
 
 from urc.config.forms import FormContext, parse_write
-from urc.config.parse_reply import parse_stage, refuse
+from urc.config.parse_reply import parse_own_framing, parse_stage, refuse
 from urc.config.part import Findings, Part
 from urc.expressions import Template, compile_template
 from urc.model.codec import ReadSpec
@@ -133,11 +133,12 @@ def _one(verb: str, part: Part, context: StepContext, findings: Findings) -> Ste
 
 def _expect(part: Part, inner: Part, context: StepContext, findings: Findings) -> ExpectStep | None:
     transport = part.text("from", context.transport)
+    framing = None
     if isinstance(inner.data, dict):
-        why = "means nothing for a step"
-        refuse(inner, ("match", "stages", "framing"), why, findings)
+        refuse(inner, ("match", "stages"), "means nothing for a step", findings)
         refuse(inner, ("timeout",), "stands beside 'expect', not in it", findings)
-        stage = parse_stage(inner, findings, context.forms)
+        framing, forms = parse_own_framing(inner, findings, context.forms)
+        stage = parse_stage(inner, findings, forms)
     else:
         pattern = findings.pattern(inner)
         if pattern is None:
@@ -152,6 +153,7 @@ def _expect(part: Part, inner: Part, context: StepContext, findings: Findings) -
         _timeout_s(part, findings),
         otherwise,
         text,
+        framing,
     )
 
 

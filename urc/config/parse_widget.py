@@ -39,7 +39,7 @@ def parse_widget(document: Document, findings: Findings) -> Widget:
         title=part.text("title"),
         folder=folder,
         inputs={key: _port(inner) for key, inner in part.named("inputs").items()},
-        outputs={key: _port(inner) for key, inner in part.named("outputs").items()},
+        outputs={key: _output(inner) for key, inner in part.named("outputs").items()},
         options={key: inner.data for key, inner in part.named("options").items()},
         min_cells=(smallest[0], smallest[1]) if smallest else (1, 1),
         summary=part.text("summary"),
@@ -60,8 +60,12 @@ def _port(part: Part) -> Port:
         unit=part.text("unit"),
         is_required=part.flag("required", default=True),
         description=part.text("description"),
-        is_held=part.flag("hold", default=False),
-        arguments=tuple(part.named("arguments")),
+    )
+
+
+def _output(part: Part) -> Port:
+    return _port(part)._replace(
+        is_held=part.flag("hold", default=False), arguments=tuple(part.named("arguments"))
     )
 
 

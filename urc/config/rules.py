@@ -1,5 +1,8 @@
 """The last pass: rules over a whole profile. None of them is an error; all are worth a look."""
 
+from pathlib import PurePath
+from typing import Final
+
 from urc.config.gather import Sources
 from urc.config.link_wire import Uses
 from urc.config.part import Findings, Part, shown_duration
@@ -10,6 +13,9 @@ from urc.model.interface import Interface
 
 __all__ = ["check_profile"]
 
+_ENDINGS: Final = (".yaml", ".yml")
+"""Of files; text that comes by another way has no name of its own."""
+
 
 def check_profile(
     sources: Sources,
@@ -19,6 +25,7 @@ def check_profile(
     findings: Findings,
 ) -> None:
     """Add a warning for each thing that is declared to no purpose, or cannot keep up."""
+    _check_name(sources, findings)
     _check_unused(sources, driver, uses, findings)
     _check_slots(sources, interfaces, findings)
     for part, poll in zip(sources.driver.listed("polls"), driver.polls, strict=True):
@@ -26,6 +33,20 @@ def check_profile(
     _check_rate(sources.driver, driver, findings)
     secrets = {name for name, one in sources.settings.items() if one.flag("secret", default=False)}
     check_flow(sources.driver, driver, frozenset(secrets), findings)
+
+
+def _check_name(sources: Sources, findings: Findings) -> None:
+    """Warn of a robot that is started by one name and shown by another."""
+    file = PurePath(sources.root.document.file)
+    name = sources.root.text("name")
+    if sources.kind == "robot" and file.suffix in _ENDINGS and name != file.stem:
+        findings.warn(
+            sources.root,
+            "other-name",
+            f"the robot is called {name!r}, its file {file.name!r}",
+            at="name",
+            hint=f"write name: {file.stem}, or call the file {name}{file.suffix}",
+        )
 
 
 def _check_unused(sources: Sources, driver: Driver, uses: Uses, findings: Findings) -> None:

@@ -12,9 +12,7 @@ import asyncio
 import logging
 import os
 import signal
-import socket
 import subprocess
-import sys
 import time
 from collections import deque
 from collections.abc import Sequence
@@ -26,6 +24,7 @@ from urc.guard import wire
 from urc.guard.host import Host
 from urc.guard.lane import Clock
 from urc.guard.pipe import Pipe
+from urc.guard.process import launch, reap
 from urc.guard.proxy import GuardedTransport
 from urc.model.codec import Payload, size_of
 from urc.motion.hold import Reason, Terms
@@ -244,7 +243,7 @@ class Guard(Client):
         loop = asyncio.get_running_loop()
         self._started_s = loop.time()
         try:
-            self._process, line = _launch()
+            self._process, line = launch()
         except OSError as fault:
             log.error("the guard cannot be started (%s)", fault)
             self._is_up.clear()
@@ -272,6 +271,9 @@ class Guard(Client):
             self._look.cancel()
         if self._pipe is not None:
             self._pipe.end()
+            is_idle = not any(held.may_move for held in self._held.values())
+            if is_idle and not self._was_heard and self._process is not None:
+                self._process.kill()  # it has hardly begun: nothing is open, nothing moves
             with suppress(TimeoutError):
                 async with asyncio.timeout(_FINISH_S):
                     await self._gone.wait()
@@ -282,7 +284,7 @@ class Guard(Client):
             transport.lost("the session was closed")
         process, self._process = self._process, None
         if process is not None:
-            await _reap(process)
+            await reap(process)
         if self._reaping:
             await asyncio.wait(self._reaping)
 
@@ -329,7 +331,7 @@ class Guard(Client):
         if process is not None:
             with suppress(ProcessLookupError):
                 process.send_signal(signal.SIGKILL)  # never two of them on one line
-            task = asyncio.get_running_loop().create_task(_reap(process))
+            task = asyncio.get_running_loop().create_task(reap(process))
             self._reaping.add(task)
             task.add_done_callback(self._reaping.discard)
         log.error("the guard ended; another one is started, and stops what moved")
@@ -363,36 +365,6 @@ class Guard(Client):
 
     async def _ready(self) -> None:
         await self._is_up.wait()
-
-
-def _launch() -> tuple["subprocess.Popen[bytes]", socket.socket]:
-    """Start the process; return it and our end of the pipe."""
-    ours, theirs = socket.socketpair()
-    try:
-        process = subprocess.Popen(  # noqa: S603 - our own interpreter and module
-            # -P: nothing is imported from the folder we happen to be in.
-            [sys.executable, "-P", "-m", "urc.guard", str(theirs.fileno())],
-            pass_fds=(theirs.fileno(),),
-            stdin=subprocess.DEVNULL,
-            process_group=0,  # a terminal's Ctrl-C is for the server, which tells the guard
-        )
-    except BaseException:
-        ours.close()
-        raise
-    finally:
-        theirs.close()
-    return process, ours
-
-
-async def _reap(process: "subprocess.Popen[bytes]") -> None:
-    """Wait for a process that ends by itself; kill one that does not."""
-    for _ in range(100):
-        if process.poll() is not None:
-            return
-        await asyncio.sleep(0.01)
-    process.kill()
-    while process.poll() is None:  # noqa: ASYNC110 - a killed process is gone in a moment
-        await asyncio.sleep(0.01)
 
 
 def _nothing() -> None:

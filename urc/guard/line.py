@@ -110,6 +110,7 @@ class Line:
         else:
             self.reins.stop_all()
             self.reins.step()
+            self.reins.look()
             self._switch(self._shut(turn))
 
     def send(self, turn: int, number: int, data: Payload) -> None:
@@ -234,7 +235,8 @@ class Line:
             reason = str(fault)
         except Exception as bug:  # supervisor, as in `_attempt`
             reason = why_broken(bug)
-        await self._recover(reason)
+        # In a task of its own: one that went on here would grow with every cut.
+        self._switch(self._recover(reason))
 
     async def _read(self) -> str:
         while True:
@@ -279,7 +281,7 @@ class Line:
 
     async def _shut(self, turn: int) -> None:
         until_s = self._clock.now() + _WITHIN_S
-        while self._is_open and not self.reins.is_settled and self._clock.now() < until_s:
+        while self._is_open and not self._is_quiet and self._clock.now() < until_s:
             await self._clock.sleep(_PAUSE_S)
         self._is_handed = False
         self._cut("")
@@ -327,14 +329,15 @@ class Line:
 
     async def _serve_rescued(self) -> None:
         """Wait for the engine to take the line, and serve it then."""
+        alarm = self._clock.call_at(self._clock.now() + _KEPT_S, self._handed.set)
         try:
-            async with asyncio.timeout(_KEPT_S):
-                await self._handed.wait()
-        except TimeoutError:
-            self._is_rescuing = False
-            await self._recover("nobody has asked for the line")
-            return
-        await self._serve()
+            await self._handed.wait()
+        finally:
+            alarm.cancel()
+        if self._is_handed:
+            await self._serve()
+        else:
+            self._switch(self._recover("nobody has asked for the line"))
 
     def _in_vain(self) -> None:
         """Tell the engine, if it waits, that its time is up."""

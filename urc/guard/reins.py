@@ -130,6 +130,11 @@ class Reins:
             mover.renew(terms)
         return mover
 
+    def look(self) -> None:
+        """Take note of what has arrived by now; only of a line that works."""
+        if self._unsent is not None and self.lane.is_idle and not self._unsent():
+            self._doubtful.clear()
+
     # -- the line
 
     def begin(self) -> None:

@@ -20,6 +20,7 @@ __all__ = [
     "NUMBERED",
     "Collect",
     "Envelope",
+    "FramingSpec",
     "Payload",
     "ReadSpec",
     "WriteSpec",
@@ -46,6 +47,22 @@ NUMBERED: Final = frozenset(("call", "goal", "request"))
 
 Payload = bytes | Envelope
 """One frame without its framing."""
+
+
+class FramingSpec(NamedTuple):
+    """How a byte stream is cut into frames. `type` is a row of the framings table."""
+
+    type: str = "delimiter"
+    options: Mapping[str, object] = NOTHING
+    """As parsed by the loader: for ``delimiter``, ``tx`` and ``rx`` as bytes."""
+    max_bytes: int = 65536
+    """Longest frame accepted; a longer one is dropped and counted."""
+    timeout_s: float | None = None
+    """Silence inside of a frame after which what there is of it is dropped; None: never."""
+    strips_ansi: bool = False
+    """Whether the escape sequences of a terminal are taken out of what comes."""
+    sent: "FramingSpec | None" = None
+    """Of what URC sends, where that is framed otherwise than what comes; None: the same."""
 
 
 def size_of(payload: Payload) -> int:

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from typing import Final, Literal, NamedTuple
 
 from urc.expressions import Template
-from urc.model.codec import ReadSpec, WriteSpec
+from urc.model.codec import FramingSpec, ReadSpec, WriteSpec
 from urc.model.flow import (
     Confirm,
     ErrorReply,
@@ -39,22 +39,6 @@ __all__ = [
 
 ScalarOrTemplate = bool | int | float | str | None | Template
 """An option as written: a plain value, or a template over ``settings``."""
-
-
-class FramingSpec(NamedTuple):
-    """How a byte stream is cut into frames. `type` is a row of the framings table."""
-
-    type: str = "delimiter"
-    options: Mapping[str, object] = NOTHING
-    """As parsed by the loader: for ``delimiter``, ``tx`` and ``rx`` as bytes."""
-    max_bytes: int = 65536
-    """Longest frame accepted; a longer one is dropped and counted."""
-    timeout_s: float | None = None
-    """Silence inside of a frame after which what there is of it is dropped; None: never."""
-    strips_ansi: bool = False
-    """Whether the escape sequences of a terminal are taken out of what comes."""
-    sent: "FramingSpec | None" = None
-    """Of what URC sends, where that is framed otherwise than what comes; None: the same."""
 
 
 class Timeouts(NamedTuple):

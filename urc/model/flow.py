@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from typing import Literal, NamedTuple
 
 from urc.expressions import Template
-from urc.model.codec import ReadSpec, WriteSpec
+from urc.model.codec import FramingSpec, ReadSpec, WriteSpec
 from urc.model.values import NOTHING, Reading, Value
 from urc.patterns import Pattern
 
@@ -173,6 +173,8 @@ class ExpectStep(NamedTuple):
     """What to do when it does not come; None: fail."""
     text: str = ""
     """What to say when it does not come; "" for words of our own."""
+    framing: FramingSpec | None = None
+    """What cuts the line while it is waited for; None: the line's own."""
 
 
 class PromptStep(NamedTuple):

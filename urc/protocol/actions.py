@@ -202,8 +202,7 @@ def _expecting(label: str, step: ExpectStep | PromptStep, builder: Builder) -> A
         runner.listen(line, ear, now, now + answer.timeout_s, otherwise, text)
         if isinstance(step, PromptStep):
             return line.inbox.look_for(step.pattern, ear)
-        line.inbox.listen(ear)
-        return []
+        return line.listen(ear, now)
 
     return expect
 

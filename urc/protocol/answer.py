@@ -13,6 +13,7 @@ from urc.model.codec import traffic_of
 from urc.patterns import Pattern
 from urc.protocol.fast_read import FastRead, Taken
 from urc.protocol.forms import BadItem, BadText, Frame, Reader
+from urc.protocol.framing import Framing
 from urc.protocol.readings import Decode
 
 __all__ = ["Answer", "Ear", "Fields", "Heard", "Listening", "Matcher", "Offer", "Quick", "shown"]
@@ -62,6 +63,8 @@ class Answer(NamedTuple):
     errors: tuple[Pattern, ...] = ()
     faults: tuple[tuple[Matcher, Template | None], ...] = ()
     lines: int | Pattern | None = None
+    framing: Framing | None = None
+    """What cuts the line while a step waits for it; None: the line's own, or its request's."""
 
 
 class Offer(NamedTuple):

@@ -107,7 +107,8 @@ class Builder:
 
     def expected(self, step: ExpectStep) -> Answer:
         """Return what a step waits for."""
-        return self._answer(step.transport, step.read, step.errors, step.faults, step.timeout_s)
+        answer = self._answer(step.transport, step.read, step.errors, step.faults, step.timeout_s)
+        return answer._replace(framing=step.framing and build_framing(step.framing))
 
     def reply_s(self, transport: str) -> float:
         """Return how long an answer may take where nothing else is said."""

@@ -100,6 +100,11 @@ class Inbox:
         self._ears.append(ear)
         self.is_listening = True
 
+    @property
+    def framing(self) -> Framing | None:
+        """What cuts the stream for those that listen; None: they are content with the line's."""
+        return next((ear.answer.framing for ear in self._ears if ear.answer.framing), None)
+
     def look_for(self, pattern: Pattern, ear: Ear) -> list[LineEvent]:
         """Let `ear` have the text that `pattern` finds after the last whole frame."""
         self._prompt = (pattern, ear)

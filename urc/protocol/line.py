@@ -19,14 +19,14 @@ misses `urc.protocol.answering.MISSES_UNTIL_CLOSED` answers in a row is given up
 from urc.model.codec import Envelope, Payload, traffic_of
 from urc.model.driver import TransportSpec
 from urc.model.values import Reading
-from urc.protocol.answer import Heard, Matcher
+from urc.protocol.answer import Ear, Heard, Matcher
 from urc.protocol.answering import Answering
 from urc.protocol.encode import BadArgument
 from urc.protocol.events import Fault, Open, Send
 from urc.protocol.exchange import DONE, Asked, Ended, Exchange, LineEvent, Outcome
 from urc.protocol.flights import Flight
 from urc.protocol.forms import Frame
-from urc.protocol.framing import FrameFault, Framing
+from urc.protocol.framing import FrameFault
 from urc.protocol.outbox import counted
 from urc.protocol.times import soonest
 
@@ -45,7 +45,7 @@ class Line(Answering):
         self.is_scripted = False
         """Whether a sequence is at work, which may wait for the next frame."""
         self._may_recut = False
-        """Whether an answer has ever brought its own framing."""
+        """Whether an answer brings its own framing, or did before the last bytes came."""
         self._number = 0
         """Of the last envelope whose answer carries it; never used twice."""
 
@@ -170,6 +170,17 @@ class Line(Answering):
 
     # -- receiving
 
+    def listen(self, ear: Ear, now: float) -> list[LineEvent]:
+        """Let `ear` have the frames that answer no request, cut by its own framing if it has one.
+
+        Bytes that the line's framing has left may be whole frames of that one.
+        """
+        self.inbox.listen(ear)
+        if ear.answer.framing is None:
+            return []
+        self._may_recut = True
+        return self.go_on(now) if self.inbox.has_more else []
+
     def receive(self, data: Payload, now: float) -> list[LineEvent]:
         """Take bytes or an envelope from the transport."""
         if self.state != "open":
@@ -181,7 +192,7 @@ class Line(Answering):
             self.is_behind = self.is_open and bool(told)
             return told
         if self._may_recut:
-            self.inbox.cut_by(self._framing_for())
+            self._recut()
         self.inbox.decoder.push(data, now)
         return self.go_on(now)
 
@@ -219,7 +230,7 @@ class Line(Answering):
         may_rush = not (self.is_scripted or self._may_recut)
         while self.state == "open":
             if self._may_recut:
-                inbox.cut_by(self._framing_for())
+                self._recut()
             frame = inbox.decoder.next(now)
             if frame is None:
                 break
@@ -236,9 +247,11 @@ class Line(Answering):
             events += inbox.look()
         return events + self._pump(now) if self._outbox or self.is_per_request else events
 
-    def _framing_for(self) -> Framing:
-        """Return what cuts the stream now: an answer may bring its own framing."""
-        return (self._flights.framing() if self._flights else None) or self.framing
+    def _recut(self) -> None:
+        """Choose what cuts the stream now: an answer, or a step, may bring its own framing."""
+        framing = (self._flights.framing() if self._flights else None) or self.inbox.framing
+        self._may_recut = framing is not None
+        self.inbox.cut_by(framing or self.framing)
 
     def tick(self, now: float) -> list[LineEvent]:
         """Do what is due at `now`."""

@@ -80,6 +80,7 @@ _INSERT: Final = (
     f"INSERT INTO entries ({', '.join(_COLUMNS)}, chain)"  # noqa: S608 - names of our own
     f" VALUES ({', '.join('?' * (len(_COLUMNS) + 1))})"
 )
+_LAST: Final = "SELECT chain FROM entries ORDER BY id DESC LIMIT 1"
 _SELECT: Final = f"SELECT id, {', '.join(_COLUMNS)}, chain FROM entries"  # noqa: S608
 
 
@@ -113,7 +114,6 @@ class AuditLog:
         self._wakes = threading.Condition()
         self._is_closing = False
         self._is_busy = False
-        self._chain = ""
         self._thread = threading.Thread(target=self._run, name="urc-audit", daemon=True)
         self._thread.start()
 
@@ -123,7 +123,7 @@ class AuditLog:
             if len(self._waiting) >= self._most_waiting:
                 self._lost += 1
                 return
-            self._waiting.append(entry)
+            self._waiting.append(_cut(entry))
             self._wakes.notify()
 
     def settle(self, timeout_s: float = _CLOSE_S) -> bool:
@@ -156,7 +156,7 @@ class AuditLog:
                     base = self._opened()
                 self._write(base, batch)
                 self._well()
-            except (sqlite3.Error, OSError) as error:
+            except Exception as error:  # a supervisor: whatever it is, the next batch is tried
                 self._unwell(str(error), batch)
                 if base is not None:
                     with suppress(sqlite3.Error):
@@ -201,11 +201,10 @@ class AuditLog:
             base.execute("PRAGMA synchronous = NORMAL")
             base.execute("PRAGMA journal_size_limit = 1048576")
             base.execute(_CREATE)
-            last = base.execute("SELECT chain FROM entries ORDER BY id DESC LIMIT 1").fetchone()
+            base.execute(_LAST)  # says whether it is a file of ours
         except sqlite3.Error:
             base.close()
             raise
-        self._chain = last[0] if last else ""
         return base
 
     def _write(self, base: sqlite3.Connection, batch: Sequence[Entry]) -> None:
@@ -215,21 +214,21 @@ class AuditLog:
         if lost:
             text = f"{lost} entries could not be kept"
             entries.append(Entry(self._now(), "", "lost", outcome=text, times=lost))
-        chain = self._chain
-        rows: list[tuple[object, ...]] = []
-        for entry in map(_cut, entries):
-            chain = _link(chain, entry)
-            rows.append((*entry, chain))
         base.execute("BEGIN IMMEDIATE")
         try:
+            last = base.execute(_LAST).fetchone()  # maybe of another server with this folder
+            chain = last[0] if last else ""
+            rows: list[tuple[object, ...]] = []
+            for entry in entries:
+                chain = _link(chain, entry)
+                rows.append((*entry, chain))
             base.executemany(_INSERT, rows)
             self._make_room(base)
             base.execute("COMMIT")
-        except sqlite3.Error:
+        except Exception:
             with suppress(sqlite3.Error):
                 base.execute("ROLLBACK")
             raise
-        self._chain = chain
         with self._wakes:
             self._lost -= lost
 

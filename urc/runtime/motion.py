@@ -32,6 +32,8 @@ __all__ = ["Frames", "MotionDesk", "Movers", "Verb", "is_lossy"]
 
 Verb = str
 """``take``, ``ask``, ``yes``, ``no``, ``force``, ``leave`` or ``reset``."""
+Moved = Callable[[Client, int, str, Mapping[str, Reading], Payload, float], None]
+"""Takes who ticked, the epoch of the lease, command, arguments, frame, and when."""
 MOST_SCREENS = 256
 _FIRST_TICKS = 2**31
 _NO_ROBOT = "the robot is not connected"
@@ -110,6 +112,8 @@ class MotionDesk:
         self._unconfirmed: set[str] = set()
         self.on_change: Callable[[LeaseState], None] = _ignore
         """Told of every new state of the lease, and when a stop is confirmed."""
+        self.on_moved: Moved = _unseen
+        """Told of each tick, once its frame has gone to the movers; must neither wait nor raise."""
 
     @property
     def can_move(self) -> bool:
@@ -225,6 +229,7 @@ class MotionDesk:
             return str(error)
         self.lease.touch(now)
         movers.tick(command, data)
+        self.on_moved(screen.client, epoch, command, arguments, data, now)
         return ""
 
     def release(self, client: str, command: str) -> None:
@@ -303,3 +308,14 @@ def is_lossy(driver: Driver, transport: str) -> bool:
 
 def _ignore(state: LeaseState) -> None:
     """Nobody wants to know."""
+
+
+def _unseen(
+    client: Client,
+    epoch: int,
+    command: str,
+    arguments: Mapping[str, Reading],
+    data: Payload,
+    now: float,
+) -> None:
+    """Nobody looks."""

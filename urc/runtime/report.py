@@ -95,6 +95,9 @@ class LinkReport:
         """Count something that was not as declared, and tell of it now and then."""
         self.faults += 1
         self._is_changed = True
+        if self.state == "connecting" and self._detail:
+            # Connected, and nothing good has come yet: why is what people want to know.
+            self._detail = f"connected; {fault.message}"
         self.note("warning", f"fault {fault.code}", f"{fault.code}: {fault.message}")
 
     def note(self, level: Literal["info", "warning", "error"], kind: str, text: str) -> None:

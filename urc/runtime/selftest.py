@@ -147,10 +147,12 @@ def _narrowed(driver: Driver, test: DocumentTest) -> Driver:
 
 def _in_an_instant(trial: Trial, test: DocumentTest) -> list[str]:
     """Connect, ask, and feed the answer; return what is wrong."""
-    if not (test.expect or test.sent or test.fails is not None):
+    command = test.run or (test.reply_to if isinstance(test.reply_to, str) else None)
+    checks = bool(test.expect or test.sent or test.fails is not None)
+    asked = trial.driver.commands.get(command or "")
+    if not checks and (not test.feed or asked is None or asked.reply is None):
         return ["it checks nothing; say what it should 'expect', what is 'sent' or how it 'fails'"]
     trial.begin()
-    command = test.run or (test.reply_to if isinstance(test.reply_to, str) else None)
     if command is not None:
         trial.run(command, test.arguments)
     for name, fed in test.feed.items():
@@ -163,6 +165,8 @@ def _in_an_instant(trial: Trial, test: DocumentTest) -> list[str]:
         complaints = _check_failure(trial, test.fails)
     complaints += check_values(trial, test.expect, Remedy(trial, in_steps=False))
     complaints += check_bytes(trial, trial.driver, test.sent)
+    if not checks and command is not None and not complaints:
+        complaints += check_reply(trial.ended, {}, command)  # all that it says: it is done
     return complaints
 
 

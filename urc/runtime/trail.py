@@ -1,17 +1,20 @@
 """What one robot's controls leave in the audit: two lines for each motion, not one for each tick.
 
-Floor 4, synchronous; time is passed in. A motion is told when it begins and when it ends, with its
-first and its last values; a refusal that comes again and again is told once a second, with its
-count. So the audit answers "why did it move?" and does not grow with every stick.
+Floor 4, synchronous; time is passed in; nothing here waits or raises, for motion passes by.
+A motion is told when it begins and when it ends, with its first and its last values; a refusal that
+comes again and again is told once a second, with its count. So the audit answers
+"why did it move?" and does not grow with every stick.
 """
 
 import json
+import logging
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import Final
+from functools import wraps
+from typing import Concatenate, Final, ParamSpec
 
 from urc.model.codec import Payload, traffic_of
-from urc.model.values import Reading
+from urc.model.values import NOTHING, Reading
 from urc.motion.lease import Client, LeaseState
 from urc.runtime.audit import Entry, shown
 
@@ -23,6 +26,31 @@ _AGAIN_S: Final = 1.0
 """How often the same refusal is told."""
 _MOST_KEPT: Final = 64
 """Refusals that are counted at once."""
+_MOST_TOLD: Final = 16
+"""Refusals that are told in a second, whatever they say: a hostile page must not fill the file."""
+_MOST_SECRETS: Final = 256
+_LONGEST_NAME: Final = 100
+_LONGEST_TEXT: Final = 1000
+
+log = logging.getLogger(__name__)
+_P = ParamSpec("_P")
+
+
+def _harmless(
+    take: "Callable[Concatenate[Trail, _P], None]",
+) -> "Callable[Concatenate[Trail, _P], None]":
+    """Let no mistake in here reach what it only looks at; it is told once."""
+
+    @wraps(take)
+    def taken(self: "Trail", /, *args: _P.args, **named: _P.kwargs) -> None:
+        try:
+            take(self, *args, **named)
+        except Exception:  # a supervisor: motion and STOP go on
+            if not self.is_faulty:
+                log.exception("the audit misses what happens to %s", self.robot)
+            self.is_faulty = True
+
+    return taken
 
 
 @dataclass(slots=True)
@@ -60,14 +88,27 @@ class Trail:
             utc: the time of day, in seconds since 1970.
             secrets: texts that no entry may hold, such as the values of secret settings.
         """
-        self._robot = robot
+        self.robot = robot
+        self.is_faulty = False
+        """Whether anything could not be noted because of a mistake in URC."""
         self._note = note
         self._utc = utc
-        self._secrets = tuple(one for one in secrets if one)
+        self._secrets: tuple[str, ...] = ()
+        self.hide(secrets)
         self._motions: dict[str, _Motion] = {}
         self._refusals: dict[tuple[str, str, str], _Refusal] = {}
         self._lease = LeaseState()
+        self._told_s = float("-inf")
+        self._told = 0
+        """Refusals that were told in the second that began then."""
 
+    def hide(self, secrets: Iterable[str]) -> None:
+        """Keep these out as well, from now on."""
+        known = dict.fromkeys((*(one for one in secrets if one), *self._secrets))
+        # Longest first: one secret may be part of another.
+        self._secrets = tuple(sorted(list(known)[:_MOST_SECRETS], key=len, reverse=True))
+
+    @_harmless
     def moved(
         self,
         client: Client,
@@ -94,6 +135,7 @@ class Trail:
         motion.count += 1
         motion.arguments, motion.data = arguments, data
 
+    @_harmless
     def stopped(self, command: str, reason: str, now: float) -> None:
         """Take note that a control stopped, and why."""
         motion = self._motions.pop(command, None)
@@ -111,8 +153,10 @@ class Trail:
             lasted_s=round(now - motion.began_s, 3),
         )
 
+    @_harmless
     def refused(self, client: Client, about: str, message: str, now: float) -> None:
         """Take note that a tick of the control, or a wish, `about` was refused."""
+        about, message = about[:_LONGEST_NAME], message[:_LONGEST_TEXT]
         key = (client.id, about, message)
         known = self._refusals.get(key)
         if known is None:
@@ -120,11 +164,12 @@ class Trail:
                 self._refusals.pop(next(iter(self._refusals)))
             known = self._refusals[key] = _Refusal(now - _AGAIN_S)
         known.count += 1
-        if now - known.told_s >= _AGAIN_S:
+        if now - known.told_s >= _AGAIN_S and self._may_tell(now):
             outcome = self._hidden(message)
             self._put("refused", client, command=about, outcome=outcome, times=known.count)
             known.told_s, known.count = now, 0
 
+    @_harmless
     def leased(self, state: LeaseState, now: float) -> None:
         """Take note of a new state of the lease: who has the controls, and whether STOP latched."""
         before, self._lease = self._lease, state
@@ -139,6 +184,7 @@ class Trail:
         if state.asked_by is not None and state.asked_by != before.asked_by:
             self._put("lease", state.asked_by, epoch=state.epoch, outcome="asks for the controls")
 
+    @_harmless
     def ran(
         self,
         client: Client,
@@ -146,8 +192,11 @@ class Trail:
         arguments: Mapping[str, Reading],
         outcome: str,
         data: Payload = b"",
+        answer: Mapping[str, Reading] = NOTHING,
     ) -> None:
         """Take note of a command that is not held, and what it came to: ``done`` or why not."""
+        if answer:
+            outcome = f"{outcome}: {_json(answer)}"
         self._put(
             "ran",
             client,
@@ -156,6 +205,12 @@ class Trail:
             data=self._data(data),
             outcome=self._hidden(outcome),
         )
+
+    def _may_tell(self, now: float) -> bool:
+        if now - self._told_s >= _AGAIN_S:
+            self._told_s, self._told = now, 0
+        self._told += 1
+        return self._told <= _MOST_TOLD
 
     def _put(
         self,
@@ -172,7 +227,7 @@ class Trail:
     ) -> None:
         entry = Entry(
             at=self._utc(),
-            robot=self._robot,
+            robot=self.robot,
             what=what,
             who=who.name,
             role=who.role if who is not _NOBODY else "",
@@ -188,7 +243,7 @@ class Trail:
         self._note(entry)
 
     def _arguments(self, arguments: Mapping[str, Reading]) -> str:
-        return self._hidden(json.dumps(dict(arguments), default=repr, ensure_ascii=False))
+        return self._hidden(_json(arguments))
 
     def _data(self, data: Payload) -> str:
         shown_bytes = traffic_of(data)
@@ -202,3 +257,11 @@ class Trail:
             for form in (secret, json.dumps(secret, ensure_ascii=False)[1:-1]):
                 text = text.replace(form, HIDDEN)
         return text
+
+
+def _json(values: Mapping[str, Reading]) -> str:
+    return json.dumps(dict(values), default=_plain, ensure_ascii=False)
+
+
+def _plain(value: object) -> str:
+    return f"{len(value)} bytes" if isinstance(value, bytes) else repr(value)

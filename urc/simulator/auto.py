@@ -18,7 +18,6 @@ from urc.patterns import Pattern, example
 from urc.protocol.convert import BadValue
 from urc.protocol.decode import build_raw
 from urc.protocol.forms import (
-    BadText,
     CodecContext,
     Frame,
     NotWritable,
@@ -29,7 +28,8 @@ from urc.protocol.forms import (
 )
 from urc.protocol.framing import Framing, FramingError, build_framing
 from urc.simulator.backwards import computed_fields
-from urc.simulator.echo import correlated, own_fields, typed_arguments
+from urc.simulator.echo import correlated, own_fields, rule_for, typed_arguments
+from urc.simulator.in_lines import in_lines
 from urc.simulator.values import Values
 
 __all__ = ["Answer", "Asked", "AutoLine", "AutoMessage", "AutoRobot", "Unanswered", "numbered"]
@@ -197,8 +197,12 @@ class AutoLine:
 
     def answers(self, asked: Asked, now_s: float) -> list[Payload]:
         """Return the declared answers to a request; raise `Unanswered`."""
-        known = asked.arguments
-        said = [data for one in asked.request.answers for data in self.say(one, now_s, known)]
+        known, label = asked.arguments, asked.request.label
+        try:
+            said = [data for one in asked.request.answers for data in self.say(one, now_s, known)]
+        except Unanswered as problem:
+            rule = rule_for(self._robot.driver, self._spec.name, label)
+            raise Unanswered(f"{label}: {problem}; {rule}") from None
         return [numbered(data, asked.frame) for data in said]
 
     def framing_of(self, label: str) -> Framing:
@@ -232,7 +236,7 @@ class AutoLine:
                 payload = answer.reader.write({**dict.fromkeys(answer.needed, 1), **attempt})
                 if not isinstance(payload, bytes):
                     return [payload]
-                pieces = _in_lines(payload, answer, self._spec.encoding)
+                pieces = in_lines(payload, answer.spec.lines, answer.reader, self._spec.encoding)
                 return [answer.framing.encode(piece) for piece in pieces]
             except (NotWritable, FramingError) as error:
                 why = str(error)
@@ -336,7 +340,7 @@ class AutoLine:
                 if isinstance(step, SendStep):
                     requests.append((step.send, []))
                 elif isinstance(step, ExpectStep):
-                    answers.append(self._answer(step.read))
+                    answers.append(self._answer(step.read, step.framing))
                 else:
                     prompt = ReadSpec("prompt")
                     answers.append(Answer(prompt, None, self._framing, step.pattern))
@@ -373,27 +377,3 @@ def _rounded(raw: object) -> object:
     if isinstance(raw, (list, tuple)):
         return [_rounded(one) for one in raw]
     return raw
-
-
-def _in_lines(payload: bytes, answer: Answer, encoding: str) -> list[bytes]:
-    """Return the frames of an answer, which may be several lines."""
-    lines = answer.spec.lines
-    if lines is None:
-        return [payload]
-    pieces = payload.split(b"\n")
-    if isinstance(lines, int):
-        return pieces + [b""] * (lines - len(pieces))
-    end = example(lines, {}).encode(encoding, "replace")
-    if answer.reader is None or _ends(pieces[-1], lines, encoding):
-        return pieces
-    # What the form itself has in its last line goes before a line of our own.
-    replaced = [*pieces[:-1], end]
-    is_read = answer.reader.read(Frame(b"\n".join(replaced), encoding)) is not None
-    return replaced if is_read and len(pieces) > 1 else [*pieces, end]
-
-
-def _ends(line: bytes, until: Pattern, encoding: str) -> bool:
-    try:
-        return until.search(Frame(line, encoding).text) is not None
-    except BadText:
-        return False

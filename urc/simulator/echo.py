@@ -9,11 +9,11 @@ from collections.abc import Iterator, Mapping
 
 from urc.expressions import Template
 from urc.model.codec import ReadSpec
-from urc.model.driver import Argument
+from urc.model.driver import Argument, Driver
 from urc.patterns import compile_pattern, example
 from urc.protocol.vectors import elements_of
 
-__all__ = ["correlated", "own_fields", "typed_arguments"]
+__all__ = ["correlated", "own_fields", "rule_for", "typed_arguments"]
 
 _EQUALS = re.compile(
     r"""(?<![\w.])(_?[A-Za-z]\w*(?:\.\w+)?)\s*==\s*
@@ -36,6 +36,17 @@ _MATCH = re.compile(
 
 _HEMISPHERE = re.compile(r"\|\s*ddmm\(\s*(_?[A-Za-z]\w*)\s*\)", re.ASCII)
 """What says on which half of the earth a number of degrees and minutes is."""
+
+
+def rule_for(driver: Driver, transport: str, label: str) -> str:
+    """Return what to write where no answer can be made, for people: a rule, and under which key."""
+    if label in driver.commands and not driver.commands[label].steps:
+        trigger = f"command: {label}"
+    elif any(label == poll.name != f"polls.{at}" for at, poll in enumerate(driver.polls)):
+        trigger = f"poll: {label}"
+    else:
+        trigger = "match: …"
+    return f"write simulator: {{ {transport}: [{{ {trigger}, send: … }}] }}"
 
 
 def own_fields(spec: ReadSpec, known: Mapping[str, object]) -> dict[str, object]:

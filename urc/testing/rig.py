@@ -37,6 +37,8 @@ SERVER_ADDRESS = "10.77.0.2"
 READY_S = 40.0
 ANSWER_S = 10.0
 END_S = 5.0
+PATIENCE_S = 25.0
+"""For a page to have the controls and to drive; it gives up by itself before."""
 
 
 class Program:
@@ -215,7 +217,7 @@ class Operators(Program):
         """Let a page live by a plan, whose fields are those of `rig_operator.Plan`."""
         self.order(json.dumps(plan))
 
-    def await_told(self, word: str, number: int, timeout_s: float = 15.0) -> str:
+    def await_told(self, word: str, number: int, timeout_s: float = PATIENCE_S) -> str:
         """Return what was told with `word` about a plan; fail when it failed."""
 
         def is_told() -> bool:

@@ -25,6 +25,8 @@ DEATHS = ("close", "kill", "freeze", "block", "reset", "kick", *LINK_DEATHS)
 HEALED_S = 0.4
 """How long it is looked whether a healed link brings motion back."""
 STOP_WITHIN_S = 3.0
+WITNESSES = 2
+"""Idle programs that say when they are not woken in time, as the server's then are not either."""
 
 _PROFILE = """\
 urc: 1
@@ -57,7 +59,7 @@ class Trial(NamedTuple):
     fault: str
     """What must not happen, and did; "" when nothing."""
     late_ms: float
-    """By how much the robots' own process was not woken in time meanwhile: a busy machine."""
+    """By how much idle programs, and the robots' own, were not woken in time: a busy machine."""
 
     @property
     def is_good(self) -> bool:
@@ -102,6 +104,7 @@ class Rig:
                 Server(files, folder / "data", *options, host=self.host, inside=there)
             )
             self.operators = enter(Operators(inside=here))
+            self._witnesses = [enter(Robots([])) for _ in range(WITNESSES)]
         except BaseException:
             self._programs.close()
             raise
@@ -196,8 +199,13 @@ class Rig:
             return Trial(death, float("inf"), fault, 0.0)
         sent_ns = int(heard[moved[-1]].text[2:]) * 1000
         fault = "" if moved[-1] < until_stop else "it moved again after the stop"
-        late_ms = self.robots.latest_ms(sent_ns, stop.time_ns + 20_000_000)
+        late_ms = self._late_ms(sent_ns, stop.time_ns + 20_000_000)
         return Trial(death, (stop.time_ns - sent_ns) / 1e6, fault or _order(heard), late_ms)
+
+    def _late_ms(self, from_ns: int, until_ns: int) -> float:
+        """Return how late the robots were at worst, and whoever else had to be woken for a stop."""
+        others = max(one.latest_ms(from_ns, until_ns) for one in self._witnesses)
+        return self.robots.latest_ms(from_ns, until_ns) + others
 
 
 def _order(heard: Sequence[Heard]) -> str:

@@ -29,7 +29,7 @@ import time
 from typing import Any, NamedTuple
 
 TICK_NS = 50_000_000
-ANSWER_S = 10.0
+ANSWER_S = 20.0
 LONGEST_LIFE_S = 40.0
 _PR_SET_PDEATHSIG = 1
 FLOOD = 400
@@ -194,7 +194,8 @@ class Page:
         while not (self.is_mine and self.is_live and self.beat >= 0):
             now_ns = time.monotonic_ns()
             if now_ns > until_ns or self.is_closed:
-                raise TimeoutError(f"no controls: {self.refusal or 'no answer'}")
+                state = f"live {self.is_live}, mine {self.is_mine}, beat {self.beat}"
+                raise TimeoutError(f"no controls ({state}): {self.refusal or 'no answer'}")
             # Whoever had them before is going just now: asked again until they are free.
             if self.you and not self.is_mine and now_ns - asked_ns > TICK_NS:
                 verb = "reset" if self.is_latched else "take"

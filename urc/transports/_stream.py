@@ -254,12 +254,15 @@ def forget_unsent(line: socket.socket) -> None:
 
 
 def unsent_in(line: socket.socket) -> int:
-    """Return the bytes in the kernel that the other side has not acknowledged, 0 if unknown."""
+    """Return the bytes in the kernel that the other side has not acknowledged.
+
+    0 where the system does not tell; 1 for a line that is closed: what became of them is not known.
+    """
     if sys.platform != "linux":
         return 0
     number = line.fileno()
     if number < 0:
-        return 0
+        return 1
     try:
         ioctl(number, TIOCOUTQ, _UNSENT)  # SIOCOUTQ has its number
     except OSError:

@@ -78,6 +78,11 @@ class Client:
             trust_env=False,
         )
 
+    @property
+    def where(self) -> str:
+        """Host and port, for people."""
+        return self._place.authority
+
     async def reach(self, timeout_s: float = CONNECT_S) -> None:
         """Connect once, for the next request; raise `ConnectFailed`."""
         await self._backend.reach(timeout_s)

@@ -218,6 +218,11 @@ class Stream:
     def _topic(self) -> str:
         return self._spec.path
 
+    @property
+    def _shown(self) -> str:
+        """Which stream of which robot, for people."""
+        return f"http {self._client.where} {self._spec.path}"
+
     def _pause_s(self) -> float:
         """Return the wait before the next attempt: longer each time, and never quite the same."""
         if self._retry_s is not None and not self._failures:
@@ -230,13 +235,13 @@ class Stream:
         self._pulse.beat()
         self._wait_s = _FIRST_WAIT_S
         if self._failures:
-            log.info("%s: here again after %d failures", self._spec.path, self._failures)
+            log.info("%s: here again after %d failures", self._shown, self._failures)
             self._failures = 0
 
     def _fail(self, fault: Exception) -> None:
         self._failures += 1
         if self._failures == 1:
-            log.warning("%s: %s; trying again", self._spec.path, fault)
+            log.warning("%s: %s; trying again", self._shown, fault)
         is_gone = isinstance(fault, HttpFault) and fault.is_unreachable
         if is_gone and self._pulse.silence_s > _GONE_S:
             self._inbox.end(str(fault))

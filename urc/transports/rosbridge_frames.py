@@ -26,6 +26,8 @@ MAX_PNG_BYTES = 2 * 1024 * 1024
 """Of the text in an image: it is unpacked byte by byte, which takes a second for so many."""
 MAX_VALUES = 2_000_000
 """Commas and brackets of an operation: an empty list takes three bytes there and fifty here."""
+_MANY_VALUES = 100_000
+"""Of CBOR that names values again: they take a tenth of a second."""
 _CBOR_MAP = b"\xa0"
 """A map in CBOR starts with this byte or a higher one, JSON with none of them."""
 _LONGEST_ID = 256
@@ -134,7 +136,7 @@ def _read_cbor(data: bytes) -> object:
     import cbor2  # only where a subscription asks for CBOR
 
     try:
-        return _Plain().of(cbor2.loads(data, tag_hook=_tagged))
+        return _Plain(len(data)).of(cbor2.loads(data, tag_hook=_tagged))
     except (cbor2.CBORError, ValueError, RecursionError, MemoryError) as problem:
         raise BadFrame(f"a frame is not CBOR ({problem})") from problem
 
@@ -155,15 +157,22 @@ class _Plain:
     become more than any memory holds.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, size: int) -> None:
+        """Make it for a frame of `size` bytes: each value that it says takes one at least."""
         self._room = MAX_BYTES
         """Bytes that may still be said; a value is at least one."""
+        self._values = max(size, _MANY_VALUES)
+        self._left = self._values
+        """Values that may still be said: each takes time, however small it is."""
 
     def of(self, value: Any) -> Any:
         """Return `value` with null for every number that JSON has not."""
         self._room -= 1 + (len(value) if isinstance(value, str | bytes) else 0)
         if self._room < 0:
             raise ValueError(f"it stands for more than {MAX_BYTES} bytes")
+        self._left -= 1
+        if self._left < 0:
+            raise ValueError(f"it stands for more than {self._values} values")
         if isinstance(value, float):
             return value if math.isfinite(value) else None
         if isinstance(value, dict):

@@ -4,6 +4,7 @@ Floor 5. `build_app` is handed the robots and everything that tells them apart; 
 """
 
 import asyncio
+import time
 from collections.abc import AsyncIterator, Iterable, Mapping
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
@@ -20,17 +21,21 @@ from starlette.types import ASGIApp
 from starlette.websockets import WebSocket
 
 from urc import __version__
+from urc.runtime.audit import AuditLog
 from urc.runtime.latch import LatchFile
+from urc.runtime.trail import Trail
 from urc.shipped import vendored
 from urc.web import wire
 from urc.web.assets import STATIC, Assets, folder_assets, import_map, widget_assets
 from urc.web.dev import Dev, no_dev_routes
+from urc.web.dev_secrets import secret_texts
 from urc.web.dev_watch import Remake
 from urc.web.pages import Head, error_page, menu_page, robot_page
 from urc.web.policy import Policy
 from urc.web.robots import LINGER_S, Robot, Station, missing_settings
 from urc.web.server import serve
 from urc.web.socket import Client, Guest
+from urc.web.timeline import timeline
 
 __all__ = ["Robot", "build_app", "serve"]
 
@@ -51,7 +56,7 @@ def build_app(
         robots: by the name in their URL.
         allowed_hosts: names it answers to, besides addresses, ``localhost`` and ``*.local``.
         linger_s: how long a robot stays connected after its last client has gone, in seconds.
-        data: folder in which a stop is kept over a restart; None: it is not.
+        data: folder in which a stop is kept over a restart, and the audit; None: neither is.
         remake: makes each robot anew when its document is saved, and turns the dev pages on; None:
             there are none.
 
@@ -59,10 +64,16 @@ def build_app(
         UrcError: two robots bring different widgets of one name.
     """
     vendor = vendored()
+    audit = AuditLog(data / "audit.sqlite") if data else None
     routes = _Routes(
         robots=dict(robots),
         stations={
-            name: Station(robot, linger_s=linger_s, latch=_latch(data, robot))
+            name: Station(
+                robot,
+                linger_s=linger_s,
+                latch=_latch(data, robot),
+                trail=_trail(audit, name, robot),
+            )
             for name, robot in robots.items()
         },
         modules=import_map(vendor),
@@ -71,6 +82,7 @@ def build_app(
         widgets=widget_assets(
             widget for robot in robots.values() for widget in robot.profile.widgets.values()
         ),
+        audit=audit,
     )
     dev = remake and Dev(
         routes.stations,
@@ -84,6 +96,13 @@ def build_app(
 def _latch(data: Path | None, robot: Robot) -> LatchFile | None:
     can_move = any(command.hold for command in robot.profile.driver.commands.values())
     return LatchFile(data / "latches", robot.profile.name) if data and can_move else None
+
+
+def _trail(audit: AuditLog | None, name: str, robot: Robot) -> Trail | None:
+    if audit is None:
+        return None
+    secrets = secret_texts(robot.profile, robot.settings)
+    return Trail(name, audit.note, utc=time.time, secrets=secrets)
 
 
 class _Dashboard(Starlette):
@@ -100,6 +119,7 @@ class _Dashboard(Starlette):
                 Route("/robots/{name}/", routes.robot),
                 Route("/healthz", routes.health),
                 Route("/api/v1/robots/{name}/stop", routes.stop, methods=["POST"]),
+                Route("/api/v1/robots/{name}/timeline", routes.timeline),
                 Route("/favicon.ico", routes.favicon),
                 Route("/static/{file:path}", routes.static_file),
                 Route("/vendor/{file:path}", routes.vendor_file),
@@ -124,6 +144,7 @@ class _Routes:
     static: Assets
     vendor: Assets
     widgets: Assets
+    audit: AuditLog | None = None
     dev: Dev | None = None
 
     def renew(self, name: str, robot: Robot, latch: LatchFile | None) -> None:
@@ -132,18 +153,24 @@ class _Routes:
         brought = [w for each in (*others, robot) for w in each.profile.widgets.values()]
         self.widgets = widget_assets(brought)
         self.robots[name] = robot
+        secrets = secret_texts(robot.profile, robot.settings)
+        self.stations[name].controls.trail.hide(secrets)
         self.stations[name].replace(robot, latch)
 
     @asynccontextmanager
     async def lifespan(self, _: Starlette) -> AsyncIterator[None]:
         """Keep one supervisor a robot for as long as the server runs."""
-        async with asyncio.TaskGroup() as group:
-            tasks = [group.create_task(station.run()) for station in self.stations.values()]
-            if self.dev:
-                tasks.append(group.create_task(self.dev.run()))
-            yield
-            for task in tasks:
-                task.cancel()
+        try:
+            async with asyncio.TaskGroup() as group:
+                tasks = [group.create_task(station.run()) for station in self.stations.values()]
+                if self.dev:
+                    tasks.append(group.create_task(self.dev.run()))
+                yield
+                for task in tasks:
+                    task.cancel()
+        finally:
+            if self.audit:  # the last: how the robots were stopped is in it
+                await asyncio.to_thread(self.audit.close)
 
     async def menu(self, request: Request) -> Response:
         head = Head(request.state.nonce, "URC")
@@ -188,6 +215,13 @@ class _Routes:
         is_confirmed = await station.deliver_stop()
         by = station.controls.desk.lease.state.latched_by
         return JSONResponse({"latched": by, "confirmed": is_confirmed}, headers=_PAGE)
+
+    async def timeline(self, request: Request) -> Response:
+        """Tell who made a robot move."""
+        name = request.path_params["name"]
+        if name not in self.stations:
+            return JSONResponse({"error": "no robot of that name is served here"}, 404, _PAGE)
+        return await timeline(request, self.audit, name, is_here=not _guest(request).place)
 
     async def favicon(self, request: Request) -> Response:
         return self.static.respond("favicon.svg", request)

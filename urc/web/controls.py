@@ -13,9 +13,11 @@ from urc.motion.fresh import Input
 from urc.motion.hold import Reason
 from urc.motion.lease import Client, LeaseState, Role
 from urc.motion.pace import Pace
+from urc.runtime.audit import Entry
 from urc.runtime.clock import Alarm, Clock
 from urc.runtime.latch import LatchFile
 from urc.runtime.motion import Frames, MotionDesk, Movers
+from urc.runtime.trail import Trail
 from urc.web import wire_drive as wire
 
 __all__ = ["BEAT_S", "Controls", "Drivable", "Seat"]
@@ -74,16 +76,23 @@ class Seat:
 class Controls:
     """The desk of one robot, and who sits at it."""
 
-    def __init__(self, driver: Driver, clock: Clock, file: LatchFile | None = None) -> None:
+    def __init__(
+        self,
+        driver: Driver,
+        clock: Clock,
+        file: LatchFile | None = None,
+        trail: Trail | None = None,
+    ) -> None:
         """Take up the latch where it was.
 
         Args:
             driver: its commands with ``hold`` are the controls.
             clock: the time.
             file: keeps the latch over a restart; None: nothing does.
+            trail: takes note of what happens; None: nobody does.
         """
-        self.desk = MotionDesk(driver, kept=file.load() if file is not None else None)
-        self.desk.on_change = self._changed
+        self.trail = trail or Trail("", _unread, utc=lambda: 0.0)
+        self.desk = self._desk(driver, file.load() if file is not None else None)
         self._driver = driver
         self._clock = clock
         self._file = file
@@ -110,11 +119,16 @@ class Controls:
                 seat.forget(command)
             seat.paces.clear()
         self._driver, self._file = driver, file
-        self.desk = MotionDesk(driver, kept=kept)
-        self.desk.on_change = self._changed
+        self.desk = self._desk(driver, kept)
         for seat in self._seats.values():
             self.desk.join(seat.client)
         self._changed(self.desk.lease.state)
+
+    def _desk(self, driver: Driver, kept: LeaseState | None) -> MotionDesk:
+        desk = MotionDesk(driver, kept=kept)
+        desk.on_change = self._changed
+        desk.on_moved = self.trail.moved
+        return desk
 
     # -- sessions
 
@@ -130,6 +144,9 @@ class Controls:
                     self._stopped(command, reason)
         finally:
             self.desk.detach()
+            now = self._clock.now()
+            for command in self.commands:  # its movers stop what moves, and report no more
+                self.trail.stopped(command, "the robot was disconnected", now)
 
     # -- screens
 
@@ -198,14 +215,16 @@ class Controls:
         reason = self.desk.drive(seat.client.id, said.verb, now, said.for_s)
         if reason:
             seat.notice(said.verb, wire.encode_refused(said.verb, "", reason))
+            self.trail.refused(seat.client, said.verb, reason, now)
         self._set_expiry()
 
     def _thin(self, seat: Seat, tick: wire.Tick) -> None:
+        now = self._clock.now()
         if tick.command not in self.commands:
             text = f"{tick.command!r} is no held command of this robot"
             seat.notice("tick", wire.encode_refused("tick", "", text))
+            self.trail.refused(seat.client, tick.command, text, now)
             return
-        now = self._clock.now()
         pace = seat.paces.setdefault(tick.command, Pace(THINNED_S))
         if tick.command in seat.alarms or not pace.take(now):
             seat.pending[tick.command] = tick
@@ -231,6 +250,7 @@ class Controls:
             seat.moved_s[command] = now
         elif now - seat.moved_s.get(command, float("-inf")) > PATIENCE_S or self._is_closed(given):
             seat.notice(command, wire.encode_refused("tick", command, reason))
+            self.trail.refused(seat.client, command, reason, now)
 
     def _is_closed(self, given: Input) -> bool:
         return given.epoch != self.desk.lease.state.epoch
@@ -239,6 +259,7 @@ class Controls:
 
     def _stopped(self, command: str, reason: Reason) -> None:
         self.desk.stopped(command, reason)
+        self.trail.stopped(command, reason, self._clock.now())
         if reason in ("released", "stopped"):
             return  # the hand knows, or the lease says it
         for seat in self._seats.values():
@@ -251,6 +272,7 @@ class Controls:
             self._file.keep(state)
         for seat in self._seats.values():
             seat.wake()
+        self.trail.leased(state, self._clock.now())
         self._set_expiry()
         if state.holder is not None and self._beating is None:
             self._beat()
@@ -284,3 +306,7 @@ class Controls:
         return wire.encode_lease(
             state, seat.client, left_s=max(0.0, left_s), is_confirmed=self.desk.is_confirmed
         )
+
+
+def _unread(entry: Entry) -> None:
+    """Nobody reads it."""

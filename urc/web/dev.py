@@ -42,6 +42,8 @@ class DevPage:
     """Path and query of the WebSocket with values and links, on which commands are given, too."""
     socket: str
     """Path of the dev page's own."""
+    timeline: str
+    """Path of what made the robot move."""
 
 
 def dev_url(name: str) -> str:
@@ -111,6 +113,7 @@ class Dev:
             url=f"/robots/{quoted}/",
             values=f"/ws?robot={quoted}",
             socket=f"{dev_url(name)}/ws",
+            timeline=f"/api/v1/robots/{quoted}/timeline",
         )
         return HTMLResponse(render("dev.html.j2", page), headers={"cache-control": "no-store"})
 

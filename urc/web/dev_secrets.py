@@ -13,7 +13,7 @@ from urc.model.profile import Profile
 from urc.model.values import Value
 from urc.runtime.report import REDACTED
 
-__all__ = ["Blanker", "stand_ins"]
+__all__ = ["Blanker", "secret_texts", "stand_ins"]
 
 _SHORTEST = 3
 """A shorter secret would blot out half of every frame; then the whole of it is blanked."""
@@ -27,6 +27,15 @@ def stand_ins(profile: Profile, settings: Mapping[str, Value]) -> dict[str, Valu
         for name, value in settings.items()
         if name in profile.settings
     }
+
+
+def secret_texts(profile: Profile, settings: Mapping[str, Value]) -> list[str]:
+    """Return the values of a robot's secret settings."""
+    return [
+        str(settings[name])
+        for name, setting in profile.settings.items()
+        if setting.is_secret and settings.get(name) is not None
+    ]
 
 
 class Blanker:
@@ -45,11 +54,7 @@ class Blanker:
     @classmethod
     def of(cls, profile: Profile, settings: Mapping[str, Value]) -> "Blanker":
         """Return the one for a robot's secret settings."""
-        secrets = [
-            str(settings[name])
-            for name, setting in profile.settings.items()
-            if setting.is_secret and settings.get(name) is not None
-        ]
+        secrets = secret_texts(profile, settings)
         encodings = (spec.encoding for spec in profile.driver.transports.values())
         return cls(secrets, dict.fromkeys(("utf-8", *encodings)))
 

@@ -21,6 +21,7 @@ from urc.runtime.clock import Clock, LoopClock
 from urc.runtime.hub import Hub
 from urc.runtime.latch import LatchFile
 from urc.runtime.motion import Frames, Movers
+from urc.runtime.trail import Trail
 from urc.web.controls import Controls
 from urc.web.fanout import Fanout
 
@@ -118,6 +119,7 @@ class Station:
         linger_s: float = LINGER_S,
         clock: Clock | None = None,
         latch: LatchFile | None = None,
+        trail: Trail | None = None,
     ) -> None:
         """Wait for the first client.
 
@@ -126,10 +128,11 @@ class Station:
             linger_s: how long it stays open after the last client has gone, in seconds.
             clock: the time.
             latch: keeps a stop over a restart.
+            trail: takes note of who moves the robot.
         """
         self.robot = robot
         self.clock: Clock = clock or LoopClock()
-        self.controls = Controls(robot.profile.driver, self.clock, latch)
+        self.controls = Controls(robot.profile.driver, self.clock, latch, trail)
         self._linger_s = linger_s
         self._visitors = 0
         self._stirred = asyncio.Event()

@@ -9,11 +9,13 @@ import asyncio
 import logging
 import math
 from collections import deque
+from collections.abc import Mapping
 from typing import NamedTuple, Protocol
 
 from starlette.types import Message
 from starlette.websockets import WebSocketDisconnect
 
+from urc.model.values import NOTHING, Reading
 from urc.motion.lease import Role
 from urc.runtime.session import CommandFailed
 from urc.web import wire
@@ -275,7 +277,7 @@ class Client:
             # Refused by closing nothing and queueing nothing: the page sees it as its one answer.
             text = f"{COMMANDS_AT_ONCE} commands are still under way"
             if len(self._answers) < 2 * COMMANDS_AT_ONCE:
-                self._answer(wire.encode_reply(asked, code="busy", message=text))
+                self._reply(asked, code="busy", message=text)
             else:
                 self._close(wire.CLOSE_TOO_FAST, text)
             return
@@ -285,15 +287,40 @@ class Client:
 
     async def _run(self, asked: wire.Run, live: Live) -> None:
         if needs_holding(self._station.robot.profile.driver, asked.command):
-            self._answer(wire.encode_reply(asked, code="refused", message=HELD))
+            self._reply(asked, code="refused", message=HELD)
             return
         try:
             async with asyncio.timeout(COMMAND_TIMEOUT_S):
                 replied = await live.session.command(asked.command, asked.arguments)
+        except asyncio.CancelledError:
+            if self._seat is not None:
+                text = "nobody waited for the answer"
+                trail = self._station.controls.trail
+                trail.ran(self._seat.client, asked.command, asked.arguments, text)
+            raise
         except TimeoutError:
             text = f"no answer within {COMMAND_TIMEOUT_S:g} s"
-            self._answer(wire.encode_reply(asked, code="timed-out", message=text))
+            self._reply(asked, code="timed-out", message=text)
         except CommandFailed as failed:
-            self._answer(wire.encode_reply(asked, code=failed.code, message=failed.message))
+            self._reply(asked, code=failed.code, message=failed.message)
         else:
-            self._answer(wire.encode_reply(asked, values=replied.values))
+            self._reply(asked, values=replied.values)
+
+    def _reply(
+        self,
+        asked: wire.Run,
+        *,
+        values: Mapping[str, Reading] = NOTHING,
+        code: str = "",
+        message: str = "",
+    ) -> None:
+        """Answer a command, and leave in the audit what it came to."""
+        self._answer(wire.encode_reply(asked, values=values, code=code, message=message))
+        if self._seat is None:
+            return
+        trail, who = self._station.controls.trail, self._seat.client
+        if code == "busy" or message is HELD:
+            trail.refused(who, asked.command, message, self._station.clock.now())
+        else:
+            outcome = f"{code}: {message}" if code else "done"
+            trail.ran(who, asked.command, asked.arguments, outcome, answer=values)

@@ -117,9 +117,16 @@ async def driven(
         await asyncio.wait((task,), timeout=WAIT_S)
 
 
+async def fresh(new_page: PageMaker, size: str = "desktop") -> Page:
+    """Return an empty page, which may outlive the server by a moment."""
+    page = await new_page(size=size)  # type: ignore[arg-type]
+    new_page.allow(page, lambda text: "WebSocket" in text and "ERR_CONNECTION_REFUSED" in text)
+    return page
+
+
 async def opened(new_page: PageMaker, address: str, size: str = "desktop") -> Page:
     """Open the robot's page and wait until it can be driven."""
-    page = await new_page(size=size)  # type: ignore[arg-type]
+    page = await fresh(new_page, size)
     await page.goto(address)
     await page.wait_for_function(
         "() => document.querySelector('[data-who]').textContent.match(/drive/)"

@@ -30,6 +30,8 @@ from tests.e2e.motion.driving import (
 
 pytestmark = pytest.mark.anyio
 
+LATE_S = 0.15
+"""One loop plays the server, the robot and the test here; the 50 ms are held by the rig's tests."""
 STILL_S = 0.4
 """Longer than a lease: whoever still ticked would be seen."""
 
@@ -120,7 +122,8 @@ async def test_each_way_of_letting_go_is_neutral_and_ends_the_gesture(
         await push(page)
         await robot.until_moving()
         await WAYS[way](page)
-        await robot.until_stopped()
+        happened_s = robot.clock.now()
+        assert await robot.until_stopped() - happened_s <= 0.1
         assert "expired" not in robot.line.reasons, "it did not wait for the lease to run out"
         await page.mouse.move(*(await centre(page, LEFT)), steps=5)
         await stays_still(robot)
@@ -240,7 +243,7 @@ async def test_a_dialog_stops_within_the_lease_and_nothing_resumes(new_page: Pag
         opening = asyncio.create_task(fire(page, "setTimeout(() => alert('?'), 0)"))
         await robot.until_stopped()
         stopped_s = robot.line.written[-1][0]
-        assert stopped_s - max(last, robot.line.ticked_s) <= LEASE_S + 0.05
+        assert stopped_s - max(last, robot.line.ticked_s) <= LEASE_S + LATE_S
         closing.set()
         await opening
         await stays_still(robot)
@@ -256,7 +259,7 @@ async def test_a_page_that_is_busy_stops_within_the_lease(new_page: PageMaker) -
             fire(page, "{ const end = performance.now() + 3000; while (performance.now() < end); }")
         )
         stopped_s = await robot.until_stopped()
-        assert stopped_s - robot.line.ticked_s <= LEASE_S + 0.05
+        assert stopped_s - robot.line.ticked_s <= LEASE_S + LATE_S
         await busy
         await stays_still(robot)
         note = await text_of(page, "[data-cell='0'] .joystick-note").text_content() or ""
@@ -311,7 +314,7 @@ async def test_a_renderer_that_stands_still_stops_within_the_lease() -> None:
             os.kill(process, signal.SIGSTOP)
         try:
             stopped_s = await robot.until_stopped()
-            assert stopped_s - robot.line.ticked_s <= LEASE_S + 0.05
+            assert stopped_s - robot.line.ticked_s <= LEASE_S + LATE_S
         finally:
             for process in frozen:
                 os.kill(process, signal.SIGCONT)

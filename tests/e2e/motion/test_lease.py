@@ -7,7 +7,7 @@ from playwright.async_api import Page
 
 from tests.e2e.conftest import PageMaker
 from tests.e2e.dashboards import until, until_text
-from tests.e2e.motion.driving import LEFT, driven, moved, opened, push, text_of
+from tests.e2e.motion.driving import LEFT, driven, fresh, moved, opened, push, text_of
 
 pytestmark = pytest.mark.anyio
 
@@ -99,7 +99,7 @@ async def test_a_request_can_be_turned_down_and_the_controls_taken_over(
 async def test_a_page_that_only_watches_sees_all_and_drives_nothing(new_page: PageMaker) -> None:
     """It has no button for the controls, its sticks move nothing, and its STOP works."""
     async with driven() as (robot, address):
-        page = await new_page()
+        page = await fresh(new_page)
         await page.goto(f"{address}?watch")
         await says(page, "^Nobody drives; this page only watches$")
         assert await page.locator("[data-verb]:visible").count() == 0

@@ -9,7 +9,7 @@ from playwright.async_api import Page, Route
 
 from tests.e2e.conftest import PageMaker
 from tests.e2e.dashboards import until, until_attribute, until_text
-from tests.e2e.motion.driving import LEFT, STOP, Wire, centre, driven, moved, opened, push
+from tests.e2e.motion.driving import LEFT, STOP, Wire, centre, driven, fresh, moved, opened, push
 
 pytestmark = pytest.mark.anyio
 
@@ -83,7 +83,7 @@ async def test_stop_of_somebody_else_stops_who_drives(new_page: PageMaker) -> No
 async def test_stop_goes_by_a_request_when_the_socket_is_blocked(new_page: PageMaker) -> None:
     """No WebSocket at all: the page says NO LINK, and STOP reaches the robot all the same."""
     async with driven() as (robot, address):
-        page = await new_page()
+        page = await fresh(new_page)
         await page.add_init_script(
             "window.WebSocket = class extends EventTarget {"
             " static OPEN = 1; readyState = 0; bufferedAmount = 0; close() {} send() {} }"
@@ -148,7 +148,6 @@ async def test_a_latched_stop_holds_over_a_restart(new_page: PageMaker, tmp_path
         await until_text(page, NOTE, DONE)
         kept = tmp_path / "latches" / "puppet.latch.json"
         await until(lambda: kept.exists() and json.loads(kept.read_text())["latched_by"] != "")
-        new_page.allow(page, lambda text: "WebSocket" in text)
     async with driven(tmp_path, Wire()) as (robot, address):
         page = await opened_latched(new_page, address)
         await push(page)
@@ -165,7 +164,7 @@ async def test_a_latched_stop_holds_over_a_restart(new_page: PageMaker, tmp_path
 
 async def opened_latched(new_page: PageMaker, address: str) -> Page:
     """Open the page of a robot that is stopped."""
-    page = await new_page()
+    page = await fresh(new_page)
     await page.goto(address)
     await page.wait_for_function(
         "() => document.querySelector('[data-who]').textContent.startsWith('■ Stopped by')"

@@ -13,7 +13,7 @@ from playwright.async_api import Page
 
 from tests.e2e.conftest import PageMaker
 from tests.e2e.dashboards import until, until_text
-from tests.e2e.motion.driving import STOP, push
+from tests.e2e.motion.driving import STOP, fresh, push
 from tests.e2e.processes import UrcProcess
 
 pytestmark = pytest.mark.anyio
@@ -52,6 +52,8 @@ class Rover:
     def __init__(self) -> None:
         self.lines: list[tuple[float, str]] = []
         self._writers: set[asyncio.StreamWriter] = set()
+        self._server: asyncio.Server | None = None
+        self._port = 0
 
     async def talk(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         """Serve one connection."""
@@ -65,6 +67,23 @@ class Rover:
         finally:
             self._writers.discard(writer)
             writer.close()
+
+    async def come(self, port: int = 0) -> int:
+        """Listen; return the port."""
+        self._server = await asyncio.start_server(self.talk, "127.0.0.1", port)
+        self._port = int(self._server.sockets[0].getsockname()[1])
+        return self._port
+
+    async def come_back(self) -> None:
+        """Listen where it did before."""
+        await self.come(self._port)
+
+    async def leave(self) -> None:
+        """Hang up, and listen no more."""
+        assert self._server is not None
+        self._server.close()
+        for writer in tuple(self._writers):
+            writer.transport.abort()
 
     @property
     def is_moving(self) -> bool:
@@ -80,12 +99,13 @@ class Rover:
 async def rover(tmp_path: Path) -> AsyncIterator[tuple[Rover, str]]:
     """Let a robot listen; give it and its profile."""
     robot = Rover()
-    server = await asyncio.start_server(robot.talk, "127.0.0.1", 0)
-    port = server.sockets[0].getsockname()[1]
+    port = await robot.come()
     file = tmp_path / "rover.yaml"
     file.write_text(PROFILE.replace("PORT", str(port)), encoding="utf-8")
-    async with server:
+    try:
         yield robot, str(file)
+    finally:
+        await robot.leave()
 
 
 Start = Callable[..., UrcProcess]
@@ -110,7 +130,7 @@ async def test_a_finger_moves_the_robot_and_letting_go_stops_it(
     """Scaled to the arguments' ranges, at the declared rate at most, and then silence."""
     async with rover(tmp_path) as (robot, file):
         _, address = await serve(urc_process, file, tmp_path)
-        page = await new_page()
+        page = await fresh(new_page)
         await ready(page, address)
         await push(page, ".joystick-pad", right=30, up=60)
         await until(lambda: robot.is_moving)
@@ -132,7 +152,7 @@ async def test_a_tab_that_is_closed_stops_the_robot(
     """Its socket is gone, and so is the motion."""
     async with rover(tmp_path) as (robot, file):
         _, address = await serve(urc_process, file, tmp_path)
-        page = await new_page()
+        page = await fresh(new_page)
         await ready(page, address)
         await push(page, ".joystick-pad")
         await until(lambda: robot.is_moving)
@@ -146,8 +166,7 @@ async def test_a_server_that_is_killed_stops_the_robot_and_keeps_the_latch(
     """Its guard stops what moves; a stop that was latched before is latched afterwards."""
     async with rover(tmp_path) as (robot, file):
         process, address = await serve(urc_process, file, tmp_path)
-        page = await new_page()
-        new_page.allow(page, lambda text: "WebSocket" in text)
+        page = await fresh(new_page)
         await ready(page, address)
         await push(page, ".joystick-pad")
         await until(lambda: robot.is_moving)
@@ -181,7 +200,7 @@ async def test_a_stop_by_request_reaches_a_robot_that_nobody_looks_at(
     """URC connects to it for that, and says whether it was reached."""
     async with rover(tmp_path) as (robot, file):
         _, address = await serve(urc_process, file, tmp_path)
-        page = await new_page()
+        page = await fresh(new_page)
         await page.goto(address.split("/robots/")[0])
         said = await page.evaluate(
             "fetch('/api/v1/robots/rover/stop', { method: 'POST' }).then((said) => said.json())"
@@ -193,3 +212,21 @@ async def test_a_stop_by_request_reaches_a_robot_that_nobody_looks_at(
             "fetch('/api/v1/robots/nobody/stop', { method: 'POST' }).then((said) => said.status)"
         )
         assert refused == 404
+
+
+async def test_a_stop_while_the_robot_is_away_is_the_first_thing_that_it_hears(
+    new_page: PageMaker, urc_process: Start, tmp_path: Path
+) -> None:
+    """Latched at once, NO LINK meanwhile, confirmed when its line has taken it."""
+    async with rover(tmp_path) as (robot, file):
+        _, address = await serve(urc_process, file, tmp_path)
+        page = await fresh(new_page)
+        await ready(page, address)
+        await robot.leave()
+        await until_text(page, "[data-stop-note]", "▲ NO LINK")
+        await page.click(STOP)
+        await until_text(page, "[data-stop-note]", "▲ NO LINK, latched")
+        assert robot.lines == []
+        await robot.come_back()
+        await until_text(page, "[data-stop-note]", "✓ sent ✓ confirmed ✓ latched")
+        assert [line for _, line in robot.lines] == [STOPPED]

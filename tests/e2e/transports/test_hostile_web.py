@@ -191,7 +191,9 @@ async def test_stream_that_wants_no_pause_gets_one() -> None:
         assert clock() - began_s >= 3 * http_streams.SHORTEST_RETRY_S * 0.9
 
 
-async def test_picture_that_drips_is_asked_for_again(monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_picture_that_drips_is_asked_for_again(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
     """A byte now and then is no picture."""
     monkeypatch.setattr(http_streams, "SILENCE_S", 0.3)
     monkeypatch.setattr(http_streams, "_FIRST_WAIT_S", 0.01)
@@ -212,6 +214,7 @@ async def test_picture_that_drips_is_asked_for_again(monkeypatch: pytest.MonkeyP
     how = Subscription("/cam", {"stream": "mjpeg"})
     async with liar(talk) as port, line(http.from_setup, f"http://127.0.0.1:{port}/", (how,)):
         await until(lambda: came >= 3)
+    assert f"http 127.0.0.1:{port} /cam: no picture within 0.3 s" in caplog.text
 
 
 # -- WebSocket

@@ -169,7 +169,7 @@ async def test_broker_publishes_the_will_however_the_line_ends(
         await transport.open(3.0)
         if end == "cut":
             assert transport._session is not None
-            transport._session._line.shutdown(2)
+            transport._session.line.shutdown(2)
         await transport.close()
         assert await reader.next() == "rover/stop halt"
 

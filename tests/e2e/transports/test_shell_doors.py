@@ -324,9 +324,12 @@ async def test_camera_behind_the_jump_host_is_emulated_as_well(tmp_path: Path, s
     """
     profile = profile_of(CAMERA.replace("SCHEME", scheme), tmp_path)
     settings: dict[str, Value] = {"password": PASSWORD, "ssh_port": free_port()}
-    async with nothing_left(), stand_in(profile, settings) as led:
-        async with Session(led, settings, built_in_catalog().transports) as session:
-            await shows(session, {"depth": 12.5})
+    async with (
+        nothing_left(),
+        stand_in(profile, settings) as twin,
+        Session(twin, settings, built_in_catalog().transports) as session,
+    ):
+        await shows(session, {"depth": 12.5})
 
 
 def test_key_of_the_emulated_server_is_kept_for_its_owner_alone(tmp_path: Path) -> None:

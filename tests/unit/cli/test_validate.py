@@ -43,6 +43,7 @@ def _documents(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     documents = {"good": GOOD, "failing": FAILING, "warned": WARNED, "broken": BROKEN}
     for name, text in documents.items():
+        text = text.replace("name: bot\n", f"name: {name}\n")
         Path(f"{name}.yaml").write_text(text, encoding="utf-8")
     Path("folder").mkdir()
 
@@ -184,3 +185,27 @@ def test_validate_imports_only_what_a_good_document_needs() -> None:
     heavy = {"asyncio", "jinja2", "jsonschema", "starlette", "uvicorn", "msgspec", "socket", "ssl"}
     slow = {"dataclasses", "inspect", "logging", "importlib_metadata"}
     assert not modules_after("validate", str(ROOT / "robots" / "puppet.yaml")) & (heavy | slow)
+
+
+@pytest.mark.parametrize(
+    ("reply", "said"),
+    [
+        ("OK", None),
+        ("NO", "no-match: nothing declared matches 'NO'"),
+        ("ERR", "refused: the robot answered 'ERR'"),
+    ],
+)
+def test_command_that_is_asked_and_answered_is_a_test(
+    reply: str, said: str | None, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """It holds when the command is done, and says why it is not; one without a reply is refused."""
+    command = "commands: { go: { send: GO, reply: { equals: OK, errors: ['^ERR'] } } }\n"
+    head = GOOD[: GOOD.index("tests:")].replace("name: bot\n", "name: asked\n")
+    test = f'tests: [{{ name: go, run: go, feed: {{ wire: "{reply}\\n" }} }}]\n'
+    Path("asked.yaml").write_text(head + command + test, "utf-8")
+    assert main(["validate", "asked.yaml"]) == (said is not None)
+    assert said is None or said in capsys.readouterr().out
+    silent = "commands: { go: { send: GO } }\n"
+    Path("asked.yaml").write_text(head + silent + test, "utf-8")
+    assert main(["validate", "asked.yaml"]) == 1
+    assert "this test cannot fail" in capsys.readouterr().out

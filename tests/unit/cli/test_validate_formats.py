@@ -96,8 +96,8 @@ SARIF = keyed(
 def _folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     Path("broken.yaml").write_text(ROBOT.replace("every", "evry"), "utf-8")
-    Path("some.yaml").write_text(ROBOT + TESTS, "utf-8")
-    Path("all.yaml").write_text(ROBOT + TESTS + BOTH, "utf-8")
+    for name, text in (("some", ROBOT + TESTS), ("all", ROBOT + TESTS + BOTH)):
+        Path(f"{name}.yaml").write_text(text.replace("name: bot\n", f"name: {name}\n"), "utf-8")
 
 
 def test_sarif_has_every_required_member_and_rules_that_the_results_name(capsys: Output) -> None:

@@ -1,120 +1,17 @@
-"""A line in the guard: motion where it is clear, stops before anything, and first when it is back."""
+"""A line in the guard: motion where it is clear, and stops before anything else."""
 
 import asyncio
 from collections.abc import AsyncIterator
 
 import pytest
 
+from tests.unit.guard.lines import STOP, TERMS, CountedWire, Rig, SlowWire, Wire
 from urc.guard import wire
-from urc.guard.client import LineSpec, LocalGuard
-from urc.model.codec import Envelope, Payload
-from urc.motion.hold import Terms
-from urc.testing.clock import FakeClock, settle
-from urc.transports.base import ConnectFailed, PeerClosed, Transport, TransportError
+from urc.model.codec import Envelope
+from urc.testing.clock import settle
+from urc.transports.base import ConnectFailed, PeerClosed
 
 pytestmark = pytest.mark.anyio
-
-STOP = b"stop"
-TERMS = Terms(STOP, period_s=0.02)
-
-
-class Wire:
-    """A robot's line that takes what it is told to take."""
-
-    address = "wire"
-
-    def __init__(self) -> None:
-        self.written: list[Payload] = []
-        self.aborts = 0
-        self.opens = 0
-        self.is_open = False
-        self.refusal = ""
-        self.arriving: asyncio.Queue[Payload | TransportError] = asyncio.Queue()
-
-    async def open(self, timeout_s: float) -> None:
-        self.opens += 1
-        if self.refusal:
-            raise ConnectFailed(self.refusal)
-        self.is_open = True
-        self.arriving = asyncio.Queue()
-
-    async def receive(self) -> Payload:
-        found = await self.arriving.get()
-        if isinstance(found, TransportError):
-            raise found
-        return found
-
-    async def send(self, data: Payload) -> None:
-        self.written.append(data)
-
-    async def close(self) -> None:
-        self.is_open = False
-
-    def cut(self, reason: str = "the line broke") -> None:
-        self.arriving.put_nowait(PeerClosed(reason))
-
-
-class CountedWire(Wire):
-    """One that tells what is unsent, and takes bytes at once."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.is_stuck = False
-        self.stuck_bytes = 0
-
-    def offer(self, data: bytes) -> bool:
-        self.written.append(data)
-        if self.is_stuck:
-            self.stuck_bytes += len(data)
-        return True
-
-    def unsent(self) -> int:
-        return self.stuck_bytes
-
-    async def abort(self) -> None:
-        self.aborts += 1
-        self.stuck_bytes = 0
-        self.is_stuck = False
-        await self.close()
-
-
-class SlowWire(Wire):
-    """One on which sending waits while it is stuck, and nothing else is known."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.flowing = asyncio.Event()
-        self.flowing.set()
-
-    async def send(self, data: Payload) -> None:
-        await self.flowing.wait()
-        self.written.append(data)
-
-
-class Rig:
-    """A guard of one line, and the engine's side of it."""
-
-    def __init__(self, robot: Wire, *, stalled_s: float = 0.25, is_strict: bool = False) -> None:
-        self.robot = robot
-        self.clock = FakeClock()
-        make = wire.Make("wire", "", {}, [], "", stalled_s, is_strict)
-        line: Transport = robot
-        self.guard = LocalGuard([LineSpec(make, line)], self.clock)
-        self.guard.start()
-        self.transport = self.guard.transports["wire"]
-
-    async def drive(self, terms: Terms = TERMS) -> None:
-        await self.transport.open(1.0)
-        self.guard.arm("wire", "drive", terms)
-        self.tick(b"go 1")
-        await settle()
-
-    def tick(self, data: Payload) -> None:
-        self.guard.tick("drive", data)
-
-    async def stops(self) -> list[tuple[str, str]]:
-        async with asyncio.timeout(1.0):
-            return list(await self.guard.stops())
 
 
 @pytest.fixture
@@ -255,6 +152,21 @@ async def test_cut_line_is_opened_by_the_guard_itself(rig: Rig) -> None:
     assert rig.robot.written == [b"go 1", STOP, b"hello"]
 
 
+async def test_cuts_have_no_end(rig: Rig) -> None:
+    """A thousandth cut is as the first."""
+    await rig.drive()
+    for number in range(300):
+        rig.robot.cut()
+        await rig.clock.advance(0.1)
+        assert rig.robot.written[-1] == STOP
+        await rig.transport.open(1.0)
+        rig.guard.arm("wire", "drive", TERMS)
+        rig.tick(b"go on")
+        await settle()
+        assert rig.robot.written[-1] == b"go on"
+        assert rig.robot.opens == number + 2
+
+
 async def test_engine_waits_for_a_rescue_as_for_any_robot(rig: Rig) -> None:
     await rig.drive()
     rig.robot.refusal = "nothing listens"
@@ -280,7 +192,6 @@ async def test_rescued_line_that_nobody_wants_is_closed(rig: Rig) -> None:
     await rig.clock.advance(0.1)
     assert rig.robot.is_open
     await rig.clock.advance(10.0)
-    await asyncio.sleep(6.2)  # bounded by the loop's own time
     assert not rig.robot.is_open
 
 
@@ -334,8 +245,25 @@ async def test_stop_is_repeated_where_it_may_be_lost(rig: Rig) -> None:
 async def test_closing_stops_before(rig: Rig) -> None:
     await rig.drive()
     await rig.transport.close()
+    await rig.clock.advance(5.0)
     assert rig.robot.written == [b"go 1", STOP]
     assert not rig.robot.is_open
+    assert rig.robot.opens == 1
+
+
+async def test_stop_that_did_not_get_through_is_owed_after_closing(rig: Rig) -> None:
+    robot = rig.robot
+    assert isinstance(robot, CountedWire)
+    await rig.drive()
+    robot.is_stuck = True
+    closing = asyncio.ensure_future(rig.transport.close())
+    while not closing.done():
+        await rig.clock.advance(0.05)
+    robot.is_stuck = False
+    robot.stuck_bytes = 0
+    await rig.clock.advance(0.3)
+    assert robot.opens == 2
+    assert robot.written == [b"go 1", STOP, STOP]
 
 
 async def test_end_of_the_guard_stops_before(rig: Rig) -> None:

@@ -49,9 +49,12 @@ commands:
     to: ros
     args: { speed: { type: number, min: -1, max: 1 } }
     send:
-      publish: { topic: /cmd_vel, type: geometry_msgs/Twist, json: { linear: { x: "{{ speed }}" } } }
+      publish:
+        { topic: /cmd_vel, type: geometry_msgs/Twist, json: { linear: { x: "{{ speed }}" } } }
   reset: { to: ros, send: { call: { service: /reset, type: std_srvs/Trigger } } }
-  dock: { to: ros, send: { goal: { action: /dock, type: irobot_create_msgs/action/Dock, json: {} } } }
+  dock:
+    to: ros
+    send: { goal: { action: /dock, type: irobot_create_msgs/action/Dock, json: {} } }
   lamp:
     to: broker
     args: { lit: { type: boolean } }

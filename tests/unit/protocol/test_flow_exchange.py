@@ -1,5 +1,7 @@
 """Whose answer a frame is: correlation, order, stages, refusals, retries, replies of many lines."""
 
+import base64
+
 import pytest
 
 from tests.dialogue import Dialogue
@@ -248,6 +250,77 @@ messages: { mode: { regex: '^MODE (?P<mode>\\w+)$' } }
             talk.raw(data[start : start + size])
         assert talk.values == {"mode": "two", "a": "AB\nD"}
         assert talk.outcomes == {1: "done"}
+
+
+GREETING = """
+wire: on_connect:
+wire: - { expect: '^HELLO (?P<_name>\\w+)$' }
+wire: - expect: { framing: { type: fixed, size: 16 }, struct: [{ id: _n, type: bytes, size: 16 }] }
+wire: - { send: "LOGIN {{ _name }} {{ _n | b64encode }}" }
+wire: - { expect: '^WELCOME$' }
+signals: { mode: { type: string } }
+messages: { mode: { regex: '^MODE (?P<mode>\\w+)$' } }
+"""
+NONCE = b"\n\x00abc\nHELLO x\n\r\xff"
+
+
+@pytest.mark.parametrize("size", [1, 2, 7, 9, 16, 17, 25, 33, 100])
+def test_a_step_may_bring_its_own_framing(size: int) -> None:
+    """The greeting is a line, the challenge sixteen bytes of any kind, and then come lines again.
+
+    However the bytes are cut by the network, and when more follows than was asked for.
+    """
+    assert len(NONCE) == 16
+    talk = Dialogue(GREETING).connect()
+    data = b"HELLO ada\n" + NONCE + b"MODE idle\n"
+    for start in range(0, len(data), size):
+        talk.raw(data[start : start + size])
+    assert talk.values == {"mode": "idle"}
+    assert talk.sent == [f"LOGIN ada {base64.b64encode(NONCE).decode()}"]
+    talk.says("WELCOME", "MODE two")
+    assert talk.values == {"mode": "two"}
+    assert talk.faults == []
+    assert talk.engine.lines["wire"].is_ready
+
+
+def test_a_frame_that_came_before_its_step_is_cut_by_the_framing_of_the_step() -> None:
+    """The bytes lie there, no line to the line's own framing, while the sequence waits."""
+    talk = Dialogue(
+        """
+signals: { mode: { type: string } }
+messages: { mode: { regex: '^MODE (?P<mode>\\w+)$' } }
+sequences:
+  read:
+    - { wait: 1s }
+    - { expect: { framing: { type: fixed, size: 4 }, regex: '^(?P<mode>....)$' } }
+"""
+    ).connect()
+    talk.run("read")
+    talk.raw(b"ABCDMODE x")
+    assert talk.values == {}
+    talk.at(1.0)
+    assert talk.values == {"mode": "ABCD"}
+    assert talk.outcomes == {1: "done"}
+    talk.raw(b"y\n")
+    assert talk.values == {"mode": "xy"}
+
+
+def test_a_step_that_waited_in_vain_leaves_the_line_to_its_own_framing() -> None:
+    """Half a challenge is in front of the next line; the one after it is whole."""
+    talk = Dialogue(
+        """
+signals: { mode: { type: string } }
+messages: { mode: { regex: '^MODE (?P<mode>\\w+)$' } }
+sequences: { read: [{ expect: { framing: { type: fixed, size: 9 }, regex: '^.{9}$' } }] }
+"""
+    ).connect()
+    talk.run("read")
+    talk.raw(b"\n123")
+    talk.at(0.5)
+    assert talk.outcomes == {1: "timed-out"}
+    talk.raw(b"\nMODE on\n")
+    assert talk.values == {"mode": "on"}
+    assert talk.faults == ["no-match"] * 2
 
 
 def test_a_request_that_times_out_says_what_came_in_place_of_the_answer() -> None:

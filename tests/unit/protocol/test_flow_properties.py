@@ -71,6 +71,9 @@ sequences:
     - { if: a > 5, then: [{ send: "{{ a }}", to: wire }, { expect: '^OK$', from: wire,
         else: [{ run: slow }] }] }
     - { set: { b: "{{ _a }}" } }
+  challenge:
+    - { send: NONCE, to: wire }
+    - { expect: { framing: { type: fixed, size: 3 }, regex: '(?s)^(?P<_b>...)$' }, from: wire }
 messages: { b: { from: wire, regex: '^B (?P<b>\\w*)$' } }
 polls:
   - { run: call, every: 900ms }

@@ -2,9 +2,11 @@
 
 import pytest
 
-from tests.dialogue import Dialogue
+from tests.dialogue import Dialogue, driver_of
+from urc.model.flow import Confirm
 from urc.problems import UrcError
 from urc.protocol.encode import BadArgument
+from urc.protocol.engine import Engine
 from urc.protocol.motions import NotNow
 
 DRIVER = """
@@ -21,11 +23,6 @@ commands:
     send: "{{ seq('n', 0, 9) }} TURN {{ v }}"
     args: { v: { type: integer, min: -1, max: 1, default: 0 } }
     hold: { repeat: 50ms, release: {} }
-  blast:
-    send: "BLAST {{ v }}"
-    args: { v: { type: integer, default: 0 } }
-    hold: { repeat: 50ms, release: {} }
-    confirm: { text: Clear the area, two_person: true }
   ping: { send: "{{ seq('n', 0, 9) }} PING" }
 messages:
   mode: { regex: '^MODE (?P<mode>\\w+)$' }
@@ -78,13 +75,16 @@ def test_a_value_that_is_not_as_declared_makes_no_frame(value: object) -> None:
 
 
 def test_two_people_must_confirm_where_one_is_not_enough() -> None:
-    """Names that are the same, or nobody's, are one person."""
-    talk = Dialogue(DRIVER).connect()
-    move = talk.engine.motions.motion_frame
+    """Documents may not ask for it; a driver that does is obeyed. Equal names are one person."""
+    driver = driver_of(DRIVER)
+    asked = driver.commands["turn"]._replace(confirm=Confirm(text="Clear", is_two_person=True))
+    engine = Engine(driver._replace(commands={**driver.commands, "turn": asked}), {})
+    engine.start("wire", 0)
+    move = engine.motions.motion_frame
     for people in ((), ("ann",), ("ann", "ann"), ("ann", "")):
         with pytest.raises(NotNow, match="two people must confirm"):
-            move("blast", {"v": 1}, 0.1, people)
-    assert move("blast", {"v": 1}, 0.1, ("ann", "bob")) == b"BLAST 1\n"
+            move("turn", {"v": 1}, 0.1, people)
+    assert move("turn", {"v": 1}, 0.1, ("ann", "bob")) == b"0 TURN 1\n"
 
 
 def test_counters_go_on_over_motion_and_commands() -> None:

@@ -1,5 +1,8 @@
 """Readings: alarms that last, and signals that are computed from others."""
 
+import pytest
+
+from tests.dialogue import Dialogue
 from urc.expressions import compile_expression
 from urc.model.values import Conversion, Limits, Sample, Signal
 from urc.protocol.readings import Readings
@@ -150,3 +153,35 @@ def test_conversions_and_refusals_of_a_frame() -> None:
     made = readings(Signal("a", conversion=Conversion(polynomial=(0, 0.1))), Signal("b", max=1))
     samples, refused = made.put({"a": "3", "b": 2}, 0.0)
     assert (values(samples), refused) == ({"a": 0.3}, ["b: 2 is above its maximum 1"])
+
+
+@pytest.mark.parametrize(
+    ("said", "value"),
+    [
+        ("T 9.9E37", None),
+        ("T +9.90000E+37", None),
+        ("T 9.8E37", 9.8e37),
+        ('{"t": 99e36}', None),
+        ('{"t": 98e36}', 98e36),
+        ("T 000", None),
+        ("T 0", 0),
+        ("W 9.9E37", None),
+        ("W +9.90000E+37", "+9.90000E+37"),
+    ],
+)
+def test_number_in_quotes_that_means_no_value(said: str, value: object) -> None:
+    """It is that number however it is spelt, or exact text where that begins with zeros."""
+    talk = Dialogue(
+        """
+signals:
+  t: { not_available: ["9.9E37", "000"] }
+  w: { type: string, not_available: ["9.9E37"] }
+messages:
+  t: { regex: '^T (?P<t>.+)$' }
+  j: { json: { t: t } }
+  w: { regex: '^W (?P<w>.+)$' }
+"""
+    ).connect()
+    talk.says(said)
+    assert list(talk.values.values()) == [value]
+    assert talk.faults == []

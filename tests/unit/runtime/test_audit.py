@@ -149,3 +149,51 @@ def test_texts_have_an_end_and_any_character(kept: AuditLog) -> None:
 def test_many_bytes_are_shown_by_their_hash() -> None:
     assert shown(b"GO") == "474f"
     assert shown(bytes(100)).startswith("100 bytes, sha256 cd00e292c5970d3c5e2f0ffa5171e555")
+
+
+def test_two_servers_with_one_folder_keep_one_chain(file: Path) -> None:
+    with AuditLog(file) as one, AuditLog(file) as other:
+        for number in range(6):
+            log = other if number % 2 else one
+            log.note(entry(number))
+            assert log.settle()
+    assert [each.at for each in read(file)] == [1000.0 + number for number in range(6)]
+    assert check(file) == ""
+
+
+def test_an_entry_that_no_file_takes_is_counted_and_the_next_one_is_kept(
+    file: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("urc.runtime.audit._RETRY_S", 0.0)
+    with AuditLog(file) as log:
+        log.note(entry(1)._replace(epoch=2**70))
+        assert log.settle()
+        log.note(entry(2))
+        assert log.settle()
+    assert [(each.what, each.times) for each in read(file)] == [("moved", 1), ("lost", 1)]
+
+
+def test_a_file_that_somebody_locks_holds_nobody_up_and_is_told_once(
+    file: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr("urc.runtime.audit._RETRY_S", 0.0)
+    with AuditLog(file) as log:
+        log.note(entry(1))
+        assert log.settle()
+        base = sqlite3.connect(file, isolation_level=None)
+        base.execute("BEGIN IMMEDIATE")
+        for number in (2, 3):
+            began_s = time.monotonic()
+            log.note(entry(number))
+            assert time.monotonic() - began_s < 0.5, "the lock is waited for elsewhere"
+            assert log.settle(10)
+        assert log.fault == "database is locked"
+        base.execute("ROLLBACK")
+        base.close()
+        log.note(entry(4))
+        assert log.settle()
+    assert [(each.what, each.times) for each in read(file)][1:] == [("moved", 1), ("lost", 2)]
+    told = [one.getMessage() for one in caplog.records]
+    assert [text for text in told if "locked" in text] == [
+        "the audit cannot be kept: database is locked; robots are driven and stopped as ever"
+    ]

@@ -45,3 +45,13 @@ async def test_state_keeps_its_time_while_only_its_detail_changes() -> None:
         ("warning", "lost: refused"),
         ("warning", "no-match: what?"),
     ]
+
+
+async def test_a_line_that_brings_only_faults_says_which() -> None:
+    """A wrong password is told in place of “nothing received yet”."""
+    hub = Hub({})
+    report = LinkReport("web", "http h:80", hub, FakeClock())
+    report.show("connecting", "connected; nothing received yet")
+    report.count(Fault("web", "refused", "401 Unauthorized"))
+    report.publish()
+    assert hub.links["web"].detail == "connected; 401 Unauthorized"

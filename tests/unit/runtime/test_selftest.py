@@ -59,6 +59,7 @@ def trial(**keys: object) -> DocumentTest:
         trial(run="stop", fails="within 0.5 s", sent={"wire": "stop"}),
         trial(feed={"wire": "none\n"}, reply_to=0, fails="no-match"),
         trial(feed={"wire": "x\n"}, run="stop", fails=""),
+        trial(feed={"wire": "ok\n"}, run="stop"),
     ],
     ids=lambda test: f"{test.run or test.reply_to}-{test.fails}",
 )
@@ -129,6 +130,15 @@ def test_message_that_nobody_asked_for_is_read() -> None:
     [
         (
             trial(feed={"wire": "42\n"}, reply_to=0),
+            "it checks nothing; say what it should 'expect', what is 'sent' or how it 'fails'",
+        ),
+        (
+            trial(feed={"wire": "ok"}, run="stop"),
+            "stop should be done, but is not: no answer, or no command was run",
+        ),
+        (trial(feed={"wire": "no\n"}, run="stop"), "no-match: nothing declared matches 'no'"),
+        (
+            trial(feed={"wire": "ok\n"}, run="say", arguments={"word": "x"}),
             "it checks nothing; say what it should 'expect', what is 'sent' or how it 'fails'",
         ),
         (

@@ -1,5 +1,7 @@
 """What the controls leave in the audit says who moved what, why it stopped, and no secret."""
 
+import pytest
+
 from urc.motion.lease import Client, LeaseState
 from urc.runtime.audit import Entry
 from urc.runtime.trail import HIDDEN, Trail
@@ -65,12 +67,50 @@ def test_a_refusal_at_50_hz_is_told_once_a_second() -> None:
     ]
 
 
-def test_refusals_of_many_kinds_are_forgotten_one_by_one() -> None:
+def test_refusals_of_many_kinds_are_forgotten_one_by_one_and_told_sixteen_a_second() -> None:
     book = Book()
     for number in range(1000):
         book.trail.refused(ANN, "go", f"reason {number}", 1.0)
-    assert len(book.entries) == 1000
+    assert len(book.entries) == 16
     assert len(book.trail._refusals) == 64
+    book.trail.refused(ANN, "go", "reason 1000", 2.0)
+    assert len(book.entries) == 17
+
+
+def test_a_refusal_holds_a_bounded_text() -> None:
+    book = Book()
+    book.trail.refused(ANN, "x" * 60_000, "y" * 60_000, 1.0)
+    (found,) = book.entries
+    assert (len(found.command), len(found.outcome)) == (100, 1000)
+
+
+def test_a_mistake_in_here_reaches_nobody_and_is_told_once(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    def broken(_: Entry) -> None:
+        raise RuntimeError("no")
+
+    trail = Trail("rover", broken, utc=lambda: 99.0)
+    trail.moved(ANN, 7, "go", {}, b"", 1.0)
+    trail.stopped("go", "released", 2.0)
+    trail.leased(LeaseState(1, ANN), 3.0)
+    assert trail.is_faulty
+    assert [one.getMessage() for one in caplog.records] == [
+        "the audit misses what happens to rover"
+    ]
+
+
+def test_secrets_that_come_later_are_hidden_too_and_the_longest_first() -> None:
+    book = Book("hunter")
+    book.trail.hide(["hunter2"])
+    book.trail.ran(ANN, "say", {"text": "hunter2 hunter"}, "done")
+    assert book.entries[0].arguments == f'{{"text": "{HIDDEN} {HIDDEN}"}}'
+
+
+def test_an_answer_is_told_and_bytes_of_it_by_their_size() -> None:
+    book = Book()
+    book.trail.ran(ANN, "look", {}, "done", answer={"picture": b"\x00" * 9, "angle": 2})
+    assert book.entries[0].outcome == 'done: {"picture": "9 bytes", "angle": 2}'
 
 
 def test_the_lease_and_the_latch_leave_a_line_each() -> None:

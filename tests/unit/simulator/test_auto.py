@@ -267,18 +267,45 @@ polls:
 
 
 def test_what_cannot_be_answered_is_told(tmp_path: Path) -> None:
-    """A search in a document has no inverse."""
+    """A search in a document has no inverse; what is said names the rule that would help."""
     body = """
 signals:
   volts: { min: 0, max: 10 }
 polls:
   - { every: 1s, send: "volts?", reply: { json: { volts: "max(cells)" } } }
+  - { name: cells, every: 1s, send: "cells?", reply: { json: { volts: "max(cells)" } } }
+commands:
+  ask: { send: "ask", reply: { json: { volts: "max(cells)" } } }
 """
     line = Twin(profile_of(tmp_path, body), {}).line("wire")
-    assert line.receive(b"volts?\r", 0.0) == []
-    assert line.last_fault == (
+    why = (
         "no answer can be made by its json: nothing to write, or two paths that exclude each other"
     )
+    for asked, label, trigger in (
+        (b"volts?", "polls.0", "match: …"),
+        (b"cells?", "cells", "poll: cells"),
+        (b"ask", "ask", "command: ask"),
+    ):
+        assert line.receive(asked + b"\r", 0.0) == []
+        rule = f"write simulator: {{ wire: [{{ {trigger}, send: … }}] }}"
+        assert line.last_fault == f"{label}: {why}; {rule}"
+
+
+def test_the_mark_behind_the_lines_of_an_answer_takes_no_value_away(tmp_path: Path) -> None:
+    """It stands in a line of its own where the last line says something."""
+    body = """
+signals:
+  volts: { min: 0, max: 10 }
+  mode: { type: string, states: { A: auto, M: manual } }
+commands:
+  ask:
+    send: "ask"
+    reply: { regex: '^(?P<volts>[0-9.]+)\\n(?P<mode>\\w+)', lines: { until: '^OK$' } }
+"""
+    talk = Dialogue(profile_of(tmp_path, body))
+    assert isinstance(talk.run("ask"), Replied)
+    assert set(talk.values) == {"volts", "mode"}
+    assert talk.faults == []
 
 
 def test_answers_repeat_the_counters_of_binary_requests(tmp_path: Path) -> None:

@@ -10,11 +10,15 @@ import pytest
 from starlette.types import Message
 
 from urc.model.profile import Setting
+from urc.protocol.events import Replied
+from urc.runtime.audit import Entry
 from urc.runtime.session import CommandFailed
+from urc.runtime.trail import Trail
 from urc.testing.clock import FakeClock, settle
 from urc.testing.dashboard import FakeRobot, dashboard_profile
 from urc.web.robots import Robot, Station
-from urc.web.socket import BAD_MESSAGES, MESSAGES_PER_S, Allowance, Client
+from urc.web.socket import BAD_MESSAGES, MESSAGES_PER_S, TICKS_PER_S, Allowance, Client
+from urc.web.wire import CLOSE_TOO_FAST
 
 pytestmark = pytest.mark.anyio
 
@@ -64,6 +68,7 @@ class Scene:
         self.robot = robot
         self.clock = clock
         self.station = station
+        self.audit: list[Entry] = []
         self.line = FakeLine()
         self.client = Client(self.line, station, self.line)
         self.task = asyncio.create_task(self.client.serve())
@@ -74,9 +79,12 @@ async def scene(settings: dict[str, Setting] | None = None) -> AsyncIterator[Sce
     """Serve one client; it and the station are gone after the test."""
     clock = FakeClock()
     robot = FakeRobot(dashboard_profile(settings=settings), clock)
-    station = Station(Robot(robot.profile, {}, robot.open), clock=clock)
+    audit: list[Entry] = []
+    trail = Trail("puppet", audit.append, utc=lambda: 99.0)
+    station = Station(Robot(robot.profile, {}, robot.open), clock=clock, trail=trail)
     running = asyncio.create_task(station.run())
     made = Scene(station, robot, clock)
+    made.audit = audit
     await settle()
     try:
         yield made
@@ -139,6 +147,26 @@ async def test_a_command_gets_exactly_one_reply() -> None:
             {"t": "reply", "id": 3, "ok": True, "values": {"battery": 7}},
             {"t": "reply", "id": 4, "ok": False, "code": "refused", "message": "not now"},
         ]
+        assert [(e.what, e.who, e.command, e.arguments, e.outcome) for e in it.audit] == [
+            ("ran", "screen 1", "ask", '{"x": 1}', 'done: {"battery": 7}'),
+            ("ran", "screen 1", "ask", "{}", "refused: not now"),
+        ]
+
+
+async def test_a_command_whose_page_has_gone_is_in_the_audit() -> None:
+    """It was given, whoever waits for its answer."""
+    async with scene() as it:
+
+        async def wait(name: str, arguments: object) -> Replied:
+            await asyncio.Event().wait()
+            raise AssertionError
+
+        it.robot.command = wait  # type: ignore[method-assign]
+        it.line.say({"t": "run", "id": 3, "command": "ask"})
+        await settle()
+        it.line.leave()
+        await settle()
+        assert [(e.what, e.outcome) for e in it.audit] == [("ran", "nobody waited for the answer")]
 
 
 async def test_bad_messages_are_counted_answered_and_then_close_the_line() -> None:
@@ -225,3 +253,50 @@ async def test_commands_at_once_are_bounded() -> None:
         gate.set()
         await settle()
         assert len(it.line.of_type("reply")) == 17
+
+
+async def test_ticks_do_not_count_as_messages_until_they_are_a_flood() -> None:
+    """A stick that is moved quickly must not close its own line; a hostile page must."""
+    tick = {"t": "tick", "command": "drive", "epoch": 1, "number": 1, "echo": 1}
+    async with scene() as it:
+        for _ in range(5):
+            for _ in range(200):
+                it.line.say(tick)
+            await it.clock.advance(0.2)
+        assert it.line.closed is None
+        for _ in range(2 * TICKS_PER_S):
+            it.line.say(tick)
+        await settle()
+        assert it.line.closed is not None
+        assert it.line.closed[0] == CLOSE_TOO_FAST
+
+
+async def test_a_stop_is_taken_however_much_else_was_said() -> None:
+    """It is not one of the hundred messages a second."""
+    async with scene() as it:
+        for _ in range(MESSAGES_PER_S):
+            it.line.say({"t": "ping", "c": 1})
+        it.line.say({"t": "stop"})
+        await settle()
+        assert it.line.closed is None
+        assert it.station.controls.desk.lease.state.latched_by == "screen 1"
+
+
+@pytest.mark.parametrize(
+    "message",
+    [
+        {"t": "tick", "command": "drive", "epoch": 1, "number": 1},
+        {"t": "tick", "command": "drive", "epoch": 1, "number": 1, "echo": 1, "more": 1},
+        {"t": "tick", "command": "drive", "epoch": 1, "number": 1, "echo": 1, "arguments": [1]},
+        '{"t":"tick","command":"drive","epoch":1,"number":1,"echo":1,"arguments":{"speed":NaN}}',
+        '{"t":"tick","command":"drive","epoch":1,"number":1,"echo":1,"arguments":{"speed":1e999}}',
+        {"t": "drive", "verb": "grab"},
+        {"t": "release"},
+    ],
+)
+async def test_what_is_no_message_about_the_controls_is_counted_as_bad(message: object) -> None:
+    """Not-a-number and infinity are no values either."""
+    async with scene() as it:
+        it.line.say(message)
+        await settle()
+        assert it.client.bad_messages == 1

@@ -10,6 +10,8 @@ import pytest
 
 from tests.unit.runtime.test_motion import DRIVER
 from urc.motion.lease import Role
+from urc.runtime.audit import Entry
+from urc.runtime.trail import Trail
 from urc.testing.clock import FakeClock, settle
 from urc.testing.movers import FakeFrames, FakeMovers
 from urc.web import wire_drive as wire
@@ -23,7 +25,9 @@ class Scene:
 
     def __init__(self) -> None:
         self.clock = FakeClock()
-        self.controls = Controls(DRIVER, self.clock)
+        self.audit: list[Entry] = []
+        trail = Trail("rover", self.audit.append, utc=lambda: 99.0)
+        self.controls = Controls(DRIVER, self.clock, trail=trail)
         self.frames = FakeFrames(DRIVER)
         self.movers = FakeMovers(self.clock)
         self.told: dict[str, list[dict[str, Any]]] = {}
@@ -192,3 +196,74 @@ async def test_a_silent_holder_loses_the_controls_and_a_request_is_granted() -> 
         assert it.controls.desk.lease.state.holder == bob.client
         await it.clock.advance(61)
         assert it.controls.desk.lease.state.holder is None
+
+
+def audited(it: Scene) -> list[str]:
+    """Return what was noted: what, who, command, outcome."""
+    return [" ".join(f"{e.what} {e.who} {e.command} {e.outcome}".split()) for e in it.audit]
+
+
+async def test_the_audit_says_who_moved_what_and_why_it_stopped() -> None:
+    """The frame, the arguments and the lease are in it; a release is a reason."""
+    async with scene() as it:
+        ann = it.sit(role="engineer")
+        it.say(ann, "take")
+        it.tick(ann, 0.5)
+        await it.clock.advance(0.05)
+        it.tick(ann, 0.25)
+        it.controls.hear(ann, wire.Release("drive"))
+        await settle()
+        assert audited(it) == [
+            "lease screen 1 has the controls",
+            "moved screen 1 drive begins",
+            "stopped screen 1 drive released",
+        ]
+        moved, stopped = it.audit[1:]
+        assert (moved.robot, moved.role, moved.client) == ("rover", "engineer", "s1")
+        assert moved.epoch == it.controls.desk.lease.state.epoch
+        assert moved.arguments == '{"speed": 0.5}'
+        assert bytes.fromhex(moved.data) == b"drive speed=0.5"
+        assert bytes.fromhex(stopped.data) == b"drive speed=0.25"
+        assert (stopped.times, stopped.lasted_s) == (2, 0.05)
+
+
+async def test_the_audit_names_whoever_was_refused_and_why() -> None:
+    """A tick without the controls, a wish that is not granted, and what is no control."""
+    async with scene() as it:
+        ann, bob = it.sit(), it.sit("192.168.1.7")
+        it.say(ann, "take")
+        it.tick(bob)
+        it.say(bob, "force")
+        it.controls.hear(bob, wire.Tick("beep", 0, 1, 0, {}))
+        it.controls.stop("vic")
+        refused = [one for one in audited(it) if one.startswith("refused")]
+        assert refused[0] == "refused screen 2 at 192.168.1.7 drive screen 1 has the controls"
+        assert refused[1].startswith("refused screen 2 at 192.168.1.7 force ")
+        assert refused[2].endswith("'beep' is no held command of this robot")
+        assert "STOP by vic" in audited(it)
+
+
+async def test_the_audit_ends_a_motion_whose_robot_was_disconnected() -> None:
+    """Nobody reports its stop any more."""
+    async with scene() as it:
+        ann = it.sit()
+        it.say(ann, "take")
+        it.tick(ann)
+    assert audited(it)[-1] == "stopped screen 1 drive the robot was disconnected"
+
+
+async def test_an_audit_that_breaks_keeps_nobody_from_driving_and_stopping() -> None:
+    """Whatever is wrong with it."""
+    async with scene() as it:
+
+        def broken(entry: Entry) -> None:
+            raise OSError("the disk is on fire")
+
+        it.controls.trail._note = broken
+        ann = it.sit()
+        it.say(ann, "take")
+        it.tick(ann, 0.5)
+        assert it.movers.texts[-1] == "drive speed=0.5"
+        it.controls.stop("ann")
+        assert it.movers.texts[-1].endswith("stop")
+        assert it.controls.desk.lease.state.latched_by == "ann"

@@ -1,4 +1,4 @@
-"""Where dev pages are: only when turned on, only from this machine, with the policy of all pages."""
+"""Where dev pages are: only when turned on, only from this machine, with every page's policy."""
 
 import re
 

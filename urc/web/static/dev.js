@@ -10,6 +10,7 @@ import { Badge, part } from "./badge.js";
 import { element, visible } from "./dev_bytes.js";
 import { Commands } from "./dev_commands.js";
 import { WireLog } from "./dev_log.js";
+import { Timeline } from "./dev_timeline.js";
 import { TryOut } from "./dev_try.js";
 import { Socket } from "./socket.js";
 import { DASH, Store, ageText } from "./store.js";
@@ -58,6 +59,7 @@ const desk = {
 };
 const tryOut = new TryOut(root, desk);
 const commands = new Commands(part(root, "[data-commands]"), desk);
+const timeline = new Timeline(root, root.dataset["timeline"] ?? "");
 
 /**
  * Ask one thing and wait for its one answer.
@@ -214,6 +216,7 @@ function address(path) {
 }
 
 line.open();
+timeline.refresh();
 setInterval(draw, DRAW_EVERY_MS);
 addEventListener("pagehide", () => [values, line].forEach((socket) => socket.close()));
 addEventListener("pageshow", (event) => {

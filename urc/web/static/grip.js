@@ -139,10 +139,15 @@ export class Grip {
     this.holder.end(this);
   }
 
+  /** Let go of a pointer that was taken away: a browser tells that with the next move only. */
+  check() {
+    if (this.hand?.kind !== "pointer") return;
+    if (!this.spec.el.hasPointerCapture(this.pointerId)) this.drop(["pointer"]);
+  }
+
   /** @returns {Record<string, Value>} by the command's own names */
   sample() {
     if (!this.hand) return {};
-    if (this.hand.kind === "pointer" && !this.spec.el.hasPointerCapture(this.pointerId)) return {};
     return argumentsOf(this.output, this.spec.sample(this.hand));
   }
 

@@ -218,6 +218,7 @@ export class Input {
     this.frameMs = nowMs;
     this.pads.step(this.grips);
     for (const control of this.controls.values()) {
+      for (const grip of [...control.grips]) grip.check();
       if (control.grips.size === 0) continue;
       const leaseMs = Math.min(...[...control.grips].map((grip) => grip.output.leaseMs));
       if (gapMs > leaseMs && control.phase === "held") {
