@@ -51,8 +51,18 @@ STATIC = (
 )
 # Two processes: the browser's loop stays out of the way of the rest.
 TESTS = (
-    Step("tests", (PYTHON, "-m", "pytest", "tests/unit", "tests/contract"), timeout_s=300),
-    Step("tests e2e", (PYTHON, "-m", "pytest", "tests/e2e"), timeout_s=420),
+    Step("tests", (PYTHON, "-m", "pytest", "tests/unit", "tests/contract"), timeout_s=420),
+    # Most of them wait for a server or for silence, so a few at a time take no more processor.
+    Step(
+        "tests e2e",
+        (
+            *(PYTHON, "-m", "pytest", "tests/e2e", "--ignore=tests/e2e/motion"),
+            *("-n", "3", "--dist", "loadgroup"),
+        ),
+        timeout_s=700,
+    ),
+    # Alone: they measure how soon a robot stops.
+    Step("tests motion", (PYTHON, "-m", "pytest", "tests/e2e/motion"), timeout_s=420),
 )
 
 
