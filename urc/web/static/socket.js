@@ -63,7 +63,8 @@ export class Socket {
    * @returns {boolean} whether it was handed to the browser
    */
   send(message) {
-    if (!this.isUp || !this.line) return false;
+    // The browser may know that it is closing before anybody is told by an event.
+    if (!this.isUp || !this.line || this.line.readyState !== WebSocket.OPEN) return false;
     this.line.send(JSON.stringify(message));
     return true;
   }
