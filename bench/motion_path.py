@@ -17,11 +17,12 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
+from bench.figures import tell
 from bench.harness import Result
 from urc.testing.rig import Program, Robots, Server
 from urc.testing.rig_operator import Page, Plan
 
-__all__ = ["run"]
+__all__ = ["PROFILE", "TimedPage", "run", "ticks_of"]
 
 TIMES_C = 2.0
 TIMES_PYTHON = 1.5
@@ -53,12 +54,18 @@ Ticker = Callable[[int], int]
 class TimedPage(Page):
     """A page that says when it gave a tick to its socket."""
 
+    def begin_anew(self) -> None:
+        """Do what a person does after a stop: let go, and take the controls for a new gesture."""
+        self.let_go()
+        self.has_let_go = False
+        self.say({"t": "drive", "verb": "leave"})
+        self.wait(time.monotonic_ns() + SETTLE_NS)
+        self.take_controls()
+        self.refusal = ""
+
     def tick_number(self, number: int) -> int:
         """Send a tick with `number` as its value; return when, in nanoseconds."""
         self.hear()  # the newest beat
-        if self.refusal:  # a busy machine was silent for longer than the lease: a new gesture
-            self.say({"t": "release", "command": "go"})
-            self.refusal = ""
         self.sent += 1
         body = {
             "t": "tick",
@@ -100,7 +107,7 @@ def run(*, full: bool) -> Sequence[Result]:
                     taken[name] += times
                     medians[name].append(statistics.median(times))
     for name, times in taken.items():
-        print(json.dumps(_distribution(name, times)), flush=True)
+        tell(_distribution(name, times))
     goals = {"C relay": TIMES_C, "Python relay": TIMES_PYTHON}
     return [_result(name, medians, goal) for name, goal in goals.items() if name in medians]
 
@@ -121,7 +128,7 @@ def _bare(command: Sequence[str], ticks: int) -> Iterator[Callable[[], list[floa
     with Robots(["tcp:127.0.0.1:0"]) as robots, Program([*command, str(robots.ports[0])]) as relay:
         port = int(relay.wait_for("ready")[1])
         page = TimedPage(Plan(1, "127.0.0.1", port, "", "", 0))
-        yield lambda: _round(page, robots, ticks)
+        yield lambda: ticks_of(page, robots, ticks)
         page.socket.close()
         relay.signal(signal.SIGTERM)
 
@@ -138,25 +145,29 @@ def _urc(folder: Path, ticks: int) -> Iterator[Callable[[], list[float]]]:
 
             def one_round() -> list[float]:
                 page.wait(time.monotonic_ns() + 100_000_000)
-                return _round(page, robots, ticks)
+                return ticks_of(page, robots, ticks)
 
             yield one_round
             page.socket.close()
 
 
-def _round(page: TimedPage, robots: Robots, ticks: int) -> list[float]:
+def ticks_of(page: TimedPage, robots: Robots, ticks: int) -> list[float]:
     """Tick; return the time of each tick that came, in milliseconds."""
     first = len(robots.heard[0]) + 1
     sent: dict[int, int] = {}
     next_ns = time.monotonic_ns()
     for number in range(first, first + ticks):
         page.wait(next_ns)
+        if page.refusal:  # a busy machine was silent for longer than the lease
+            page.begin_anew()
+            next_ns = time.monotonic_ns()
         sent[number * 1000] = page.tick_number(number * 1000)
         next_ns += TICK_NS
     page.wait(next_ns + SETTLE_NS)  # what was thinned out or waits for the line comes now
     page.let_go()
     page.has_let_go = False
     page.wait(time.monotonic_ns() + SETTLE_NS)
+    page.refusal = ""
     heard = {int(one.text[2:]): one.time_ns for one in robots.heard[0]}
     came = [(heard[value] - at) / 1e6 for value, at in sent.items() if value in heard]
     if len(came) < ticks * LEAST_SHARE:
@@ -168,7 +179,8 @@ def _distribution(name: str, times: Sequence[float]) -> dict[str, object]:
     ordered = sorted(times)
     last = len(ordered) - 1
     return {
-        "motion_path": name,
+        "figure": "motion_path",
+        "way": name,
         "ticks": len(ordered),
         "p50_us": round(ordered[last // 2] * 1000),
         "p99_us": round(ordered[round(last * 0.99)] * 1000),

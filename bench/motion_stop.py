@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from math import inf
 from pathlib import Path
 
+from bench.figures import distribution, tell
 from bench.harness import Result
 from urc.testing.rig import can_relay
 from urc.testing.rig_deaths import BOUND_MS, DEATHS, LINK_DEATHS, Rig, Trial
@@ -40,47 +41,29 @@ def run(*, full: bool) -> Sequence[Result]:
                 continue
             trials = _trials(rig, death, wanted)
             said = [one for one in trials if not one.is_excused]
-            print(json.dumps(_distribution(death, said, len(trials) - len(said))), flush=True)
+            tell(_figures(death, said, len(trials) - len(said)))
             results.append(_result(death, said, wanted))
     return results
 
 
 def _trials(rig: Rig, death: str, wanted: int) -> list[Trial]:
     trials: list[Trial] = []
-    for _ in range(MOST_BOUTS * wanted // LANES):
+    for _ in range(-(-MOST_BOUTS * wanted // LANES)):
         trials += rig.bout(death)
         if sum(not one.is_excused for one in trials) >= wanted:
             break
     return trials
 
 
-def _distribution(death: str, trials: Sequence[Trial], excused: int) -> dict[str, object]:
-    """Return what the trials say, and their histogram: from how many ms on → how many."""
-    times = sorted(one.stop_ms for one in trials if one.stop_ms < inf)
-    bins: dict[str, int] = {}
-    for stop_ms in times:
-        name = str(int(stop_ms // BIN_MS) * BIN_MS)
-        bins[name] = bins.get(name, 0) + 1
+def _figures(death: str, trials: Sequence[Trial], excused: int) -> dict[str, object]:
     return {
-        "motion_stop": death,
+        "figure": "motion_stop",
+        "death": death,
         "trials": len(trials),
         "broken": sum(not one.is_good for one in trials),
         "faults": sorted({one.fault for one in trials if one.fault}),
         "excused": excused,
-        **{name: round(value, 1) for name, value in _quantiles(times).items()},
-        "histogram_ms": bins,
-    }
-
-
-def _quantiles(times: Sequence[float]) -> dict[str, float]:
-    if not times:
-        return {}
-    last = len(times) - 1
-    return {
-        "min_ms": times[0],
-        "p50_ms": times[last // 2],
-        "p99_ms": times[round(last * 0.99)],
-        "max_ms": times[-1],
+        **distribution([one.stop_ms for one in trials], BIN_MS),
     }
 
 

@@ -56,6 +56,7 @@ def link_command(linker: Linker, part: Part, command: Command) -> None:
     if command.hold is not None:
         release = part.must("hold").must("release")
         link_arguments(linker.findings, release, command, release.entries(), "release")
+        _link_slew(linker.findings, part.must("hold").named("slew"), command)
         if _needs_two(command):
             linker.findings.error(
                 part.must("hold"),
@@ -64,6 +65,27 @@ def link_command(linker: Linker, part: Part, command: Command) -> None:
                 key=True,
                 hint="let two people confirm a command that enables the motion",
             )
+
+
+def _link_slew(findings: Findings, slew: Mapping[str, Part], command: Command) -> None:
+    """Check that what may grow so fast are numbers that may have any value between two others."""
+    for name, inner in slew.items():
+        argument = command.arguments.get(name)
+        if argument is None:
+            findings.error(
+                inner,
+                "unknown-argument",
+                f"command {command.name!r} has no argument {name!r}",
+                key=True,
+                hint=did_you_mean(name, command.arguments, "arguments"),
+            )
+            continue
+        kind = argument.of if argument.type == "array" else argument.type
+        if kind not in ("integer", "number") or argument.choices:
+            what = "has choices" if argument.choices else f"is {kind}"
+            text = f"argument {name!r} {what}, and nothing lies between two of its values"
+            hint = "limit arguments that are numbers without choices"
+            findings.error(inner, "wrong-type", text, key=True, hint=hint)
 
 
 def link_requirements(linker: Linker, part: Part, command: Command) -> None:

@@ -259,7 +259,9 @@ def _hold(part: Part, findings: Findings) -> Hold:
         )
         return Hold(repeat_s)
     values = {name: given(inner.data) for name, inner in release.entries().items()}
-    return Hold(repeat_s, values, lease_s, _watchdog_s(part, findings))
+    slew = {name: float(inner.data) for name, inner in part.named("slew").items()}
+    on_stall = cast("Literal['abort', 'wait'] | None", part.text("on_stall") or None)
+    return Hold(repeat_s, values, lease_s, _watchdog_s(part, findings), slew, on_stall)
 
 
 def _watchdog_s(part: Part, findings: Findings) -> float | None:

@@ -14,7 +14,7 @@ __all__ = ["QuickCheck"]
 
 _Check = Callable[[Any], bool]
 _ANNOTATIONS: Final = frozenset(
-    ("$schema", "$defs", "title", "description", "examples", "default", "then", "else")
+    ("$schema", "$defs", "title", "description", "examples", "default", "file", "then", "else")
 )
 
 
@@ -221,6 +221,7 @@ _MAKERS: dict[str, Callable[[QuickCheck, Any, Any, str], _Check]] = {
     "minLength": _size(str, lambda size, limit: size >= limit),
     "minProperties": _size(dict, lambda size, limit: size >= limit),
     "minimum": _range(lambda number, limit: number >= limit),
+    "exclusiveMinimum": _range(lambda number, limit: number > limit),
     "pattern": _pattern,
     "properties": _properties,
     "propertyNames": _names,

@@ -1,4 +1,4 @@
-"""The guard's process: ``python -m urc.guard DESCRIPTOR``, started by `urc.guard.client` alone."""
+"""The guard's process: ``python -m urc.guard PIPE``, started by `urc.guard.client` alone."""
 
 import asyncio
 import gc
@@ -12,14 +12,17 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import Final
 
+from urc._loop import run
 from urc.guard import wire
 from urc.guard.host import FINISH_S, Host
 from urc.guard.pipe import Pipe
+from urc.guard.process import DOOR
 
 __all__ = ["BEAT_S", "main"]
 
 BEAT_S: Final = 0.1
 _GRACE_S: Final = 0.7
+_ENTER_S: Final = 5.0
 
 
 class _Clock:
@@ -40,8 +43,9 @@ class _Clock:
 async def _guard(line: socket.socket) -> None:
     loop = asyncio.get_running_loop()
     over = asyncio.Event()
-    for number in (signal.SIGTERM, signal.SIGHUP):
-        loop.add_signal_handler(number, over.set)
+    for name in ("SIGTERM", "SIGHUP"):
+        with suppress(AttributeError, NotImplementedError):  # Windows: the pipe's end says it there
+            loop.add_signal_handler(getattr(signal, name), over.set)
 
     def emit(said: wire.FromGuard) -> int:
         return pipe.post(said)
@@ -75,15 +79,25 @@ async def _guard(line: socket.socket) -> None:
     os._exit(0)  # a library's thread or task that does not end must not keep the process
 
 
+def _line(place: str) -> socket.socket:
+    """Return our end of the pipe: inherited, or behind the server's door."""
+    if not place.startswith(DOOR):
+        return socket.socket(fileno=int(place))
+    line = socket.create_connection(("127.0.0.1", int(place.removeprefix(DOOR))), timeout=_ENTER_S)
+    line.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+    line.sendall(sys.stdin.buffer.read())
+    return line
+
+
 def main() -> None:
     """Guard the lines of one robot until the pipe ends, or SIGTERM."""
     # Ctrl-C reaches every process of the terminal: the server says what is to be done about it.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     logging.basicConfig(format="%(levelname)s: guard: %(message)s", level=logging.WARNING)
-    line = socket.socket(fileno=int(sys.argv[1]))
+    line = _line(sys.argv[1])
     gc.collect()
     gc.freeze()  # what is loaded by now stays: no need to look through it again
-    asyncio.run(_guard(line))
+    run(_guard(line))
 
 
 if __name__ == "__main__":

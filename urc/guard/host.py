@@ -38,6 +38,7 @@ class Host:
             wire.Open: lambda said: self._lines[said.line].open(said.turn, said.timeout_s),
             wire.Close: lambda said: self._lines[said.line].close(said.turn),
             wire.Make: self._make,
+            wire.Renew: self._renew,
             wire.Owe: self._owe,
         }
 
@@ -91,6 +92,11 @@ class Host:
     def _arm(self, said: wire.Arm) -> None:
         line = self._controls[said.control] = self._lines[said.line]
         line.reins.arm(said.control, said.terms)
+
+    def _renew(self, said: wire.Renew) -> None:
+        line = self._controls.get(said.control)
+        if line is not None:
+            line.reins.renew(said.control, said.stop)
 
     def _stop(self, said: wire.Stop) -> None:
         for name, control, terms in said.controls:

@@ -9,6 +9,7 @@ first thing written, and the open line is kept for the engine, which finds it at
 
 import asyncio
 import logging
+from collections import deque
 from collections.abc import Callable, Coroutine
 from typing import Any, Final
 
@@ -17,8 +18,8 @@ from urc.guard.lane import Clock, Lane, Ring, why_broken
 from urc.guard.pipe import UNFIT
 from urc.guard.reins import Reins
 from urc.model.codec import Payload
-from urc.motion.stall import STALLED_S
 from urc.transports.base import PeerClosed, Transport, TransportError
+from urc.transports.hurry import HURRY, Hurry
 
 __all__ = ["WINDOW_BYTES", "Line"]
 
@@ -35,8 +36,14 @@ _EVERY_S: Final = 0.05
 """Shortest time between two attempts; where opening is dear, five times that."""
 _SHORTEST_S: Final = 0.07
 _LONGEST_S: Final = 2.0
-"""Bounds of an attempt's time: some times what the last one took that was good."""
+"""Bounds of an attempt's time: some times what good ones take. One that was begun while the robot
+was away is lost, and holds the next one up."""
+_REMEMBERED: Final = 5
 _TIMES: Final = 4.0
+_LOG_IN_S: Final = 6.0
+_GROWTH: Final = 1.25
+_LONG_S: Final = 0.5
+"""Where tries cannot overlap, each has more time than the one before, up to this."""
 _USUAL_S: Final = 0.25
 _WITHIN_S: Final = 0.7
 """Repeats of a stop, and what a slow line needs for the last one."""
@@ -57,7 +64,7 @@ class Line:
         self.transport = transport
         self._emit = emit
         self._clock = clock
-        self._is_dear = make.stalled_s > STALLED_S
+        self._is_dear = make.is_strict
         self.reins = Reins(
             transport,
             clock,
@@ -84,6 +91,10 @@ class Line:
         """Set while the engine waits for a rescue to succeed; rings when its time is up."""
         self._fault = ""
         self._patience_s = _USUAL_S
+        self._took_s: deque[float] = deque(maxlen=_REMEMBERED)
+        """By the last that were good: the shortest says what the way takes, without this machine's
+        own delays."""
+        self._hurry = Hurry(_SHORTEST_S)
         self._credit = 0
         self._credited = asyncio.Event()
         self._is_reading = False
@@ -207,8 +218,8 @@ class Line:
             return f"no answer from {self.transport.address} within {timeout_s:g} s"
         except Exception as bug:  # supervisor: a foreign transport may raise what it likes
             return why_broken(bug)
-        took_s = self._clock.now() - began_s
-        self._patience_s = min(max(_TIMES * took_s, _SHORTEST_S), _LONGEST_S)
+        self._took_s.append(self._clock.now() - began_s)
+        self._patience_s = min(max(_TIMES * min(self._took_s), _SHORTEST_S), _LONGEST_S)
         return ""
 
     def _begin(self) -> None:
@@ -266,6 +277,7 @@ class Line:
 
     async def _recover(self, reason: str, *, is_abort: bool = False) -> None:
         """Close what is broken, tell the engine, and stop the robot if that is owed."""
+        is_abort = is_abort or self.reins.is_in_doubt  # else the kernel would send it later
         self._cut(reason)
         await self._close_transport(is_abort=is_abort)
         if self.reins.owes:
@@ -284,8 +296,9 @@ class Line:
         while self._is_open and not self._is_quiet and self._clock.now() < until_s:
             await self._clock.sleep(_PAUSE_S)
         self._is_handed = False
+        is_abort = self.reins.is_in_doubt
         self._cut("")
-        await self._close_transport()
+        await self._close_transport(is_abort=is_abort)
         self._emit(wire.Closed(self.name, turn))
         if self.reins.owes:
             await self._rescue()
@@ -312,19 +325,26 @@ class Line:
         self._is_rescuing = True
         every_s = 5 * _EVERY_S if self._is_dear else _EVERY_S
         until_s = self._clock.now() + _RESCUE_S
+        hurry = HURRY.set(self._hurry)
         try:
             while self.reins.owes and self._clock.now() < until_s:
                 began_s = self._clock.now()
-                self._fault = await self._attempt(self._patience_s)
+                # Where tries overlap, a way that has become long is no reason to give up.
+                enough_s = _LOG_IN_S if self._is_dear else _LONGEST_S
+                is_hurried = self._hurry.is_used
+                self._fault = await self._attempt(enough_s if is_hurried else self._patience_s)
                 if not self._fault:
+                    HURRY.set(None)
                     self._begin()
                     if self._waiting is not None:
                         self._hand_over()
                     await self._serve_rescued()
                     return
+                self._patience_s = min(self._patience_s * _GROWTH, _LONG_S)
                 await self._clock.sleep(max(0.0, began_s + every_s - self._clock.now()))
             self._in_vain()
         finally:
+            HURRY.reset(hurry)
             self._is_rescuing = False
 
     async def _serve_rescued(self) -> None:

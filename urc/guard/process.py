@@ -1,30 +1,121 @@
 """Starts and buries the guard's process."""
 
 import asyncio
+import hmac
+import os
+import secrets
 import socket
 import subprocess
 import sys
+from typing import Any, Final
 
-__all__ = ["launch", "reap"]
+__all__ = ["CAN_INHERIT", "DOOR", "Door", "launch", "reap"]
+
+CAN_INHERIT: Final = os.name == "posix"
+"""Whether this system can hand an open pipe to another process."""
+DOOR: Final = "door:"
+"""Before the port, where the guard comes to us instead."""
+TOKEN_BYTES: Final = 64
+_LOOPBACK: Final = "127.0.0.1"
+_ADMIT_S: Final = 10.0
+_SAY_S: Final = 1.0
 
 
-def launch() -> tuple["subprocess.Popen[bytes]", socket.socket]:
-    """Start the process; return it and our end of the pipe."""
+class Door:
+    """Where the guard of a system without inherited pipes comes in: a port of this machine's own.
+
+    Anybody on this machine may knock. Who does not say the word that the guard alone was told, on
+    its standard input, is turned away.
+    """
+
+    def __init__(self) -> None:
+        self._listener = socket.create_server((_LOOPBACK, 0))
+        self._listener.setblocking(False)
+        self.token = secrets.token_hex(TOKEN_BYTES // 2).encode()
+
+    @property
+    def port(self) -> int:
+        """Where it is."""
+        return int(self._listener.getsockname()[1])
+
+    async def admitted(self) -> socket.socket:
+        """Return the guard's connection; raise `TimeoutError` when it does not come in time."""
+        loop = asyncio.get_running_loop()
+        try:
+            async with asyncio.timeout(_ADMIT_S):
+                while True:
+                    line, _ = await loop.sock_accept(self._listener)
+                    if await self._is_guard(line):
+                        line.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+                        return line
+                    line.close()
+        finally:
+            self.close()
+
+    async def _is_guard(self, line: socket.socket) -> bool:
+        line.setblocking(False)
+        loop, said = asyncio.get_running_loop(), b""
+        try:
+            async with asyncio.timeout(_SAY_S):
+                while len(said) < TOKEN_BYTES:
+                    data = await loop.sock_recv(line, TOKEN_BYTES - len(said))
+                    if not data:
+                        return False
+                    said += data
+        except (OSError, TimeoutError):
+            return False
+        except BaseException:
+            line.close()
+            raise
+        return hmac.compare_digest(said, self.token)
+
+    def close(self) -> None:
+        """Let nobody in any more; may be called twice."""
+        self._listener.close()
+
+
+def launch(
+    *, is_inherited: bool = CAN_INHERIT
+) -> tuple["subprocess.Popen[bytes]", socket.socket | Door]:
+    """Start the process; return it, and our end of the pipe or the door that it will come to."""
+    return _heir() if is_inherited else _visitor()
+
+
+def _heir() -> tuple["subprocess.Popen[bytes]", socket.socket]:
     ours, theirs = socket.socketpair()
     try:
-        process = subprocess.Popen(  # noqa: S603 - our own interpreter and module
-            # -P: nothing is imported from the folder we happen to be in.
-            [sys.executable, "-P", "-m", "urc.guard", str(theirs.fileno())],
-            pass_fds=(theirs.fileno(),),
-            stdin=subprocess.DEVNULL,
-            process_group=0,  # a terminal's Ctrl-C is for the server, which tells the guard
-        )
+        place = str(theirs.fileno())
+        process = _started(place, pass_fds=(theirs.fileno(),), stdin=subprocess.DEVNULL)
     except BaseException:
         ours.close()
         raise
     finally:
         theirs.close()
     return process, ours
+
+
+def _visitor() -> tuple["subprocess.Popen[bytes]", Door]:
+    door = Door()
+    try:
+        process = _started(f"{DOOR}{door.port}", stdin=subprocess.PIPE)
+        assert process.stdin is not None  # noqa: S101 - it was asked for
+        with process.stdin as told:
+            told.write(door.token)  # not as an argument: those everybody can read
+    except BaseException:
+        door.close()
+        raise
+    return process, door
+
+
+def _started(place: str, **more: Any) -> "subprocess.Popen[bytes]":
+    # A terminal's Ctrl-C is for the server, which tells the guard.
+    if sys.platform == "win32":
+        more["creationflags"] = subprocess.CREATE_NEW_PROCESS_GROUP
+    else:
+        more["process_group"] = 0
+    # -P: nothing is imported from the folder we happen to be in.
+    command = [sys.executable, "-P", "-m", "urc.guard", place]
+    return subprocess.Popen(command, **more)  # noqa: S603 - our own interpreter and module
 
 
 async def reap(process: "subprocess.Popen[bytes]") -> None:

@@ -65,6 +65,11 @@ class GuardedTransport:
         """Where it leads, for people."""
         return self._address
 
+    @property
+    def is_open(self) -> bool:
+        """Whether it is connected, by the newest word of the guard."""
+        return self._is_open
+
     async def open(self, timeout_s: float) -> None:
         """Connect, or raise `ConnectFailed` within `timeout_s` seconds."""
         await self.close()

@@ -13,7 +13,7 @@ from collections.abc import Callable
 from typing import Final
 
 from urc.guard.lane import Clock, Lane, Ring
-from urc.model.codec import Payload, size_of
+from urc.model.codec import Payload
 from urc.motion.hold import Mover, Reason, Terms
 from urc.motion.stall import IN_FLIGHT_S, StallWatch
 from urc.transports.base import Transport, TransportError
@@ -21,7 +21,9 @@ from urc.transports.base import Transport, TransportError
 __all__ = ["Reins"]
 
 _LOOK_S: Final = 0.005
-"""How often one looks at a line that is not clear; nothing is due sooner than that."""
+"""How soon one looks at a line that is not clear; nothing else is due sooner than that."""
+_LONGEST_LOOK_S: Final = 0.02
+"""One looks half as often each time, down to this, where nothing waits for it to be clear."""
 
 
 class Reins:
@@ -63,6 +65,7 @@ class Reins:
         self._is_open = False
         self._alarm: Ring | None = None
         self._alarm_s = 0.0
+        self._look_s = _LOOK_S
 
     @property
     def owes(self) -> bool:
@@ -95,6 +98,12 @@ class Reins:
         if now - at_s < mover.terms.lease_s:  # else it waited so long that it renews nothing
             mover.tick(data, min(at_s, now))
 
+    def renew(self, control: str, stop: Payload) -> None:
+        """Stop `control` with `stop` from now on."""
+        mover = self._movers.get(control)
+        if mover is not None:
+            mover.renew(mover.terms._replace(stop=stop))
+
     def release(self, control: str) -> None:
         """Stop what was let go."""
         mover = self._movers.get(control)
@@ -103,9 +112,7 @@ class Reins:
 
     def stop(self, control: str, terms: Terms) -> None:
         """Stop `control`, whether it moves or not."""
-        mover = self._movers.get(control)
-        if mover is None:
-            mover = self._mover(control, terms)
+        mover = self._mover(control, terms)
         mover.stop("stopped", self._clock.now())
         if not self._is_open:
             mover.cut()
@@ -190,6 +197,8 @@ class Reins:
             return True  # all that was written has gone: asking the system would take its time
         unsent = self._unsent()
         self._watch.saw(unsent, now)
+        if not unsent:
+            self._doubtful.clear()
         return not unsent or (not self._is_strict and self._watch.age_s(now) < IN_FLIGHT_S)
 
     def _write(self, control: str, data: Payload, now: float, *, is_stop: bool) -> None:
@@ -202,8 +211,11 @@ class Reins:
         elif is_stop:
             self._tell(control)
         if self._unsent is not None:
-            self._watch.wrote(size_of(data), now)
+            # What a message takes on the line is seen at the next look; a guess that is too high
+            # would make it seem that something had left.
+            self._watch.wrote(len(data) if isinstance(data, bytes) else 0, now)
             self._doubtful.add(control)
+            self._look_s = _LOOK_S
 
     def _sent(self, tag: tuple[str, bool], fault: TransportError | None) -> None:
         control, is_stop = tag
@@ -226,13 +238,16 @@ class Reins:
     # -- time
 
     def _set_alarm(self, now: float) -> None:
-        at_s = now + _LOOK_S
-        if not self._doubtful and self.lane.is_idle:
-            # What is due already waits for the line to be clear.
-            dues = [one.deadline for one in self._movers.values() if one.state != "idle"]
-            at_s = max(at_s, min((due for due in dues if due is not None), default=float("inf")))
-            if at_s == float("inf"):
-                return
+        # What is due already waits for the line to be clear.
+        dues = [one.deadline for one in self._movers.values() if one.state != "idle"]
+        at_s = min((due for due in dues if due is not None), default=float("inf"))
+        at_s = max(at_s, now + _LOOK_S)
+        if self._doubtful or not self.lane.is_idle:
+            # The end of a line's time is looked for when it comes, not a look later.
+            stalled_s = self._watch.deadline or at_s
+            at_s = min(at_s, now + self._look_s, max(stalled_s, now))
+        elif at_s == float("inf"):
+            return
         if self._alarm is not None and self._alarm_s <= at_s:
             return  # one that rings early finds nothing to do, and is set anew
         if self._alarm is not None:
@@ -260,4 +275,6 @@ class Reins:
         unsent = self._unsent()
         if not unsent and self.lane.is_idle:
             self._doubtful.clear()
+        is_wanted = any(mover.is_waiting for mover in self._movers.values())
+        self._look_s = _LOOK_S if is_wanted else min(2 * self._look_s, _LONGEST_LOOK_S)
         return self._watch.saw(unsent, now)

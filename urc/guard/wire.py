@@ -29,6 +29,7 @@ __all__ = [
     "Received",
     "Refused",
     "Release",
+    "Renew",
     "Send",
     "Sent",
     "Stop",
@@ -54,7 +55,7 @@ class Make(msgspec.Struct, array_like=True, frozen=True, tag=1):
     stalled_s: float
     """Unsent motion of this age means that the line is stalled: it is reset and opened afresh."""
     is_strict: bool
-    """Nothing is written while anything is unsent, however young."""
+    """Opening it is dear: nothing is written while anything is unsent, however young."""
 
 
 class Open(msgspec.Struct, array_like=True, frozen=True, tag=2):
@@ -127,6 +128,13 @@ class Owe(msgspec.Struct, array_like=True, frozen=True, tag=10):
     line: str
     control: str
     terms: Terms
+
+
+class Renew(msgspec.Struct, array_like=True, frozen=True, tag=11):
+    """Stop a control with these bytes from now on: the number in those before is used up."""
+
+    control: str
+    stop: Payload
 
 
 class Opened(msgspec.Struct, array_like=True, frozen=True, tag=21):
@@ -204,7 +212,7 @@ class Beat(msgspec.Struct, array_like=True, frozen=True, tag=29):
     """By how much its own timer was late."""
 
 
-ToGuard = Make | Open | Send | Close | Credit | Arm | Tick | Release | Stop | Owe
+ToGuard = Make | Open | Send | Close | Credit | Arm | Tick | Release | Renew | Stop | Owe
 FromGuard = Opened | OpenFailed | Received | Sent | Refused | Lost | Closed | Stopped | Beat
 
 

@@ -103,6 +103,10 @@ class Hold(NamedTuple):
     watchdog_s: float | None = None
     """How long the robot itself goes on after the last value, ``inf`` when it never stops by
     itself; None: nobody has said. For the loader's rules alone."""
+    slew: Mapping[str, float] = NOTHING
+    """Argument → most that it may grow in a second, away from the value that stops the motion."""
+    on_stall: Literal["abort", "wait"] | None = None
+    """What becomes of a line that takes nothing while it moves; None: as is usual on its kind."""
 
 
 class Confirm(NamedTuple):

@@ -36,14 +36,15 @@ class Freshness:
             first: number of the first tick; one that nobody can guess refuses what was recorded
                 before a restart.
         """
-        self._issued: deque[tuple[int, float]] = deque(maxlen=_KEPT)
+        self._issued: deque[float] = deque(maxlen=_KEPT)
+        """When the newest numbers were issued: each is one more than that before it."""
         self._number = first - 1
         self._newest: dict[str, int] = {}
 
     def issue(self, now: float) -> int:
         """Return the number of a tick that is told to the page now."""
         self._number += 1
-        self._issued.append((self._number, now))
+        self._issued.append(now)
         return self._number
 
     def refusal(self, given: Input, epoch: int, now: float, of: str = "") -> str:
@@ -59,9 +60,10 @@ class Freshness:
             return f"it belongs to lease {given.epoch}, and this is {epoch}"
         if given.number <= self._newest.get(of, -1):
             return "it is not newer than the last one"
-        issued_at = next((at for number, at in self._issued if number == given.echo), None)
-        if issued_at is None:
+        back = self._number - given.echo
+        if not 0 <= back < len(self._issued):
             return "it answers no tick of this server"
+        issued_at = self._issued[-1 - back]
         if now - issued_at > OLDEST_S:
             return f"it is {(now - issued_at) * 1000:.0f} ms old"
         self._newest[of] = given.number

@@ -8,11 +8,29 @@ what counts: on a line that is written to all the time there may always be some.
 from collections import deque
 from typing import Final
 
-__all__ = ["IN_FLIGHT_S", "STALLED_S", "WAITED_S", "StallWatch"]
+__all__ = [
+    "AFRESH_S",
+    "IN_FLIGHT_S",
+    "SHORTEST_CUT_S",
+    "STALLED_S",
+    "STOP_WITHIN_S",
+    "TICK_S",
+    "WAITED_S",
+    "StallWatch",
+]
 
-STALLED_S: Final = 0.25
+SHORTEST_CUT_S: Final = 0.2
+"""A cut of the link that lasts as long as this, or longer, ..."""
+STOP_WITHIN_S: Final = 0.1
+"""... is followed by the stop within this time of its end."""
+TICK_S: Final = 0.05
+"""Of a hand that holds a control: as long may it take after a cut until anything is written."""
+AFRESH_S: Final = 0.03
+"""What it takes to reset a line near by, to open it, and to write the stop."""
+STALLED_S: Final = round(SHORTEST_CUT_S + STOP_WITHIN_S - TICK_S - AFRESH_S, 3)
 """Unsent bytes that stay for this long mean that the line is stalled: it is to be reset, and opened
-afresh, because what waits in the kernel would be delivered later, however old it is then."""
+afresh, because what waits in the kernel would be delivered later, however old it is then. A byte
+that was written as late as a tick after the shortest cut began has just this time."""
 WAITED_S: Final = 1.0
 """The same where opening afresh is dear."""
 IN_FLIGHT_S: Final = 0.15

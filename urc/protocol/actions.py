@@ -29,6 +29,7 @@ from urc.protocol.events import Samples
 from urc.protocol.exchange import Ask, Exchange, LineEvent, expires_at
 from urc.protocol.forms import Frame, NotWritable
 from urc.protocol.gate import Counters
+from urc.protocol.reins import Reins
 from urc.protocol.steps import Action, Program, Runner
 
 __all__ = ["build_program", "programs_of_lines"]
@@ -38,7 +39,8 @@ def build_program(
     label: str, steps: tuple[Step, ...], transports: frozenset[str], builder: Builder
 ) -> Program:
     """Compile a sequence."""
-    return Program(label, _actions(label, steps, builder), transports)
+    actions = _actions(label, steps, builder)
+    return Program(label, actions, transports, Reins(len(actions)))
 
 
 def programs_of_lines(

@@ -84,6 +84,8 @@ class Brief:
         ask = self._ask
         # Nothing will look at its namespace: no counter, and no answer that must be told by it.
         line.send_idle(Exchange(ask, Asked(request), NOTHING, data, now + ask.queue_s), now)
+        if request.on_sent is not None:
+            request.on_sent(data)
         sent = new(Send, (self._name, data, False))
         return [sent] if ask.answers else [sent, Replied(request.id, request.command)]
 

@@ -3,6 +3,7 @@
 Floor 3, pure. See `urc.protocol.line` for the theory of operation.
 """
 
+from collections.abc import Callable
 from typing import Literal
 
 from urc.model.driver import TransportSpec
@@ -31,6 +32,8 @@ class Connection:
         """Whether anybody may talk here; else only those who make it so, or say good-bye."""
         self.last_sent = float("-inf")
         self.counters = Counters()
+        self.on_ready: Callable[[], None] | None = None
+        """Called when anybody may talk here; must not call the line back."""
         self._flights = Flights()
         self._outbox = Outbox(spec, self._flights)
         self.inbox = Inbox(spec, self.framing, messages)
@@ -47,19 +50,30 @@ class Connection:
         """Whether the transport is connected."""
         return self.state == "open"
 
+    @property
+    def is_silent(self) -> bool:
+        """Whether the robot has said nothing for longer than `stale_after` allows."""
+        return self.is_open and self.spec.stale_after_s is not None and self._silent_at is None
+
     def opened(self, now: float) -> list[LineEvent]:
         """Take note that the transport is connected, with nothing received on it yet."""
         events = self._lose("the line was connected anew") if self.state == "open" else []
         self._reset("open")
         self.last_sent = now
         self._hear(now)
-        self.is_ready = not self.spec.on_connect
+        if not self.spec.on_connect:
+            self._get_ready()
         return events + self._pump(now)
 
     def ready(self, now: float) -> list[LineEvent]:
         """Let everybody talk: the connection is as it must be."""
-        self.is_ready = True
+        self._get_ready()
         return self._pump(now)
+
+    def _get_ready(self) -> None:
+        self.is_ready = True
+        if self.on_ready is not None:
+            self.on_ready()
 
     def closed(self, reason: str, now: float) -> list[LineEvent]:
         """Take note that the transport is not connected (any more)."""
@@ -126,7 +140,7 @@ class Connection:
         self._silent_at = None
         self.is_behind = False
         if state == "open":
-            self.counters = Counters()
+            self.counters.begin()
 
     def _hear(self, now: float) -> None:
         if self.spec.stale_after_s is not None:

@@ -105,7 +105,7 @@ class Engine:
             for name, command in driver.commands.items()
             if not command.steps
         }
-        self._programs = {
+        self.programs = {
             name: build_program(name, command.steps, lines_of(name, driver), builder)
             for name, command in driver.commands.items()
             if command.steps
@@ -118,7 +118,7 @@ class Engine:
         self._schedule = Schedule(driver, builder, self.known)
         self._runners: list[Runner] = []
         self._verifications = Verifications(self.known)
-        has_scripts = self._programs or self._greetings or self._good_byes
+        has_scripts = self.programs or self._greetings or self._good_byes
         is_timed = any(line.inbox.is_timed for line in self._all_lines)
         self._calm_s = 0.0 if has_scripts or is_timed else calm_s(driver)
         self._is_begun = False
@@ -257,7 +257,7 @@ class Engine:
             refused = why_refused(found, self.known, values, confirmed_by, now)
             if refused is not None:
                 return sink(refused, now)
-        program = self._programs.get(command)
+        program = self.programs.get(command)
         if program is None:
             return self._send(found, values, sink, now, privileged_on)
         if any(runner.program is program for runner in self._runners):
@@ -286,6 +286,7 @@ class Engine:
             expires_at(ask, now),
         ).mark(
             is_privileged=on == command.transport,
+            on_sent=sink.on_sent if isinstance(sink, Asked) else None,
             condition=partial(why_not_allowed, command, self.known, values)
             if command.requires
             else None,

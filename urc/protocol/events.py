@@ -1,6 +1,6 @@
 """What an engine asks for and tells: the only way anything leaves it."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 from urc.model.codec import Payload
@@ -17,6 +17,8 @@ class Request(NamedTuple):
     arguments: Mapping[str, Reading] = NOTHING
     confirmed_by: tuple[str, ...] = ()
     """Who said yes to the question before it, who asks for it among them."""
+    on_sent: Callable[[Payload], None] | None = None
+    """Told what goes out for it, each time; not what is secret, nor what a sequence sends."""
 
 
 class Open(NamedTuple):

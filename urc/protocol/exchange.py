@@ -111,6 +111,8 @@ class Exchange:
     """Asked again before it is sent: returns why not, or ""."""
     waits_until = float("-inf")
     """It is not sent again before."""
+    on_sent: Callable[[Payload], None] | None = None
+    """Told what is sent."""
 
     def __init__(
         self,
@@ -138,8 +140,10 @@ class Exchange:
         is_privileged: bool = False,
         is_secret: bool = False,
         condition: Callable[[float], str] | None = None,
+        on_sent: Callable[[Payload], None] | None = None,
     ) -> "Exchange":
         """Say what is special about it, and return it."""
+        self.on_sent = on_sent
         self.is_privileged = is_privileged
         self.is_secret = is_secret
         self.condition = condition
@@ -191,6 +195,11 @@ class Asked:
         if outcome.code:
             return [Failed(number, command, outcome.code, outcome.message)]
         return [Replied(number, command, outcome.values)]
+
+    @property
+    def on_sent(self) -> Callable[[Payload], None] | None:
+        """Whoever is to be told what is sent for it."""
+        return self._request.on_sent
 
     def replied(self, values: Mapping[str, Reading]) -> Replied:
         """Return the answer of a command that is done."""

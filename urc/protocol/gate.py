@@ -4,6 +4,7 @@ Floor 3, pure. Everything is bounded, and everything that is dropped is given ba
 """
 
 from bisect import insort, insort_left
+from collections.abc import Callable
 from typing import Final, Protocol, TypeVar
 
 from urc.model.flow import Priority
@@ -60,10 +61,12 @@ class Draw:
 class Counters:
     """The counters of one connection."""
 
-    __slots__ = ("_last",)
+    __slots__ = ("_last", "counted")
 
     def __init__(self) -> None:
         self._last: dict[str, int] = {}
+        self.counted: Callable[[], None] | None = None
+        """Called when a frame was counted; must not count any."""
 
     def draw(self) -> Draw:
         """Return the numbers of the next frame; nothing is counted yet."""
@@ -72,6 +75,16 @@ class Counters:
     def count(self, draw: Draw) -> None:
         """Count the frame that was made with `draw`."""
         self._last.update(draw.values)
+        if self.counted is not None:
+            self.counted()
+
+    def reserve(self, draw: Draw) -> None:
+        """Keep the numbers of `draw` for a frame that may be sent later: no other gets them."""
+        self._last.update(draw.values)
+
+    def begin(self) -> None:
+        """Begin anew, as each connection does."""
+        self._last = {}
 
 
 class Rankable(Protocol):

@@ -155,6 +155,8 @@ class Line(Answering):
         if isinstance(data, Envelope) and ask.is_numbered:
             number = self._number = self._number + 1
             data = data._replace(attributes={**data.attributes, "id": number})
+        if exchange.on_sent is not None and not exchange.is_secret:
+            exchange.on_sent(data)
         self.last_sent = exchange.sent_at = now
         self._outbox.sent(exchange, now)
         sent: list[LineEvent] = [Send(self.spec.name, data, exchange.is_secret)]

@@ -6,6 +6,7 @@ a frame of motion must fulfil, too.
 """
 
 from collections.abc import Callable, Mapping
+from functools import partial
 
 from urc.expressions import COUNTERS
 from urc.model.codec import Payload
@@ -45,11 +46,33 @@ class Motions:
         self._asks = asks
         self._lines = lines
         self._known = known
+        self.on_count: Callable[[str], None] = _nobody
+        """Told the line on which a number was used up that the stops made so far come after."""
+        self.on_ready: Callable[[str], None] = _nobody
+        """Told the line that was connected, and is ready for everybody."""
+        for one, command in self._held.items():
+            line = command.transport
+            lines[line].on_ready = partial(self._told_ready, line)
+            if asks[one].has_counters:
+                lines[line].counters.counted = partial(self._counted, line)
+
+    def is_lasting(self, command: str) -> bool:
+        """Return whether its stop is the same bytes for ever; else it is to be made anew.
+
+        It is not where it carries a number, or what the robot or a setting says.
+        """
+        ask = self._asks[command]
+        return ask.is_local and not ask.has_counters
+
+    def is_ready(self, command: str) -> bool:
+        """Return whether its line is connected, and the steps of the connection are done."""
+        line = self._lines[self._found(command).transport]
+        return line.is_open and line.is_ready
 
     def stop_frame(self, command: str) -> Payload:
         """Return what stops the motion of `command`: bytes, framing included, or an envelope.
 
-        It depends on nothing that the robot says, and on no connection.
+        It needs no connection. A number in it is its own: no other frame gets that one.
 
         Raises:
             BadArgument: it is no motion, or cannot be written.
@@ -58,8 +81,11 @@ class Motions:
         hold = found.hold
         values = check_arguments(found, {} if hold is None else hold.release)
         counters = self._lines[found.transport].counters
-        names = {**self._known.names, **values, COUNTERS: counters.draw()}
-        return self._asks[command].encode(names)
+        draw = counters.draw()
+        names = {**self._known.names, **values, COUNTERS: draw}
+        data = self._asks[command].encode(names)
+        counters.reserve(draw)
+        return data
 
     def motion_frame(
         self,
@@ -78,13 +104,16 @@ class Motions:
 
         Raises:
             BadArgument: it is no motion, or an argument is not as declared.
-            NotNow: the line is not ready, what it requires does not hold, or nobody confirmed it.
+            NotNow: the line is not ready, the robot silent, what it requires does not hold, or
+                nobody confirmed it.
         """
         found = self._found(command)
         values = self._checks[command](arguments)
         line, ask = self._lines[found.transport], self._asks[command]
         if not (line.is_open and line.is_ready):
             raise NotNow("the robot is not connected")
+        if line.is_silent:
+            raise NotNow(f"the robot has said nothing for {line.spec.stale_after_s:g} s")
         if command in self._guarded:
             refused = why_refused(found, self._known, values, confirmed_by, now)
             if refused is not None:
@@ -97,8 +126,18 @@ class Motions:
         line.counters.count(draw)
         return data
 
+    def _counted(self, line: str) -> None:
+        self.on_count(line)
+
+    def _told_ready(self, line: str) -> None:
+        self.on_ready(line)
+
     def _found(self, command: str) -> Command:
         found = self._held.get(command)
         if found is None:
             raise BadArgument(f"{command!r} is no command with a release")
         return found
+
+
+def _nobody(line: str) -> None:
+    """Nobody wants to know."""

@@ -15,6 +15,7 @@ from urc.protocol.exchange import DONE, Exchange, LineEvent, Outcome
 from urc.protocol.known import Known
 from urc.protocol.line import Line
 from urc.protocol.readings import Readings
+from urc.protocol.reins import PAUSE_S, Reins
 
 __all__ = ["Action", "Host", "Program", "Runner", "Sink"]
 
@@ -53,6 +54,8 @@ class Program(NamedTuple):
     actions: tuple[Action, ...]
     transports: frozenset[str]
     """Lines that it talks on by itself."""
+    reins: Reins
+    """Where it stands, and what people want of it; one run at a time holds them."""
 
 
 class Runner:
@@ -95,6 +98,7 @@ class Runner:
         self._began_at = 0.0
         self._otherwise: tuple[Action, ...] | None = None
         self._late_text = ""
+        program.reins.begin()
 
     @property
     def is_over(self) -> bool:
@@ -116,9 +120,16 @@ class Runner:
     def advance(self, now: float) -> list[LineEvent]:
         """Do steps until one must wait or all are done."""
         events: list[LineEvent] = []
+        self._obey()
         while self._outcome is None and not self.is_waiting:
+            is_outermost = len(self._stack) == 1
+            if self.program.reins.halts(is_outermost=is_outermost):
+                self.sleep(now + PAUSE_S)
+                break
             action = next(self._stack[-1], None) if self._stack else None
             if action is not None:
+                if is_outermost:
+                    self.program.reins.step()
                 events += action(self, now)
             elif self._stack:
                 self._stack.pop()
@@ -126,13 +137,25 @@ class Runner:
                 self._outcome = DONE
         if self._outcome is not None and self._sink is not None:
             sink, self._sink = self._sink, None
+            self.program.reins.end(self._outcome.message if self._outcome.code else "")
             events += sink(self._outcome, now)
         return events
+
+    def _obey(self) -> None:
+        """Do what people want of it."""
+        reins = self.program.reins
+        if reins.is_aborted:
+            self.stop("aborted", "somebody ended it")
+        elif reins.goes_on():
+            self._resume()
 
     def expire(self, now: float) -> None:
         """Take note that the wait has ended by itself."""
         if self.ends_at is not None and self.ends_at <= now:
             self.stop("timed-out", "it took too long")
+            return
+        if self.program.reins.is_paused:
+            self.stop("timed-out", f"it was paused for {PAUSE_S:g} s")
             return
         if self._listening is None and self._awaited is None:
             self._resume()

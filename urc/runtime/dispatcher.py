@@ -9,11 +9,11 @@ for each transport.
 import asyncio
 import logging
 from collections.abc import Callable, Mapping, Sequence
-from typing import Protocol
+from typing import Literal, Protocol
 
 from urc.model.codec import Payload
 from urc.model.driver import Command
-from urc.model.values import Sample
+from urc.model.values import NOTHING, Sample
 from urc.protocol.events import (
     Close,
     Event,
@@ -25,8 +25,9 @@ from urc.protocol.events import (
     Samples,
     Send,
 )
+from urc.protocol.reins import Pull, Reins
 from urc.runtime.clock import Alarm, Clock
-from urc.runtime.hub import Hub, Note
+from urc.runtime.hub import Hub, Note, Progress
 from urc.runtime.waiting import MAX_WAITING, Answer, Waiting
 
 __all__ = ["Dispatcher", "EngineLike", "Port"]
@@ -111,6 +112,7 @@ class Dispatcher:
         clock: Clock,
         commands: Mapping[str, Command],
         limit_s: Callable[[str], float],
+        reins: Mapping[str, Reins] = NOTHING,
     ) -> None:
         """Take an engine over.
 
@@ -120,6 +122,7 @@ class Dispatcher:
             clock: the time.
             commands: of the driver.
             limit_s: command → seconds after which its wait ends, whatever the engine says.
+            reins: sequence → where it stands.
         """
         self._engine = engine
         self._hub = hub
@@ -127,6 +130,8 @@ class Dispatcher:
         self._commands = commands
         self._ports: dict[str, Port] = {}
         self._waiting = Waiting(clock, limit_s)
+        self._reins = dict(reins)
+        self._seen = dict.fromkeys(reins, 0)
         self._loop: asyncio.AbstractEventLoop | None = None
         self._alarm: Alarm | None = None
         self._alarm_s: float | None = None
@@ -185,6 +190,13 @@ class Dispatcher:
             self._perform(events, None)
         self._arm_after(now)
         return answer
+
+    def pull(self, sequence: str, what: Pull) -> None:
+        """Let a sequence pause, go on, or end; nothing happens where there is none."""
+        reins = self._reins.get(sequence)
+        if reins is not None:
+            reins.pull(what)
+            self._run(self._engine.tick)
 
     def forget(self, request_id: int) -> None:
         """Nobody waits for this answer any more."""
@@ -278,7 +290,19 @@ class Dispatcher:
         if self._alarm_s is None or self._alarm_s > now + self._calm_s:
             self._arm()
 
+    def _look(self) -> None:
+        """Show where the sequences stand."""
+        for name, reins in self._reins.items():
+            if reins.count != self._seen[name]:
+                self._seen[name] = reins.count
+                state: Literal["idle", "running", "paused"] = "idle"
+                if reins.is_running:
+                    state = "paused" if reins.is_paused else "running"
+                self._hub.set_progress(Progress(name, reins.place, reins.of, state, reins.reason))
+
     def _arm(self, soonest_s: float = 0.0) -> None:
+        if self._reins:
+            self._look()
         due_s = self._engine.deadline
         if due_s is not None and soonest_s:
             due_s = max(due_s, self._clock.now() + soonest_s)

@@ -7,7 +7,7 @@ from typing import Final
 from urc.guard import wire
 from urc.guard.client import CAN_GUARD, Client, Guard, LineSpec, LocalGuard
 from urc.model.codec import Payload
-from urc.model.driver import Driver
+from urc.model.driver import Driver, TransportSpec
 from urc.model.values import Value
 from urc.motion.hold import Mover, Reason, Terms
 from urc.motion.stall import STALLED_S, WAITED_S
@@ -76,6 +76,13 @@ class GuardedMovers:
         """Renew the lease of `command`; `data` is its newest frame."""
         self.client.tick(command, data)
 
+    def renew(self, command: str, stop: Payload) -> None:
+        """Let `stop` be what stops `command` from now on; it arms nothing."""
+        terms = self._armed.get(command)
+        if terms is not None:
+            self._armed[command] = terms._replace(stop=stop)
+            self.client.renew(command, stop)
+
     def release(self, command: str) -> None:
         """Stop `command`, which was let go."""
         self.client.release(command)
@@ -85,6 +92,10 @@ class GuardedMovers:
         if stops:
             self.client.stop([self._stop_of(command, frame) for command, frame in stops.items()])
 
+    def is_open(self, command: str) -> bool:
+        """Return whether the line of `command` is connected, by the newest word of the guard."""
+        return self.client.transports[self._driver.commands[command].transport].is_open
+
     async def stops(self) -> Sequence[tuple[str, Reason]]:
         """Wait for the next stop frames that were written: command, and why it stopped."""
         return await self.client.stops()
@@ -92,7 +103,9 @@ class GuardedMovers:
     def _stop_of(self, command: str, frame: Payload) -> tuple[str, str, Terms]:
         known = self._driver.commands[command]
         terms = self._armed.get(command)
-        if terms is None:
+        if terms is not None:
+            terms = self._armed[command] = terms._replace(stop=frame)
+        else:
             period_s = known.hold.repeat_s if known.hold is not None else STALLED_S
             lossy = is_lossy(self._driver, known.transport)
             terms = Terms(frame, period_s=period_s, is_lossy=lossy)
@@ -119,7 +132,7 @@ def take_reins(
     Raises:
         UrcError: a transport cannot be made with these settings.
     """
-    lines = [_line(made) for made in make_lines(driver, settings, table).values()]
+    lines = [_line(made, driver) for made in make_lines(driver, settings, table).values()]
     if is_guarded and CAN_GUARD:
         return GuardedMovers(driver, Guard(lines))
     if is_guarded:
@@ -127,9 +140,21 @@ def take_reins(
     return GuardedMovers(driver, LocalGuard(lines, clock))
 
 
-def _line(made: Made) -> LineSpec:
+def _is_dear(spec: TransportSpec, driver: Driver) -> bool:
+    """Return whether a line that takes nothing is waited for, and not reset at once."""
+    said = {
+        one.hold.on_stall
+        for one in driver.commands.values()
+        if one.hold is not None and one.transport == spec.name
+    }
+    if "abort" in said:  # the more careful of two that differ
+        return False
+    return "wait" in said or spec.type in _DEAR or bool(spec.via)
+
+
+def _line(made: Made, driver: Driver) -> LineSpec:
     setup, spec = made.setup, made.spec
-    is_dear = spec.type in _DEAR or bool(spec.via)
+    is_dear = _is_dear(spec, driver)
     make = wire.Make(
         line=setup.name,
         factory=made.factory,

@@ -21,6 +21,7 @@ __all__ = [
     "LinkState",
     "LinkStatus",
     "Note",
+    "Progress",
     "Subscription",
     "Tap",
     "Tapped",
@@ -104,6 +105,19 @@ class Subscription:
         return samples
 
 
+@dataclass(frozen=True, slots=True)
+class Progress:
+    """Where a sequence stands."""
+
+    command: str
+    place: int
+    """Steps that were begun, without those inside of others."""
+    of: int
+    state: Literal["idle", "running", "paused"]
+    reason: str = ""
+    """Why it ended without success; "" when it did not."""
+
+
 Tapped = Sample | Note | Traffic
 """What a tap gives."""
 
@@ -149,6 +163,8 @@ class Hub:
         self.index = {name: place for place, name in enumerate(self.names)}
         self.revision = 0
         self.links: dict[str, LinkStatus] = {}
+        self.progress: dict[str, Progress] = {}
+        """Sequence → where it stands; those that were never run are missing."""
         self.notes: deque[Note] = deque(maxlen=NOTES_KEPT)
         self.notes_count = 0
         """Notes ever made; the deque holds the last of them."""
@@ -186,6 +202,14 @@ class Hub:
         if self.links.get(status.transport) == status:
             return
         self.links[status.transport] = status
+        self.revision += 1
+        self._wake()
+
+    def set_progress(self, progress: Progress) -> None:
+        """Take where a sequence stands."""
+        if self.progress.get(progress.command) == progress:
+            return
+        self.progress[progress.command] = progress
         self.revision += 1
         self._wake()
 

@@ -9,6 +9,7 @@ import json
 import logging
 import os
 import tempfile
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
@@ -16,6 +17,7 @@ from urc.motion.lease import LeaseState
 
 __all__ = ["LatchFile"]
 
+RETRY_S = 5.0
 _MOST_BYTES = 4096
 _LONGEST_NAME = 200
 
@@ -30,8 +32,11 @@ class LatchFile:
         self._file = folder / f"{robot}.latch.json"
         self._newest: LeaseState | None = None
         self._writing: asyncio.Task[None] | None = None
+        self._again: asyncio.TimerHandle | None = None
         self.fault = ""
         """Why the newest state could not be kept; "" when it is, or will be."""
+        self.on_fault: Callable[[str], None] = _untold
+        """Told every new `fault`, and "" when all is well again."""
 
     def load(self) -> LeaseState:
         """Return what was kept.
@@ -53,8 +58,14 @@ class LatchFile:
         return LeaseState(latched_by="URC, whose record of the last stop cannot be read")
 
     def keep(self, state: LeaseState) -> None:
-        """Write `state` soon; only the newest counts. Returns at once."""
+        """Write `state` soon; only the newest counts. Returns at once.
+
+        What could not be written is tried again every few seconds.
+        """
         self._newest = state
+        if self._again is not None:
+            self._again.cancel()
+            self._again = None
         if self._writing is None or self._writing.done():
             self._writing = asyncio.get_running_loop().create_task(self._write())
 
@@ -69,12 +80,20 @@ class LatchFile:
             try:
                 await asyncio.to_thread(self._replace, state)
             except OSError as error:
-                fault = error.strerror or str(error)
-                if fault != self.fault:
-                    log.warning("the stop latch cannot be kept over a restart: %s", fault)
-                self.fault = fault
+                self._tell(error.strerror or str(error))
+                if self._newest is None:
+                    loop = asyncio.get_running_loop()
+                    self._again = loop.call_later(RETRY_S, self.keep, state)
             else:
-                self.fault = ""
+                self._tell("")
+
+    def _tell(self, fault: str) -> None:
+        if fault == self.fault:
+            return
+        self.fault = fault
+        if fault:
+            log.warning("the stop latch cannot be kept over a restart: %s", fault)
+        self.on_fault(fault)
 
     def _replace(self, state: LeaseState) -> None:
         """Put a whole new file in the place of the old one: a crash leaves one of the two."""
@@ -97,3 +116,7 @@ class LatchFile:
                 os.fsync(folder)
             finally:
                 os.close(folder)
+
+
+def _untold(fault: str) -> None:
+    """Nobody wants to know."""

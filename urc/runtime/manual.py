@@ -12,6 +12,7 @@ from urc.config.values import shown
 from urc.expressions import Template
 from urc.model.codec import traffic_of
 from urc.model.driver import Argument, Command, Driver, TransportSpec
+from urc.model.interface import WidgetUse
 from urc.model.profile import Profile, Setting
 from urc.model.values import Limits, Reading, Signal
 from urc.problems import UrcError, printable
@@ -41,6 +42,7 @@ def manual(profile: Profile) -> str:
         ("Signals", _signals(driver.signals)),
         ("Commands", _commands(driver)),
         ("When control is lost", _releases(driver)),
+        ("Interfaces", _interfaces(profile)),
         ("Polls", _polls(driver)),
         ("Tests", [f"- {_plain(test.name)}" for test in profile.tests]),
         ("Licence", _origin(profile)),
@@ -224,6 +226,33 @@ def _releases(driver: Driver) -> Iterator[str]:
             }
             given = ", ".join(f"{name} {_value(value)}" for name, value in values.items())
             yield f"- {_code(command.name)}: {_code(given) if given else 'nothing more is sent'}"
+
+
+def _interfaces(profile: Profile) -> Iterator[str]:
+    """Yield what stands on each interface, also of the one that is made when there is none."""
+    for place, interface in enumerate(profile.interfaces.values()):
+        found = {
+            slot: interface.widgets.get(slot) or profile.slots.get(slot) for slot in interface.shown
+        }
+        uses = [use for use in found.values() if use is not None]
+        pages = ", ".join(_plain(page.title or page.name) for page in interface.tabs.values())
+        if uses:
+            yield from ([""] if place else [])
+            yield from (f"### {_plain(interface.title or interface.name)}", "")
+            if pages:
+                yield from (f"Pages: {pages}.", "")
+            yield from _table(("slot", "widget", "shows", "gives"), [_use(use) for use in uses])
+
+
+def _use(use: WidgetUse) -> tuple[str, str, str, str]:
+    shows = [*use.inputs.values(), *(name for many in use.lists.values() for name in many)]
+    more = ", …" if len(shows) > _SHOWN_TEXTS else ""
+    return (
+        _code(use.slot),
+        use.widget,
+        ", ".join(map(_code, shows[:_SHOWN_TEXTS])) + more,
+        ", ".join(map(_code, use.outputs.values())),
+    )
 
 
 def _polls(driver: Driver) -> Iterator[str]:

@@ -18,7 +18,6 @@ Synchronous; time is passed in. Whoever owns the movers reports their stops by `
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from secrets import randbelow
-from typing import Protocol
 
 from urc.model.codec import Payload
 from urc.model.driver import Driver
@@ -27,6 +26,7 @@ from urc.motion.fresh import Freshness, Input
 from urc.motion.hold import Reason, Terms
 from urc.motion.lease import REQUEST_S, Changed, Client, Lease, LeaseState, Refused
 from urc.problems import UrcError
+from urc.runtime.held import Control, Frames, Movers, control_of, is_lossy
 
 __all__ = ["Frames", "MotionDesk", "Movers", "Verb", "is_lossy"]
 
@@ -39,49 +39,6 @@ _FIRST_TICKS = 2**31
 _NO_ROBOT = "the robot is not connected"
 LET_GO = "it was stopped: let go, then begin anew"
 _TAKE_ANEW = "it was stopped: take the controls anew"
-
-
-class Frames(Protocol):
-    """What is asked of the engine: `urc.protocol.motions.Motions`."""
-
-    def stop_frame(self, command: str) -> Payload:
-        """Return what stops the motion of a held command; raise `UrcError` when it cannot."""
-
-    def motion_frame(self, command: str, arguments: Mapping[str, Reading], now: float) -> Payload:
-        """Return the frame of a held command; raise `UrcError` that says why not."""
-
-
-class Movers(Protocol):
-    """Who owns the wire: the guard process, or this one."""
-
-    def arm(self, command: str, terms: Terms) -> None:
-        """Take ticks of `command` from now on, under these terms."""
-
-    def tick(self, command: str, data: Payload) -> None:
-        """Renew the lease of `command`; `data` is its newest frame."""
-
-    def release(self, command: str) -> None:
-        """Stop `command`, which was let go."""
-
-    def stop(self, stops: Mapping[str, Payload]) -> None:
-        """Stop at once, whatever moves; these are the stop frames of all held commands."""
-
-    async def stops(self) -> Sequence[tuple[str, Reason]]:
-        """Wait for the next stop frames that were written: command, and why it stopped.
-
-        In their order, at least one. Being cancelled loses none. A control that `stop` stopped is
-        told with ``stopped`` even when it did not move: it says that the robot's line took it.
-        """
-
-
-@dataclass(slots=True)
-class _Control:
-    """One held command, as its screen knows it."""
-
-    is_armed: bool = False
-    needs_release: bool = False
-    closed_epoch: int = -1
-    """Lease in which it stopped by itself: it goes on in a later one only."""
 
 
 @dataclass(slots=True)
@@ -107,7 +64,8 @@ class MotionDesk:
         self._is_lossy = {
             name: is_lossy(driver, one.transport) for name, one in self._holds.items()
         }
-        self._controls = {name: _Control() for name in self._holds}
+        self._controls = {name: control_of(driver, one) for name, one in self._holds.items()}
+        self._is_making = False
         self._screens: dict[str, _Screen] = {}
         self._unconfirmed: set[str] = set()
         self.on_change: Callable[[LeaseState], None] = _ignore
@@ -119,6 +77,10 @@ class MotionDesk:
     def can_move(self) -> bool:
         """Whether the driver has any held command."""
         return bool(self._holds)
+
+    def holds(self, command: str) -> bool:
+        """Return whether `command` is a held one."""
+        return command in self._holds
 
     @property
     def is_confirmed(self) -> bool:
@@ -135,6 +97,7 @@ class MotionDesk:
     def attach(self, frames: Frames, movers: Movers) -> None:
         """Take a session's engine and movers; a stop that is still owed goes out."""
         self._frames, self._movers = frames, movers
+        frames.on_count, frames.on_ready = self._renew, self._ready
         if self._unconfirmed:
             self._movers.stop(self._stop_frames(self._holds))
 
@@ -142,6 +105,7 @@ class MotionDesk:
         """Take note that the session is over: its movers stop what moves, and nothing is armed."""
         self._frames = self._movers = None
         for control in self._controls.values():
+            control.is_owed_again = False
             if control.is_armed:
                 self._close(control)
 
@@ -193,6 +157,18 @@ class MotionDesk:
             self._movers.stop(self._stop_frames(self._holds))
         self._settle(self.lease.stop(by), is_stopped=True)
 
+    def halt(self) -> list[str]:
+        """Stop what moves, and let it be driven again only by a new gesture in a new lease.
+
+        Returns:
+            The commands that may have moved.
+        """
+        self._stop_what_moves()
+        halted = [name for name, control in self._controls.items() if control.is_armed]
+        for name in halted:
+            self._close(self._controls[name])
+        return halted
+
     def expire(self, now: float) -> None:
         """Do what time alone does."""
         self._settle(self.lease.expire(now))
@@ -217,16 +193,22 @@ class MotionDesk:
         frames, movers = self._frames, self._movers
         if frames is None or movers is None:
             return _NO_ROBOT
+        arguments = control.limited(arguments, now)
+        self._is_making = True  # its stop is made after it
         try:
             data = frames.motion_frame(command, arguments, now)
             if not control.is_armed:
                 movers.arm(command, self._terms(command, frames))
                 control.is_armed = True
+            elif not frames.is_lasting(command):
+                self._renew_stops(control.line)
         except UrcError as error:
             if control.is_armed:
                 movers.release(command)
             self._close(control)
             return str(error)
+        finally:
+            self._is_making = False
         self.lease.touch(now)
         movers.tick(command, data)
         self.on_moved(screen.client, epoch, command, arguments, data, now)
@@ -239,8 +221,10 @@ class MotionDesk:
         if control is None or holder is None or holder.id != client:
             return
         control.needs_release = False
+        control.rest()
         if control.is_armed and self._movers is not None:
             self._movers.release(command)
+            self._renew(control.line)  # the number of this stop is used up
 
     def stopped(self, command: str, reason: Reason) -> None:
         """Take note of what the movers report: the stop of a control was written."""
@@ -249,24 +233,71 @@ class MotionDesk:
             return
         if reason not in ("released", "stopped"):
             self._close(control)
+        if self._is_too_early(command, control):
+            control.is_owed_again = True
+            return
         if reason != "released" and command in self._unconfirmed:
             self._unconfirmed.discard(command)
             if self.is_confirmed:
                 self.on_change(self.lease.state)
 
-    def _close(self, control: _Control) -> None:
+    # -- stops that are made anew
+
+    def _is_too_early(self, command: str, control: Control) -> bool:
+        """Return whether a stop that was written may not count: the robot was not ready for it."""
+        frames, movers = self._frames, self._movers
+        if frames is None or movers is None:
+            return False
+        if not control.is_greeted and frames.is_lasting(command):
+            return False
+        return not (movers.is_open(command) and frames.is_ready(command))
+
+    def _ready(self, line: str) -> None:
+        """Repeat the stops that went out before the start-up steps of `line` were done."""
+        owed = [
+            name
+            for name, control in self._controls.items()
+            if control.line == line and control.is_owed_again
+        ]
+        for name in owed:
+            self._controls[name].is_owed_again = False
+        if owed and self._movers is not None:
+            self._movers.stop(self._stop_frames(owed))
+
+    def _renew(self, line: str) -> None:
+        """Make the stops of `line` anew: they come after what has been sent."""
+        if not self._is_making:
+            self._renew_stops(line)
+
+    def _renew_stops(self, line: str) -> None:
+        frames, movers = self._frames, self._movers
+        if frames is None or movers is None:
+            return
+        for name, control in self._controls.items():
+            if control.line != line or not control.is_armed or frames.is_lasting(name):
+                continue
+            try:
+                stop = frames.stop_frame(name)
+            except UrcError:
+                continue  # the one it has is better than none
+            if stop != control.stop:
+                control.stop = stop
+                movers.renew(name, stop)
+
+    def _close(self, control: Control) -> None:
         """Take no tick of a control until it was let go, and the lease was taken anew."""
+        control.rest()
         control.is_armed = False
         control.needs_release = True
         control.closed_epoch = self.lease.state.epoch
 
     def _terms(self, command: str, frames: Frames) -> Terms:
-        hold = self._holds[command].hold
-        assert hold is not None  # noqa: S101 - `_holds` has no others
+        control = self._controls[command]
+        control.stop = stop = frames.stop_frame(command)
         return Terms(
-            frames.stop_frame(command),
-            period_s=hold.repeat_s,
-            lease_s=hold.lease_s,
+            stop,
+            period_s=control.hold.repeat_s,
+            lease_s=control.hold.lease_s,
             is_lossy=self._is_lossy[command],
         )
 
@@ -278,6 +309,7 @@ class MotionDesk:
                 self._stop_what_moves()
             for control in self._controls.values():
                 control.is_armed = control.needs_release = False
+                control.rest()
         self.on_change(outcome.state)
 
     def _stop_what_moves(self) -> None:
@@ -289,21 +321,14 @@ class MotionDesk:
         """Return the stop frames; one that cannot be made must not keep back the others."""
         made: dict[str, Payload] = {}
         for name in commands:
+            control = self._controls[name]
             try:
                 if self._frames is not None:
                     made[name] = self._frames.stop_frame(name)
-            except UrcError:
-                continue  # told by `urc validate`; what is armed has its own already
+            except UrcError:  # told by `urc validate`
+                if control.is_armed and control.stop is not None:
+                    made[name] = control.stop  # the one it was armed with
         return made
-
-
-_LOSSY = frozenset(("udp", "serial", "mqtt", "rosbridge"))
-"""Kinds of line on which one stop may be lost on the way."""
-
-
-def is_lossy(driver: Driver, transport: str) -> bool:
-    """Return whether what is written to a line may be lost on the way without anybody noticing."""
-    return driver.transports[transport].type in _LOSSY
 
 
 def _ignore(state: LeaseState) -> None:

@@ -9,6 +9,7 @@ from random import random as random_share
 from types import TracebackType
 from typing import TYPE_CHECKING, Literal
 
+from urc.model.codec import Payload
 from urc.model.driver import Driver
 from urc.model.profile import Profile
 from urc.model.values import NOTHING, Reading, Value
@@ -16,6 +17,7 @@ from urc.problems import UrcError
 from urc.protocol.bounds import GOOD_BYE_S, longest_s
 from urc.protocol.engine import Engine
 from urc.protocol.events import Failed, Replied, Request
+from urc.protocol.reins import PAUSE_S, Pull
 from urc.registry import Table
 from urc.runtime.clock import Clock, LoopClock, within
 from urc.runtime.dispatcher import Dispatcher
@@ -103,7 +105,12 @@ class Session:
                 driver, self.settings, transports, self._clock, is_guarded=motion == "guarded"
             )
         self._dispatcher = Dispatcher(
-            engine, self.hub, self._clock, driver.commands, partial(_limit_s, driver)
+            engine,
+            self.hub,
+            self._clock,
+            driver.commands,
+            partial(_limit_s, driver),
+            {name: program.reins for name, program in engine.programs.items()},
         )
         self._links: dict[str, Link] = {}
         made = (
@@ -188,6 +195,7 @@ class Session:
         arguments: Mapping[str, Reading] | None = None,
         *,
         confirmed_by: tuple[str, ...] = (),
+        on_sent: Callable[[Payload], None] | None = None,
     ) -> Replied:
         """Run a command and return its reply; the wait is always bounded.
 
@@ -197,13 +205,16 @@ class Session:
             name: as in the driver.
             arguments: name → value; those left out take their defaults.
             confirmed_by: people who said yes to it, where two must.
+            on_sent: told what goes out for it, each time; not what is secret, nor what a sequence
+                sends.
 
         Raises:
             CommandFailed: it was refused here or by the robot, timed out, or the robot is gone.
         """
         if self._untried:
             await self._first_attempt(name)
-        request = new(Request, (next(self._numbers), name, arguments or NOTHING, confirmed_by))
+        number, given = next(self._numbers), arguments or NOTHING
+        request = new(Request, (number, name, given, confirmed_by, on_sent))
         try:
             outcome = await self._dispatcher.command(request)
         except asyncio.CancelledError:
@@ -212,6 +223,14 @@ class Session:
         if isinstance(outcome, Failed):
             raise CommandFailed(outcome.code, outcome.message)
         return outcome
+
+    def pull(self, sequence: str, what: Pull) -> None:
+        """Let a sequence pause, do one more step, go on, or end.
+
+        Told ``step`` before it is run, it begins paused. Where none of that name is at work,
+        nothing else happens.
+        """
+        self._dispatcher.pull(sequence, what)
 
     async def _first_attempt(self, name: str) -> None:
         """Wait until the line of a command has been tried, well or not, for as long as may take."""
@@ -227,7 +246,9 @@ class Session:
 
 def _limit_s(driver: Driver, name: str) -> float:
     """Return how long the declaration lets a command take, and a little more."""
-    return longest_s(driver, name) + _GRACE_S
+    known = driver.commands.get(name)
+    paused_s = PAUSE_S if known is not None and known.steps else 0.0
+    return longest_s(driver, name) + paused_s + _GRACE_S
 
 
 def _expects_frames(driver: Driver, transport: str) -> bool:

@@ -17,10 +17,10 @@ from urc.model.codec import Payload, traffic_of
 from urc.model.values import NOTHING, Reading
 from urc.motion.lease import Client, LeaseState
 from urc.runtime.audit import Entry, shown
+from urc.runtime.disguise import HIDDEN, Disguises
 
 __all__ = ["Trail"]
 
-HIDDEN: Final = "•••"
 _NOBODY: Final = Client("", "", "viewer")
 _AGAIN_S: Final = 1.0
 """How often the same refusal is told."""
@@ -94,6 +94,7 @@ class Trail:
         self._note = note
         self._utc = utc
         self._secrets: tuple[str, ...] = ()
+        self._disguises = Disguises()
         self.hide(secrets)
         self._motions: dict[str, _Motion] = {}
         self._refusals: dict[tuple[str, str, str], _Refusal] = {}
@@ -105,8 +106,8 @@ class Trail:
     def hide(self, secrets: Iterable[str]) -> None:
         """Keep these out as well, from now on."""
         known = dict.fromkeys((*(one for one in secrets if one), *self._secrets))
-        # Longest first: one secret may be part of another.
-        self._secrets = tuple(sorted(list(known)[:_MOST_SECRETS], key=len, reverse=True))
+        self._secrets = tuple(known)[:_MOST_SECRETS]
+        self._disguises = Disguises(self._secrets)
 
     @_harmless
     def moved(
@@ -247,16 +248,13 @@ class Trail:
 
     def _data(self, data: Payload) -> str:
         shown_bytes = traffic_of(data)
-        if any(secret.encode() in shown_bytes for secret in self._secrets):
+        if self._disguises.are_in(shown_bytes):
             return HIDDEN
         return shown(shown_bytes) if shown_bytes else ""
 
     def _hidden(self, text: str) -> str:
-        """Return a text without the secrets, also where JSON has written them with escapes."""
-        for secret in self._secrets:
-            for form in (secret, json.dumps(secret, ensure_ascii=False)[1:-1]):
-                text = text.replace(form, HIDDEN)
-        return text
+        """Return a text without the secrets, however they are encoded."""
+        return self._disguises.hide(text)
 
 
 def _json(values: Mapping[str, Reading]) -> str:

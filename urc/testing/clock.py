@@ -55,6 +55,11 @@ class FakeClock:
         heapq.heappush(self._due, (time_s, next(self._numbers), alarm))
         return alarm
 
+    async def hold_up(self, seconds: float) -> None:
+        """Let the time pass with nothing done in it, as a busy loop does; then what is due."""
+        self._now += seconds
+        await self.advance(0)
+
     async def advance(self, seconds: float) -> None:
         """Move on, stopping at everything that falls due, in order, and letting it take effect."""
         end_s = self._now + seconds

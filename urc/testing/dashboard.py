@@ -6,12 +6,14 @@ from pathlib import Path
 
 import yaml
 
+from urc.model.codec import Payload
 from urc.model.driver import Command, Driver, TransportSpec
 from urc.model.interface import Grid, Interface, Slot, WidgetUse
 from urc.model.profile import Profile, Setting
 from urc.model.values import Alarm, Limits, Reading, Sample, Signal, Value
 from urc.model.widget import Port, Widget
 from urc.protocol.events import Replied
+from urc.protocol.reins import Pull
 from urc.runtime.clock import Clock, LoopClock
 from urc.runtime.hub import Hub, LinkState, LinkStatus, Note
 from urc.runtime.motion import Movers
@@ -36,10 +38,16 @@ def plain_widget(name: str, inputs: Sequence[str], folder: Path | None = None) -
     place = folder or shipped("widgets") / name
     manifest = place / "widget.yaml"
     declared = yaml.safe_load(manifest.read_text("utf-8")) if manifest.is_file() else {}
-    types = ("integer", "number", "boolean", "string")
+    types = ("integer", "number", "boolean", "string", "array", "object", "image", "blob")
     known = declared.get("inputs", {})
     ports = {
-        each: Port(each, types, is_required=known.get(each, {}).get("required", True))
+        each: Port(
+            each,
+            types,
+            unit=known.get(each, {}).get("unit", ""),
+            is_required=known.get(each, {}).get("required", True),
+            is_many=known.get(each, {}).get("many", False),
+        )
         for each in {**known, **dict.fromkeys(inputs)}
     }
     outputs = {
@@ -76,7 +84,7 @@ def dashboard_profile(
     wanted = uses or (WidgetUse("battery", "battery", {"level": "battery"}),)
     known = {each.name: each for each in widgets}
     for use in wanted:
-        known.setdefault(use.widget, plain_widget(use.widget, tuple(use.inputs)))
+        known.setdefault(use.widget, plain_widget(use.widget, (*use.inputs, *use.lists)))
     given = [
         use._replace(options={**option_defaults(known[use.widget]), **use.options})
         for use in wanted
@@ -112,6 +120,10 @@ class FakeRobot:
         self.opened = 0
         self.is_open = False
         self.commands: list[tuple[str, dict[str, Reading]]] = []
+        self.confirmed_by: list[tuple[str, ...]] = []
+        """Who said yes to each of them."""
+        self.pulls: list[tuple[str, Pull]] = []
+        """What was wanted of sequences."""
         self.frames = FakeFrames(profile.driver)
         self.movers: Movers | None = FakeMovers(self.clock)
         self.on_command: Callable[[str, Mapping[str, Reading]], Mapping[str, Value]] | None = None
@@ -132,13 +144,27 @@ class FakeRobot:
         finally:
             self.is_open = False
 
-    async def command(self, name: str, arguments: Mapping[str, Reading]) -> Replied:
-        """Keep the command, and answer as the test says."""
+    async def command(
+        self,
+        name: str,
+        arguments: Mapping[str, Reading],
+        *,
+        confirmed_by: tuple[str, ...] = (),
+        on_sent: Callable[[Payload], None] | None = None,
+    ) -> Replied:
+        """Keep the command, say that its name was sent, and answer as the test says."""
+        if on_sent is not None:
+            on_sent(name.encode())
+        self.confirmed_by.append(confirmed_by)
         self.commands.append((name, dict(arguments)))
         values = self.on_command(name, arguments) if self.on_command else {}
         return Replied(len(self.commands), name, values)
 
-    def say(self, signal: str, value: Value, *, alarm: Alarm = "", age_s: float = 0.0) -> None:
+    def pull(self, sequence: str, what: Pull) -> None:
+        """Keep what is wanted of a sequence."""
+        self.pulls.append((sequence, what))
+
+    def say(self, signal: str, value: Reading, *, alarm: Alarm = "", age_s: float = 0.0) -> None:
         """Let a reading arrive that was measured `age_s` ago."""
         self.hub.put([Sample(signal, value, self.clock.now() - age_s, alarm)])
 

@@ -21,19 +21,47 @@ class FakeFrames:
         self.driver = driver
         self.refusal = ""
         """Why there is no frame; "" when there is."""
+        self.on_count: Callable[[str], None] = _unheard
+        self.on_ready: Callable[[str], None] = _unheard
+        self.is_greeted = True
+        """Whether the line's start-up steps are done."""
+        self.number = 0
+        """Of the newest frame, where they carry one; 0 where they do not."""
+
+    def is_lasting(self, command: str) -> bool:
+        """Return whether its stop is the same for ever."""
+        return not self.number
+
+    def is_ready(self, command: str) -> bool:
+        """Return whether its line is ready."""
+        return self.is_greeted
+
+    def send(self, line: str = "wire") -> int:
+        """Use a number up on another frame, and return it."""
+        self.number = number = self.number + 1
+        self.on_count(line)
+        return number
+
+    def _numbered(self) -> str:
+        if not self.number:
+            return ""
+        self.number += 1
+        return f"{self.number} "
 
     def stop_frame(self, command: str) -> Payload:
         """Return what stops it."""
-        return f"{command} stop".encode()
+        return f"{self._numbered()}{command} stop".encode()
 
     def motion_frame(self, command: str, arguments: Mapping[str, Reading], now: float) -> Payload:
         """Return its arguments, checked as the engine checks them."""
         if self.refusal:
             raise UrcError(self.refusal)
         values = check_arguments(self.driver.commands[command], arguments)
-        return " ".join(
-            (command, *(f"{name}={value!r}" for name, value in values.items()))
-        ).encode()
+        text = " ".join((command, *(f"{name}={value!r}" for name, value in values.items())))
+        data = f"{self._numbered()}{text}".encode()
+        if self.number:
+            self.on_count(self.driver.commands[command].transport)
+        return data
 
 
 class FakeMovers:
@@ -71,6 +99,15 @@ class FakeMovers:
             self.ticked_s = self._clock.now()
         self.step()
 
+    def renew(self, command: str, stop: Payload) -> None:
+        """Stop it with these bytes from now on."""
+        mover = self._movers[command]
+        mover.renew(mover.terms._replace(stop=stop))
+
+    def is_open(self, command: str) -> bool:
+        """Return whether its line is there."""
+        return self.is_up
+
     def release(self, command: str) -> None:
         """Let go."""
         if command in self._movers:
@@ -107,3 +144,7 @@ class FakeMovers:
             self.written.append((now, data.decode()))
             if self._write is not None:
                 self._write(data)
+
+
+def _unheard(line: str) -> None:
+    """Nobody wants to know."""

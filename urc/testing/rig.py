@@ -10,6 +10,7 @@ Linux only. `Relay` needs root and /dev/net/tun; see `can_relay`.
 import contextlib
 import json
 import os
+import signal
 import subprocess
 import sys
 import threading
@@ -55,6 +56,7 @@ class Program:
         """All that it said, standard error included."""
         self.changed = threading.Condition()
         self._has_ended = False
+        self._ordering = threading.Lock()
         self._process = subprocess.Popen(  # noqa: S603 - tests name what is run
             [*inside, *arguments],
             cwd=ROOT,
@@ -95,9 +97,10 @@ class Program:
         return self._process.poll() is None
 
     def order(self, text: str) -> None:
-        """Write one line to it."""
-        self._orders.write(text + "\n")
-        self._orders.flush()
+        """Write one line to it; from any thread."""
+        with self._ordering:
+            self._orders.write(text + "\n")
+            self._orders.flush()
 
     def wait_until(self, is_so: Callable[[], bool], timeout_s: float, what: str) -> None:
         """Wait until something that it says makes `is_so` true; fail when time runs out."""
@@ -171,6 +174,8 @@ class Robots(Program):
         """Of each robot."""
         self.late: list[tuple[int, float]] = []
         """When the robots' own process was not woken in time, and by how many milliseconds."""
+        self.waits: dict[int, list[tuple[int, float]]] = {}
+        """Of each process that is watched: until when it waited for a processor, how many ms."""
         self.visits: list[list[tuple[int, bool]]] = [[] for _ in places]
         """Of each robot: when, and whether a connection was made or ended."""
         super().__init__(_script("rig_robot.py", *places), inside=inside)
@@ -181,6 +186,9 @@ class Robots(Program):
         words = line.split(" ", 3)
         if words[0] == "line":
             self.heard[int(words[1])].append(Heard(int(words[2]), words[3]))
+        elif words[0] == "waited":
+            waits = self.waits.setdefault(int(words[2]), [])
+            waits.append((int(words[1]), int(words[3]) / 1000))
         elif words[0] == "late":
             self.late.append((int(words[1]), int(words[2]) / 1000))
         elif words[0] in ("open", "gone"):
@@ -196,6 +204,15 @@ class Robots(Program):
         with self.changed:
             found = [late for time_ns, late in self.late if from_ns <= time_ns <= until_ns]
         return max(found, default=0.0)
+
+    def waited_ms(self, from_ns: int, until_ns: int) -> float:
+        """Return how long the one that waited most was kept from running between two times."""
+        with self.changed:
+            sums = [
+                sum(ms for at, ms in waits if from_ns <= at <= until_ns)
+                for waits in self.waits.values()
+            ]
+        return max(sums, default=0.0)
 
 
 class Operators(Program):
@@ -245,6 +262,7 @@ class Relay(Program):
 
     def __init__(self) -> None:
         self._done = 0
+        self._doing = threading.Lock()
         super().__init__(_script("rig_relay.py"))
         _, *found = self.wait_for("ready")
         self._descriptors = dict(zip("ab", found, strict=True))
@@ -259,10 +277,11 @@ class Relay(Program):
 
     def do(self, *orders: str) -> int:
         """Carry out orders such as ``cut a``; return when the last was, in nanoseconds."""
-        wanted = self._done + len(orders)
-        self.order("\n".join(orders))
-        self.wait_until(lambda: self._done >= wanted, ANSWER_S, f"order {orders}")
-        return int(next(line for line in reversed(self.lines) if line.startswith("done"))[5:])
+        with self._doing:
+            wanted = self._done + len(orders)
+            self.order("\n".join(orders))
+            self.wait_until(lambda: self._done >= wanted, ANSWER_S, f"order {orders}")
+            return int(next(line for line in reversed(self.lines) if line.startswith("done"))[5:])
 
 
 class Server(Program):
@@ -275,18 +294,45 @@ class Server(Program):
         *options: str,
         host: str = "127.0.0.1",
         inside: Sequence[str] = (),
+        can_hang: bool = False,
     ) -> None:
-        command = [sys.executable, "-m", "urc.cli.main", "serve", *map(str, profiles)]
+        """Start it, and wait until it listens.
+
+        Args:
+            profiles: the robots' documents.
+            data: its folder.
+            options: more of ``urc serve``.
+            host: where it listens.
+            inside: as of `Program`.
+            can_hang: let it be held up by a signal, see `urc.testing.rig_server`.
+        """
+        script = ["-P", str(HERE / "rig_server.py")] if can_hang else ["-m", "urc.cli.main"]
+        command = [sys.executable, *script, "serve", *map(str, profiles)]
         command += ["--host", host, "--port", "0", "--data-dir", str(data), *options]
         self.host = host
         super().__init__(command, inside=inside)
         url = self.wait_for("dashboard", READY_S)[1]
         self.port = int(url.rstrip("/").rpartition(":")[2])
 
+    @property
+    def guards(self) -> list[int]:
+        """Process ids of its guards."""
+        found = Path(f"/proc/{self.pid}/task/{self.pid}/children").read_text("ascii").split()
+        return [int(child) for child in found if _is_guard(child)]
+
     def _end(self) -> None:
         if self.is_running:
+            self._process.send_signal(signal.SIGCONT)
             self._process.terminate()  # it listens to no standard input
         super()._end()
+
+
+def _is_guard(process: str) -> bool:
+    try:
+        words = Path(f"/proc/{process}/cmdline").read_bytes().split(b"\0")
+    except OSError:
+        return False
+    return b"urc.guard" in words
 
 
 def now_ns() -> int:

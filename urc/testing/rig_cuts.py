@@ -1,7 +1,8 @@
 """Cuts of the link between server and robots while somebody drives, and what comes through after.
 
 Each value of the motion is the time at which its tick was sent, so that the robot knows how old it
-is when it arrives.
+is when it arrives. One rig has robots on every kind of line; the whole link is cut, or each robot's
+own, at its own times.
 """
 
 import json
@@ -10,27 +11,41 @@ import time
 from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
+from threading import Lock
 from types import TracebackType
 from typing import NamedTuple, Self
 
-from urc.testing.rig import SERVER_ADDRESS, Heard, Operators, Relay, Robots, Server
-from urc.testing.rig_deaths import lane_profile
+from urc.testing.rig import Heard, Operators, Relay, Robots, Server
+from urc.testing.rig_kinds import (
+    FIRST_PORT,
+    Bounds,
+    bounds_of,
+    document,
+    place_of,
+    start_counterpart,
+)
 
-__all__ = ["OLDEST_MS", "STOP_MS", "Cut", "CutRig"]
+__all__ = ["LATE_MS", "Cut", "CutRig"]
 
-OLDEST_MS = 300.0
-"""No motion that is older may reach a robot."""
-STOP_MS = 100.0
-"""The stop is to come within this time of the robot's being reachable."""
-SHORT_S = 0.45
-"""A cut that is shorter may pass unnoticed: nothing was late enough for a stop."""
+LATE_MS = 300.0
+"""Motion that is older is late."""
+BURST_MS = 100.0
+"""Where motion may come late at all, the stop follows within this."""
 LEAD_S = 0.2
 WATCH_S = 1.0
+READY_S = 25.0
+ATTEMPTS = 3
+"""To have a robot driven at all."""
+
+
+class NotDrivenError(AssertionError):
+    """A page has not moved its robot: the next one may, or something is wrong."""
 
 
 class Cut(NamedTuple):
     """What one cut did to one robot."""
 
+    kind: str
     lasted_s: float
     was_held: bool
     """Whether the control was held all the time, or let go during the cut."""
@@ -40,42 +55,80 @@ class Cut(NamedTuple):
     """From the link's being back to the stop; infinite when none came."""
     fault: str
     late_ms: float
+    """By how much this machine was late meanwhile."""
+    was_moving: bool = True
+    """Whether the robot moved when the link was cut; a busy machine may have stopped it before."""
+
+    @property
+    def bounds(self) -> Bounds:
+        """What is required."""
+        return bounds_of(self.kind)
+
+    @property
+    def is_stop_needed(self) -> bool:
+        """Whether the robot must hear a stop."""
+        if not self.bounds.is_told:
+            return False
+        return not self.was_held or self.lasted_s >= self.bounds.unnoticed_s
 
     @property
     def is_good(self) -> bool:
         """Whether the contract was kept."""
-        has_stopped = self.stop_ms <= STOP_MS or (self.was_held and self.lasted_s < SHORT_S)
-        return not self.fault and self.oldest_ms <= OLDEST_MS and has_stopped
+        is_stopped = self.stop_ms <= self.bounds.stop_ms or not self.is_stop_needed
+        is_fresh = self.oldest_ms <= self.bounds.oldest_ms
+        return self.was_moving and not self.fault and is_fresh and is_stopped
 
     @property
     def is_excused(self) -> bool:
         """Whether this machine itself was later than the trial was: it says nothing then."""
-        late = max(self.oldest_ms - OLDEST_MS, self.stop_ms - STOP_MS)
+        if not self.was_moving:
+            return not self.fault
+        late = self.oldest_ms - self.bounds.oldest_ms
+        if self.is_stop_needed:
+            late = max(late, self.stop_ms - self.bounds.stop_ms)
         return not self.fault and 0 < late <= self.late_ms
 
 
 class CutRig:
     """Some robots behind a relay, and a server with pages on this side of it. Needs root."""
 
-    def __init__(self, folder: Path, *, lanes: int = 6) -> None:
-        """Start everything; the robots' documents and the server's data go into `folder`."""
+    def __init__(self, folder: Path, kinds: Sequence[str]) -> None:
+        """Start everything; the robots' documents and the server's data go into `folder`.
+
+        Args:
+            folder: an empty one.
+            kinds: of line, one for each robot.
+        """
+        self.kinds = tuple(kinds)
         self._dice = random.Random(11)  # noqa: S311 - the same moments in every run
         self._numbers = 0
+        self._lock = Lock()
         self._programs = ExitStack()
         try:
-            enter = self._programs.enter_context
-            self.relay = enter(Relay())
-            here, there = self.relay.inside("a"), self.relay.inside("b")
-            self.robots = enter(Robots([f"tcp:{SERVER_ADDRESS}:0"] * lanes, inside=there))
-            files = [folder / f"lane-{lane}.yaml" for lane in range(lanes)]
-            for lane, file in enumerate(files):
-                text = lane_profile(lane, SERVER_ADDRESS, self.robots.ports[lane])
-                file.write_text(text, "utf-8")
-            self.server = enter(Server(files, folder / "data", inside=here))
-            self.operators = enter(Operators(inside=here))
+            self._start(folder)
         except BaseException:
             self._programs.close()
             raise
+
+    def _start(self, folder: Path) -> None:
+        enter = self._programs.enter_context
+        self.relay = enter(Relay())
+        here, there = self.relay.inside("a"), self.relay.inside("b")
+        others = [
+            start_counterpart(kind, lane, folder, there) for lane, kind in enumerate(self.kinds)
+        ]
+        for other in others:
+            if other is not None:
+                enter(other)
+        places = [place_of(kind, lane) for lane, kind in enumerate(self.kinds)]
+        self.robots = enter(Robots(places, inside=there))
+        files = [folder / f"lane-{lane}.yaml" for lane in self.lanes]
+        for lane, (kind, file) in enumerate(zip(self.kinds, files, strict=True)):
+            text = document(kind, lane, self.robots.ports[lane], others[lane])
+            file.write_text(text, "utf-8")
+        self.server = enter(Server(files, folder / "data", inside=here))
+        self.operators = enter(Operators(inside=here))
+        self._witness = enter(Robots([]))
 
     def __enter__(self) -> Self:
         """Return it; everything ends with the block."""
@@ -90,37 +143,76 @@ class CutRig:
         """End everything."""
         self._programs.close()
 
+    @property
+    def lanes(self) -> range:
+        """Numbers of the robots."""
+        return range(len(self.kinds))
+
+    def port(self, lane: int) -> int:
+        """Return the port by which a robot's link is cut."""
+        first = FIRST_PORT.get(self.kinds[lane])
+        return self.robots.ports[lane] if first is None else first + lane
+
     def cut(self, seconds: float, order: str = "cut") -> list[Cut]:
-        """Cut the link while each robot is driven; return what came of it.
+        """Cut the link of all while each robot is driven; return what came of it.
 
         Args:
             seconds: for how long.
-            order: ``cut``, or ``cut a`` or ``cut b`` for one direction.
+            order: ``cut``, or ``cut a`` or ``cut b`` for one direction, or ``down a``.
         """
-        lanes = range(len(self.robots.heard))
+        return self._trial(self.lanes, seconds, order, self._share())
+
+    def cut_one(self, lane: int, seconds: float, share: float) -> Cut:
+        """Cut the link of one robot; from a thread of its own, if you like.
+
+        Args:
+            lane: which.
+            seconds: for how long.
+            share: after which part of it a control is let go, where it is: every second time.
+        """
+        for _ in range(ATTEMPTS - 1):
+            try:
+                return self._trial((lane,), seconds, f"cut {self.port(lane)}", share)[0]
+            except NotDrivenError:
+                continue
+        return self._trial((lane,), seconds, f"cut {self.port(lane)}", share)[0]
+
+    def _share(self) -> float:
+        return 0.1 + self._dice.random() * 0.8
+
+    def _trial(self, lanes: Sequence[int], seconds: float, order: str, share: float) -> list[Cut]:
         began_ns = time.monotonic_ns()
-        pages = [self._drive(lane) for lane in lanes]
-        for lane in lanes:
-            self._await_motion(lane, began_ns)
-        time.sleep(LEAD_S + self._dice.random() * 0.05)
+        pages = {lane: self._drive(lane) for lane in lanes}
+        try:
+            for lane in lanes:
+                self._await_motion(lane, began_ns)
+        except NotDrivenError:
+            for number in pages.values():
+                self.operators.kill(number)
+            raise
+        time.sleep(LEAD_S + share * 0.05)
         cut_ns = self.relay.do(order)
-        before_s = seconds * (0.1 + self._dice.random() * 0.8)
-        time.sleep(before_s)
-        for lane in lanes:
-            if lane % 2:
-                self.operators.order(json.dumps({"let_go": pages[lane]}))
-        time.sleep(seconds - before_s)
-        healed_ns = self.relay.do(order.replace("cut", "heal"))
-        time.sleep(WATCH_S)
-        for number in pages:
+        time.sleep(seconds * share)
+        released = {lane: number for lane, number in pages.items() if number % 2}
+        for number in released.values():
+            self.operators.order(json.dumps({"let_go": number}))
+        time.sleep(seconds - seconds * share)
+        healed_ns = self.relay.do(order.replace("cut", "heal").replace("down", "up"))
+        self._watch(pages, released, cut_ns, healed_ns)
+        cuts = [
+            self._judge(lane, cut_ns, healed_ns, was_held=lane not in released) for lane in lanes
+        ]
+        for number in pages.values():
             self.operators.kill(number)
-        return [self._judge(lane, cut_ns, healed_ns, was_held=lane % 2 == 0) for lane in lanes]
+        return cuts
 
     def _drive(self, lane: int) -> int:
         """Let a page drive a robot; return its number."""
-        self._numbers += 1
+        with self._lock:
+            self._numbers += 1
+            number = self._numbers
         plan = {
-            "number": self._numbers,
+            "number": number,
             "host": "127.0.0.1",
             "port": self.server.port,
             "robot": f"lane-{lane}",
@@ -128,37 +220,97 @@ class CutRig:
             "drive_s": 0.0,
         }
         self.operators.start(plan)
-        return self._numbers
+        return number
 
     def _await_motion(self, lane: int, began_ns: int) -> None:
         def moves() -> bool:
             return any(one.text != "M 0" for one in self.robots.since(lane, began_ns))
 
-        self.robots.wait_until(moves, 10.0, f"motion of lane {lane}")
+        what = f"motion of lane {lane} ({self.kinds[lane]})"
+        try:
+            self.robots.wait_until(moves, READY_S, what)
+        except AssertionError as error:
+            raise NotDrivenError(str(error)) from error
+
+    def _watch(
+        self, pages: Sequence[int] | dict[int, int], released: dict[int, int],
+        cut_ns: int, healed_ns: int,
+    ) -> None:  # fmt: skip
+        """Wait for the stops that must come, and then for anything that must not."""
+        for lane in pages:
+            bounds = bounds_of(self.kinds[lane])
+            is_short = (healed_ns - cut_ns) / 1e9 < bounds.unnoticed_s
+            if not bounds.is_told or (is_short and lane not in released):
+                continue
+            left_s = bounds.stop_ms / 1000 - (time.monotonic_ns() - healed_ns) / 1e9
+            try:
+                self.robots.wait_until(
+                    lambda lane=lane: self._stops(lane, cut_ns),  # type: ignore[misc]
+                    max(left_s, 0.01),
+                    "a stop",
+                )
+            except AssertionError:
+                continue  # judged later
+        time.sleep(WATCH_S)
+
+    def _stops(self, lane: int, cut_ns: int) -> bool:
+        return any(one.text == "M 0" for one in self.robots.since(lane, cut_ns))
 
     def _judge(self, lane: int, cut_ns: int, healed_ns: int, *, was_held: bool) -> Cut:
-        heard = [one for one in self.robots.since(lane, cut_ns) if one.time_ns > healed_ns]
+        kind, all_heard = self.kinds[lane], self.robots.since(lane, cut_ns)
+        heard = [one for one in all_heard if one.time_ns > healed_ns]
         stops = [place for place, one in enumerate(heard) if one.text == "M 0"]
-        motion = [one for one in heard if one.text != "M 0"]
-        oldest_ms = max(
-            ((one.time_ns - int(one.text[2:]) * 1000) / 1e6 for one in motion), default=0.0
-        )
+        ages_ms = [
+            (one.time_ns - int(one.text[2:]) * 1000) / 1e6 for one in heard if one.text != "M 0"
+        ]
         # A stop may also have come before or within a cut of one direction.
-        if not stops and self._had_stopped(lane, cut_ns, healed_ns):
+        before = [one for one in all_heard if one.time_ns <= healed_ns]
+        if not stops and before and before[-1].text == "M 0":
             stop_ms = 0.0
         else:
             stop_ms = (heard[stops[0]].time_ns - healed_ns) / 1e6 if stops else float("inf")
-        fault = ""
-        if stops and any(one.text != "M 0" for one in heard[stops[0] :]):
-            fault = "it moved again after the stop"
-        elif stops and stops[0] and (healed_ns - cut_ns) / 1e9 >= SHORT_S:
-            fault = "motion came before the stop"
-        elif len(stops) > 2:  # one that lay in the kernel, and one on the new connection
-            fault = f"{len(stops)} stops came"
-        late_ms = self.robots.latest_ms(cut_ns, healed_ns + int(WATCH_S * 1e9))
-        return Cut((healed_ns - cut_ns) / 1e9, was_held, oldest_ms, stop_ms, fault, late_ms)
+        lasted_s = (healed_ns - cut_ns) / 1e9
+        is_noticed = lasted_s >= bounds_of(kind).unnoticed_s
+        now_ns = time.monotonic_ns()
+        witness = self._witness.latest_ms(cut_ns, now_ns)
+        late_ms = self.robots.latest_ms(cut_ns, now_ns) + witness
+        fault = _fault(
+            bounds_of(kind), heard, [age - late_ms for age in ages_ms],
+            is_noticed=is_noticed, was_held=was_held, burst_ms=BURST_MS + late_ms,
+        )  # fmt: skip
+        oldest_ms = max(ages_ms, default=0.0)
+        earlier = [one.text for one in self.robots.heard[lane] if one.time_ns < cut_ns]
+        was_moving = earlier[-1:] != ["M 0"]
+        return Cut(kind, lasted_s, was_held, oldest_ms, stop_ms, fault, late_ms, was_moving)
 
-    def _had_stopped(self, lane: int, cut_ns: int, healed_ns: int) -> bool:
-        heard: Sequence[Heard] = self.robots.since(lane, cut_ns)
-        within = [one for one in heard if one.time_ns <= healed_ns]
-        return bool(within) and within[-1].text == "M 0"
+
+def _fault(
+    bounds: Bounds,
+    heard: Sequence[Heard],
+    ages_ms: Sequence[float],
+    *,
+    is_noticed: bool,
+    was_held: bool,
+    burst_ms: float,
+) -> str:
+    """Return what must not happen after a cut, and did."""
+    texts = [one.text for one in heard]
+    moved = [text for text in texts if text != "M 0"]
+    stop = texts.index("M 0") if "M 0" in texts else len(texts)
+    late = sum(age > LATE_MS for age in ages_ms)
+    if any(text != "M 0" for text in texts[stop:]):
+        return "it moved again after the stop"
+    if len(moved) != len(set(moved)):
+        return "the same motion came twice"
+    if bounds.most_late is not None and late > bounds.most_late:
+        return f"{late} late motions came"
+    if not bounds.is_repeated and len(texts) - stop > 2:
+        return f"{len(texts) - stop} stops came"  # but one in the kernel, and one on the new line
+    if not was_held and len(moved) > (bounds.most_late or 0):
+        return "motion came that had been let go" if is_noticed else ""
+    if is_noticed and bounds.is_told and stop > (bounds.most_late or 0):
+        return "motion came before the stop"
+    is_last = late == stop < len(texts)  # nothing fresh came between
+    if late and is_last and heard[stop].time_ns - heard[0].time_ns > burst_ms * 1e6:
+        return "the stop came long after late motion"
+    return ""

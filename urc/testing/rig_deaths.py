@@ -8,11 +8,13 @@ import random
 import time
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
 from types import TracebackType
 from typing import NamedTuple, Self
 
 from urc.testing.rig import SERVER_ADDRESS, Heard, Operators, Relay, Robots, Server
+from urc.testing.rig_operator import Plan
 
 __all__ = ["BOUND_MS", "DEATHS", "LEASE_MS", "LINK_DEATHS", "Rig", "Trial", "lane_profile"]
 
@@ -25,6 +27,9 @@ DEATHS = ("close", "kill", "freeze", "block", "reset", "kick", *LINK_DEATHS)
 HEALED_S = 0.4
 """How long it is looked whether a healed link brings motion back."""
 STOP_WITHIN_S = 3.0
+LIFE_S = 600.0
+LOOK_NS = 25_000_000
+"""How much later it is known that a process was kept from running."""
 WITNESSES = 2
 """Idle programs that say when they are not woken in time, as the server's then are not either."""
 
@@ -59,24 +64,39 @@ class Trial(NamedTuple):
     fault: str
     """What must not happen, and did; "" when nothing."""
     late_ms: float
-    """By how much idle programs, and the robots' own, were not woken in time: a busy machine."""
+    """By how much idle programs, and the robots' own, were not woken in time, or how long the
+    server or a guard was kept from running: a busy machine."""
+    bound_ms: float = BOUND_MS
+    has_moved: bool = True
+    """Whether the robot moved before: one that never did shows nothing of how it stops."""
 
     @property
     def is_good(self) -> bool:
         """Whether the contract was kept."""
-        return not self.fault and self.stop_ms <= BOUND_MS
+        return not self.fault and self.stop_ms <= self.bound_ms
 
     @property
     def is_excused(self) -> bool:
         """Whether this machine itself was later than the trial was: it says nothing then."""
-        return not self.fault and 0 < self.stop_ms - BOUND_MS <= self.late_ms
+        if not self.has_moved:
+            return True
+        return not self.fault and 0 < self.stop_ms - self.bound_ms <= self.late_ms
 
 
 class Rig:
     """Some robots, a real server, and pages that die; with a relay between them where one is."""
 
+    can_hang = False
+    """Whether the server can be held up, see `urc.testing.rig.Server`."""
+
     def __init__(
-        self, folder: Path, *, lanes: int = 20, has_relay: bool = False, options: Sequence[str] = ()
+        self,
+        folder: Path,
+        *,
+        lanes: int = 20,
+        has_relay: bool = False,
+        options: Sequence[str] = (),
+        inside: Sequence[str] = (),
     ) -> None:
         """Start everything.
 
@@ -85,6 +105,7 @@ class Rig:
             lanes: robots, and pages at once.
             has_relay: put a link between pages and server that can be cut; needs root.
             options: of ``urc serve``.
+            inside: what starts the server elsewhere, beside the relay.
         """
         self._dice = random.Random(5)  # noqa: S311 - the same phases in every run
         self._numbers = 0
@@ -100,14 +121,21 @@ class Rig:
             for lane, file in enumerate(files):
                 text = lane_profile(lane, "127.0.0.1", self.robots.ports[lane])
                 file.write_text(text, "utf-8")
-            self.server = enter(
-                Server(files, folder / "data", *options, host=self.host, inside=there)
-            )
+            self._serve = partial(
+                Server, files, folder / "data", *options, host=self.host, inside=(*there, *inside),
+                can_hang=self.can_hang,
+            )  # fmt: skip
+            self.server = enter(self._serve())
             self.operators = enter(Operators(inside=here))
             self._witnesses = [enter(Robots([])) for _ in range(WITNESSES)]
+            self._watch()
         except BaseException:
             self._programs.close()
             raise
+
+    def _watch(self) -> None:
+        """Watch whether the server and its guards are let run."""
+        self._watcher = self._programs.enter_context(Robots([f"pid:{self.server.pid}"]))
 
     def __enter__(self) -> Self:
         """Return it; everything ends with the block."""
@@ -136,21 +164,28 @@ class Rig:
             for lane, number in pages.items()
         ]
 
+    @property
+    def lanes(self) -> range:
+        """Numbers of the robots."""
+        return range(len(self.robots.heard))
+
+    def weather(self, *orders: str) -> None:
+        """Make the relay slow or lossy, by its orders."""
+        self._link().do(*orders)
+
+    def drive(self, lane: int, death: str = "outside", drive_s: float = 0.0) -> int:
+        """Let a page drive a robot until it dies; return its number."""
+        self._numbers += 1
+        plan = Plan(
+            self._numbers, self.host, self.server.port, f"lane-{lane}", death, drive_s,
+            life_s=LIFE_S,
+        )  # fmt: skip
+        self.operators.start(plan._asdict())
+        return self._numbers
+
     def _begin(self, death: str) -> Mapping[int, int]:
-        pages: dict[int, int] = {}
-        for lane in range(len(self.robots.heard)):
-            self._numbers += 1
-            pages[lane] = self._numbers
-            plan = {
-                "number": self._numbers,
-                "host": self.host,
-                "port": self.server.port,
-                "robot": f"lane-{lane}",
-                "death": "outside" if death in LINK_DEATHS else death,
-                "drive_s": 0.3 + self._dice.random() * 0.2,
-            }
-            self.operators.start(plan)
-        return pages
+        how = "outside" if death in LINK_DEATHS else death
+        return {lane: self.drive(lane, how, 0.3 + self._dice.random() * 0.2) for lane in self.lanes}
 
     def _let_die(self, death: str, pages: Mapping[int, int]) -> None:
         for number in pages.values():
@@ -196,16 +231,17 @@ class Rig:
         if stop is None:
             said = self.operators.news["dying", number].partition(" ")[2]
             fault = "no stop came" if moved else f"nothing moved ({said})"
-            return Trial(death, float("inf"), fault, 0.0)
+            return Trial(death, float("inf"), fault, 0.0, has_moved=bool(moved))
         sent_ns = int(heard[moved[-1]].text[2:]) * 1000
         fault = "" if moved[-1] < until_stop else "it moved again after the stop"
-        late_ms = self._late_ms(sent_ns, stop.time_ns + 20_000_000)
+        late_ms = self.late_ms(sent_ns, stop.time_ns + 20_000_000)
         return Trial(death, (stop.time_ns - sent_ns) / 1e6, fault or _order(heard), late_ms)
 
-    def _late_ms(self, from_ns: int, until_ns: int) -> float:
+    def late_ms(self, from_ns: int, until_ns: int) -> float:
         """Return how late the robots were at worst, and whoever else had to be woken for a stop."""
         others = max(one.latest_ms(from_ns, until_ns) for one in self._witnesses)
-        return self.robots.latest_ms(from_ns, until_ns) + others
+        kept_ms = self._watcher.waited_ms(from_ns, until_ns + LOOK_NS)
+        return self.robots.latest_ms(from_ns, until_ns) + max(others, kept_ms)
 
 
 def _order(heard: Sequence[Heard]) -> str:

@@ -29,8 +29,8 @@ import time
 from typing import Any, NamedTuple
 
 TICK_NS = 50_000_000
+FLOOD_NS = 1_000_000
 ANSWER_S = 20.0
-LONGEST_LIFE_S = 40.0
 _PR_SET_PDEATHSIG = 1
 FLOOD = 400
 """Messages at once for which a server throws a page out."""
@@ -45,9 +45,11 @@ class Plan(NamedTuple):
     robot: str
     death: str
     """``close``, ``kill``, ``freeze``, ``block``, ``reset``, ``kick``, or ``outside``: it drives on
-    while somebody else cuts a line."""
+    while somebody else cuts a line. ``flood``: it ticks a thousand times a second."""
     drive_s: float
     """How long it drives before."""
+    life_s: float = 120.0
+    """How long it lives after that at most, where nobody ends it."""
     command: str = "go"
     argument: str = "t"
 
@@ -168,9 +170,10 @@ class Page:
         elif kind in ("refused", "error"):
             self.refusal = message.get("message", "")
 
-    def tick(self) -> None:
-        """Send a sample of what is held: the time."""
+    def tick(self) -> int:
+        """Send a sample of what is held, which is the time in microseconds; return it."""
         self.sent += 1
+        value = time.monotonic_ns() // 1000
         self.say(
             {
                 "t": "tick",
@@ -178,9 +181,10 @@ class Page:
                 "epoch": self.epoch,
                 "number": self.sent,
                 "echo": self.beat,
-                "arguments": {self.plan.argument: time.monotonic_ns() // 1000},
+                "arguments": {self.plan.argument: value},
             }
         )
+        return value
 
     def let_go(self) -> None:
         """Hold nothing any more."""
@@ -235,21 +239,21 @@ def live(plan: Plan) -> None:
     tell("driving", plan.number, began_ns)
     _drive(page, began_ns, began_ns + int(plan.drive_s * 1e9))
     tell("dying", plan.number, time.monotonic_ns(), page.refusal)
-    _die(page, plan.death)
+    _die(page, plan)
 
 
-def _drive(page: Page, next_ns: int, until_ns: int) -> None:
-    """Tick on a grid of 50 ms until then."""
+def _drive(page: Page, next_ns: int, until_ns: int, every_ns: int = TICK_NS) -> None:
+    """Tick on a grid until then."""
     while next_ns < until_ns:
         page.wait(next_ns)
         if not page.has_let_go:
             page.tick()
-        next_ns += TICK_NS
+        next_ns += every_ns
     page.wait(until_ns)
 
 
-def _die(page: Page, death: str) -> None:
-    end_ns = time.monotonic_ns() + int(LONGEST_LIFE_S * 1e9)
+def _die(page: Page, plan: Plan) -> None:
+    end_ns, death = time.monotonic_ns() + int(plan.life_s * 1e9), plan.death
     if death == "close":
         page.close()
     elif death == "kill":
@@ -266,7 +270,8 @@ def _die(page: Page, death: str) -> None:
     elif death == "block":
         page.wait(end_ns)  # the socket lives, the page's thread samples nothing
     else:
-        _drive(page, time.monotonic_ns(), end_ns)
+        every_ns = FLOOD_NS if death == "flood" else TICK_NS
+        _drive(page, time.monotonic_ns(), end_ns, every_ns)
 
 
 def start(plan: Plan) -> int:

@@ -14,6 +14,7 @@ Orders, one a line of standard input, times in milliseconds::
     cut | heal              the whole link
     cut a | cut b           only what comes from that side
     cut PORT | heal PORT    only packets from or to that TCP or UDP port
+    cut PORT a              of these only those from that side; healed all the same
     down a | up a           the network interface of a side
 
 Ends when its standard input does; the namespaces end with the last program inside.
@@ -64,7 +65,8 @@ class Weather:
     loss: float = 0.0
     is_cut: dict[str, bool] = field(default_factory=lambda: {"a": False, "b": False})
     """Side → whether what comes from it is lost."""
-    ports: set[int] = field(default_factory=set)
+    ports: dict[str, set[int]] = field(default_factory=lambda: {"a": set(), "b": set()})
+    """Side → ports; what comes from it, from or to one of them, is lost."""
 
 
 def made(name: str) -> Side:
@@ -143,7 +145,7 @@ class Relay:
                 return
             weather = self.weather
             lost = weather.is_cut[side.name] or len(self._waiting) >= MOST_WAITING
-            lost = lost or not weather.ports.isdisjoint(ports_of(packet))
+            lost = lost or not weather.ports[side.name].isdisjoint(ports_of(packet))
             if lost or (weather.loss and self._dice.random() < weather.loss):
                 continue
             due_ns = time.monotonic_ns() + weather.delay_ns
@@ -182,7 +184,9 @@ class Relay:
         elif verb in ("down", "up"):
             switch(self._sides[what], DEVICE, is_up=verb == "up")
         elif what.isdigit():
-            (weather.ports.add if verb == "cut" else weather.ports.discard)(int(what))
+            for side in words[2:] or SIDES:
+                ports = weather.ports[side]
+                (ports.add if verb == "cut" else ports.discard)(int(what))
         else:
             for side in [what] if what else SIDES:
                 weather.is_cut[side] = verb == "cut"

@@ -1,18 +1,26 @@
 """Robots that stamp every line they hear: a program of its own, which imports nothing of URC.
 
-``python rig_robot.py tcp:127.0.0.1:0 udp:127.0.0.1:0 …`` is one robot for each argument. What they
-hear is told on standard output, one line each, with times of the monotonic clock in nanoseconds::
+``python rig_robot.py tcp:127.0.0.1:0 udp:127.0.0.1:0 …`` is one robot for each argument. ``ws`` is
+a WebSocket whose messages are the lines, ``bridge`` one that takes messages as rosbridge does and
+hears ``M NUMBER`` for ``{"data": NUMBER}``; ``mqtt:HOST:PORT`` listens to the topic ``go`` of a
+broker there. What they hear is told on standard output, one line each, with times of the monotonic
+clock in nanoseconds::
 
     ready 40001 40002 …     their ports, once
-    open ROBOT TIME         a connection was made
+    open ROBOT TIME         a connection was made; a broker has taken the subscription
     line ROBOT TIME TEXT    a line was heard; TIME is that of its first byte
     gone ROBOT TIME         a connection ended
     late TIME MICROSECONDS  this program itself was not woken in time: the machine is busy
+    waited TIME PID MICROSECONDS  another one that could run was not let: ``pid:NUMBER`` among the
+                            arguments is watched, with its children
 
 Ends when its standard input does, so that it never outlives whoever started it.
 """
 
+import base64
 import contextlib
+import hashlib
+import json
 import os
 import selectors
 import socket
@@ -22,9 +30,127 @@ from dataclasses import dataclass
 
 BEAT_NS = 5_000_000
 """How often it looks whether it is woken in time."""
+LOOK_NS = 20_000_000
+"""How often it looks whether others wait."""
+WAITED_NS = 2_000_000
+"""Waiting that is worth a line."""
 LATE_NS = 5_000_000
 """Lateness that is worth a line."""
 LONGEST_LINE = 65536
+BROKER_S = 20.0
+"""How long a broker may take to start."""
+_GUID = b"258EAFA5-E914-47DA-95CA-C5AB0DC85B11"
+
+
+class Ear:
+    """Takes lines out of what comes over one connection."""
+
+    opening = b""
+    """What is said first."""
+
+    def __init__(self) -> None:
+        self.rest = b""
+        """Bytes of a line whose end has not come yet."""
+        self.reply = b""
+        """What is to be answered."""
+        self.is_ready = True
+        """Whether the connection can carry lines; else it is told as open later."""
+
+    def take(self, data: bytes) -> list[str]:
+        """Return the lines that end in `data`."""
+        *lines, rest = (self.rest + data).split(b"\n")
+        self.rest = rest[-LONGEST_LINE:]
+        return [line.decode("latin-1").rstrip("\r") for line in lines]
+
+
+class WebEar(Ear):
+    """The messages of a WebSocket."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.is_ready = False
+
+    def take(self, data: bytes) -> list[str]:
+        """Shake hands, then return each message."""
+        self.rest += data
+        if not self.is_ready:
+            head, end, self.rest = self.rest.partition(b"\r\n\r\n")
+            if not end:
+                self.rest = head
+                return []
+            self.is_ready = True
+            rows = (row.partition(b":") for row in head.split(b"\r\n"))
+            key = next(value for name, _, value in rows if name.lower() == b"sec-websocket-key")
+            proof = base64.b64encode(hashlib.sha1(key.strip() + _GUID).digest())  # noqa: S324
+            self.reply += (
+                b"HTTP/1.1 101 Switching Protocols\r\nUpgrade: websocket\r\n"
+                b"Connection: Upgrade\r\nSec-WebSocket-Accept: " + proof + b"\r\n\r\n"
+            )
+        found: list[str] = []
+        while (frame := self._frame()) is not None:
+            kind, body = frame
+            if kind in (1, 2):
+                found += self.read(body)
+            elif kind == 9:
+                self.reply += bytes([0x8A, len(body)]) + body
+        return found
+
+    def _frame(self) -> tuple[int, bytes] | None:
+        """Take the first whole frame; None while there is none."""
+        data = self.rest
+        if len(data) < 6:
+            return None
+        head, size = 2, data[1] & 0x7F
+        if size == 126:
+            head, size = 4, int.from_bytes(data[2:4], "big")
+        end = head + 4 + size
+        if len(data) < end:
+            return None
+        mask = data[head : head + 4]
+        self.rest = data[end:]
+        body = bytes(byte ^ mask[place % 4] for place, byte in enumerate(data[head + 4 : end]))
+        return data[0] & 0x0F, body
+
+    def read(self, body: bytes) -> list[str]:
+        """Return the lines of a message."""
+        return body.decode().splitlines()
+
+
+class BridgeEar(WebEar):
+    """What is published through a rosbridge."""
+
+    def read(self, body: bytes) -> list[str]:
+        """Return a line for what is published, nothing for all else."""
+        said = json.loads(body)
+        return [f"M {said['msg']['data']}"] if said["op"] == "publish" else []
+
+
+class BrokerEar(Ear):
+    """A subscriber of MQTT 3.1.1."""
+
+    opening = b"\x10\x0c\x00\x04MQTT\x04\x02\x00\x00\x00\x00"
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.is_ready = False
+
+    def take(self, data: bytes) -> list[str]:
+        """Subscribe when the log-in is granted, then return what is published."""
+        self.rest += data
+        found: list[str] = []
+        while len(self.rest) >= 2 and len(self.rest) >= 2 + self.rest[1]:
+            kind, body = self.rest[0] >> 4, self.rest[2 : 2 + self.rest[1]]
+            self.rest = self.rest[2 + len(body) :]
+            if kind == 2:
+                self.reply += b"\x82\x07\x00\x01\x00\x02go\x00"
+            elif kind == 9:
+                self.is_ready = True
+            elif kind == 3:
+                found.append(body[2 + int.from_bytes(body[:2], "big") :].decode())
+        return found
+
+
+EARS = {"tcp": Ear, "udp": Ear, "ws": WebEar, "bridge": BridgeEar, "mqtt": BrokerEar}
 
 
 @dataclass
@@ -33,7 +159,7 @@ class Door:
 
     robot: int
     socket: socket.socket
-    is_stream: bool
+    kind: str
 
 
 @dataclass
@@ -42,23 +168,63 @@ class Visit:
 
     robot: int
     socket: socket.socket
-    rest: bytes = b""
-    """Bytes of a line whose end has not come yet."""
+    ear: Ear
     began_ns: int = 0
-    """When its first byte came."""
+    """When the first byte of an unfinished line came."""
+    is_told: bool = False
 
 
-def opened(place: str, robot: int) -> Door:
-    """Listen at ``tcp:HOST:PORT`` or ``udp:HOST:PORT``."""
+def opened(place: str, robot: int) -> Door | Visit:
+    """Listen at ``KIND:HOST:PORT``, or connect to a broker there."""
     kind, host, port = place.split(":")
-    is_stream = kind == "tcp"
+    if kind == "mqtt":
+        line = dialled(host, int(port))
+        line.sendall(BrokerEar.opening)
+        line.setblocking(False)
+        return Visit(robot, line, BrokerEar())
+    is_stream = kind != "udp"
     made = socket.socket(socket.AF_INET, socket.SOCK_STREAM if is_stream else socket.SOCK_DGRAM)
     made.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     made.bind((host, int(port)))
     if is_stream:
         made.listen(16)
     made.setblocking(False)
-    return Door(robot, made, is_stream)
+    return Door(robot, made, kind)
+
+
+def dialled(host: str, port: int) -> socket.socket:
+    """Connect to somebody who may just be starting."""
+    until_ns = time.monotonic_ns() + int(BROKER_S * 1e9)
+    while True:
+        try:
+            return socket.create_connection((host, port), 1.0)
+        except OSError:
+            if time.monotonic_ns() > until_ns:
+                raise
+            time.sleep(0.05)
+
+
+class Others:
+    """A process and its children: how long each could have run and was not let."""
+
+    def __init__(self, process: str) -> None:
+        self._process = process
+        self._waited: dict[str, int] = {}
+
+    def look(self) -> list[tuple[str, int]]:
+        """Return who has waited since the last look, and for how many nanoseconds."""
+        found: list[tuple[str, int]] = []
+        with contextlib.suppress(OSError):  # it has ended
+            with open(f"/proc/{self._process}/task/{self._process}/children") as children:
+                everybody = [self._process, *children.read().split()]
+            for one in everybody:
+                with contextlib.suppress(OSError), open(f"/proc/{one}/schedstat") as counts:
+                    waited = int(counts.read().split()[1])
+                    more = waited - self._waited.get(one, waited)
+                    self._waited[one] = waited
+                    if more > WAITED_NS:
+                        found.append((one, more))
+        return found
 
 
 class Robots:
@@ -67,15 +233,18 @@ class Robots:
     def __init__(self, places: list[str]) -> None:
         self._selector = selectors.DefaultSelector()
         self._told: list[str] = []
-        doors = [opened(place, robot) for robot, place in enumerate(places)]
-        for door in doors:
-            self._selector.register(door.socket, selectors.EVENT_READ, door)
+        self._others = [Others(place[4:]) for place in places if place.startswith("pid:")]
+        places = [place for place in places if not place.startswith("pid:")]
+        made = [opened(place, robot) for robot, place in enumerate(places)]
+        for one in made:
+            self._selector.register(one.socket, selectors.EVENT_READ, one)
         self._selector.register(0, selectors.EVENT_READ)
-        self._tell("ready", *(door.socket.getsockname()[1] for door in doors))
+        ports = (one.socket.getsockname()[1] for one in made)
+        self._tell("ready", *ports)
 
     def run(self) -> None:
         """Listen until standard input ends."""
-        due_ns = time.monotonic_ns() + BEAT_NS
+        look_ns = due_ns = time.monotonic_ns() + BEAT_NS
         while True:
             self._flush()
             ready = self._selector.select(max(0.0, (due_ns - time.monotonic_ns()) / 1e9))
@@ -84,6 +253,11 @@ class Robots:
                 self._tell("late", now_ns, (now_ns - due_ns) // 1000)
             if now_ns >= due_ns:
                 due_ns = now_ns + BEAT_NS
+            if now_ns >= look_ns:
+                look_ns = now_ns + LOOK_NS
+                for other in self._others:
+                    for process, waited_ns in other.look():
+                        self._tell("waited", now_ns, process, waited_ns // 1000)
             for key, _ in ready:
                 if key.fd == 0:
                     if not os.read(0, 4096):
@@ -94,7 +268,7 @@ class Robots:
                     self._greet(key.data)
 
     def _greet(self, door: Door) -> None:
-        if not door.is_stream:
+        if door.kind == "udp":
             data = door.socket.recv(LONGEST_LINE)
             now_ns = time.monotonic_ns()
             for line in data.splitlines():
@@ -102,8 +276,9 @@ class Robots:
             return
         made, _ = door.socket.accept()
         made.setblocking(False)
-        self._selector.register(made, selectors.EVENT_READ, Visit(door.robot, made))
-        self._tell("open", door.robot, time.monotonic_ns())
+        visit = Visit(door.robot, made, EARS[door.kind]())
+        self._selector.register(made, selectors.EVENT_READ, visit)
+        self._look(visit, time.monotonic_ns())
 
     def _hear(self, visit: Visit) -> None:
         try:
@@ -118,15 +293,23 @@ class Robots:
             visit.socket.close()
             self._tell("gone", visit.robot, now_ns)
             return
-        *lines, rest = data.split(b"\n")
-        for line in lines:
-            began_ns = visit.began_ns if visit.rest else now_ns
-            text = (visit.rest + line).decode("latin-1").rstrip("\r")
-            visit.rest = b""
+        ear = visit.ear
+        began_ns = visit.began_ns if ear.rest else now_ns
+        for text in ear.take(data):
             self._tell("line", visit.robot, began_ns, text)
-        if rest:
-            visit.began_ns = visit.began_ns if visit.rest else now_ns
-            visit.rest = (visit.rest + rest)[-LONGEST_LINE:]
+            began_ns = now_ns
+        visit.began_ns = began_ns
+        if ear.reply:
+            with contextlib.suppress(OSError):  # gone again: told by the next look at it
+                visit.socket.sendall(ear.reply)
+            ear.reply = b""
+        self._look(visit, now_ns)
+
+    def _look(self, visit: Visit, now_ns: int) -> None:
+        """Tell once that a connection can carry lines."""
+        if visit.ear.is_ready and not visit.is_told:
+            visit.is_told = True
+            self._tell("open", visit.robot, now_ns)
 
     def _tell(self, *words: object) -> None:
         self._told.append(" ".join(map(str, words)) + "\n")

@@ -6,9 +6,10 @@ import socket
 
 from urc.transports._faults import explain, late, place_of
 from urc.transports._lookup import Lookup
-from urc.transports._stream import READ_AHEAD_BYTES, Stream, adopt, tune
+from urc.transports._stream import READ_AHEAD_BYTES, Stream, adopt
 from urc.transports._tls import Tls
 from urc.transports.base import ByteStream, Carrier, ConnectFailed
+from urc.transports.hurry import connected
 
 __all__ = ["Reach"]
 
@@ -73,15 +74,8 @@ class Reach:
 
 async def _dial(family: int, address: object, read_ahead_bytes: int) -> Stream:
     """Connect one socket, which is closed again when that fails or is cancelled."""
-    loop = asyncio.get_running_loop()
-    line = socket.socket(family, socket.SOCK_STREAM)
+    line = await connected(family, address)
     try:
-        line.setblocking(False)
-        tune(line)
-        await loop.sock_connect(line, address)  # type: ignore[arg-type] # as getaddrinfo gave it
-        if line.getsockname() == line.getpeername():
-            # A port of this machine that nobody listens on, and the kernel chose it for our end.
-            raise ConnectionRefusedError(errno.ECONNREFUSED, "connected to itself")
         return await adopt(line, read_ahead_bytes)
     except BaseException:
         line.close()

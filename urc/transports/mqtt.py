@@ -111,8 +111,10 @@ class MqttTransport:
 
     async def abort(self) -> None:
         """Close at once; what the broker has not got by now it never gets. Never raises."""
-        if self._session is not None:
-            await self._dialer.reset(self._session.line)
+        session, self._session = self._session, None
+        if session is not None:
+            await self._dialer.reset(session.line)
+            session.end(has_farewell=False)
         await self.close()
 
     async def _begin(self, timeout_s: float) -> "_Session":
@@ -206,15 +208,19 @@ class _Session:
                 self._client.loop_write()
         self._raise_if_ended()
 
-    def end(self) -> None:
-        """Close at once. The broker publishes the will, if there is one."""
+    def end(self, *, has_farewell: bool = True) -> None:
+        """Close at once. The broker publishes the will, if there is one.
+
+        Args:
+            has_farewell: say good-bye; that pushes what is unsent before it.
+        """
         is_open = self.inbox.ended is None
         self.inbox.end(CLOSED)
         if self._check is not None:
             self._check.cancel()
         client = self._client
         client.on_disconnect = None
-        if is_open and client.is_connected():
+        if has_farewell and is_open and client.is_connected():
             with suppress(OSError, ValueError):
                 if self._options.will is None:
                     client.disconnect()

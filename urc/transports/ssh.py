@@ -6,7 +6,7 @@ it, the last who leaves closes it, and when it dies everybody is told.
 """
 
 import asyncio
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 
 import asyncssh
@@ -94,6 +94,17 @@ class SshTransport:
         """Return the bytes handed over that have not left this machine for good."""
         return 0 if self._channel is None else self._channel.unsent()
 
+    async def abort(self) -> None:
+        """Close at once, for all that go through here; what is unsent is never sent."""
+        self.break_off()
+        await self.close()
+
+    def break_off(self) -> None:
+        """End the connection, and the one that it goes through: the robot has not got it all."""
+        self._shared.break_off()
+        if self._outer is not None:
+            self._outer.break_off()
+
     async def connect(self, host: str, port: int, timeout_s: float) -> ByteStream:
         """Return a connection to `host` and `port` as the server sees them.
 
@@ -107,7 +118,7 @@ class SshTransport:
             except BaseException:
                 await self._shared.leave()
                 raise
-        return _Carried(channel, self._shared)
+        return _Carried(channel, self._shared, self.break_off)
 
     async def look_at_key(self, timeout_s: float) -> Offer:
         """Return the host key that the server shows, without logging in there.
@@ -161,8 +172,9 @@ class SshTransport:
 class _Carried:
     """A connection through the server, which keeps the SSH connection open while it lasts."""
 
-    def __init__(self, channel: Channel, shared: Shared) -> None:
+    def __init__(self, channel: Channel, shared: Shared, break_off: Callable[[], None]) -> None:
         self._channel = channel
+        self._break_off = break_off
         self._shared = shared
         self._is_user = True
 
@@ -174,6 +186,10 @@ class _Carried:
 
     def unsent(self) -> int:
         return self._channel.unsent()
+
+    async def reset(self) -> None:
+        self._break_off()
+        await self.abort()
 
     async def abort(self) -> None:
         self._channel.discard()

@@ -83,6 +83,10 @@ class Connection:
         if when_closed is not None:
             await when_closed()
 
+    def reset(self) -> None:
+        """End it without a word, not even a good-bye: that would push what is unsent before it."""
+        self._wire.reset()
+
     async def _opened(
         self, begin: Callable[[Channel], Awaitable[Any]], channel: Channel, failure: str
     ) -> Channel:
@@ -158,6 +162,11 @@ class Shared:
         await asyncio.wait([attempt])
         if not attempt.cancelled() and attempt.exception() is None:
             await attempt.result().close()
+
+    def break_off(self) -> None:
+        """End the connection for everybody who uses it; what is unsent is never sent."""
+        if self._attempt is not None and self._attempt.done() and self._is_good(self._attempt):
+            self._attempt.result().reset()
 
     async def _again(
         self, before: "asyncio.Task[Connection] | None", timeout_s: float

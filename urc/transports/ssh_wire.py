@@ -11,8 +11,8 @@ from typing import Any
 
 import asyncssh
 
-from urc.transports._faults import HUNG_UP, broke, one_line
-from urc.transports._stream import unsent_in
+from urc.transports._faults import CLOSED, HUNG_UP, broke, one_line
+from urc.transports._stream import forget_unsent, unsent_in
 
 __all__ = ["Through", "Wire", "why_lost"]
 
@@ -70,6 +70,14 @@ class Wire(asyncio.BufferedProtocol):
         """Note why the connection is over; the first reason counts."""
         self.fault = self.fault or reason
         self._room.set()
+
+    def reset(self) -> None:
+        """Close at once, and let the kernel forget what it has not sent: nothing comes late."""
+        line = self._transport.get_extra_info("socket")
+        if line is not None and line.fileno() >= 0:
+            forget_unsent(line)
+        self.end(CLOSED)
+        self._transport.abort()
 
     # -- called by asyncio
 

@@ -10,7 +10,7 @@ import socket
 
 from urc.transports._faults import explain, place_of, reason
 from urc.transports._lookup import Lookup
-from urc.transports._stream import tune
+from urc.transports.hurry import connected
 
 __all__ = ["Address", "reason"]
 
@@ -39,7 +39,7 @@ class Address:
             share_s = (deadline - loop.time()) / (len(addresses) - place)
             try:
                 async with asyncio.timeout(share_s):
-                    return await _connected(family, address)
+                    return await connected(family, address)
             except TimeoutError:
                 fault = fault or TimeoutError(errno.ETIMEDOUT, "timed out")
             except OSError as refused:
@@ -51,19 +51,3 @@ class Address:
         if isinstance(fault, OSError | UnicodeError):
             return explain(self.host, self.text, fault)
         return f"cannot connect to {self.text} ({reason(fault)})"
-
-
-async def _connected(family: int, address: object) -> socket.socket:
-    """Connect one socket, which is closed again when that fails or is cancelled."""
-    loop = asyncio.get_running_loop()
-    line = socket.socket(family, socket.SOCK_STREAM)
-    try:
-        line.setblocking(False)
-        tune(line)
-        await loop.sock_connect(line, address)  # type: ignore[arg-type] # as getaddrinfo gave it
-        if line.getsockname() == line.getpeername():
-            raise ConnectionRefusedError(errno.ECONNREFUSED, "connected to itself")
-    except BaseException:
-        line.close()
-        raise
-    return line

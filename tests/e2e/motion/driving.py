@@ -2,7 +2,7 @@
 
 import asyncio
 from collections.abc import AsyncIterator, Callable, Mapping
-from contextlib import asynccontextmanager
+from contextlib import AbstractAsyncContextManager, asynccontextmanager
 from pathlib import Path
 
 from playwright.async_api import CDPSession, Locator, Page
@@ -19,6 +19,8 @@ from urc.web.app import Robot, build_app, serve
 
 SEND = WriteSpec("text", {})
 LEASE_S = 0.25
+CALM_LEASE_S = 1.0
+"""For tests that are not about the lease: a browser on a busy machine pauses for some ticks."""
 
 
 def number(name: str, least: float = -1.0, most: float = 1.0) -> Argument:
@@ -33,10 +35,14 @@ def held(name: str, *arguments: Argument, lease_s: float = LEASE_S) -> Command:
     return Command(name, "wire", SEND, named, hold=Hold(0.02, release, lease_s))
 
 
-COMMANDS = {
-    "drive": held("drive", number("speed", -2.0, 2.0), number("turn")),
-    "lift": held("lift", number("rate", -0.5, 0.5)),
-}
+def commands(lease_s: float) -> dict[str, Command]:
+    """Return what the robot can be told."""
+    return {
+        "drive": held("drive", number("speed", -2.0, 2.0), number("turn"), lease_s=lease_s),
+        "lift": held("lift", number("rate", -0.5, 0.5), lease_s=lease_s),
+    }
+
+
 USES = (
     WidgetUse(
         "left", "joystick", {}, {"moved": "drive"}, {"axes": "x", "expo": 0.0, "dead_zone": 0.0},
@@ -58,10 +64,10 @@ STOP = "[data-stop-button]"
 class Wire(FakeRobot):
     """A robot whose line keeps what was written, with the time of each."""
 
-    def __init__(self, *changed: WidgetUse) -> None:
+    def __init__(self, *changed: WidgetUse, lease_s: float = LEASE_S) -> None:
         """Make a robot; `changed` take the place of what fills their slots."""
         uses = {use.slot: use for use in (*USES, *changed)}
-        super().__init__(dashboard_profile(uses=tuple(uses.values()), commands=COMMANDS))
+        super().__init__(dashboard_profile(uses=tuple(uses.values()), commands=commands(lease_s)))
 
     @property
     def line(self) -> FakeMovers:
@@ -115,6 +121,11 @@ async def driven(
     finally:
         task.cancel()
         await asyncio.wait((task,), timeout=WAIT_S)
+
+
+def calmly_driven(data: Path | None = None) -> AbstractAsyncContextManager[tuple[Wire, str]]:
+    """Serve a robot as `driven` does, with the longest lease."""
+    return driven(data, Wire(lease_s=CALM_LEASE_S))
 
 
 async def fresh(new_page: PageMaker, size: str = "desktop") -> Page:
@@ -197,3 +208,29 @@ def silence(wire: Wire) -> Callable[[], bool]:
 def moved(texts: list[str], command: str = "drive") -> Mapping[int, str]:
     """Return the frames among `texts` that move, by their place."""
     return {place: text for place, text in enumerate(texts) if is_motion(text, command)}
+
+
+class Lateness:
+    """How late this loop itself was, at worst: what no bound on a robot can leave out."""
+
+    def __init__(self) -> None:
+        self.most_s = 0.0
+
+    async def watch(self) -> None:
+        """Look every 10 ms, until cancelled."""
+        loop = asyncio.get_running_loop()
+        while True:
+            due_s = loop.time() + 0.01
+            await asyncio.sleep(0.01)
+            self.most_s = max(self.most_s, loop.time() - due_s)
+
+
+@asynccontextmanager
+async def lateness() -> AsyncIterator[Lateness]:
+    """Measure it for as long as the block lasts."""
+    found = Lateness()
+    task = asyncio.create_task(found.watch())
+    try:
+        yield found
+    finally:
+        task.cancel()

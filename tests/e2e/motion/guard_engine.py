@@ -1,18 +1,20 @@
 """An engine's process for the tests of the guard: a session that drives by itself.
 
 ``python guard_engine.py PORT [here]``. It obeys lines on standard input (``drive``, ``rest``,
-``release``, ``stop``, ``big``, ``files``, ``end``, or a command), ticks every 50 ms while it
-drives, and tells on standard output, with times of the monotonic clock in nanoseconds::
+``release``, ``stop``, ``big``, ``files``, ``backtrack``, ``end``, or a command), ticks every 50 ms
+while it drives, and tells on standard output, with times of the monotonic clock in nanoseconds::
 
     guard PID           of the guard, whenever there is another one
     linked STATE        of the robot's line
     tick TIME           a tick was given to the movers
     stopped REASON TIME what the movers told
     files NUMBER        open descriptors of this process
+    backtracked TIME TIME   from when to when a pattern has held up everything here
 """
 
 import asyncio
 import os
+import re
 import sys
 import tempfile
 import time
@@ -45,6 +47,7 @@ interfaces:
   default: { grid: hello, widgets: { hello: { use: button, bind: { press: hello } } } }
 """
 PERIOD_S = 0.05
+HELD_UP_NS = 600_000_000
 BIG = 200_000
 """Bytes of a frame that no robot takes which has stopped reading."""
 
@@ -111,8 +114,21 @@ class Engine:
             self.movers.stop({"drive": self.frames.stop_frame("drive")})
         elif word == "files":
             tell("files", len(os.listdir("/proc/self/fd")))
+        elif word == "backtrack":
+            tell("backtracked", *backtrack())
+            self.is_driving = False
         else:
             await self.session.command(word)
+
+
+def backtrack() -> tuple[int, int]:
+    """Match a pattern of which each letter more doubles the work, for longer than any lease."""
+    began_ns = time.monotonic_ns()
+    letters = 18
+    while time.monotonic_ns() - began_ns < HELD_UP_NS:
+        letters += 1
+        re.match("^(a+)+$", "a" * letters + "!")
+    return began_ns, time.monotonic_ns()
 
 
 def tell(*words: object) -> None:

@@ -7,7 +7,7 @@ from playwright.async_api import Page
 
 from tests.e2e.conftest import PageMaker
 from tests.e2e.dashboards import until, until_text
-from tests.e2e.motion.driving import LEFT, driven, fresh, moved, opened, push, text_of
+from tests.e2e.motion.driving import LEFT, calmly_driven, fresh, moved, opened, push, text_of
 
 pytestmark = pytest.mark.anyio
 
@@ -32,7 +32,7 @@ async def test_everybody_sees_who_drives_and_a_second_hand_moves_nothing(
     new_page: PageMaker,
 ) -> None:
     """The refusal names the holder; what the holder does goes on."""
-    async with driven() as (robot, address):
+    async with calmly_driven() as (robot, address):
         first, second = await opened(new_page, address), await opened(new_page, address)
         await push(first)
         await robot.until_moving()
@@ -53,7 +53,7 @@ async def test_a_hand_over_passes_through_a_stop_and_needs_a_new_gesture(
     new_page: PageMaker,
 ) -> None:
     """Asked, granted: the first stick is still held, and moves nothing; the second begins anew."""
-    async with driven() as (robot, address):
+    async with calmly_driven() as (robot, address):
         first, second = await opened(new_page, address), await opened(new_page, address)
         await push(first)
         await robot.until_moving()
@@ -80,7 +80,7 @@ async def test_a_request_can_be_turned_down_and_the_controls_taken_over(
     new_page: PageMaker,
 ) -> None:
     """Kept by a word; taken by whoever sits at the machine itself, through a stop."""
-    async with driven() as (robot, address):
+    async with calmly_driven() as (robot, address):
         first, second = await opened(new_page, address), await opened(new_page, address)
         await wish(first, "take")
         await wish(second, "ask")
@@ -98,7 +98,7 @@ async def test_a_request_can_be_turned_down_and_the_controls_taken_over(
 
 async def test_a_page_that_only_watches_sees_all_and_drives_nothing(new_page: PageMaker) -> None:
     """It has no button for the controls, its sticks move nothing, and its STOP works."""
-    async with driven() as (robot, address):
+    async with calmly_driven() as (robot, address):
         page = await fresh(new_page)
         await page.goto(f"{address}?watch")
         await says(page, "^Nobody drives; this page only watches$")
@@ -119,7 +119,7 @@ async def test_a_page_that_goes_stops_and_coming_back_resumes_nothing(
     new_page: PageMaker,
 ) -> None:
     """A reload with the stick held: stopped, nobody drives, and the new page sends nothing."""
-    async with driven() as (robot, address):
+    async with calmly_driven() as (robot, address):
         page = await opened(new_page, address)
         await push(page)
         await robot.until_moving()
@@ -135,7 +135,7 @@ async def test_a_page_that_goes_stops_and_coming_back_resumes_nothing(
 
 async def test_a_line_that_is_lost_and_back_resumes_nothing(new_page: PageMaker) -> None:
     """Offline and on again with the stick held: only a new gesture moves."""
-    async with driven() as (robot, address):
+    async with calmly_driven() as (robot, address):
         page = await opened(new_page, address)
         await push(page)
         await robot.until_moving()
@@ -160,7 +160,7 @@ async def test_a_line_that_is_lost_and_back_resumes_nothing(new_page: PageMaker)
 
 async def test_the_page_says_that_the_robot_refused(new_page: PageMaker) -> None:
     """Whatever the driver requires: the reason stands at the stick, and nothing is sent anew."""
-    async with driven() as (robot, address):
+    async with calmly_driven() as (robot, address):
         page = await opened(new_page, address)
         robot.frames.refusal = "The robot is not in automatic mode"
         await push(page)

@@ -6,6 +6,7 @@ from urc.guard import wire
 from urc.guard.client import LineSpec, LocalGuard
 from urc.model.codec import Payload
 from urc.motion.hold import Terms
+from urc.motion.stall import STALLED_S
 from urc.testing.clock import FakeClock, settle
 from urc.transports.base import ConnectFailed, PeerClosed, Transport, TransportError
 
@@ -91,7 +92,9 @@ class SlowWire(Wire):
 class Rig:
     """A guard of one line, and the engine's side of it."""
 
-    def __init__(self, robot: Wire, *, stalled_s: float = 0.25, is_strict: bool = False) -> None:
+    def __init__(
+        self, robot: Wire, *, stalled_s: float = STALLED_S, is_strict: bool = False
+    ) -> None:
         self.robot = robot
         self.clock = FakeClock()
         make = wire.Make("wire", "", {}, [], "", stalled_s, is_strict)

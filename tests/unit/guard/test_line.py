@@ -8,6 +8,7 @@ import pytest
 from tests.unit.guard.lines import STOP, TERMS, CountedWire, Rig, SlowWire, Wire
 from urc.guard import wire
 from urc.model.codec import Envelope
+from urc.motion.stall import AFRESH_S, SHORTEST_CUT_S, STOP_WITHIN_S
 from urc.testing.clock import settle
 from urc.transports.base import ConnectFailed, PeerClosed
 
@@ -68,6 +69,51 @@ async def test_tick_that_waited_too_long_renews_nothing(rig: Rig) -> None:
     assert rig.robot.written == [b"go 1", STOP]
 
 
+async def test_stop_is_the_newest_that_was_made(rig: Rig) -> None:
+    """Where it carries a number, the one before may count no more. It arms nothing."""
+    rig.guard.renew("drive", b"nobody")
+    await rig.drive()
+    rig.guard.renew("drive", b"stop 2")
+    await rig.clock.advance(0.3)
+    assert rig.robot.written == [b"go 1", b"stop 2"]
+    rig.guard.renew("drive", b"stop 3")
+    rig.tick(b"go 2")
+    await rig.clock.advance(0.1)
+    assert rig.robot.written == [b"go 1", b"stop 2"]
+    rig.guard.stop([("wire", "drive", TERMS._replace(stop=b"stop 4"))])
+    assert rig.robot.written == [b"go 1", b"stop 2", b"stop 4"]
+
+
+async def test_owed_stop_is_the_newest_too(rig: Rig) -> None:
+    await rig.drive()
+    rig.guard.renew("drive", b"stop 2")
+    rig.robot.cut()
+    await rig.clock.advance(0.1)
+    assert rig.robot.written == [b"go 1", b"stop 2"]
+
+
+@pytest.mark.parametrize("began_s", [0.0, 0.013, 0.049, 0.05])
+async def test_cut_of_a_fifth_of_a_second_is_followed_by_the_stop_in_a_tenth(
+    rig: Rig, began_s: float
+) -> None:
+    """However it falls between two ticks: the line is open afresh by then, with time left."""
+    robot = rig.robot
+    assert isinstance(robot, CountedWire)
+    await rig.drive()
+    await rig.clock.advance(0.05 - began_s)
+    cut_s = rig.clock.now()
+    robot.is_stuck = True
+    await rig.clock.advance(began_s)
+    while STOP not in robot.written:
+        rig.tick(b"go %d" % len(robot.written))
+        for _ in range(50):
+            await rig.clock.advance(0.001)
+            if STOP in robot.written:
+                break
+    assert rig.clock.now() - cut_s <= SHORTEST_CUT_S + STOP_WITHIN_S - AFRESH_S + 0.0011
+    assert robot.aborts == 1
+
+
 async def test_newest_waits_while_bytes_are_unsent(rig: Rig) -> None:
     """For a moment they may be: acknowledgements are put off. Then nothing more is written."""
     robot = rig.robot
@@ -111,7 +157,7 @@ async def test_stalled_line_is_reset_and_the_stop_is_first(rig: Rig) -> None:
     assert robot.aborts == 1
     assert robot.written.index(STOP) == len(robot.written) - 1
     assert robot.opens == 2
-    with pytest.raises(PeerClosed, match="has taken nothing for 250 ms while it moved"):
+    with pytest.raises(PeerClosed, match="has taken nothing for 220 ms while it moved"):
         await rig.transport.receive()
     assert await rig.stops() == [("drive", "revoked")]
 
@@ -306,3 +352,27 @@ async def test_two_controls_stop_before_either_moves(rig: Rig) -> None:
     rig.guard.tick("turn", b"right")
     await rig.clock.advance(0.05)
     assert rig.robot.written[:3] == [b"go 1", b"left", STOP]
+
+
+async def test_opening_that_took_long_once_does_not_make_the_next_attempts_slow(rig: Rig) -> None:
+    """A busy machine may take long; what the way takes is what the quickest of them took."""
+    robot = rig.robot
+    await rig.drive()
+    patience: list[float] = []
+    whole = robot.open
+
+    async def late(timeout_s: float) -> None:
+        patience.append(timeout_s)
+        if len(patience) == 1:
+            await rig.clock.sleep(0.06)
+        await whole(timeout_s)
+
+    robot.open = late  # type: ignore[method-assign]
+    for _ in range(3):
+        robot.cut()
+        await rig.clock.advance(0.3)
+        await rig.transport.open(1.0)
+        rig.guard.arm("wire", "drive", TERMS)
+        rig.tick(b"go on")
+        await settle()
+    assert patience == [0.07, 0.07, 0.07]

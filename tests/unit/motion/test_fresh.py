@@ -42,7 +42,7 @@ def test_everything_recorded_and_played_back_is_refused() -> None:
 
 
 def test_a_line_is_stalled_when_bytes_stay_for_a_quarter_of_a_second() -> None:
-    watch = StallWatch()
+    watch = StallWatch(0.25)
     assert not watch.saw(10, 1.0)
     assert watch.deadline == 1.25
     assert not watch.saw(10, 1.249)
@@ -50,7 +50,7 @@ def test_a_line_is_stalled_when_bytes_stay_for_a_quarter_of_a_second() -> None:
 
 
 def test_a_line_that_was_clear_in_between_is_not_stalled() -> None:
-    watch = StallWatch()
+    watch = StallWatch(0.25)
     watch.saw(10, 1.0)
     watch.saw(0, 1.1)
     assert not watch.saw(10, 1.3)

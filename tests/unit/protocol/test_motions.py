@@ -7,6 +7,7 @@ from urc.model.flow import Confirm
 from urc.problems import UrcError
 from urc.protocol.encode import BadArgument
 from urc.protocol.engine import Engine
+from urc.protocol.events import Request
 from urc.protocol.motions import NotNow
 
 DRIVER = """
@@ -87,18 +88,80 @@ def test_two_people_must_confirm_where_one_is_not_enough() -> None:
     assert move("turn", {"v": 1}, 0.1, ("ann", "bob")) == b"0 TURN 1\n"
 
 
-def test_counters_go_on_over_motion_and_commands() -> None:
-    """A frame that is made counts; one that stops, made in advance, does not."""
+def test_counters_go_on_over_motion_stops_and_commands() -> None:
+    """Each frame that is made has a number of its own, the stop made in advance too."""
     talk = Dialogue(DRIVER).connect()
     motions = talk.engine.motions
     assert motions.motion_frame("turn", {"v": 1}, 0.1) == b"0 TURN 1\n"
     assert motions.stop_frame("turn") == b"1 TURN 0\n"
-    assert motions.motion_frame("turn", {"v": 1}, 0.2) == b"1 TURN 1\n"
+    assert motions.motion_frame("turn", {"v": 1}, 0.2) == b"2 TURN 1\n"
     talk.run("ping")
-    assert motions.motion_frame("turn", {"v": 0}, 0.3) == b"3 TURN 0\n"
+    assert motions.motion_frame("turn", {"v": 0}, 0.3) == b"4 TURN 0\n"
+
+
+def test_whoever_keeps_a_stop_is_told_when_its_number_is_used_up() -> None:
+    """By motion, by a command, and on each connection anew; making a stop is no news."""
+    talk = Dialogue(DRIVER)
+    motions, used = talk.engine.motions, list[str]()
+    motions.on_count = used.append
+    assert (motions.is_lasting("turn"), motions.is_lasting("drive")) == (False, True)
+    for _ in range(2):
+        talk.connect()
+        motions.motion_frame("turn", {"v": 1}, 0.1)
+        motions.stop_frame("turn")
+        talk.run("ping")
+        assert used == ["wire", "wire"]
+        used.clear()
+        talk.engine.closed("wire", "gone", 1)
+
+
+def test_a_line_with_start_up_steps_is_told_ready_when_they_are_done() -> None:
+    """Then what it did not count may be said again."""
+    talk = Dialogue(DRIVER + "wire: on_connect: [{ send: LOGIN }, { expect: '^OK$' }]")
+    motions, ready = talk.engine.motions, list[str]()
+    motions.on_ready = ready.append
+    talk.connect()
+    assert (ready, motions.is_ready("drive")) == ([], False)
+    talk.says("OK")
+    assert (ready, motions.is_ready("drive")) == (["wire"], True)
 
 
 def test_its_errors_are_of_one_kind() -> None:
     """Whoever asks catches one."""
     assert issubclass(NotNow, UrcError)
     assert issubclass(BadArgument, UrcError)
+
+
+ASKED = """
+commands:
+  lamp: { send: "LED {{ on }}", args: { on: { type: integer, min: 0, max: 1 } } }
+  ping: { send: "{{ seq('n', 0, 9) }} PING", reply: { regex: '^PONG$' } }
+  look: { send: LOOK, reply: { regex: '^OK$' } }
+"""
+
+
+def test_whoever_asks_for_a_command_may_hear_what_is_sent_for_it() -> None:
+    """For the audit: on a free line at once, from the queue later, with the number it got."""
+    talk, sent = Dialogue(ASKED).connect(), list[object]()
+    for number, (name, given) in enumerate(
+        [("lamp", {"on": 1}), ("lamp", {"on": 2}), ("look", {}), ("ping", {})]
+    ):
+        events = talk.engine.command(Request(number, name, given, on_sent=sent.append), 0.1)
+        talk.take(events)
+    assert sent == [b"LED 1\n", b"LOOK\n"], "what is refused, or waits, is not sent"
+    talk.at(0.2).says("OK")
+    assert sent[2:] == [b"0 PING\n"]
+
+
+def test_a_robot_that_says_nothing_any_more_is_not_moved() -> None:
+    """Whether it was frozen, or the line is half open: nobody would see what it does."""
+    talk = Dialogue(DRIVER + "wire: stale_after: 2s").connect()
+    move = talk.engine.motions.motion_frame
+    talk.at(1.9)
+    assert move("turn", {"v": 1}, 1.9)
+    talk.at(2.1)
+    with pytest.raises(NotNow, match="the robot has said nothing for 2 s"):
+        move("turn", {"v": 1}, 2.1)
+    assert talk.engine.motions.stop_frame("turn"), "it is stopped all the same"
+    talk.says("MODE manual")
+    assert move("turn", {"v": 1}, 2.2)

@@ -1,5 +1,6 @@
 """What survives a restart: whole or not at all, and never in the way of stopping."""
 
+import asyncio
 import errno
 import json
 from pathlib import Path
@@ -53,7 +54,8 @@ async def test_a_full_disk_is_told_and_harms_nothing(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The old file stays whole, and the next write that can be made is made."""
-    file = LatchFile(tmp_path, "puppet")
+    file, told = LatchFile(tmp_path, "puppet"), list[str]()
+    file.on_fault = told.append
     file.keep(LeaseState(1, latched_by="ann"))
     await file.settle()
 
@@ -62,11 +64,36 @@ async def test_a_full_disk_is_told_and_harms_nothing(
 
     with monkeypatch.context() as patched:
         patched.setattr("os.fsync", full)
-        file.keep(LeaseState(2))
-        await file.settle()
+        for epoch in (2, 2, 2):
+            file.keep(LeaseState(epoch))
+            await file.settle()
+        assert told == ["No space left on device"], "once, however often it fails"
         assert file.fault == "No space left on device"
     assert json.loads((tmp_path / "puppet.latch.json").read_text())["epoch"] == 1
     assert len(list(tmp_path.iterdir())) == 1
     file.keep(LeaseState(3))
     await file.settle()
     assert (file.fault, file.load().epoch) == ("", 3)
+    assert told == ["No space left on device", ""]
+
+
+async def test_what_could_not_be_written_is_tried_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A stop that was latched while the disk was full survives a restart after all."""
+    monkeypatch.setattr("urc.runtime.latch.RETRY_S", 0.0)
+    well = asyncio.Event()
+    file = LatchFile(tmp_path, "puppet")
+    file.on_fault = lambda fault: None if fault else well.set()
+
+    faults = [OSError(errno.ENOSPC, "No space left on device")]
+
+    def full(descriptor: int) -> None:
+        if faults:
+            raise faults.pop()
+
+    monkeypatch.setattr("os.fsync", full)
+    file.keep(LeaseState(2, latched_by="ann"))
+    async with asyncio.timeout(10):
+        await well.wait()
+    assert file.load().latched_by == "ann"

@@ -1,0 +1,89 @@
+"""Figures of a run: printed as JSON, one line each, and written into the documentation if wanted.
+
+`./dev bench --full --write-docs` puts those of the motion benchmarks into docs/motion.md, between
+the marks that stand there.
+"""
+
+import json
+import re
+from collections.abc import Mapping, Sequence
+from math import inf
+from pathlib import Path
+
+__all__ = ["PAGE", "distribution", "tell", "told", "write_docs"]
+
+PAGE = Path(__file__).resolve().parents[1] / "docs" / "motion.md"
+BARS = 40
+"""Longest bar of a histogram, in characters."""
+
+told: list[dict[str, object]] = []
+"""What was told in this run."""
+
+
+def tell(figures: Mapping[str, object]) -> None:
+    """Print figures, and keep them."""
+    told.append(dict(figures))
+    print(json.dumps(figures), flush=True)
+
+
+def distribution(times_ms: Sequence[float], bin_ms: float) -> dict[str, object]:
+    """Return the quantiles of times, and their histogram: from how many ms on → how many."""
+    times = sorted(one for one in times_ms if one < inf)
+    if not times:
+        return {}
+    last = len(times) - 1
+    bins: dict[str, int] = {}
+    for time_ms in times:
+        name = f"{int(time_ms // bin_ms) * bin_ms:g}"
+        bins[name] = bins.get(name, 0) + 1
+    return {
+        "min_ms": round(times[0], 1),
+        "p50_ms": round(times[last // 2], 1),
+        "p99_ms": round(times[round(last * 0.99)], 1),
+        "max_ms": round(times[-1], 1),
+        "histogram_ms": bins,
+    }
+
+
+def write_docs(page: Path = PAGE) -> None:
+    """Put what was told into the page; what was not measured in this run stays as it was."""
+    text = page.read_text("utf-8")
+    for kind in sorted({str(one["figure"]) for one in told if "figure" in one}):
+        rows = [one for one in told if one.get("figure") == kind]
+        begin, end = f"<!-- figures: {kind} -->", "<!-- end -->"
+        found = re.search(rf"(?s){re.escape(begin)}.*?{end}", text)
+        if found is None:
+            raise SystemExit(f"bench: {page} has no place {begin!r}")
+        text = text[: found.start()] + f"{begin}\n{_section(rows)}{end}" + text[found.end() :]
+    page.write_text(text, "utf-8")
+
+
+def _section(rows: Sequence[Mapping[str, object]]) -> str:
+    columns = [name for name in rows[0] if name not in ("figure", "histogram_ms")]
+    lines = [f"| {' | '.join(_title(name) for name in columns)} |"]
+    lines.append("|---" * len(columns) + "|")
+    lines += [f"| {' | '.join(_cell(row.get(name, '')) for name in columns)} |" for row in rows]
+    drawn = [_drawing(row, columns[0]) for row in rows if row.get("histogram_ms")]
+    return "\n".join(lines) + "\n" + "".join(f"\n```text\n{one}```\n" for one in drawn)
+
+
+def _title(name: str) -> str:
+    words, _, unit = name.rpartition("_")
+    return f"{words.replace('_', ' ')}, {unit}" if unit in ("ms", "us") else name.replace("_", " ")
+
+
+def _cell(value: object) -> str:
+    if isinstance(value, list):
+        return ", ".join(map(str, value)) or "–"
+    return str(value)
+
+
+def _drawing(row: Mapping[str, object], name: str) -> str:
+    bins = row["histogram_ms"]
+    assert isinstance(bins, dict)
+    most = max(bins.values())
+    wide = max(len(start) for start in bins)
+    lines = [f"{row[name]}: from so many ms on, how often"]
+    for start, count in bins.items():
+        lines.append(f"{start:>{wide}} {'█' * max(1, round(count / most * BARS))} {count}")
+    return "\n".join(lines) + "\n"

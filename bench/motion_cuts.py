@@ -1,0 +1,106 @@
+"""What comes through when a robot's link was cut while it was driven: on every kind of line.
+
+Real programs on both sides of a relay between two network namespaces: `urc serve` with its guards,
+and robots, brokers and log-in servers. Each robot's own link is cut, for times that are spread
+evenly over their logarithm, at different moments for each; every second control is let go within.
+Needs root and /dev/net/tun; otherwise left out, and told.
+"""
+
+import json
+import random
+import tempfile
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from math import inf
+from pathlib import Path
+
+from bench.figures import distribution, tell
+from bench.harness import Result
+from urc.testing.rig import can_relay
+from urc.testing.rig_cuts import Cut, CutRig
+from urc.testing.rig_kinds import KINDS, bounds_of
+
+__all__ = ["run"]
+
+EACH, EACH_IF_FULL = 8, 200
+LANES, LANES_IF_FULL = 2, 6
+"""Robots of each kind, all at once."""
+SHORTEST_S = 0.2
+LONGEST_S, LONGEST_IF_FULL_S = 3.0, 60.0
+BIN_MS = 10
+
+
+def run(*, full: bool) -> Sequence[Result]:
+    """Cut; the worst of each kind is held to its bounds."""
+    if not can_relay():
+        print(json.dumps({"left_out": "motion_cuts: needs root and /dev/net/tun"}))
+        return []
+    each, lanes = (EACH_IF_FULL, LANES_IF_FULL) if full else (EACH, LANES)
+    longest_s = LONGEST_IF_FULL_S if full else LONGEST_S
+    kinds = KINDS * lanes
+    dice = random.Random(3)  # noqa: S311 - the same cuts in every run
+    plans = {kind: _spread(each, longest_s, dice) for kind in KINDS}
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        CutRig(Path(folder), kinds) as rig,
+        ThreadPoolExecutor(len(kinds)) as threads,
+    ):
+        rig.cut(SHORTEST_S)  # starts the guards
+        done = [threads.submit(_lane, rig, lane, plans[kinds[lane]]) for lane in rig.lanes]
+        cuts = [cut for one in done for cut in one.result()]
+    return [_told(kind, [one for one in cuts if one.kind == kind], each) for kind in KINDS]
+
+
+def _spread(count: int, longest_s: float, dice: random.Random) -> list[tuple[float, float]]:
+    """Return times in any order, each with the part of it after which a control is let go."""
+    ratio = longest_s / SHORTEST_S
+    times = [SHORTEST_S * ratio ** (place / (count - 1)) for place in range(count)]
+    dice.shuffle(times)
+    return [(seconds, 0.1 + dice.random() * 0.8) for seconds in times]
+
+
+def _lane(rig: CutRig, lane: int, plan: list[tuple[float, float]]) -> list[Cut]:
+    """Do what is left of the plan, with others at it; a cut that says nothing is done again."""
+    cuts: list[Cut] = []
+    while True:
+        try:
+            seconds, share = plan.pop()
+        except IndexError:
+            return cuts
+        cuts.append(rig.cut_one(lane, seconds, share))
+        if cuts[-1].is_excused and sum(one.is_excused for one in cuts) < len(cuts) / 2:
+            plan.append((seconds, share))
+
+
+def _told(kind: str, cuts: Sequence[Cut], wanted: int) -> Result:
+    said = [one for one in cuts if not one.is_excused]
+    bad = [one for one in said if not one.is_good]
+    stops_ms = [one.stop_ms for one in said if one.is_stop_needed]
+    figures = {
+        "figure": "motion_cuts",
+        "line": kind,
+        "cuts": len(said),
+        "longest_cut_s": round(max((one.lasted_s for one in said), default=0), 1),
+        "broken": len(bad),
+        "faults": sorted({one.fault for one in bad if one.fault}),
+        "excused": len(cuts) - len(said),
+        "oldest_motion_ms": round(max((one.oldest_ms for one in said), default=0.0)),
+        **distribution(stops_ms, BIN_MS),
+    }
+    tell(figures)
+    for one in bad:
+        print(json.dumps({"broken": kind, **one._asdict()}), flush=True)
+    bounds = bounds_of(kind)
+    oldest = max((one.oldest_ms for one in said), default=inf) / bounds.oldest_ms
+    slowest = max(stops_ms, default=0.0) / bounds.stop_ms
+    is_whole = len(said) >= wanted and not any(one.fault for one in said)
+    worst = max(oldest, slowest) if is_whole else inf
+    return Result(
+        name=f"motion after cuts of {kind}: worst of {len(said)} / what is allowed",
+        ratio=round(worst, 3),
+        goal=1.0,
+        baseline_ms=bounds.stop_ms,
+        subject_ms=round(max(stops_ms, default=0.0), 1),
+        spread=1.0,
+        rounds=len(said),
+    )

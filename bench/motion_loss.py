@@ -1,0 +1,93 @@
+"""How often a link that loses packets stops a robot that nobody let go of.
+
+Pages drive over a relay with 100 ms there and back, and with random loss in both directions; each
+that is stopped begins a new gesture. Needs root and /dev/net/tun; otherwise left out, and told.
+"""
+
+import json
+import tempfile
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+from bench.figures import tell
+from bench.harness import Result
+from urc.testing.rig import can_relay
+from urc.testing.rig_deaths import Rig
+
+__all__ = ["run"]
+
+LANES = 20
+DELAY_MS = 50
+LOOK_S = 0.25
+LATE_MS, LATE_WITHIN_NS = 50.0, 600_000_000
+"""A machine that was so late within this time before a stop may have brought it about."""
+MOST = {0: None, 1: 0.1, 3: 4.0}
+"""Loss in percent → stops a minute, at most; without any, what the machine itself brings about."""
+LASTS_S, LASTS_IF_FULL_S = {0: 10, 1: 15, 3: 10}, {0: 60, 1: 180, 3: 60}
+"""Loss in percent → for how long all drive at once."""
+
+
+def run(*, full: bool) -> Sequence[Result]:
+    """Drive at each loss."""
+    if not can_relay():
+        print(json.dumps({"left_out": "motion_loss: needs root and /dev/net/tun"}))
+        return []
+    lasts_s = LASTS_IF_FULL_S if full else LASTS_S
+    results: list[Result] = []
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        Rig(Path(folder), lanes=LANES, has_relay=True) as rig,
+    ):
+        rig.bout("close")
+        for loss, most in MOST.items():
+            rig.weather(f"delay {DELAY_MS}", f"loss {loss}")
+            minutes, stops, excused = _drive(rig, lasts_s[loss])
+            rig.weather("delay 0", "loss 0")
+            rate = stops / minutes
+            figures = {"loss_percent": loss, "minutes": round(minutes, 1), "stops": stops}
+            figures["excused"] = excused
+            tell({"figure": "motion_loss", **figures, "stops_a_minute": round(rate, 3)})
+            if most is not None:
+                results.append(_result(loss, rate, most, stops))
+    return results
+
+
+def _drive(rig: Rig, seconds: float) -> tuple[float, int, int]:
+    """Let every lane be driven for so long; return the minutes of motion, and the stops.
+
+    Those before which the machine itself was late are the third number.
+    """
+    until_s = time.monotonic() + seconds
+    pages = {lane: rig.drive(lane) for lane in rig.lanes}
+    began_ns = {lane: time.monotonic_ns() for lane in pages}
+    moved_ns = stops = excused = 0
+    while time.monotonic() < until_s:
+        time.sleep(LOOK_S)
+        for lane, number in pages.items():
+            heard = rig.robots.since(lane, began_ns[lane])
+            if len(heard) > 1 and heard[-1].text == "M 0":
+                at_ns = heard[-1].time_ns
+                is_late = rig.late_ms(at_ns - LATE_WITHIN_NS, at_ns) > LATE_MS
+                stops, excused = stops + (not is_late), excused + is_late
+                moved_ns += heard[-1].time_ns - heard[0].time_ns
+                rig.operators.kill(number)
+                began_ns[lane] = time.monotonic_ns()
+                pages[lane] = rig.drive(lane)
+    for lane, number in pages.items():
+        heard = rig.robots.since(lane, began_ns[lane])
+        moved_ns += heard[-1].time_ns - heard[0].time_ns if heard else 0
+        rig.operators.kill(number)
+    return moved_ns / 60e9, stops, excused
+
+
+def _result(loss: int, rate: float, most: float, stops: int) -> Result:
+    return Result(
+        name=f"motion: stops a minute at {loss} % loss and {2 * DELAY_MS} ms / what is allowed",
+        ratio=round(rate / most, 3),
+        goal=1.0,
+        baseline_ms=0.0,
+        subject_ms=0.0,
+        spread=1.0,
+        rounds=stops,
+    )

@@ -1,0 +1,106 @@
+"""A desk among robots and screens that keep what they are told."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from urc.model.codec import Payload, WriteSpec
+from urc.model.driver import Argument, Command, Driver, TransportSpec
+from urc.model.flow import Hold
+from urc.model.values import Reading
+from urc.motion.fresh import Input
+from urc.motion.hold import Reason, Terms
+from urc.motion.lease import Client, LeaseState
+from urc.runtime.motion import MotionDesk
+from urc.testing.movers import FakeFrames
+
+__all__ = ["DRIVER", "Movers", "Scene", "held"]
+
+SPEED = Argument("speed", min=-1.0, max=1.0, default=0.0, is_required=False)
+
+
+def held(name: str, line: str = "wire") -> Command:
+    """Return a held command with a speed."""
+    hold = Hold(0.05, {"speed": 0.0}, 0.3)
+    return Command(name, line, WriteSpec("text", {}), {"speed": SPEED}, hold=hold)
+
+
+DRIVER = Driver(
+    {"wire": TransportSpec("wire", "tcp"), "air": TransportSpec("air", "udp")},
+    commands={
+        "drive": held("drive"),
+        "lift": held("lift", "air"),
+        "beep": Command("beep", "wire", WriteSpec("text", {})),
+    },
+)
+
+
+class Movers:
+    """Keeps what it is told."""
+
+    def __init__(self) -> None:
+        self.told: list[str] = []
+        self.terms: dict[str, Terms] = {}
+        self.is_up = True
+
+    def arm(self, command: str, terms: Terms) -> None:
+        self.told.append(f"arm {command}")
+        self.terms[command] = terms
+
+    def tick(self, command: str, data: Payload) -> None:
+        assert isinstance(data, bytes)
+        self.told.append(data.decode())
+
+    def renew(self, command: str, stop: Payload) -> None:
+        assert isinstance(stop, bytes)
+        self.told.append(f"stop is {stop.decode()}")
+
+    def is_open(self, command: str) -> bool:
+        return self.is_up
+
+    def release(self, command: str) -> None:
+        self.told.append(f"release {command}")
+
+    def stop(self, stops: Mapping[str, Payload]) -> None:
+        self.told.append(f"stop {' '.join(stops)}")
+
+    async def stops(self) -> Sequence[tuple[str, Reason]]:
+        raise NotImplementedError
+
+
+class Scene:
+    """A desk with a robot, two drivers, an engineer and a viewer."""
+
+    def __init__(
+        self,
+        kept: LeaseState | None = None,
+        *,
+        is_attached: bool = True,
+        driver: Driver = DRIVER,
+    ) -> None:
+        self.desk = MotionDesk(driver, kept=kept)
+        self.movers = Movers()
+        self.frames = FakeFrames(driver)
+        if is_attached:
+            self.desk.attach(self.frames, self.movers)
+        for name, role in {"ann": "driver", "bob": "driver", "eve": "engineer"}.items():
+            self.desk.join(Client(name, name, role))  # type: ignore[arg-type]
+        self.desk.join(Client("vic", "vic", "viewer"))
+        self.now = 100.0
+        self._number = 0
+
+    def tick(self, who: str = "ann", command: str = "drive", **arguments: Reading) -> str:
+        """Tick as a page does that has just heard the beat."""
+        self._number += 1
+        self.now += 0.05
+        echo = self.desk.beat(who, self.now)
+        given = Input(self.desk.lease.state.epoch, self._number, echo)
+        return self.desk.tick(who, command, arguments, given, self.now)
+
+    def drive(self, who: str, verb: str, **more: Any) -> str:
+        """Say something about the controls."""
+        return self.desk.drive(who, verb, self.now, **more)
+
+    def heard(self) -> list[str]:
+        """Return what the movers were told since the last call."""
+        told, self.movers.told = self.movers.told, []
+        return told

@@ -1,0 +1,28 @@
+"""The event loop of processes that move robots: uvloop where it is installed (``urc[fast]``)."""
+
+import asyncio
+import sys
+from collections.abc import Callable, Coroutine
+from typing import Any, TypeVar
+
+__all__ = ["run"]
+
+_Result = TypeVar("_Result")
+
+
+def run(work: Coroutine[Any, Any, _Result]) -> _Result:
+    """Run `work` to its end, as `asyncio.run` does."""
+    with asyncio.Runner(loop_factory=_fastest()) as runner:
+        return runner.run(work)
+
+
+def _fastest() -> Callable[[], asyncio.AbstractEventLoop] | None:
+    """Return what makes the fastest loop there is; None: Python's own is it."""
+    if sys.platform == "win32":  # the usual one there cannot watch the pipe to the guard
+        return asyncio.SelectorEventLoop
+    try:
+        import uvloop
+    except ImportError:
+        return None
+    make: Callable[[], asyncio.AbstractEventLoop] = uvloop.new_event_loop
+    return make

@@ -1,0 +1,119 @@
+"""What the desk of a robot is made of: its held commands, and what it asks of others."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+from urc.model.codec import Payload
+from urc.model.driver import Command, Driver
+from urc.model.flow import Hold
+from urc.model.values import Reading
+from urc.motion.hold import Reason, Terms
+from urc.motion.slew import Slew
+
+__all__ = ["Control", "Frames", "Movers", "control_of", "is_lossy"]
+
+
+class Frames(Protocol):
+    """What is asked of the engine: `urc.protocol.motions.Motions`."""
+
+    on_count: Callable[[str], None]
+    """To be set: told a line on which a number was used up that its stops must come after."""
+    on_ready: Callable[[str], None]
+    """To be set: told a line that was connected, once its start-up steps are done."""
+
+    def is_lasting(self, command: str) -> bool:
+        """Return whether the stop of a held command is the same for ever."""
+
+    def is_ready(self, command: str) -> bool:
+        """Return whether its line is connected, and its start-up steps are done."""
+
+    def stop_frame(self, command: str) -> Payload:
+        """Return what stops the motion of a held command; raise `UrcError` when it cannot."""
+
+    def motion_frame(self, command: str, arguments: Mapping[str, Reading], now: float) -> Payload:
+        """Return the frame of a held command; raise `UrcError` that says why not."""
+
+
+class Movers(Protocol):
+    """Who owns the wire: the guard process, or this one."""
+
+    def arm(self, command: str, terms: Terms) -> None:
+        """Take ticks of `command` from now on, under these terms."""
+
+    def tick(self, command: str, data: Payload) -> None:
+        """Renew the lease of `command`; `data` is its newest frame."""
+
+    def renew(self, command: str, stop: Payload) -> None:
+        """Let `stop` be what stops `command` from now on; it arms nothing."""
+
+    def is_open(self, command: str) -> bool:
+        """Return whether its line is connected, by the newest that is known."""
+
+    def release(self, command: str) -> None:
+        """Stop `command`, which was let go."""
+
+    def stop(self, stops: Mapping[str, Payload]) -> None:
+        """Stop at once, whatever moves; these are the stop frames of all held commands."""
+
+    async def stops(self) -> Sequence[tuple[str, Reason]]:
+        """Wait for the next stop frames that were written: command, and why it stopped.
+
+        In their order, at least one. Being cancelled loses none. A control that `stop` stopped is
+        told with ``stopped`` even when it did not move: it says that the robot's line took it.
+        """
+
+
+@dataclass(slots=True)
+class Control:
+    """One held command, as its screen knows it."""
+
+    line: str
+    hold: Hold
+    slew: Slew | None
+    defaults: Mapping[str, Reading]
+    """Of the arguments that it limits."""
+    is_greeted: bool
+    """The line has start-up steps: what is said before them may not count."""
+    is_armed: bool = False
+    stop: Payload | None = None
+    """What stops it, as the movers know it."""
+    is_owed_again: bool = False
+    """Its stop went out on a line that was not ready: it is repeated when it is."""
+    needs_release: bool = False
+    closed_epoch: int = -1
+    """Lease in which it stopped by itself: it goes on in a later one only."""
+
+    def rest(self) -> None:
+        """Take note that it stands."""
+        if self.slew is not None:
+            self.slew.begin()
+
+    def limited(self, arguments: Mapping[str, Reading], now: float) -> Mapping[str, Reading]:
+        """Return what may be asked of the robot now, of what its driver wants."""
+        if self.slew is None:
+            return arguments
+        return self.slew.limit({**self.defaults, **arguments}, now)
+
+
+def control_of(driver: Driver, command: Command) -> Control:
+    """Return a held command of `driver`, at rest."""
+    hold = command.hold
+    assert hold is not None  # noqa: S101 - no others are asked for
+    slew, defaults = None, {}
+    if hold.slew:
+        arguments = command.arguments
+        defaults = {name: arguments[name].default for name in hold.slew if name in arguments}
+        rest = {name: one.default for name, one in command.arguments.items()} | dict(hold.release)
+        slew = Slew(hold.slew, rest, hold.repeat_s)
+    greeted = bool(driver.transports[command.transport].on_connect)
+    return Control(command.transport, hold, slew, defaults, greeted)
+
+
+_LOSSY = frozenset(("udp", "serial", "mqtt", "rosbridge"))
+"""Kinds of line on which one stop may be lost on the way."""
+
+
+def is_lossy(driver: Driver, transport: str) -> bool:
+    """Return whether what is written to a line may be lost on the way without anybody noticing."""
+    return driver.transports[transport].type in _LOSSY

@@ -1,0 +1,91 @@
+"""What a package may do, derived from its documents: they are data, and nothing else runs here."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from urc.config.load import Checked, check
+from urc.expressions import Template
+from urc.model.driver import TransportSpec
+from urc.model.profile import Profile
+from urc.problems import ProblemsError, UrcError
+from urc.runtime.catalog import built_in_catalog
+from urc.runtime.shelves import shelf_of
+from urc.shipped import shipped
+
+__all__ = ["permissions"]
+
+
+def permissions(document: Path, folder: Path, widgets: Sequence[str]) -> list[str]:
+    """Return what a package may do, one line each.
+
+    Args:
+        document: the package's own.
+        folder: with all that the package needs; nothing outside may be named.
+        widgets: names of the widgets that come along.
+
+    Raises:
+        ProblemsError: the document is broken.
+        UrcError: it refers to a file outside.
+    """
+    checked = check(document, built_in_catalog(), shelf_of(document))
+    _check_inside(checked, folder)  # first: a finding would show a line of the file outside
+    errors = [problem for problem in checked.problems if problem.severity == "error"]
+    if errors:
+        raise ProblemsError(errors)
+    lines = _of_profile(checked.profile) if checked.profile else []
+    return [
+        *lines,
+        *(
+            f"widget {name}: a program in the dashboard's page, with all that the page may do"
+            for name in widgets
+        ),
+    ] or ["nothing: it is a layout, with no connection of its own"]
+
+
+def _check_inside(checked: Checked, folder: Path) -> None:
+    homes = (folder.resolve(), shipped("widgets").resolve())
+    for file in checked.files:
+        real = Path(file).resolve()
+        if not any(real.is_relative_to(home) for home in homes):
+            raise UrcError(f"{checked.files[0]}: it refers to {file}, which is not in the package")
+
+
+def _of_profile(profile: Profile) -> list[str]:
+    lines = [_of_transport(spec, profile) for spec in profile.driver.transports.values()]
+    for setting in profile.settings.values():
+        if setting.type == "path":
+            lines.append(f"file: the one that the setting {setting.name} names")
+        if setting.is_secret:
+            lines.append(f"secret: is given what the setting {setting.name} holds")
+    commands = profile.driver.commands
+    moving = sorted(name for name, command in commands.items() if command.hold)
+    if commands:
+        lines.append(f"commands: {', '.join(sorted(commands))}")
+    if moving:
+        lines.append(f"moves the robot: {', '.join(moving)}")
+    return lines
+
+
+def _of_transport(spec: TransportSpec, profile: Profile) -> str:
+    """Return the line of a connection: its type, and where each of its options comes from."""
+    options = [f"{name} {_told(value, profile)}" for name, value in sorted(spec.options.items())]
+    through = f" through {spec.via}" if spec.via else ""
+    return f"connects by {spec.type} ({spec.name}){through}: {', '.join(options) or 'no options'}"
+
+
+def _told(value: Any, profile: Profile) -> str:
+    """Return an option as it is written; of a setting also what it is without an answer."""
+    if isinstance(value, Template):
+        text = value.source
+        used = [
+            f"{name} is {setting.default} by default"
+            for name, setting in profile.settings.items()
+            if name in value.settings and setting.default is not None and not setting.is_secret
+        ]
+        return f"from the settings: {text}" + (f" ({', '.join(used)})" if used else "")
+    if isinstance(value, (list, tuple)):
+        return ", ".join(_told(one, profile) for one in value) or "none"
+    if isinstance(value, dict):
+        return ", ".join(f"{name} {_told(one, profile)}" for name, one in value.items()) or "none"
+    return f"always {value}"

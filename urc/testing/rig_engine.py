@@ -1,0 +1,102 @@
+"""What becomes of the robots when the server hangs or dies, or one of its guards is killed."""
+
+import os
+import signal
+import time
+
+from urc.testing.rig_deaths import Rig, Trial
+
+__all__ = ["ENGINE_DEATHS", "RESTART_MS", "EngineRig"]
+
+ENGINE_DEATHS = ("engine-stopped", "engine-killed", "engine-blocked")
+RESTART_MS = 500.0
+"""A guard that was killed is replaced within this time, and the new one stops first."""
+OPEN_MS = 100.0
+"""What it may take beside that to connect to the robot, and to be heard there."""
+AGAIN_S = 10.0
+BLOCKED_S = 30.0
+
+
+class EngineRig(Rig):
+    """Robots that are driven while something happens to the server."""
+
+    can_hang = True
+
+    def engine_bout(self, death: str) -> list[Trial]:
+        """Drive every robot, let the engine die or hang; return what came of it."""
+        began_ns = time.monotonic_ns()
+        pages = dict(self._begin("outside"))
+        for number in pages.values():
+            self.operators.await_told("dying", number)  # it has driven for a while, and drives on
+        told = len(self.server.lines)
+        self._strike(death)
+        heard = {lane: self._await_stop(lane, began_ns) for lane in pages}
+        self._mend(death, told)
+        trials = [
+            self._judge(death, lane, began_ns, heard[lane], number)
+            for lane, number in pages.items()
+        ]
+        for number in pages.values():
+            self.operators.kill(number)
+        return trials
+
+    def _strike(self, death: str) -> None:
+        numbers = {
+            "engine-stopped": signal.SIGSTOP,
+            "engine-killed": signal.SIGKILL,
+            "engine-blocked": signal.SIGUSR2,
+        }
+        self.server.signal(numbers[death])
+
+    def _mend(self, death: str, told: int) -> None:
+        if death == "engine-stopped":
+            self.server.signal(signal.SIGCONT)
+        elif death == "engine-blocked":
+            self.server.wait_for("backtracked", BLOCKED_S, after=told)
+        else:
+            self.server.close()
+            self.server = self._programs.enter_context(self._serve())
+            self._watch()
+
+    def guard_bout(self) -> list[Trial]:
+        """Drive every robot, kill their guards one after the other; return what came of it."""
+        began_ns = time.monotonic_ns()
+        pages = dict(self._begin("outside"))
+        for number in pages.values():
+            self.operators.await_told("dying", number)
+        trials = [trial for guard in self.server.guards for trial in self._kill(guard)]
+        for number in pages.values():
+            self.operators.kill(number)
+        for lane in pages:
+            self._await_stop(lane, began_ns)
+        return trials
+
+    def _kill(self, guard: int) -> list[Trial]:
+        """Return one trial; none when its robot stood still already, on a machine that is busy."""
+        killed_ns = time.monotonic_ns()
+        os.kill(guard, signal.SIGKILL)
+        robots = self.robots
+        lanes = range(len(robots.visits))
+
+        def again() -> list[tuple[int, int]]:
+            """Return the lanes that were connected anew, and when."""
+            return [
+                (lane, at)
+                for lane in lanes
+                for at, is_open in robots.visits[lane]
+                if is_open and at > killed_ns and (robots.since(lane, at) or not moved(lane))
+            ]
+
+        def moved(lane: int) -> bool:
+            before = [one.text for one in robots.heard[lane] if one.time_ns <= killed_ns]
+            return before[-1:] != ["M 0"]
+
+        robots.wait_until(lambda: bool(again()), AGAIN_S, "another guard with something to say")
+        lane, opened_ns = again()[0]
+        if not moved(lane):
+            return []
+        first = robots.since(lane, opened_ns)[0]
+        fault = "" if first.text == "M 0" else f"{first.text} came before the stop"
+        late_ms = self.late_ms(killed_ns, first.time_ns)
+        took_ms = (first.time_ns - killed_ns) / 1e6
+        return [Trial("guard-killed", took_ms, fault, late_ms, RESTART_MS + OPEN_MS)]

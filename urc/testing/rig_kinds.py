@@ -1,0 +1,185 @@
+"""The kinds of line that robots of the rig have, and the programs that stand between: real ones.
+
+For each kind: the robot's place (see `urc.testing.rig_robot`), its document, and what is required
+of it after a cut. Where a line is opened afresh at once, no motion older than 300 ms may come, and
+the stop within 100 ms. Where that is dear, or cannot be noticed, other bounds hold.
+"""
+
+import shutil
+import subprocess
+from pathlib import Path
+from typing import Final, NamedTuple
+
+from urc.testing.rig import SERVER_ADDRESS, Program
+
+__all__ = [
+    "KINDS",
+    "Bounds",
+    "Counterpart",
+    "bounds_of",
+    "document",
+    "place_of",
+    "start_counterpart",
+]
+
+KINDS: Final = (
+    "tcp",
+    "telnet",
+    "websocket",
+    "udp",
+    "ssh",
+    "serial",
+    "mqtt",
+    "rosbridge",
+)
+_AT_ONCE: Final = ("tcp", "telnet", "websocket")
+FIRST_PORT: Final = {"ssh": 2200, "mqtt": 18830}
+"""Of programs of others, in a namespace where nobody else listens; one a robot."""
+
+
+class Bounds(NamedTuple):
+    """What is required after a cut."""
+
+    oldest_ms: float
+    """No motion that is older may reach the robot."""
+    most_late: int | None
+    """Motions older than 300 ms that may come at most."""
+    stop_ms: float
+    """The stop is to come within this time of the robot's being reachable."""
+    unnoticed_s: float
+    """A cut that is shorter may pass unnoticed by a control that is held all the time."""
+    is_told: bool = True
+    """Whether URC can know that something is lost; where it cannot, a stop may be lost, too."""
+    is_repeated: bool = False
+    """Whether a stop is written several times."""
+
+
+def bounds_of(kind: str) -> Bounds:
+    """Return what is required of a kind."""
+    if kind in _AT_ONCE:
+        return Bounds(300.0, 0, 100.0, 0.45)
+    if kind == "udp":
+        return Bounds(300.0, 0, 100.0, float("inf"), is_told=False, is_repeated=True)
+    # At most one, no older than a second, and a line that is opened anew as fast as it can be.
+    return Bounds(1000.0, 1, 1000.0, 1.3, is_repeated=kind != "ssh")
+
+
+_DOCUMENT = """\
+urc: 1
+kind: robot
+name: lane-{lane}
+title: Lane {lane}
+summary: A robot of the rig. It stamps what it hears.
+transports:
+  wire: {{ {options} }}
+commands:
+  go:
+    send: {send}
+    args: {{ t: {{ type: integer, min: 0 }} }}
+    hold: {{ repeat: 50ms, lease: 250ms, release: {{ t: 0 }}, watchdog: none }}
+"""
+_LINES = "framing: { type: delimiter, tx: LF, rx: LF }"
+_TEXT = '"M {{ t }}"'
+_OPTIONS: Final = {
+    "tcp": "type: tcp, host: HOST, port: PORT, " + _LINES,
+    "telnet": "type: telnet, host: HOST, port: PORT, " + _LINES,
+    "websocket": 'type: websocket, url: "ws://HOST:PORT/"',
+    "udp": "type: udp, host: HOST, port: PORT, framing: { type: datagram }",
+    "ssh": (
+        'type: ssh, host: HOST, port: OTHER, username: robot, key: "KEY", host_key: "SHOWN", '
+        "mode: exec, command: nc 127.0.0.1 PORT, reconnect: { initial: 100ms }, " + _LINES
+    ),
+    "serial": 'type: serial, port: "socket://HOST:PORT", baud: 115200, ' + _LINES,
+    "mqtt": "type: mqtt, host: HOST, port: OTHER",
+    "rosbridge": "type: rosbridge, host: HOST, port: PORT, ros: 2",
+}
+_SENDS: Final = {
+    "mqtt": '{ publish: { topic: go, text: "M {{ t }}" } }',
+    "rosbridge": '{ publish: { topic: /go, type: std_msgs/Int64, json: { data: "{{ t }}" } } }',
+}
+
+
+class Counterpart(Program):
+    """A program of others that a robot needs; ends when told to, or with whoever started it."""
+
+    def __init__(self, command: list[str], *, inside: tuple[str, ...], port: int) -> None:
+        """Run `command`, which listens at `port`."""
+        self.port = port
+        self.options: dict[str, str] = {}
+        """What the document says of it."""
+        script = '"$@" & child=$!; cat > /dev/null; kill -9 $child; wait $child'
+        # By force: unshare lets itself be told nothing else.
+        super().__init__(["sh", "-c", script, "sh", *command], inside=inside)
+
+
+def place_of(kind: str, lane: int) -> str:
+    """Return the place of a robot of this kind, as `rig_robot` takes it."""
+    if kind == "mqtt":
+        return f"mqtt:127.0.0.1:{FIRST_PORT[kind] + lane}"
+    if kind == "ssh":
+        return "tcp:127.0.0.1:0"
+    door = {"udp": "udp", "websocket": "ws", "rosbridge": "bridge"}.get(kind, "tcp")
+    return f"{door}:{SERVER_ADDRESS}:0"
+
+
+def document(kind: str, lane: int, port: int, other: Counterpart | None) -> str:
+    """Return the document of a robot; `port` is its own, `other` what stands before it."""
+    options = _OPTIONS[kind].replace("HOST", SERVER_ADDRESS).replace("PORT", str(port))
+    if other is not None:
+        options = options.replace("OTHER", str(other.port))
+        for name, value in other.options.items():
+            options = options.replace(name, value)
+    return _DOCUMENT.format(lane=lane, options=options, send=_SENDS.get(kind, _TEXT))
+
+
+def start_counterpart(
+    kind: str, lane: int, folder: Path, inside: tuple[str, ...]
+) -> Counterpart | None:
+    """Start what a robot of this kind needs beside itself; None when that is nothing."""
+    if kind == "mqtt":
+        return _broker(FIRST_PORT[kind] + lane, folder / f"broker-{lane}.conf", inside)
+    if kind == "ssh":
+        return _login(FIRST_PORT[kind] + lane, folder / f"login-{lane}", inside)
+    return None
+
+
+def _broker(port: int, file: Path, inside: tuple[str, ...]) -> Counterpart:
+    file.write_text(
+        f"listener {port} 0.0.0.0\nallow_anonymous true\nuser root\nset_tcp_nodelay true\n", "utf-8"
+    )
+    program = shutil.which("mosquitto") or "/usr/sbin/mosquitto"
+    return Counterpart([program, "-c", str(file)], inside=inside, port=port)
+
+
+_USER_ID: Final = 65433
+_ENTER: Final = (
+    'mount --bind "$1/passwd" /etc/passwd && mount --bind "$1/shadow" /etc/shadow '
+    '&& mount --bind "$1" /run/sshd && exec "$2" -D -e -f "$1/sshd_config"'
+)
+
+
+def _login(port: int, folder: Path, inside: tuple[str, ...]) -> Counterpart:
+    """Start OpenSSH's server, with a user of its own: nothing is changed on the machine."""
+    folder.mkdir(mode=0o755)
+    for name in ("host", "user"):
+        make = ["ssh-keygen", "-q", "-t", "ed25519", "-N", "", "-f", str(folder / name)]
+        subprocess.run(make, check=True, timeout=30)  # noqa: S603 - a program by its name
+    users = Path("/etc/passwd").read_text("utf-8")
+    home = f"robot:x:{_USER_ID}:{_USER_ID}::/:/bin/sh\n"
+    (folder / "passwd").write_text(users + home, "utf-8")
+    (folder / "shadow").touch(mode=0o600)
+    (folder / "shadow").write_text("root:*:1:0:::::\nrobot:*:1:0:::::\nsshd:*:1:0:::::\n", "utf-8")
+    (folder / "sshd_config").write_text(
+        f"Port {port}\nListenAddress 0.0.0.0\nHostKey {folder / 'host'}\nStrictModes no\n"
+        "AuthorizedKeysFile /run/sshd/user.pub\nUsePAM no\nPidFile none\nMaxStartups 100\n"
+        "PrintMotd no\nPrintLastLog no\nLogLevel ERROR\nUseDNS no\n",
+        "utf-8",
+    )
+    Path("/run/sshd").mkdir(mode=0o755, exist_ok=True)  # it refuses to start without
+    program = shutil.which("sshd") or "/usr/sbin/sshd"
+    command = ["unshare", "--mount", "--pid", "--fork", "--kill-child", "sh", "-c", _ENTER, "sh"]
+    made = Counterpart([*command, str(folder), program], inside=inside, port=port)
+    look = ["ssh-keygen", "-l", "-f", str(folder / "host.pub")]
+    shown = subprocess.run(look, check=True, capture_output=True, text=True, timeout=30)  # noqa: S603
+    made.options = {"KEY": str(folder / "user"), "SHOWN": shown.stdout.split()[1]}
+    return made

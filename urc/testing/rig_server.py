@@ -1,0 +1,35 @@
+"""A real ``urc serve`` that a pattern can hold up: a program of its own.
+
+``python rig_server.py serve …``. At SIGUSR2 its one thread matches a pattern of which every letter
+more doubles the work, which keeps the interpreter from everything else. Told on standard output::
+
+    backtracked TIME TIME   from when to when, monotonic nanoseconds
+"""
+
+import re
+import signal
+import sys
+import time
+from types import FrameType
+
+from urc.cli.main import main
+
+HELD_UP_NS = 800_000_000
+"""Longer than any lease that the rig uses, and than the oldest input that is still taken."""
+FIRST_LETTERS = 20
+
+
+def backtrack(number: int, frame: FrameType | None) -> None:
+    """Hold everything up."""
+    began_ns = time.monotonic_ns()
+    letters = FIRST_LETTERS
+    while time.monotonic_ns() - began_ns < HELD_UP_NS:
+        re.match("^(a+)+$", "a" * letters + "!")
+        letters += 1
+    sys.stdout.write(f"backtracked {began_ns} {time.monotonic_ns()}\n")
+    sys.stdout.flush()
+
+
+if __name__ == "__main__":
+    signal.signal(signal.SIGUSR2, backtrack)
+    sys.exit(main())
