@@ -8,6 +8,7 @@ folders go into a real wheel only: an editable install reads them live from the 
 
 import json
 import os
+import re
 import shutil
 import subprocess
 import tempfile
@@ -19,10 +20,41 @@ from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 DATA_FOLDERS = ("schemas", "robots", "widgets", "templates")
 
 # What is taken out of each npm package; a file that is not there stops the build. The licence goes
-# with the code, always.
+# with the code, always. The first style sheet is the one that pages load for the module.
 VENDORED = {
     "uplot": ("dist/uPlot.esm.js", "dist/uPlot.min.css", "LICENSE"),
+    # The next major version: 1.9 sets markup from text as it loads, which the page policy forbids.
+    "leaflet": ("dist/leaflet-src.js", "dist/leaflet.css", "LICENSE"),
+    "three": (
+        "build/three.module.js",
+        "build/three.core.js",
+        "examples/jsm/controls/OrbitControls.js",
+        "examples/jsm/loaders/STLLoader.js",
+        "examples/jsm/loaders/ColladaLoader.js",
+        "examples/jsm/loaders/TGALoader.js",
+        "examples/jsm/loaders/collada/ColladaParser.js",
+        "examples/jsm/loaders/collada/ColladaComposer.js",
+        "LICENSE",
+    ),
+    "urdf-loader": ("src/URDFLoader.js", "src/URDFClasses.js", "README.md"),
+    "@xterm/xterm": ("lib/xterm.mjs", "css/xterm.css", "LICENSE"),
+    "@xterm/addon-fit": ("lib/addon-fit.mjs", "LICENSE"),
 }
+
+# Where a package's manifest names no module that a browser can load.
+ENTRIES: dict[str, str] = {}
+
+# Folders of a package that are imported from by path, as its own ``exports`` say.
+FOLDERS = {
+    "three/addons/": "./three/examples/jsm/",
+    "three/examples/jsm/": "./three/examples/jsm/",
+}
+
+# Packages that are published without the text of their licence: where it is in this repository.
+LICENCES = {"urdf-loader": "LICENSES/Apache-2.0.txt"}
+
+# Static imports as these packages write them, at the start of a line or behind a closing brace.
+IMPORTED = re.compile(r"""^(?:import\b|export\b|\})[^'"\n;(]*\bfrom\s*['"]([^'"]+)['"]""", re.M)
 
 NPM_TIMEOUT_S = 300
 
@@ -63,7 +95,7 @@ class CustomBuildHook(BuildHookInterface):  # type: ignore[type-arg]  # one hook
         work = Path(self._temporary.name)
         try:
             install_modules(root, work)
-            return collect(work / "node_modules", work / "urc_vendor")
+            return collect(work / "node_modules", work / "urc_vendor", root)
         except VendorError as error:
             self.app.abort(f"urc: {error}")
             raise  # abort does not return, but says nothing of that in its type
@@ -99,7 +131,7 @@ def npm_command() -> list[str]:
     return [str(home / "bin/node"), str(home / "lib/node_modules/npm/bin/npm-cli.js")]
 
 
-def collect(modules: Path, vendor: Path) -> Path:
+def collect(modules: Path, vendor: Path, root: Path) -> Path:
     """Copy the listed files to `vendor` and write the import map beside them."""
     imports: dict[str, str] = {}
     for package, files in VENDORED.items():
@@ -109,13 +141,36 @@ def collect(modules: Path, vendor: Path) -> Path:
                 raise VendorError(f"npm package {package!r} has no file {file!r} any more")
             target.parent.mkdir(parents=True, exist_ok=True)
             shutil.copyfile(source, target)
+        if package in LICENCES:
+            shutil.copyfile(root / LICENCES[package], vendor / package / "LICENSE")
         entry = entry_point(json.loads((modules / package / "package.json").read_text("utf-8")))
+        entry = ENTRIES.get(package, entry)
         if entry not in files:
             raise VendorError(f"npm package {package!r} now starts at {entry!r}, which is not kept")
         imports[package] = f"./{package}/{entry}"
+        style = next((file for file in files if file.endswith(".css")), "")
+        if style:
+            imports[f"{package}/style.css"] = f"./{package}/{style}"
+    imports |= FOLDERS
+    check_imports(vendor, imports)
     (vendor / "importmap.json").write_text(json.dumps({"imports": imports}, indent=2) + "\n")
     (vendor / "__init__.py").write_text('"""Third-party browser modules, made by the build."""\n')
     return vendor
+
+
+def check_imports(vendor: Path, imports: dict[str, str]) -> None:
+    """Stop when a kept module imports something that is not kept: a page would break on it."""
+    for module in (*sorted(vendor.rglob("*.js")), *sorted(vendor.rglob("*.mjs"))):
+        for name in IMPORTED.findall(module.read_text("utf-8")):
+            if name.startswith("."):
+                target = (module.parent / name).resolve()
+            else:
+                prefix = max((key for key in imports if name.startswith(key)), key=len, default="")
+                rest = name[len(prefix) :] if prefix.endswith("/") or name == prefix else None
+                target = vendor / imports[prefix] / rest if prefix and rest is not None else vendor
+            if not target.is_file():
+                where = module.relative_to(vendor).as_posix()
+                raise VendorError(f"{where} imports {name!r}, which is not kept")
 
 
 def entry_point(package: dict[str, Any]) -> str:

@@ -15,10 +15,11 @@ from pathlib import Path
 from scripts.chromium.bring import BringError, bring_chromium
 from scripts.node import node_executable, playwright_environment
 
-__all__ = ["NEEDS", "Brought", "Need", "bring"]
+__all__ = ["AXE", "NEEDS", "Brought", "Need", "bring"]
 
 APT_TIMEOUT_S = 600
 ROSLIB = Path(__file__).resolve().parents[1] / "node_modules" / "roslib"
+AXE = Path(__file__).resolve().parents[1] / "node_modules" / "axe-core" / "axe.min.js"
 LANGUAGE_SERVER = (
     Path(__file__).resolve().parents[1]
     / "node_modules"
@@ -198,6 +199,13 @@ NEEDS = (
         package="",
         purpose="the test of the emulated rosbridge against the client that browsers use",
         other=lambda: os.fspath(ROSLIB) if ROSLIB.is_dir() else None,
+    ),
+    Need(
+        name="axe",
+        executables=(),
+        package="",
+        purpose="the tests of the pages for people who see, hear or point otherwise",
+        other=lambda: os.fspath(AXE) if AXE.is_file() else None,
     ),
 )
 

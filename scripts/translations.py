@@ -1,0 +1,142 @@
+"""The catalogues of what pages say: brings them up to date with the sources, and compiles them.
+
+    python -m scripts.translations            update translations/*.po and compile them
+    python -m scripts.translations --check    exit 1 when a catalogue is behind, or has gaps
+
+Sources are the page templates, the widgets' templates, modules and titles, and the page's own
+modules: whatever stands in ``t("...")`` or ``ctx.t("...")`` is a message. The catalogues are
+gettext's PO files, so any translation program opens them.
+"""
+
+import argparse
+import io
+import json
+import re
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import yaml
+from babel.messages.catalog import Catalog, Message
+from babel.messages.extract import extract
+from babel.messages.pofile import read_po, write_po
+
+ROOT = Path(__file__).resolve().parents[1]
+FOLDER = ROOT / "urc" / "web" / "translations"
+TAGS = ("de", "fr", "it")
+KEYWORDS: dict[str, None] = dict.fromkeys(("t", "mark", "words.t", "ctx.t", "this.t", "this.ctx.t"))
+OPTIONS = {"parse_template_string": True}
+IDLE_HEADERS = tuple(
+    f'"{name}'
+    for name in ("POT-", "PO-", "Project-", "Report-", "Last-", "Language-Team", "Generated-")
+)
+"""Of a PO file; they would change with the day, or with the program that wrote it."""
+HOLE = re.compile(r"\{[a-z_]+\}")
+
+
+def sources() -> Iterator[tuple[str, Path]]:
+    """Yield (method, file) of everything that has words for people."""
+    for pattern, method in (
+        ("templates/*.j2", "jinja2"),
+        ("widgets/*/*.j2", "jinja2"),
+        ("widgets/*/*.js", "javascript"),
+        ("urc/web/static/*.js", "javascript"),
+        ("urc/web/*.py", "python"),
+    ):
+        for path in sorted(ROOT.glob(pattern)):
+            yield method, path
+
+
+def messages() -> dict[str, list[str]]:
+    """Return message → the files that say it, in order of appearance."""
+    found: dict[str, list[str]] = {}
+    for method, path in sources():
+        with path.open("rb") as stream:
+            for _, said, _, _ in extract(method, stream, KEYWORDS, options=OPTIONS):
+                place = path.relative_to(ROOT).as_posix()
+                for one in (said,) if isinstance(said, str) else said[:1]:
+                    if one and place not in found.setdefault(one, []):
+                        found[one].append(place)
+    for path in sorted(ROOT.glob("widgets/*/widget.yaml")):
+        title = yaml.safe_load(path.read_text("utf-8"))["title"]
+        found.setdefault(title, []).append(path.relative_to(ROOT).as_posix())
+    return found
+
+
+def updated(tag: str, wanted: dict[str, list[str]]) -> Catalog:
+    """Return the catalogue with exactly the wanted messages; what was translated stays."""
+    place = FOLDER / f"{tag}.po"
+    old = read_po(io.BytesIO(place.read_bytes()), tag) if place.is_file() else Catalog(tag)
+    new = Catalog(
+        tag,
+        header_comment=f"# What pages say ({tag}); `python -m scripts.translations` keeps it.",
+        fuzzy=False,
+    )
+    for text, files in wanted.items():
+        known = old.get(text)
+        new.add(text, known.string if known else "", [(file, 0) for file in files])
+    return new
+
+
+def faults(tag: str, catalog: Catalog) -> Iterator[str]:
+    """Yield what is wrong: gaps, and holes that a translation lost or made up."""
+    for message in entries(catalog):
+        text, said = str(message.id), str(message.string)
+        if not said:
+            yield f"{tag}.po: {text!r} is not translated"
+        elif set(HOLE.findall(text)) != set(HOLE.findall(said)):
+            yield f"{tag}.po: {text!r} and {said!r} have different names in braces"
+
+
+def entries(catalog: Catalog) -> list[Message]:
+    """Return the messages without the header."""
+    return [message for message in catalog if message.id]
+
+
+def written(catalog: Catalog) -> dict[Path, str]:
+    """Return the files of one catalogue and what stands in them."""
+    stream = io.BytesIO()
+    write_po(stream, catalog, width=100, omit_header=False, include_lineno=False)
+    lines = stream.getvalue().decode().splitlines()
+    text = "\n".join(line for line in lines if not line.startswith(IDLE_HEADERS)) + "\n"
+    words = {str(one.id): str(one.string) for one in entries(catalog) if one.string}
+    tag = str(catalog.locale)
+    table = json.dumps(words, ensure_ascii=False, indent=0, sort_keys=True) + "\n"
+    return {FOLDER / f"{tag}.po": text, FOLDER / f"{tag}.json": table}
+
+
+def is_same(place: Path, text: str) -> bool:
+    """Whether a file says this; how a PO file is laid out is its writer's matter."""
+    if not place.is_file():
+        return False
+    old = place.read_text(encoding="utf-8")
+    if place.suffix == ".json":
+        return old == text
+    both = (read_po(io.StringIO(one)) for one in (old, text))
+    was, now = ({str(one.id): str(one.string) for one in entries(catalog)} for catalog in both)
+    return was == now
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Update or check."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
+    parser.add_argument("--check", action="store_true")
+    is_check = parser.parse_args(arguments).check
+    wanted = messages()
+    wrong: list[str] = []
+    for tag in TAGS:
+        catalog = updated(tag, wanted)
+        wrong += faults(tag, catalog)
+        for place, text in written(catalog).items():
+            if is_check:
+                if not is_same(place, text):
+                    wrong.append(f"{place.name} is behind its sources: run scripts.translations")
+            else:
+                place.write_text(text, encoding="utf-8")
+    for line in wrong:
+        print(line)
+    return 1 if wrong and is_check else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
