@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from urc.cli.output import complain
+from urc.cli.packages import installed_document
 from urc.problems import UrcError
 from urc.shipped import shipped
 
@@ -133,18 +134,27 @@ def load(word: str) -> "Profile":
     """Return the profile that `word` names; raise `UrcError` with what is wrong with it."""
     from urc.config.load import load_profile
     from urc.runtime.catalog import built_in_catalog
+    from urc.runtime.shelves import shelf_of
 
-    return load_profile(profile_path(word), built_in_catalog())
+    path = profile_path(word)
+    return load_profile(path, built_in_catalog(), shelf_of(path))
 
 
 def profile_path(word: str) -> str:
-    """Return the file that `word` means: a path, or the name of a robot that ships with URC."""
+    """Return the file that `word` means: a path, a robot that ships with URC, or one installed.
+
+    A file goes before the name of a robot that ships, and that before an installed package.
+    """
     path = Path(word)
-    if path.suffix or len(path.parts) > 1 or os.path.isfile(word):
+    if path.suffix in (".yaml", ".yml") or os.path.isfile(word):
         return word
     named = shipped("robots") / f"{word}.yaml"
-    if os.path.isfile(named):
+    if len(path.parts) == 1 and os.path.isfile(named):
         return str(named)
+    if installed := installed_document(word):
+        return str(installed)
+    if path.suffix or len(path.parts) > 1:
+        return word
     if os.path.exists(word):
         return word  # a folder: reading it says so
     for suffix in (".yaml", ".yml"):

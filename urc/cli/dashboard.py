@@ -34,6 +34,8 @@ class Place:
     """Folder of URC's own data; None: that of this user."""
     has_guard: bool = True
     """Whether a process of its own stops what moves when this one cannot."""
+    tiles: Path | None = None
+    """Folder of map pictures; None: maps are grids."""
 
 
 def run_dashboard(
@@ -62,7 +64,7 @@ def run_dashboard(
         if names.count(name) > 1:
             raise Misuse(f"two robots are named {name!r}; a name must be unique")
     work = _serve(profiles, place, is_simulated, on_ready, settings_of)
-    return run_loop(work, code_when_ended=0)
+    return run_loop(work, code_when_ended=0, is_fast=True)
 
 
 async def _serve(
@@ -86,7 +88,9 @@ async def _serve(
             robots[profile.name] = Robot(profile, settings, session)
         data = place.data or data_folder()
         remake = settings_of and dict.fromkeys(robots, _remaker(settings_of, is_simulated, motion))
-        app = build_app(robots, allowed_hosts=place.allowed_hosts, data=data, remake=remake)
+        app = build_app(
+            robots, allowed_hosts=place.allowed_hosts, data=data, tiles=place.tiles, remake=remake
+        )
         await serve(app, host=place.host, port=place.port, on_ready=on_ready)
     return 0
 

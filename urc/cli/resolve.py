@@ -17,11 +17,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Print the document."""
-    from urc.config.parse_widget import Shelf
+    from urc.config.load import check
     from urc.config.resolve import resolve
-    from urc.shipped import shipped
+    from urc.runtime.catalog import built_in_catalog
+    from urc.runtime.shelves import shelf_of
 
-    resolved = resolve(profile_path(arguments.profile), Shelf(shipped("widgets")))
+    path = profile_path(arguments.profile)
+    shelf = shelf_of(path)
+    checked = check(path, built_in_catalog(), shelf)
+    resolved = resolve(path, shelf, checked.profile)
     if not resolved.text:
         raise ProblemsError(resolved.problems)
     print(resolved.text, end="")

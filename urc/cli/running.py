@@ -10,12 +10,15 @@ from collections.abc import Coroutine
 from contextlib import suppress
 from typing import Any, NamedTuple, TextIO
 
+from urc._loop import run
 from urc.problems import printable
 
 __all__ = ["LineWriter", "run_loop"]
 
 
-def run_loop(work: Coroutine[Any, Any, int], *, code_when_ended: int | None = None) -> int:
+def run_loop(
+    work: Coroutine[Any, Any, int], *, code_when_ended: int | None = None, is_fast: bool = False
+) -> int:
     """Run `work` until it returns, or until SIGINT or SIGTERM cancels it; return the exit code.
 
     A second signal ends the process at once.
@@ -23,11 +26,12 @@ def run_loop(work: Coroutine[Any, Any, int], *, code_when_ended: int | None = No
     Args:
         work: returns an exit code; what it cleans up when cancelled must take bounded time.
         code_when_ended: for a signal; 128 + its number when left out, as a shell reports it.
+        is_fast: on the fastest loop that is installed, which takes a moment to load.
     """
     handler = logging.StreamHandler()
     handler.setFormatter(_OneLine())
     logging.basicConfig(handlers=[handler], level=logging.WARNING)
-    return asyncio.run(_until_signal(work, code_when_ended))
+    return (run if is_fast else asyncio.run)(_until_signal(work, code_when_ended))
 
 
 async def _until_signal(work: Coroutine[Any, Any, int], code_when_ended: int | None) -> int:

@@ -47,6 +47,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=Path,
         help="where a stop is kept over a restart, the audit, and what else URC remembers",
     )
+    parser.add_argument(
+        "--tiles",
+        metavar="FOLDER",
+        type=Path,
+        help="pictures of maps, as FOLDER/z/x/y.png, for the option tiles of the widget map",
+    )
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -56,6 +62,8 @@ def run(arguments: argparse.Namespace) -> int:
 
     if arguments.dev and not is_loopback(arguments.host):
         raise Misuse(f"--dev shows all traffic and is for this machine alone, not {arguments.host}")
+    if arguments.tiles and not arguments.tiles.is_dir():
+        raise Misuse(f"--tiles names a folder of map pictures; {arguments.tiles} is none")
     profiles = [load(word) for word in arguments.profiles]
     values = [values for values, _ in settings_given(profiles, arguments)]
     if not is_loopback(arguments.host):
@@ -78,6 +86,7 @@ def run(arguments: argparse.Namespace) -> int:
             tuple(arguments.allowed_hosts),
             arguments.data,
             arguments.has_guard,
+            arguments.tiles,
         ),
         is_simulated=arguments.simulate,
         on_ready=_print_address,

@@ -1,0 +1,385 @@
+"""Packages as people get them: real repositories, hostile servers, kills at any moment."""
+
+import functools
+import gzip
+import json
+import os
+import socket
+import subprocess
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import closing, contextmanager
+from http.server import BaseHTTPRequestHandler, SimpleHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
+from urllib.error import HTTPError
+from urllib.request import Request, urlopen
+
+import pytest
+
+from tests.e2e.command_line import TIMEOUT_S, run
+from tests.e2e.processes import ROOT, UrcProcess
+from tests.unit.packages.made import package, write_package
+from urc.packages.index import Index, entry_of
+from urc.packages.names import PackageError
+from urc.packages.remote import ask, fetch_archive
+
+DRIVER_WIDGETS = "widgets:\n  battery: { use: dial, bind: { level: battery } }\n"
+ROBOT = """\
+driver: ../../drivers/puppet/driver.yaml
+interfaces:
+  default: ../../interfaces/plain/interface.yaml
+"""
+
+
+def fill(folder: Path) -> None:
+    """Write a robot with its driver, widget and interface into a repository's folder."""
+    from tests.unit.packages.made import DOCUMENTS
+
+    write_package(folder, "widget", "dial", "1.0.0")
+    write_package(folder, "interface", "plain", "1.0.0")
+    text = DOCUMENTS["driver"] + DRIVER_WIDGETS
+    write_package(folder, "driver", "puppet", "1.0.0", {"widgets/dial": "^1"}, text=text)
+    needs = {"drivers/puppet": "^1", "interfaces/plain": "*"}
+    write_package(folder, "robot", "my-puppet", "1.0.0", needs, text=ROBOT)
+
+
+class Person:
+    """Somebody with a data folder of their own."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.environment = {"URC_DATA_DIR": str(folder)}
+
+    def does(self, *words: str, code: int = 0) -> str:
+        """Run `urc`; return what it printed, of a failure what it complained of."""
+        done = run(*words, **self.environment)
+        assert done.returncode == code, done.stderr
+        assert "Traceback" not in done.stderr
+        return done.stdout if code == 0 else done.stderr
+
+    def holds(self) -> dict[str, bytes]:
+        """Return every file of the store that says or is something."""
+        store = self.folder / "packages"
+        return {
+            str(file.relative_to(store)): file.read_bytes()
+            for file in store.rglob("*")
+            if file.is_file() and "repositories" not in file.parts and file.name != "changing"
+        }
+
+
+@pytest.fixture
+def person(tmp_path: Path) -> Person:
+    return Person(tmp_path / "data")
+
+
+@contextmanager
+def repository(folder: Path) -> Iterator[str]:
+    process = UrcProcess(["repo", "serve", str(folder), "--port", "0", "--name", "Lab"], {})
+    try:
+        yield process.wait_for(r"^repository (http://\S+)$")[1]
+        process.interrupt()
+    finally:
+        process.kill()
+
+
+@contextmanager
+def server(handler: Callable[..., BaseHTTPRequestHandler]) -> Iterator[str]:
+    with ThreadingHTTPServer(("127.0.0.1", 0), handler) as http:
+        thread = threading.Thread(target=http.serve_forever, daemon=True)
+        thread.start()
+        try:
+            yield f"http://127.0.0.1:{http.server_port}/"
+        finally:
+            http.shutdown()
+            thread.join(TIMEOUT_S)
+
+
+def got(url: str, **headers: str) -> tuple[int, bytes, str]:
+    try:
+        request = Request(url, headers=headers)  # noqa: S310 (addresses of our own servers)
+        with urlopen(request, timeout=TIMEOUT_S) as answer:  # noqa: S310
+            return answer.status, answer.read(), answer.headers["etag"]
+    except HTTPError as error:
+        with error:
+            return error.code, error.read(), error.headers["etag"]
+
+
+def test_a_robot_is_got_once_and_driven_for_ever_without_a_network(
+    tmp_path: Path, person: Person
+) -> None:
+    """Search, look at what it may do, install; then the repository is switched off."""
+    fill(tmp_path / "lab")
+    with repository(tmp_path / "lab") as url:
+        assert f"added {url}: Lab, 4 versions of packages" in person.does("repo", "add", url)
+        assert person.does("repo", "list") == f"{url}\n"
+        assert person.does("repo", "search", "DIAL") == "widgets/dial 1.0.0  The widget dial.\n"
+        assert "--yes agrees beforehand" in person.does("install", "my-puppet", code=2)
+        assert person.does("list") == ""
+        told = person.does("install", "my-puppet", "--yes")
+    assert "robots/my-puppet 1.0.0 may do this:" in told
+    assert "connects by tcp (wire): host from the settings: {{ settings.host }}" in told
+    assert "port always 6789" in told
+    assert "secret: is given what the setting key holds" in told
+    assert "commands: beep" in told
+    assert "widget dial: a program in the dashboard's page" in told
+    assert person.does("list").startswith("robots/my-puppet 1.0.0  with drivers/puppet 1.0.0, ")
+    assert "what it said last is used" in run("repo", "search", **person.environment).stderr
+    assert "`wire` | tcp" in person.does("docs", "my-puppet")
+    words = ["serve", "my-puppet", "--simulate", "--port", "0"]
+    dashboard = UrcProcess(words, person.environment)
+    try:
+        page = dashboard.wait_for(r"^dashboard (http://\S+)$")[1]
+        assert b"my-puppet" in got(page)[1]
+        assert (
+            got(f"{page}widgets/dial/widget.js")[1] == package("widget", "dial").files["widget.js"]
+        )
+        dashboard.interrupt()
+    finally:
+        dashboard.kill()
+    gone = person.does("remove", "my-puppet")
+    assert gone.splitlines() == [
+        "removed drivers/puppet 1.0.0", "removed interfaces/plain 1.0.0",
+        "removed robots/my-puppet 1.0.0", "removed widgets/dial 1.0.0",
+    ]  # fmt: skip
+    assert list(person.holds()) == ["state.json"]
+
+
+def test_the_repository_answers_as_the_thesis_says(tmp_path: Path) -> None:
+    """Figures B.2 and B.3, and an index that is not sent twice."""
+    fill(tmp_path / "lab")
+    with repository(tmp_path / "lab") as url:
+        assert json.loads(got(url)[1]) == {
+            "name": "Lab",
+            "drivers": ["/drivers/puppet/"],
+            "interfaces": ["/interfaces/plain/"],
+            "widgets": ["/widgets/dial/"],
+            "robots": ["/robots/my-puppet/"],
+        }
+        assert json.loads(got(f"{url}drivers")[1]) == ["/drivers/puppet/"]
+        assert json.loads(got(f"{url}widgets")[1]) == ["/widgets/dial/"]
+        assert json.loads(got(f"{url}interfaces")[1]) == ["/interfaces/plain/"]
+        said = json.loads(got(f"{url}drivers/puppet/urcpm.json")[1])
+        assert said == {
+            "name": "puppet", "description": "The driver puppet.", "type": "driver",
+            "main": "driver.yaml", "dependencies": [], "css": {}, "widgets": ["/widgets/dial/"],
+            "interfaces": [],
+        }  # fmt: skip
+        said = json.loads(got(f"{url}widgets/dial/urcpm.json")[1])
+        assert (said["main"], said["css"]) == ("widget.js", [])
+        assert said["resources"]["template.html.j2"] == "template.html.j2"
+        assert got(f"{url}widgets/dial/{said['main']}")[1].startswith(b"export default")
+        status, index, tag = got(f"{url}index.json")
+        assert (status, len(json.loads(index)["packages"])) == (200, 4)
+        assert got(f"{url}index.json", **{"if-none-match": tag})[:2] == (304, b"")
+        for path in ("..%2f..%2fetc/passwd", "drivers/../x", "index.json%00", ".work", "nothing"):
+            assert got(url + path)[0] in (400, 404), path
+
+
+def test_the_same_folder_works_on_any_static_server(tmp_path: Path, person: Person) -> None:
+    """`urc repo index` writes all that is needed; a new version appears beside the old one."""
+    lab = tmp_path / "lab"
+    fill(lab)
+    assert "4 versions of packages" in person.does("repo", "index", str(lab))
+    first = (lab / "index.json").read_bytes()
+    person.does("repo", "index", str(lab))
+    assert (lab / "index.json").read_bytes() == first
+    with server(functools.partial(_Quiet, directory=str(lab))) as url:
+        person.does("repo", "add", url)
+        lock = tmp_path / "bot.lock"
+        person.does("install", "drivers/puppet", "--yes", "--lock", str(lock))
+        write_package(lab, "widget", "dial", "1.1.0", more="new")
+        assert "5 versions of packages" in person.does("repo", "index", str(lab))
+        other = Person(tmp_path / "other")
+        other.does("repo", "add", url)
+        other.does("install", "drivers/puppet", "--yes", "--lock", str(lock))
+        assert other.holds() == person.holds()
+        third = Person(tmp_path / "third")
+        third.does("repo", "add", url)
+        third.does("install", "drivers/puppet", "--yes")
+        assert third.does("list") == "drivers/puppet 1.0.0  with widgets/dial 1.1.0\n"
+
+
+class _Quiet(SimpleHTTPRequestHandler):
+    def log_message(self, *words: object) -> None:
+        pass
+
+
+def test_what_is_not_sound_is_not_listed(tmp_path: Path, person: Person) -> None:
+    """Each with its reason; the rest is."""
+    lab = tmp_path / "lab"
+    fill(lab)
+    person.does("repo", "index", str(lab))
+    (lab / "widgets/dial/more.txt").write_text("changed")
+    write_package(lab, "driver", "broken", text="transports: { wire: { type: pigeon } }\n")
+    write_package(lab, "robot", "nosy", text=f"driver: {'../' * 3}secret.yaml\n")
+    (tmp_path / "secret.yaml").write_text("urc: 1\nkind: driver\nname: secret\n")
+    (lab / "archives/widgets/dial/9.9.9.zip").write_bytes(b"PK nonsense")
+    told = person.does("repo", "index", str(lab), code=1)
+    assert "it has changed since widgets/dial 1.0.0 was listed; give it a new version" in told
+    assert "drivers/broken/driver.yaml:4:" in told
+    assert "robots/nosy/robot.yaml: it refers to" in told
+    assert "which is not in this repository" in told
+    assert "9.9.9.zip: the archive is cut off" in told
+    listed = json.loads((lab / "index.json").read_bytes())["packages"]
+    assert len(listed) == 4
+
+
+def test_a_bundle_goes_where_no_network_is(tmp_path: Path, person: Person) -> None:
+    """One file; the same bytes whoever makes it; installed from a memory stick."""
+    fill(tmp_path / "lab")
+    one, two = tmp_path / "one.urcof", tmp_path / "two.urcof"
+    robot = str(tmp_path / "lab/robots/my-puppet")
+    assert "4 packages" in person.does("bundle", robot, "--to", str(one))
+    other = Person(tmp_path / "other")
+    other.does("install", str(one), "--yes")
+    assert other.does("list").startswith("robots/my-puppet 1.0.0  with drivers/puppet 1.0.0")
+    other.does("bundle", "my-puppet", "--to", str(two))
+    assert one.read_bytes() == two.read_bytes()
+    before = other.holds()
+    data = one.read_bytes()
+    for name, evil in {
+        "cut": data[: len(data) // 2],
+        "changed": data.replace(b"The widget dial", b"The widget dia1", 1),
+        "nothing": b"",
+    }.items():
+        (tmp_path / f"{name}.urcof").write_bytes(evil)
+        told = other.does("install", str(tmp_path / f"{name}.urcof"), "--yes", code=1)
+        assert told.startswith("urc install: ")
+        assert told.count("\n") == 1
+    assert other.holds() == before
+
+
+def test_a_package_may_not_reach_out_or_replace_what_ships(tmp_path: Path, person: Person) -> None:
+    """Neither a document outside, nor the name of a widget that URC has."""
+    nosy = write_package(tmp_path, "robot", "nosy", text=f"driver: {'../' * 6}secret.yaml\n")
+    (tmp_path / "secret.yaml").write_text("urc: 1\nkind: driver\nname: secret\n")
+    told = person.does("install", str(nosy), "--yes", code=1)
+    assert "which is not in the package" in told
+    stop = write_package(tmp_path, "widget", "stop")
+    told = person.does("install", str(stop), "--yes", code=1)
+    assert "widgets/stop: URC has a widget 'stop', which no package may replace" in told
+    broken = write_package(tmp_path, "driver", "broken", text="signals: { a: { type: x } }\n")
+    assert "error" in person.does("install", str(broken), "--yes", code=1)
+    assert person.holds() == {}
+
+
+DIAL = package("widget", "dial")
+ENTRY = entry_of(DIAL)
+INDEX = Index(1, "evil", (ENTRY,)).to_bytes()
+
+
+def evil(answer: Callable[[BaseHTTPRequestHandler], None]) -> type[BaseHTTPRequestHandler]:
+    """Return a server that lists a package, and gives something else for its archive."""
+
+    class Handler(_Quiet):
+        def do_GET(self) -> None:
+            if self.path != "/index.json":
+                answer(self)
+                return
+            self.send_response(200)
+            self.send_header("content-length", str(len(INDEX)))
+            self.end_headers()
+            self.wfile.write(INDEX)
+
+    return Handler
+
+
+def says(body: bytes, status: int = 200, **headers: str) -> Callable[..., None]:
+    def answer(handler: BaseHTTPRequestHandler) -> None:
+        handler.send_response(status)
+        for name, value in headers.items():
+            handler.send_header(name.replace("_", "-"), value)
+        handler.end_headers()
+        handler.wfile.write(body)
+
+    return answer
+
+
+HOSTILE = {
+    "cut": (says(DIAL.data[:-1]), "these are not the bytes that the index names"),
+    "less than told": (says(b"PK", content_length=str(len(DIAL.data))), "archives/widgets/dial"),
+    "other bytes": (says(DIAL.data[:-1] + b"\1"), "these are not the bytes that the index names"),
+    "more": (says(DIAL.data + b"x" * 99999), "more than the"),
+    "elsewhere": (says(b"", 302, location="http://127.0.0.1:1/"), "the server answers 302, not"),
+    "gone": (says(b"", 404), "the server answers 404, not 200"),
+    "compressed": (
+        says(gzip.compress(bytes(1 << 20)), content_encoding="gzip"),
+        "the server compresses",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", HOSTILE)
+def test_a_hostile_server_changes_nothing(name: str, person: Person) -> None:
+    """One line that names the address; the store is as before."""
+    answer, told = HOSTILE[name]
+    with server(evil(answer)) as url:
+        person.does("repo", "add", url)
+        complaint = person.does("install", "dial", "--yes", code=1)
+    assert told in complaint
+    assert complaint.count("\n") == 1
+    assert person.holds() == {}
+
+
+def test_a_server_that_stalls_or_drips_is_given_up() -> None:
+    """Within the time that was given, though each byte comes in time."""
+    ended = threading.Event()
+
+    def drip(handler: BaseHTTPRequestHandler) -> None:
+        handler.send_response(200)
+        handler.end_headers()
+        while not ended.wait(0.05):
+            try:
+                handler.wfile.write(b".")
+            except OSError:
+                return
+
+    with server(evil(drip)) as url:
+        with pytest.raises(PackageError, match="not all of it came within 1 s"):
+            ask(f"{url}x", 1 << 20, total_s=1.0)
+        ended.set()
+    with closing(socket.create_server(("127.0.0.1", 0))) as silent:
+        with pytest.raises(PackageError, match="not all of it came within 1 s"):
+            ask(f"http://127.0.0.1:{silent.getsockname()[1]}/", 1 << 20, total_s=1.0)
+        port = silent.getsockname()[1]
+    with pytest.raises(PackageError, match=f"http://127.0.0.1:{port}/"):
+        fetch_archive(f"http://127.0.0.1:{port}/", ENTRY)
+
+
+@pytest.mark.parametrize(
+    "index",
+    [
+        b"", b"[]", b"{}", b"\xff", b'{"format":2,"name":"x","packages":[]}',
+        INDEX.replace(b"1.0.0", b"../x1"), INDEX.replace(b'"dial"', b'"../d"'),
+        INDEX.replace(b'"widget"', b'"script"'), INDEX.replace(b'"dial"', b'"dial\\n"'),
+        INDEX.replace(b"1.0.0", b"1.0.0\\n"), INDEX.replace(ENTRY.sha256.encode(), b"f"),
+        INDEX.replace(b'"needs": {}', b'"needs": {"dial": "soon"}'),
+        b"[" * 100_000,
+    ],
+)  # fmt: skip
+def test_an_index_that_is_none_is_not_added(index: bytes, person: Person) -> None:
+    """One line, and the repository is not remembered."""
+
+    class Handler(_Quiet):
+        do_GET = says(index)  # type: ignore[assignment]  # noqa: N815
+
+    with server(Handler) as url:
+        told = person.does("repo", "add", url, code=1)
+    assert "this is no index of a repository" in told
+    assert told.count("\n") == 1
+    assert person.does("repo", "list") == ""
+
+
+@pytest.mark.parametrize(
+    "how", [("add",), ("update",), ("remove",), ("random", "200", "7")], ids=lambda how: how[0]
+)
+def test_a_kill_at_any_moment_leaves_the_store_whole(tmp_path: Path, how: tuple[str, ...]) -> None:
+    """Install, update and remove: before every change of the disk, and at 200 random moments."""
+    done = subprocess.run(
+        [sys.executable, "-m", "tests.e2e.package_killer", str(tmp_path), *how],
+        cwd=ROOT, env=os.environ | {"PYTHONPATH": str(ROOT)}, capture_output=True, text=True,
+        timeout=80, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert "whole after" in done.stdout

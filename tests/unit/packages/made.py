@@ -1,0 +1,117 @@
+"""Packages for tests, made in a line."""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from urc.packages.archive import PACKAGE, write_archive
+from urc.packages.index import Entry
+from urc.packages.install import plan_file
+from urc.packages.lock import Lock
+from urc.packages.package import Package, open_package, sha256
+from urc.packages.sources import FileSource
+from urc.packages.store import Store
+
+__all__ = ["DOCUMENTS", "assert_whole", "entry", "files_of", "install", "package", "write_package"]
+
+DOCUMENTS = {
+    "driver": """\
+settings:
+  host: { type: host, default: 127.0.0.1 }
+  key: { type: string, secret: true }
+transports:
+  wire:
+    type: tcp
+    host: "{{ settings.host }}"
+    port: 6789
+    framing: { type: delimiter, tx: LF, rx: LF }
+signals:
+  battery: { type: integer, unit: "%", min: 0, max: 100 }
+commands:
+  beep: { send: "beep" }
+messages:
+  said: { regex: '^(?P<battery>\\d+)$' }
+""",
+    "interface": "grid: |\n  battery\n",
+    "widget": "title: A widget\nsummary: Shows a number.\ninputs: { level: { type: integer } }\n",
+    "robot": "driver: ../../drivers/puppet/driver.yaml\n",
+}
+
+
+def files_of(
+    kind: str,
+    name: str,
+    version: str = "1.0.0",
+    needs: Mapping[str, str] | None = None,
+    text: str | None = None,
+    **more: str,
+) -> dict[str, bytes]:
+    """Return the files of a package; `more` are files of a widget, by name without its ending."""
+    manifest = (
+        f"urc: 1\npackage: {kind}\nname: {name}\nversion: {version}\nlicence: MIT\n"
+        f"authors: [A. Author]\nsummary: The {kind} {name}.\n"
+    )
+    if needs:
+        manifest += "needs:\n" + "".join(f'  {key}: "{value}"\n' for key, value in needs.items())
+    body = DOCUMENTS[kind] if text is None else text
+    document = f"urc: 1\nkind: {kind}\nname: {name}\n{body}"
+    found = {"package.yaml": manifest, f"{kind}.yaml": document}
+    if kind == "widget":
+        found["widget.js"] = "export default { mount() { return {}; } };\n"
+        found["template.html.j2"] = "<b></b>\n"
+    found |= {f"{stem}.txt": content for stem, content in more.items()}
+    return {path: content.encode() for path, content in found.items()}
+
+
+def package(
+    kind: str,
+    name: str,
+    version: str = "1.0.0",
+    needs: Mapping[str, str] | None = None,
+    **more: str,
+) -> Package:
+    """Return a package, whole and checked."""
+    files = files_of(kind, name, version, needs, **more)
+    return open_package(write_archive(files, PACKAGE, name), name)
+
+
+def write_package(
+    folder: Path,
+    kind: str,
+    name: str,
+    version: str = "1.0.0",
+    needs: Mapping[str, str] | None = None,
+    **more: str,
+) -> Path:
+    """Write a package into a repository's folder; return its own."""
+    home = folder / f"{kind}s" / name
+    home.mkdir(parents=True, exist_ok=True)
+    for path, content in files_of(kind, name, version, needs, **more).items():
+        (home / path).write_bytes(content)
+    return home
+
+
+def entry(key: str, version: str, needs: Mapping[str, str] | None = None) -> Entry:
+    """Return what an index says, of an archive that nobody looks at."""
+    folder, _, name = key.partition("/")
+    return Entry(folder[:-1], name, version, "0" * 64, 1, needs=dict(needs or {}))
+
+
+def install(store: Store, *packages: Package) -> Lock:
+    """Install the first of some packages; the others are what it may need."""
+    source = FileSource("test", packages, [packages[0].manifest.key])
+    plan = plan_file(source, (), store, lambda line: None)
+    with store.changing() as change:
+        change.stage(plan.lock, plan.archives)
+        change.commit(plan.lock)
+    return plan.lock
+
+
+def assert_whole(store: Store) -> list[str]:
+    """Look at every byte of a store; return what is installed."""
+    for file in (store.folder / "blobs").glob("*"):
+        assert sha256(file.read_bytes()) == file.stem, f"{file} is torn"
+    for lock in store.installed():
+        for pin in lock.packages.values():
+            store.blob(pin.sha256)
+        assert store.document(lock).is_file()
+    return [str(lock) for lock in store.installed()]

@@ -1,0 +1,78 @@
+"""`urc install`: a package with all that it needs, from a repository, a bundle or a folder."""
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from urc.cli.failures import Misuse
+
+if TYPE_CHECKING:
+    from urc.packages.install import Plan
+    from urc.packages.lock import Lock
+
+EXAMPLE = "urc install drivers/puppet@^1.0"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add what to install, and whether to ask."""
+    parser.add_argument(
+        "package",
+        metavar="PACKAGE",
+        help="NAME or drivers/NAME, with @VERSION if one is wanted; a bundle, archive or folder",
+    )
+    parser.add_argument("--yes", action="store_true", help="install without asking")
+    parser.add_argument(
+        "--lock",
+        metavar="FILE",
+        type=Path,
+        help="take exactly what this lock names; if there is none, write it",
+    )
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Show what it may do, ask, install."""
+    from urc.cli.packages import is_agreed, is_path, open_store, planned
+    from urc.packages.disk import put_file
+
+    lock_file: Path | None = arguments.lock
+    pinned = _pinned(lock_file)
+    if pinned is not None and is_path(arguments.package):
+        raise Misuse("a lock chooses among the versions of repositories; name a package")
+    plan = planned(arguments.package, pinned)
+    with open_store().changing() as change:
+        folder = change.stage(plan.lock, plan.archives)
+        _show(plan, folder)
+        if not arguments.yes and not is_agreed("Install it?"):
+            print("nothing is installed")
+            return 1
+        change.commit(plan.lock)
+    if lock_file is not None and pinned is None:
+        put_file(lock_file, plan.lock.to_bytes(), lock_file.resolve().parent)
+    print(f"installed {plan.lock}")
+    return 0
+
+
+def _pinned(file: Path | None) -> "Lock | None":
+    from urc.packages.lock import read_lock
+
+    if file is None or not file.exists():
+        return None
+    with open(file, "rb") as opened:
+        return read_lock(opened.read(1 << 20), str(file))
+
+
+def _show(plan: "Plan", folder: Path) -> None:
+    from urc.packages.store import kinds_in
+    from urc.problems import printable
+    from urc.runtime.permissions import permissions
+
+    lock = plan.lock
+    document = folder / lock.root / f"{lock.key.kind}.yaml"
+    widgets = [key.name for key in kinds_in(lock, "widget")]
+    allowed = permissions(document, folder, widgets)
+    for key, pin in lock.packages.items():
+        kept = "" if pin.sha256 in plan.archives else ", kept from before"
+        print(printable(f"{key} {pin.version}  from {plan.origins[key]}{kept}"))
+    print(f"{lock} may do this:")
+    for line in allowed:
+        print(printable(f"  {line}"))

@@ -1,0 +1,51 @@
+"""`urc new`: the files of something new, complete and sound, to be changed."""
+
+import argparse
+import re
+from pathlib import Path
+
+EXAMPLE = "urc new widget lamp"
+
+_NAME = re.compile(r"[a-z][a-z0-9-]{0,63}")
+_FILES = Path(__file__).resolve().parent / "new_widget"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add what is made, and how it is called."""
+    parser.add_argument("kind", metavar="KIND", choices=("widget",), help="what is made: widget")
+    parser.add_argument("name", metavar="NAME", help="its name: small letters, digits and '-'")
+    parser.add_argument(
+        "--into",
+        metavar="DIR",
+        type=Path,
+        help="folder in which the new folder is made; by default where URC looks for widgets",
+    )
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Make the folder; nothing that is there already is changed."""
+    from urc.problems import UrcError
+    from urc.shipped import shipped
+
+    name: str = arguments.name
+    if not _NAME.fullmatch(name):
+        raise UrcError(f"a widget cannot be called {name!r}: write small letters, digits and '-'")
+    home: Path = arguments.into or shipped("widgets")
+    folder = home / name
+    try:
+        home.mkdir(parents=True, exist_ok=True)
+        folder.mkdir()
+        for source in sorted(_FILES.iterdir()):
+            text = source.read_text(encoding="utf-8")
+            (folder / source.name).write_text(_filled(text, name), encoding="utf-8")
+    except FileExistsError as error:
+        raise UrcError(f"{folder} is there already") from error
+    except OSError as error:
+        raise UrcError(f"{folder} cannot be made: {error.strerror or error}") from error
+    print(folder)
+    return 0
+
+
+def _filled(text: str, name: str) -> str:
+    words = name.replace("-", " ")
+    return text.replace("NEW-WIDGET", name).replace("NEW TITLE", words[:1].upper() + words[1:])

@@ -1,0 +1,83 @@
+"""What the verbs about packages share: the store, the repositories, a question, installed names."""
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from urc._folders import data_folder
+from urc.cli.failures import Misuse
+from urc.cli.output import complain
+
+if TYPE_CHECKING:
+    from urc.packages.install import Plan
+    from urc.packages.lock import Lock
+    from urc.packages.repositories import Repositories
+    from urc.packages.store import Store
+
+__all__ = ["installed_document", "is_agreed", "is_path", "open_store", "planned", "repositories"]
+
+
+def open_store() -> "Store":
+    """Return this user's store."""
+    from urc.packages.store import Store
+
+    return Store(data_folder() / "packages")
+
+
+def repositories() -> "Repositories":
+    """Return the repositories that this user added."""
+    from urc.packages.repositories import Repositories
+
+    return Repositories(data_folder() / "packages", complain)
+
+
+def installed_document(word: str) -> Path | None:
+    """Return the document of the installed robot or driver that a word names, or None.
+
+    A robot goes before a driver of the same name.
+    """
+    if not (data_folder() / "packages" / "state.json").is_file():
+        return None
+    from urc.packages.names import PackageError, parse_wish
+
+    try:
+        wish = parse_wish(word)
+    except PackageError:
+        return None  # a path, for example
+    store = open_store()
+    for kind in ("robot", "driver"):
+        if wish.kind in ("", kind) and (lock := store.find(wish._replace(kind=kind))):
+            return store.document(lock)
+    return None
+
+
+def is_path(word: str) -> bool:
+    """Return whether a word means a file or folder, not the name of a package."""
+    path = Path(word)
+    is_told = path.suffix in (".urcof", ".zip") or word.startswith((".", "/", "~"))
+    return is_told or (path / "package.yaml").is_file()
+
+
+def planned(word: str, pinned: "Lock | None" = None) -> "Plan":
+    """Return what a package's name, file or folder comes to, with all archives fetched."""
+    from urc.packages.install import plan_file, plan_wish
+    from urc.packages.names import parse_wish
+    from urc.packages.sources import open_source
+
+    store, known = open_store(), repositories().all()
+    if is_path(word):
+        source = open_source(Path(word).expanduser())
+        return plan_file(source, known, store, complain)
+    if not known:
+        raise Misuse("no repository is known; 'urc repo add URL' adds one")
+    return plan_wish(parse_wish(word), known, store, complain, pinned)
+
+
+def is_agreed(question: str) -> bool:
+    """Ask a person; raise `Misuse` where there is none."""
+    if not sys.stdin.isatty():
+        raise Misuse("nobody can be asked here; --yes agrees beforehand")
+    try:
+        return input(f"{question} Type yes: ").strip().lower() == "yes"
+    except EOFError:
+        return False

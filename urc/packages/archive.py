@@ -1,0 +1,152 @@
+"""The one form of an archive: a ZIP file without compression whose bytes follow from its files.
+
+Entries are stored, sorted, and dated 1980. So the same files give the same bytes on every machine,
+whatever its zlib; nothing in an archive can be larger than the archive; and an archive that would
+not be written so is not read. `zipfile` parses, but nothing is ever extracted by it.
+"""
+
+import struct
+import zipfile
+from collections.abc import Iterable, Mapping
+from io import BytesIO
+from typing import Final, NamedTuple
+
+from urc.packages.names import PackageError
+from urc.packages.paths import name_fault, names_fault
+
+__all__ = ["BUNDLE", "PACKAGE", "ArchiveLimits", "read_archive", "write_archive"]
+
+
+class ArchiveLimits(NamedTuple):
+    """What an archive may hold at most."""
+
+    entries: int
+    entry_bytes: int
+    total_bytes: int
+
+    @property
+    def archive_bytes(self) -> int:
+        """What the archive itself may take: its files, and its own words about each."""
+        return self.total_bytes + 1024 * self.entries
+
+
+PACKAGE: Final = ArchiveLimits(200, 5 << 20, 20 << 20)
+BUNDLE: Final = ArchiveLimits(129, PACKAGE.archive_bytes, 64 << 20)
+_DATE: Final = (1980, 1, 1, 0, 0, 0)
+_MODE: Final = 0o100644
+_END: Final = b"PK\x05\x06"
+_END_BYTES: Final = 22
+_TYPES: Final = {0o120000: "a link", 0o060000: "a device", 0o020000: "a device", 0o010000: "a pipe"}
+
+
+def write_archive(files: Mapping[str, bytes], limits: ArchiveLimits, name: str) -> bytes:
+    """Return the archive of some files, path → content.
+
+    Args:
+        files: paths are relative, with '/'.
+        limits: what it may hold.
+        name: what it is called in errors.
+
+    Raises:
+        PackageError: a path that not every system can have, or too much of something.
+    """
+    _check_names(files, name, limits)
+    _check_sizes(((path, len(content)) for path, content in files.items()), limits, name)
+    return _written(files)
+
+
+def read_archive(data: bytes, limits: ArchiveLimits, name: str) -> dict[str, bytes]:
+    """Return the files of an archive, path → content, in the order of their paths.
+
+    Raises:
+        PackageError: one line that says what is wrong with it.
+    """
+    if len(data) > limits.archive_bytes:
+        raise PackageError(f"{name}: an archive has at most {limits.archive_bytes >> 20} MiB")
+    _check_end(data, limits, name)
+    try:
+        files = _read(data, limits, name)
+    except (zipfile.BadZipFile, struct.error, EOFError, ValueError, OSError, RuntimeError,
+            NotImplementedError, OverflowError) as error:  # fmt: skip
+        raise PackageError(f"{name}: the archive is damaged or cut off: {error}") from None
+    if _written(files) != data:
+        raise PackageError(
+            f"{name}: something is in this archive beside its files; make it with 'urc bundle'"
+        )
+    return files
+
+
+def _check_end(data: bytes, limits: ArchiveLimits, name: str) -> None:
+    """Look at the number of entries before anything is made of them."""
+    if not data.startswith(b"PK"):
+        raise PackageError(f"{name}: this is no package: a ZIP archive is expected")
+    end = data[-_END_BYTES:]
+    if len(end) < _END_BYTES or not end.startswith(_END):
+        raise PackageError(f"{name}: the archive is cut off, or something was added at its end")
+    entries, size, start = struct.unpack("<HII", end[10:20])
+    if entries > limits.entries:
+        raise PackageError(f"{name}: {entries} entries, at most {limits.entries} are allowed")
+    # A central directory with more entries than its end tells would be read as far as it goes.
+    if start + size + _END_BYTES != len(data) or size > limits.entries * 1024:
+        raise PackageError(f"{name}: the archive is damaged or cut off: its parts do not fit")
+
+
+def _read(data: bytes, limits: ArchiveLimits, name: str) -> dict[str, bytes]:
+    with zipfile.ZipFile(BytesIO(data)) as archive:
+        entries = archive.infolist()
+        if len(entries) > limits.entries:
+            raise PackageError(
+                f"{name}: {len(entries)} entries, at most {limits.entries} are allowed"
+            )
+        for entry in entries:
+            _check_entry(entry, name)
+        _check_names([entry.orig_filename for entry in entries], name, limits)
+        _check_sizes(((entry.filename, entry.file_size) for entry in entries), limits, name)
+        return {entry.filename: archive.read(entry) for entry in entries}
+
+
+def _check_entry(entry: zipfile.ZipInfo, name: str) -> None:
+    path = entry.orig_filename
+    kind = (entry.external_attr >> 16) & 0o170000
+    if kind in _TYPES:
+        raise PackageError(f"{name}: {path!r} is {_TYPES[kind]}; only ordinary files are allowed")
+    if fault := name_fault(path):
+        raise PackageError(f"{name}: {fault}")
+    if entry.flag_bits & 1:
+        raise PackageError(f"{name}: {path!r} is encrypted")
+    if entry.compress_type != zipfile.ZIP_STORED or entry.compress_size != entry.file_size:
+        raise PackageError(f"{name}: {path!r} is compressed; make the archive with 'urc bundle'")
+
+
+def _check_names(paths: Iterable[str], name: str, limits: ArchiveLimits) -> None:
+    known = list(paths)
+    if len(known) > limits.entries:
+        raise PackageError(f"{name}: {len(known)} files, at most {limits.entries} are allowed")
+    for fault in (*map(name_fault, known), names_fault(known)):
+        if fault:
+            raise PackageError(f"{name}: {fault}")
+
+
+def _check_sizes(sizes: Iterable[tuple[str, int]], limits: ArchiveLimits, name: str) -> None:
+    total = 0
+    for path, size in sizes:
+        total += size
+        if size > limits.entry_bytes:
+            raise PackageError(
+                f"{name}: {path!r} has {size} bytes, at most {limits.entry_bytes} are allowed"
+            )
+    if total > limits.total_bytes:
+        raise PackageError(
+            f"{name}: the files have {total} bytes, at most {limits.total_bytes} are allowed"
+        )
+
+
+def _written(files: Mapping[str, bytes]) -> bytes:
+    buffer = BytesIO()
+    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_STORED, allowZip64=False) as archive:
+        for path in sorted(files):
+            entry = zipfile.ZipInfo(path, _DATE)
+            entry.create_system = 3  # Unix, wherever it is written: it says what the mode means
+            entry.external_attr = _MODE << 16
+            archive.writestr(entry, files[path])
+    return buffer.getvalue()

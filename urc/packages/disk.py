@@ -1,0 +1,152 @@
+"""Files that are there whole or not at all, whenever the process or the machine ends."""
+
+import os
+import shutil
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from secrets import token_hex
+from tempfile import mkdtemp
+from typing import Final
+
+from urc.packages.names import PackageError
+
+__all__ = ["clear", "discard", "exclusive", "put_file", "put_folder"]
+
+_WAIT_S: Final = 10.0
+_POLL_S: Final = 0.05
+
+
+def put_file(file: Path, data: bytes, work: Path) -> None:
+    """Write a file: after this it holds `data`, even if the power goes; before, what it held.
+
+    Args:
+        file: what it is called; its folder is made.
+        data: all of it.
+        work: a folder of the same disk, for what is not whole yet.
+
+    Raises:
+        OSError: the disk is full, for example; then nothing has changed.
+    """
+    file.parent.mkdir(parents=True, exist_ok=True)
+    work.mkdir(parents=True, exist_ok=True)
+    name = work / f"{token_hex(8)}.new"
+    # Not `mkstemp`: a web server of another user must be able to read a repository.
+    number = os.open(name, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666)
+    try:
+        try:
+            _write_all(number, data)
+            os.fsync(number)
+        finally:
+            os.close(number)
+        os.replace(name, file)
+    except BaseException:
+        with suppress(OSError):
+            os.unlink(name)
+        raise
+    _sync_folder(file.parent)
+
+
+def put_folder(folder: Path, files: Mapping[str, bytes], work: Path) -> None:
+    """Make a folder with these files, all at once; one that is there already is replaced.
+
+    WARNING: the files are not forced to the disk, since they can be made again: whoever uses them
+    compares them with what they were made of.
+    """
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    work.mkdir(parents=True, exist_ok=True)
+    made = Path(mkdtemp(dir=work))
+    try:
+        for path, data in files.items():
+            file = made / path
+            file.parent.mkdir(parents=True, exist_ok=True)
+            number = os.open(file, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o644)
+            try:
+                _write_all(number, data)
+            finally:
+                os.close(number)
+        discard(folder, work)
+        os.replace(made, folder)
+    except BaseException:
+        shutil.rmtree(made, ignore_errors=True)
+        raise
+
+
+def discard(path: Path, work: Path) -> None:
+    """Take a file or folder away, if it is there: of a folder first its name, then the rest."""
+    if not path.is_dir():
+        path.unlink(missing_ok=True)
+        return
+    try:
+        work.mkdir(parents=True, exist_ok=True)
+        gone = Path(mkdtemp(dir=work))
+        os.replace(path, gone / "gone")
+    except OSError:  # a full disk has no room for another name
+        gone = path
+    shutil.rmtree(gone, ignore_errors=True)
+
+
+def clear(work: Path) -> None:
+    """Remove what an interrupted change left."""
+    if work.is_dir():
+        for entry in work.iterdir():
+            if entry.is_dir():
+                shutil.rmtree(entry, ignore_errors=True)
+            else:
+                entry.unlink(missing_ok=True)
+
+
+@contextmanager
+def exclusive(file: Path) -> Iterator[None]:
+    """Keep other processes out while the context lasts; the system lets go when this one ends.
+
+    Raises:
+        PackageError: another one stays in for longer than ten seconds.
+    """
+    file.parent.mkdir(parents=True, exist_ok=True)
+    number = os.open(file, os.O_RDWR | os.O_CREAT, 0o644)
+    try:
+        deadline = time.monotonic() + _WAIT_S
+        while not _is_locked(number):
+            if time.monotonic() > deadline:
+                raise PackageError(f"{file.parent}: another urc is changing packages; try again")
+            time.sleep(_POLL_S)
+        yield
+    finally:
+        os.close(number)
+
+
+def _is_locked(number: int) -> bool:
+    try:
+        import fcntl
+    except ImportError:  # Windows
+        import msvcrt
+
+        try:
+            msvcrt.locking(number, msvcrt.LK_NBLCK, 1)  # type: ignore[attr-defined,unused-ignore]
+        except OSError:
+            return False
+        return True
+    try:
+        fcntl.flock(number, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    return True
+
+
+def _write_all(number: int, data: bytes) -> None:
+    rest = memoryview(data)
+    while rest:
+        rest = rest[os.write(number, rest) :]
+
+
+def _sync_folder(folder: Path) -> None:
+    """Make a new name in a folder last. Windows has no such thing, and needs none."""
+    if os.name == "nt":
+        return
+    number = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(number)
+    finally:
+        os.close(number)

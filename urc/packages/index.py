@@ -1,0 +1,116 @@
+"""``index.json``: what a repository has. A plain file, so that any web server can give it out."""
+
+from collections.abc import Iterable, Sequence
+from typing import Annotated, Final
+
+import msgspec
+
+from urc.packages.archive import PACKAGE
+from urc.packages.names import KINDS, NAME, Key, PackageError, parse_key
+from urc.packages.package import Package
+from urc.packages.versions import Version, parse_range, parse_version
+
+__all__ = ["INDEX", "INDEX_BYTES", "Entry", "Index", "entry_of", "read_index", "search"]
+
+INDEX: Final = "index.json"
+INDEX_BYTES: Final = 64 << 20
+_Text = Annotated[str, msgspec.Meta(max_length=500)]
+
+
+class Entry(msgspec.Struct, frozen=True):
+    """One version of one package."""
+
+    kind: Annotated[str, msgspec.Meta(pattern=rf"\A({'|'.join(KINDS)})\Z")]
+    name: Annotated[str, msgspec.Meta(pattern=rf"\A{NAME.pattern}\Z")]
+    version: Annotated[str, msgspec.Meta(max_length=64)]
+    sha256: Annotated[str, msgspec.Meta(pattern=r"\A[0-9a-f]{64}\Z")]
+    size: Annotated[int, msgspec.Meta(ge=0, le=PACKAGE.archive_bytes)]
+    """Bytes of the archive."""
+    language: int = 1
+    licence: _Text = ""
+    authors: tuple[_Text, ...] = ()
+    summary: _Text = ""
+    needs: dict[str, _Text] = {}
+
+    @property
+    def key(self) -> Key:
+        """Which package it is a version of."""
+        return Key(self.kind, self.name)
+
+    @property
+    def number(self) -> Version:
+        """Its version, to be compared."""
+        return parse_version(self.version)
+
+    @property
+    def file(self) -> str:
+        """Where its archive is, relative to the index."""
+        return f"archives/{self.key}/{self.version}.zip"
+
+    def __str__(self) -> str:
+        return f"{self.key} {self.version}"
+
+
+class Index(msgspec.Struct, frozen=True):
+    """All that a repository has."""
+
+    format: Annotated[int, msgspec.Meta(ge=1, le=1)]
+    name: _Text
+    packages: tuple[Entry, ...]
+
+    def to_bytes(self) -> bytes:
+        """Return the file; the same packages give the same bytes."""
+        return msgspec.json.format(msgspec.json.encode(self), indent=1) + b"\n"
+
+
+def entry_of(package: Package) -> Entry:
+    """Return what an index says of a package."""
+    said = package.manifest
+    return Entry(
+        *said.key,
+        version=said.version,
+        sha256=package.digest,
+        size=len(package.data),
+        language=said.language,
+        licence=said.licence,
+        authors=said.authors,
+        summary=said.summary,
+        needs=said.needs,
+    )
+
+
+def read_index(data: bytes, where: str) -> Index:
+    """Return an index that came from outside; raise `PackageError`.
+
+    Versions and ranges are checked here, so that nothing later trips over one.
+    """
+    if len(data) > INDEX_BYTES:
+        raise PackageError(f"{where}: an index has at most {INDEX_BYTES >> 20} MiB")
+    try:
+        index = msgspec.json.decode(data, type=Index)
+        for entry in index.packages:
+            parse_version(entry.version)
+            for needed, wanted in entry.needs.items():
+                parse_key(needed)
+                parse_range(wanted)
+    except (msgspec.DecodeError, PackageError, RecursionError, UnicodeDecodeError) as error:
+        raise PackageError(f"{where}: this is no index of a repository: {error}") from None
+    return index
+
+
+def search(entries: Iterable[Entry], words: Sequence[str], kind: str = "") -> list[Entry]:
+    """Return the newest version of each package that has all words, those named so first."""
+    wanted = [word.casefold() for word in words]
+    found: dict[tuple[str, str], Entry] = {}
+    for entry in entries:
+        if kind and entry.kind != kind:
+            continue
+        text = f"{entry.kind} {entry.name} {entry.summary}".casefold()
+        if all(word in text for word in wanted):
+            other = found.get((entry.kind, entry.name))
+            if other is None or other.number < entry.number:
+                found[entry.kind, entry.name] = entry
+    return sorted(
+        found.values(),
+        key=lambda entry: (not any(word in entry.name for word in wanted), entry.name, entry.kind),
+    )

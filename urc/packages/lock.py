@@ -1,0 +1,89 @@
+"""The lock: which version, with which bytes, of each package that one package needs."""
+
+from collections.abc import Mapping
+from typing import Annotated, Final
+
+import msgspec
+
+from urc.packages.archive import PACKAGE
+from urc.packages.index import Entry
+from urc.packages.names import Key, PackageError, parse_key
+from urc.packages.package import sha256
+from urc.packages.versions import Version, parse_version
+
+__all__ = ["LOCK", "Lock", "Pin", "lock_of", "read_lock"]
+
+LOCK: Final = "urc.lock"
+_PACKAGES_MOST: Final = 128
+
+
+class Pin(msgspec.Struct, frozen=True):
+    """One package of a lock."""
+
+    version: Annotated[str, msgspec.Meta(max_length=64)]
+    sha256: Annotated[str, msgspec.Meta(pattern=r"\A[0-9a-f]{64}\Z")]
+    size: Annotated[int, msgspec.Meta(ge=0, le=PACKAGE.archive_bytes)]
+
+
+class Lock(msgspec.Struct, frozen=True):
+    """A package with all that it needs: an ecosystem of its own."""
+
+    format: Annotated[int, msgspec.Meta(ge=1, le=1)]
+    root: str
+    """``drivers/puppet``: what was asked for."""
+    packages: dict[str, Pin]
+    """``drivers/puppet`` → what was taken; `root` is among them."""
+
+    def __post_init__(self) -> None:
+        """Refuse names and versions that are none."""
+        if len(self.packages) > _PACKAGES_MOST or self.root not in self.packages:
+            raise ValueError(
+                f"1 to {_PACKAGES_MOST} packages are expected, and the root among them"
+            )
+        for key, pin in self.packages.items():
+            parse_key(key)
+            parse_version(pin.version)
+
+    @property
+    def key(self) -> Key:
+        """What was asked for."""
+        return parse_key(self.root)
+
+    @property
+    def version(self) -> str:
+        """The root's."""
+        return self.packages[self.root].version
+
+    @property
+    def number(self) -> Version:
+        """The root's version, to be compared."""
+        return parse_version(self.version)
+
+    @property
+    def digest(self) -> str:
+        """What names this ecosystem."""
+        return sha256(self.to_bytes())
+
+    def to_bytes(self) -> bytes:
+        """Return the file; the same choice gives the same bytes."""
+        return msgspec.json.format(msgspec.json.encode(self, order="sorted"), indent=1) + b"\n"
+
+    def __str__(self) -> str:
+        return f"{self.root} {self.version}"
+
+
+def lock_of(root: Key, chosen: Mapping[Key, Entry]) -> Lock:
+    """Return the lock of what was resolved."""
+    pins = {
+        str(key): Pin(entry.version, entry.sha256, entry.size)
+        for key, entry in sorted(chosen.items())
+    }
+    return Lock(1, str(root), pins)
+
+
+def read_lock(data: bytes, where: str) -> Lock:
+    """Return the lock in a file; raise `PackageError`."""
+    try:
+        return msgspec.json.decode(data, type=Lock)
+    except (msgspec.DecodeError, PackageError, RecursionError, UnicodeDecodeError) as error:
+        raise PackageError(f"{where}: this is no lock: {error}") from None

@@ -1,0 +1,132 @@
+"""``package.yaml``: what a package says of itself."""
+
+from typing import Any, Final, NamedTuple
+
+from urc.packages.names import KINDS, NAME, Key, PackageError, parse_key
+from urc.packages.versions import parse_range, parse_version
+from urc.problems import ProblemsError
+from urc.source import Document, Limits, Path, parse_document
+
+__all__ = ["LANGUAGE", "MANIFEST", "Manifest", "parse_manifest"]
+
+MANIFEST: Final = "package.yaml"
+LANGUAGE: Final = 1
+"""Version of the language of documents that this URC reads."""
+_NEEDS_MOST: Final = 64
+_AUTHORS_MOST: Final = 32
+_LONGEST: Final = 500
+_KEYS: Final = ("urc", "package", "name", "version", "licence", "authors", "summary", "needs")
+_MUST: Final = _KEYS[:6]
+
+
+class Manifest(NamedTuple):
+    """What ``package.yaml`` says, checked."""
+
+    key: Key
+    version: str
+    """SemVer."""
+    licence: str
+    """SPDX expression."""
+    authors: tuple[str, ...]
+    summary: str
+    needs: dict[str, str]
+    """``widgets/battery-svg`` → range of versions."""
+    language: int
+
+    @property
+    def main(self) -> str:
+        """The document in the package: ``driver.yaml`` of a driver."""
+        return f"{self.key.kind}.yaml"
+
+
+def parse_manifest(content: bytes, file: str) -> Manifest:
+    """Return what a manifest says.
+
+    Raises:
+        PackageError: what is wrong with it, and on which line.
+    """
+    try:
+        document = parse_document(content, file, Limits(size_bytes=65536))
+    except ProblemsError as error:
+        raise PackageError(str(error)) from None
+    reader = _Reader(document)
+    data = reader.mapping
+    for key in data:
+        if key not in _KEYS:
+            raise reader.fault((key,), f"there is no key {key!r}; known: {', '.join(_KEYS)}")
+    for key in _MUST:
+        if key not in data:
+            raise reader.fault((), f"{key!r} is missing")
+    if type(data["urc"]) is not int or data["urc"] != LANGUAGE:
+        raise reader.fault(("urc",), f"this URC reads language version {LANGUAGE}")
+    return Manifest(
+        Key(reader.kind(), reader.name()),
+        reader.version(),
+        reader.text("licence"),
+        reader.authors(),
+        reader.text("summary") if "summary" in data else "",
+        reader.needs() if "needs" in data else {},
+        LANGUAGE,
+    )
+
+
+class _Reader:
+    """Takes the values out of a manifest, and says on which line one is wrong."""
+
+    def __init__(self, document: Document) -> None:
+        self._document = document
+        self.mapping: dict[str, Any] = {}
+        if not isinstance(document.data, dict):
+            raise self.fault((), f"keys are expected: {', '.join(_MUST)}")
+        self.mapping = document.data
+
+    def fault(self, path: Path, message: str) -> PackageError:
+        document = self._document
+        span = (document.at(path) or document.mark).span
+        where = f" {'.'.join(map(str, path))}:" if path else ""
+        return PackageError(f"{document.file}:{span.line}:{span.column}:{where} {message}")
+
+    def text(self, key: str) -> str:
+        return self._text((key,), self.mapping[key])
+
+    def _text(self, path: Path, value: object) -> str:
+        if not isinstance(value, str) or not value.strip() or len(value) > _LONGEST:
+            raise self.fault(path, f"a text of 1 to {_LONGEST} characters is expected")
+        if not value.isprintable():
+            raise self.fault(path, "a text on one line is expected, without control characters")
+        return value
+
+    def kind(self) -> str:
+        if self.mapping["package"] not in KINDS:
+            raise self.fault(("package",), f"one of {', '.join(KINDS)} is expected")
+        return str(self.mapping["package"])
+
+    def name(self) -> str:
+        name = self.mapping["name"]
+        if not isinstance(name, str) or not NAME.fullmatch(name):
+            raise self.fault(("name",), "small letters, digits and '-' are expected, 64 at most")
+        return name
+
+    def version(self) -> str:
+        try:
+            return str(parse_version(str(self.mapping["version"])))
+        except PackageError as error:
+            raise self.fault(("version",), str(error)) from None
+
+    def authors(self) -> tuple[str, ...]:
+        found = self.mapping["authors"]
+        if not isinstance(found, list) or not 0 < len(found) <= _AUTHORS_MOST:
+            raise self.fault(("authors",), f"a list of 1 to {_AUTHORS_MOST} names is expected")
+        return tuple(self._text(("authors", at), one) for at, one in enumerate(found))
+
+    def needs(self) -> dict[str, str]:
+        found = self.mapping["needs"]
+        if not isinstance(found, dict) or len(found) > _NEEDS_MOST:
+            raise self.fault(("needs",), f"at most {_NEEDS_MOST} packages are expected")
+        needs: dict[str, str] = {}
+        for key, wanted in found.items():
+            try:
+                needs[str(parse_key(str(key)))] = str(parse_range(str(wanted)))
+            except PackageError as error:
+                raise self.fault(("needs", key), str(error)) from None
+        return needs

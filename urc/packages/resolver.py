@@ -1,0 +1,137 @@
+"""Which versions to take, so that everything that needs something gets what it asks for.
+
+`resolvelib` searches (it is what pip resolves with): it goes back when two needs collide, and says
+which ones did. What a package is, and which version is best, is said here: the newest that fits.
+"""
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Any, Final, NamedTuple
+
+from resolvelib import AbstractProvider, BaseReporter, ResolutionImpossible, Resolver
+from resolvelib.resolvers import ResolutionTooDeep
+
+from urc.packages.index import Entry
+from urc.packages.manifest import LANGUAGE
+from urc.packages.names import Key, PackageError, Wish, parse_key
+from urc.packages.versions import parse_range
+
+__all__ = ["choose", "resolve"]
+
+_ROUNDS: Final = 2000
+_PACKAGES_MOST: Final = 128
+
+
+class _Need(NamedTuple):
+    key: Key
+    wanted: str
+
+
+Entries = Mapping[Key, Sequence[Entry]]
+
+
+def choose(entries: Entries, wish: Wish) -> Key:
+    """Return the package that a person means.
+
+    Raises:
+        PackageError: there is none, or several kinds have one of that name.
+    """
+    found = [key for key in entries if key.name == wish.name and wish.kind in ("", key.kind)]
+    if len(found) == 1:
+        return found[0]
+    if found:
+        names = ", ".join(map(str, sorted(found)))
+        raise PackageError(f"{wish.name!r} may be one of {names}; write which")
+    from difflib import get_close_matches
+
+    near = get_close_matches(wish.name, [key.name for key in entries], 1)
+    hint = f"; did you mean {near[0]!r}?" if near else ""
+    raise PackageError(f"no repository has {Wish(wish.kind, wish.name)}{hint}")
+
+
+def resolve(root: Key, wanted: str, entries: Entries) -> dict[Key, Entry]:
+    """Return one version of `root` and of everything that it needs.
+
+    Args:
+        root: the package that is asked for.
+        wanted: range of its versions.
+        entries: every version there is.
+
+    Raises:
+        PackageError: what collides, and who asks for what.
+    """
+    resolver: Resolver[_Need, Entry, Key] = Resolver(_Provider(entries), BaseReporter())
+    try:
+        result = resolver.resolve([_Need(root, wanted)], max_rounds=_ROUNDS)
+    except ResolutionImpossible as error:
+        raise PackageError(_conflict(error, entries)) from None
+    except ResolutionTooDeep:
+        raise PackageError(f"{root}: its needs were not settled in {_ROUNDS} steps") from None
+    if len(result.mapping) > _PACKAGES_MOST:
+        raise PackageError(f"{root} needs more than {_PACKAGES_MOST} packages")
+    return dict(sorted(result.mapping.items()))
+
+
+class _Provider(AbstractProvider[_Need, Entry, Key]):
+    def __init__(self, entries: Entries) -> None:
+        self._entries = entries
+
+    def identify(self, requirement_or_candidate: _Need | Entry) -> Key:
+        return requirement_or_candidate.key
+
+    def get_preference(
+        self,
+        identifier: Key,
+        resolutions: Mapping[Key, Entry],
+        candidates: Mapping[Key, Iterator[Entry]],
+        information: Mapping[Key, Iterator[Any]],
+        backtrack_causes: Sequence[Any],
+    ) -> tuple[bool, Key]:
+        """Settle first what collided before."""
+        causes = {cause.requirement.key for cause in backtrack_causes}
+        return identifier not in causes, identifier
+
+    def find_matches(
+        self,
+        identifier: Key,
+        requirements: Mapping[Key, Iterator[_Need]],
+        incompatibilities: Mapping[Key, Iterator[Entry]],
+    ) -> list[Entry]:
+        needs = list(requirements.get(identifier, ()))
+        refused = {entry.version for entry in incompatibilities.get(identifier, ())}
+        found = [
+            entry
+            for entry in self._entries.get(identifier, ())
+            if entry.language == LANGUAGE
+            and entry.version not in refused
+            and all(self.is_satisfied_by(need, entry) for need in needs)
+        ]
+        return sorted(found, key=lambda entry: entry.number, reverse=True)
+
+    def is_satisfied_by(self, requirement: _Need, candidate: Entry) -> bool:
+        return parse_range(requirement.wanted).allows(candidate.number)
+
+    def get_dependencies(self, candidate: Entry) -> list[_Need]:
+        return [_Need(parse_key(key), wanted) for key, wanted in candidate.needs.items()]
+
+
+def _conflict(error: "ResolutionImpossible[_Need, Entry]", entries: Entries) -> str:
+    """Say what is asked for, by whom, and what there is."""
+    causes: Iterable[Any] = error.causes
+    asked: dict[Key, list[str]] = {}
+    for cause in causes:
+        who = str(cause.parent) if cause.parent is not None else "you"
+        verb = "ask for" if cause.parent is None else "needs"
+        line = f"{who} {verb} {cause.requirement.wanted}"
+        if line not in (lines := asked.setdefault(cause.requirement.key, [])):
+            lines.append(line)
+    return "; ".join(f"{key}: {', '.join(lines)}; {_there_is(key, entries)}"
+                     for key, lines in sorted(asked.items()))  # fmt: skip
+
+
+def _there_is(key: Key, entries: Entries) -> str:
+    known = sorted(entries.get(key, ()), key=lambda entry: entry.number)
+    usable = [entry.version for entry in known if entry.language == LANGUAGE]
+    if usable:
+        shown = ", ".join(usable[-8:])
+        return f"there is {shown}" if len(usable) <= 8 else f"there is …, {shown}"
+    return "every version is for another URC" if known else "there is none"

@@ -1,0 +1,283 @@
+"""The packages of this user on this machine, kept for ever after without any network.
+
+    packages/
+      state.json              what is installed: one lock for each
+      blobs/<sha256>.zip      the archives, each under the digest of its bytes
+      ecosystems/<sha256>/    the files of one lock, made from its blobs
+      work/                   what is not whole yet, or no longer wanted
+
+Only `state.json` says what is installed, and it changes in one step. Whatever it does not name is
+rubbish, which the next change takes away. So the store is whole at every moment.
+"""
+
+import os
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Annotated, Final
+
+import msgspec
+
+from urc.packages import disk
+from urc.packages.archive import PACKAGE, read_archive
+from urc.packages.lock import LOCK, Lock
+from urc.packages.names import Key, PackageError, Wish, parse_key
+from urc.packages.package import open_package, sha256
+from urc.packages.versions import parse_range
+
+__all__ = ["Change", "Store", "ecosystem_of", "kinds_in"]
+
+_STATE_BYTES: Final = 16 << 20
+
+
+class _State(msgspec.Struct, frozen=True):
+    format: Annotated[int, msgspec.Meta(ge=1, le=1)]
+    installed: tuple[Lock, ...]
+
+
+class Store:
+    """The store in one folder; nothing is made before something is installed."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.work = folder / "work"
+        self._state = folder / "state.json"
+
+    def installed(self) -> tuple[Lock, ...]:
+        """Return what was asked for and is there, by name and version.
+
+        Raises:
+            PackageError: the state cannot be read.
+        """
+        try:
+            with open(self._state, "rb") as file:
+                data = file.read(_STATE_BYTES)
+        except FileNotFoundError:
+            return ()
+        try:
+            return msgspec.json.decode(data, type=_State).installed
+        except (msgspec.DecodeError, PackageError, UnicodeDecodeError) as error:
+            raise PackageError(f"{self._state}: this file is damaged: {error}") from None
+
+    def find(self, wish: Wish) -> Lock | None:
+        """Return the newest installed version of what is named, or None.
+
+        Raises:
+            PackageError: several kinds have one of that name.
+        """
+        found = _meant(wish, self.installed())
+        return max(found, key=lambda lock: lock.number, default=None)
+
+    def document(self, lock: Lock) -> Path:
+        """Return the document of an installed package, its files compared with its blobs first.
+
+        Raises:
+            PackageError: its files were changed, and the blobs too.
+        """
+        folder = self.place(lock)
+        if not _holds(folder, self._files(lock)):
+            with self.changing() as change:
+                change.stage(lock, {})
+        return folder / lock.root / f"{lock.key.kind}.yaml"
+
+    def place(self, lock: Lock) -> Path:
+        """Return the folder of a lock's files."""
+        return self.folder / "ecosystems" / lock.digest
+
+    def blob(self, digest: str) -> bytes:
+        """Return an archive that is in the store; raise `PackageError` if it is not, or damaged."""
+        try:
+            with open(self.blob_file(digest), "rb") as file:
+                data = file.read(PACKAGE.archive_bytes + 1)
+        except FileNotFoundError:
+            data = b""
+        if sha256(data) != digest:
+            raise PackageError(
+                f"{self.blob_file(digest)}: this archive is missing or damaged; install it again"
+            )
+        return data
+
+    def has(self, digest: str) -> bool:
+        """Return whether an archive is in the store."""
+        return self.blob_file(digest).is_file()
+
+    def blob_file(self, digest: str) -> Path:
+        """Return where an archive is, or would be."""
+        return self.folder / "blobs" / f"{digest}.zip"
+
+    @contextmanager
+    def changing(self) -> Iterator["Change"]:
+        """Keep other processes from changing the store; at the end rubbish is taken away."""
+        with disk.exclusive(self.folder / "changing"):
+            with suppress(OSError):
+                disk.clear(self.work)
+            change = Change(self)
+            try:
+                yield change
+            finally:
+                with suppress(OSError, PackageError):
+                    self._collect()
+
+    def write_state(self, installed: tuple[Lock, ...]) -> None:
+        """Say what is installed; only a `Change` may."""
+        state = _State(1, tuple(sorted(installed, key=lambda lock: (lock.root, lock.number))))
+        data = msgspec.json.format(msgspec.json.encode(state, order="sorted"), indent=1)
+        disk.put_file(self._state, data + b"\n", self.work)
+
+    def _files(self, lock: Lock) -> dict[str, bytes]:
+        """Return what a lock's folder must hold."""
+        files = {LOCK: lock.to_bytes()}
+        for key, pin in lock.packages.items():
+            for path, data in read_archive(self.blob(pin.sha256), PACKAGE, key).items():
+                files[f"{key}/{path}"] = data
+        return files
+
+    def _collect(self) -> None:
+        """Take away what no lock names. What cannot go now goes at the next change."""
+        locks = self.installed()
+        places = {lock.digest for lock in locks}
+        blobs = {f"{pin.sha256}.zip" for lock in locks for pin in lock.packages.values()}
+        for folder, wanted in (("ecosystems", places), ("blobs", blobs)):
+            if (self.folder / folder).is_dir():
+                for entry in (self.folder / folder).iterdir():
+                    if entry.name not in wanted:
+                        disk.discard(entry, self.work)
+        disk.clear(self.work)
+
+
+class Change:
+    """A change of the store, while nobody else can make one."""
+
+    def __init__(self, store: Store) -> None:
+        self._store = store
+
+    def stage(self, lock: Lock, archives: Mapping[str, bytes]) -> Path:
+        """Make the files of a lock, to be looked at; they are not installed yet.
+
+        Args:
+            lock: what is to be installed.
+            archives: digest → bytes of those that the store has not.
+
+        Raises:
+            PackageError: an archive is not what the lock says, or other bytes of a version are
+                installed already.
+        """
+        store = self._store
+        self._check_known(lock)
+        for key, pin in lock.packages.items():
+            data = archives.get(pin.sha256)
+            if data is None:
+                data = store.blob(pin.sha256)
+            elif sha256(data) != pin.sha256:
+                raise PackageError(f"{key} {pin.version}: these are not the bytes that were named")
+            said = open_package(data, f"{key} {pin.version}").manifest
+            if (str(said.key), said.version) != (key, pin.version):
+                raise PackageError(f"{key} {pin.version}: this is {said.key} {said.version}")
+            if pin.sha256 in archives:
+                disk.put_file(store.blob_file(pin.sha256), data, store.work)
+        files = store._files(lock)  # noqa: SLF001 (a change is the store's other half)
+        if not _holds(store.place(lock), files):
+            disk.put_folder(store.place(lock), files, store.work)
+        return store.place(lock)
+
+    def commit(self, lock: Lock) -> None:
+        """Install what was staged. Another version of it stays beside it."""
+        others = [
+            one
+            for one in self._store.installed()
+            if (one.root, one.version) != (lock.root, lock.version)
+        ]
+        self._store.write_state((*others, lock))
+
+    def remove(self, wish: Wish) -> tuple[list[Lock], list[str]]:
+        """Remove what was installed, and what only it needed.
+
+        Returns:
+            what had been asked for, and all that is gone, as ``drivers/puppet 1.0.0``.
+
+        Raises:
+            PackageError: it is not installed, or something else needs it.
+        """
+        before = self._store.installed()
+        gone = _meant(wish, before)
+        if not gone:
+            raise PackageError(_not_installed(wish, before))
+        after = tuple(lock for lock in before if lock not in gone)
+        self._store.write_state(after)
+        return gone, sorted(_all(before) - _all(after))
+
+    def _check_known(self, lock: Lock) -> None:
+        """Refuse other bytes under a version that is installed: nobody may change one silently."""
+        for other in self._store.installed():
+            for key, pin in other.packages.items():
+                new = lock.packages.get(key)
+                if new and new.version == pin.version and new.sha256 != pin.sha256:
+                    raise PackageError(
+                        f"{key} {pin.version} is installed with other bytes (by {other});"
+                        " a changed package needs a new version"
+                    )
+
+
+def ecosystem_of(document: Path) -> Path | None:
+    """Return the folder of files that an installed document belongs to, or None."""
+    for folder in document.resolve().parents:
+        if (folder / LOCK).is_file():
+            return folder
+    return None
+
+
+def _meant(wish: Wish, locks: tuple[Lock, ...]) -> list[Lock]:
+    """Return those that a wish means; without a range, whatever is installed is wanted."""
+    wanted = parse_range(wish.range)
+    found = [
+        lock
+        for lock in locks
+        if lock.key.name == wish.name
+        and wish.kind in ("", lock.key.kind)
+        and (wish.range == "*" or wanted.allows(lock.number))
+    ]
+    if len({lock.key for lock in found}) > 1:
+        names = ", ".join(sorted({lock.root for lock in found}))
+        raise PackageError(f"{wish.name!r} may be one of {names}; write which")
+    return found
+
+
+def _all(locks: tuple[Lock, ...]) -> set[str]:
+    return {f"{key} {pin.version}" for lock in locks for key, pin in lock.packages.items()}
+
+
+def _not_installed(wish: Wish, locks: tuple[Lock, ...]) -> str:
+    needed = [
+        f"{lock} needs {key} {pin.version}"
+        for lock in locks
+        for key, pin in lock.packages.items()
+        if key != lock.root
+        and parse_key(key).name == wish.name
+        and wish.kind in ("", parse_key(key).kind)
+    ]
+    if needed:
+        return f"{wish} was not installed by itself: {'; '.join(needed)}"
+    names = ", ".join(map(str, locks))
+    return f"{wish} is not installed" + (f"; there is {names}" if names else "; nothing is")
+
+
+def _holds(folder: Path, files: Mapping[str, bytes]) -> bool:
+    """Return whether a folder holds these files, to the last byte, and nothing else."""
+    found = 0
+    for parent, folders, names in os.walk(folder):
+        for name in names:
+            path = Path(parent, name)
+            wanted = files.get(path.relative_to(folder).as_posix())
+            if wanted is None or path.is_symlink() or path.stat().st_size != len(wanted):
+                return False
+            if path.read_bytes() != wanted:
+                return False
+            found += 1
+        if any(Path(parent, name).is_symlink() for name in folders):
+            return False
+    return found == len(files)
+
+
+def kinds_in(lock: Lock, kind: str) -> list[Key]:
+    """Return the packages of one kind in a lock."""
+    return [key for key in map(parse_key, lock.packages) if key.kind == kind]
