@@ -33,6 +33,11 @@ BROWSER_FIXTURES = {"browser", "new_page"}
 TEST_TIMEOUT_S = 60
 
 
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Let tests that compare pictures take them anew."""
+    parser.addoption("--update", action="store_true", help="take the kept pictures anew")
+
+
 @pytest.fixture(scope="session")
 def anyio_backend() -> str:
     """Run async tests on asyncio only, all in one loop, so that a session can own a browser."""

@@ -135,8 +135,8 @@ def test_a_slip_is_reported_as_the_page_says(
 def test_the_widget_of_the_page_renders_in_each_state(folder: Path) -> None:
     """All five files are shown, and the template makes sense before any value is there."""
     lamp = folder / "widgets" / "lamp"
-    shipped_names = {path.name for path in (folder / "widgets" / "value").iterdir()}
-    assert {path.name for path in lamp.iterdir()} == shipped_names
+    needed = {"widget.yaml", "template.html.j2", "widget.js", "widget.css", "demo.yaml"}
+    assert {path.name for path in lamp.iterdir()} == needed
     shelf = Shelf(lamp.parent)
     widget = shelf.get("lamp")
     assert widget is not None

@@ -39,6 +39,10 @@ commands:
       side: { type: string, choices: [a, b], default: a }
 messages:
   level: { regex: '^(?P<level>[0-9])$' }
+widgets:
+  level: { use: value, bind: { value: level } }
+interfaces:
+  main: { title: Main, tabs: { one: { grid: level } } }
 tests:
   - { name: "blinks | thrice", run: blink, sent: { wire: "B|3 \\t`" } }
 """
@@ -90,6 +94,16 @@ Three times.
 | `side` | Side | string | `a`, `b` | `a` |
 
 - `level`: How bright.
+
+## Interfaces
+
+### Main
+
+Pages: One.
+
+| slot | widget | shows |
+|---|---|---|
+| `level` | value | `level` |
 
 ## Tests
 

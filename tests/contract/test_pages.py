@@ -24,7 +24,8 @@ HOSTILE = '"><script>alert(1)</script><img src=x onerror=alert(1)>{{ 7*7 }}'
 CONTENT_POLICY = (
     "default-src 'none'; script-src 'nonce-NONCE' 'strict-dynamic'; "
     "style-src 'self' 'nonce-NONCE'; img-src 'self' data: blob:; connect-src 'self'; "
-    "frame-src 'self'; worker-src 'self'; base-uri 'none'; form-action 'none'; "
+    "frame-src 'self'; worker-src 'self'; manifest-src 'self'; base-uri 'none'; "
+    "form-action 'none'; "
     "object-src 'none'; frame-ancestors 'none'; require-trusted-types-for 'script'; "
     "trusted-types urc"
 )
@@ -244,11 +245,14 @@ def test_no_path_leads_out_of_what_is_served(client: TestClient, path: str) -> N
 
 
 def test_the_import_map_leads_to_files_that_are_served(client: TestClient) -> None:
-    """Every vendored module that a widget may import is there."""
+    """Every module that a widget may import is there, ours and others'."""
     page = client.get("/robots/puppet/").text
     found = re.search(r'type="importmap">(\{.*?\})</script>', page)
     assert found is not None
-    addresses = re.findall(r'"(/vendor/[^"]+)"', found[1])
+    addresses = [
+        address for address in re.findall(r'"(/[^"]+)"', found[1]) if not address.endswith("/")
+    ]
+    assert len(addresses) > 10
     assert all(client.get(address).status_code == 200 for address in addresses)
 
 
@@ -284,7 +288,7 @@ def test_scripts_write_no_markup_and_files_stay_short() -> None:
         text = path.read_text("utf-8")
         assert text.startswith("// @ts-check"), path
         assert not re.search(r"innerHTML|outerHTML|insertAdjacentHTML|document\.write|eval\(", text)
-        assert len(text.splitlines()) <= 300, path
+        assert len(text.splitlines()) <= 400, path
 
 
 THEMES = {
@@ -293,6 +297,9 @@ THEMES = {
     "sunlight": (7.0, None),
     "night": (4.5, None),
 }
+
+
+SERIES = tuple(f"series-{number}" for number in range(1, 7))
 
 
 def theme_colours(name: str) -> dict[str, str]:
@@ -333,7 +340,7 @@ def test_each_theme_can_be_read(theme: str) -> None:
     ]
     faults += [
         f"{token} on {ground}: {contrast(token, ground):.2f}"
-        for token in ("line", "focus", "level", "alarm", "caution")
+        for token in ("line", "focus", "level", "alarm", "caution", *SERIES)
         for ground in ("surface", "raised", "ground")
         if contrast(token, ground) < 3
     ]

@@ -1,22 +1,35 @@
 """Every shipped widget folder: complete, named as its folder, its template sound in every state."""
 
 import re
+from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
 
 import pytest
-import yaml
 
-from urc.model.values import Limits, Signal
-from urc.model.widget import Port, Widget
+from urc.config.parse_widget import Shelf
+from urc.model.widget import Widget
 from urc.shipped import shipped
+from urc.source import read_document
 from urc.testing.dashboard import option_defaults
-from urc.web.pages import WidgetContext, render_widget
+from urc.web.demos import DemoState, demo_states
+from urc.web.pages import WidgetContext, render_widget, widget_context
 
 FOLDERS = sorted(path for path in shipped("widgets").iterdir() if path.is_dir())
 FILES = {"widget.yaml", "template.html.j2", "widget.js", "widget.css", "demo.yaml"}
-TYPES = {"string": str, "integer": int, "number": (int, float), "boolean": bool}
+MORE = {".js", ".json", ".svg", ".png", ".jpg", ".urdf", ".stl"}
+"""What else a widget may bring: modules and small assets."""
+MOST_BYTES = 256 * 1024
+SHELF = Shelf(shipped("widgets"))
+TYPES = {
+    "string": str,
+    "integer": int,
+    "number": (int, float),
+    "boolean": bool,
+    "array": list,
+    "object": dict,
+}
 HOSTILE = "</h3><script>alert(1)</script><img src=x onerror=alert(1)>"
 
 
@@ -35,27 +48,22 @@ class Page(HTMLParser):
 
 def read(folder: Path, name: str) -> Any:
     """Return a YAML document of the folder."""
-    return yaml.safe_load((folder / name).read_text("utf-8"))
+    return read_document(str(folder / name)).data
 
 
 def widget_of(folder: Path) -> Widget:
     """Return the widget as its manifest declares it."""
-    manifest = read(folder, "widget.yaml")
-    ports = {
-        name: Port(name, tuple(port["type"]), port.get("unit", ""))
-        for name, port in manifest.get("inputs", {}).items()
-    }
-    return Widget(
-        manifest["name"], manifest["title"], folder, ports, options=manifest.get("options", {})
-    )
+    widget = SHELF.get(folder.name)
+    assert widget is not None, SHELF.problems
+    return widget
 
 
-def signals_of(demo: dict[str, Any]) -> dict[str, Signal]:
-    """Return the signals that a demo binds to the inputs."""
-    return {
-        name: Signal(name, **{**given, "limits": Limits(**given.get("limits", {}))})
-        for name, given in demo["signals"].items()
-    }
+def contexts(widget: Widget) -> dict[str, tuple[DemoState, WidgetContext]]:
+    """Return what the template is rendered with in each state of the demo."""
+    found = {}
+    for state in demo_states(widget):
+        found[state.name] = (state, widget_context(state.use, widget, state.profile, "cell-0"))
+    return found
 
 
 STATES = [
@@ -68,7 +76,10 @@ STATES = [
 @pytest.mark.parametrize("folder", FOLDERS, ids=lambda folder: folder.name)
 def test_a_widget_folder_is_complete(folder: Path) -> None:
     """All five files, the name of the folder, and inputs that the demo binds."""
-    assert {path.name for path in folder.iterdir()} == FILES
+    assert {path.name for path in folder.iterdir()} >= FILES
+    for path in folder.rglob("*"):
+        assert path.is_dir() or path.name in FILES or path.suffix in MORE, path
+        assert path.stat().st_size <= MOST_BYTES, path
     manifest = read(folder, "widget.yaml")
     assert (manifest["urc"], manifest["kind"], manifest["name"]) == (1, "widget", folder.name)
     demo = read(folder, "demo.yaml")
@@ -90,21 +101,19 @@ def test_a_widget_folder_is_complete(folder: Path) -> None:
 @pytest.mark.parametrize(("folder", "state"), STATES, ids=lambda part: getattr(part, "name", part))
 def test_a_template_renders_in_each_state_without_values(folder: Path, state: str) -> None:
     """What stands there before the module has loaded makes sense, and texts are texts."""
-    demo = read(folder, "demo.yaml")
-    shown = demo["states"][state]
     widget = widget_of(folder)
-    options = {
-        **dict.fromkeys(widget.options),
-        **option_defaults(widget),
-        **shown.get("options", {}),
-    }
-    outputs = dict.fromkeys(demo.get("outputs", {}), HOSTILE)
+    _, context = contexts(widget)[state]
     # A label of its own would stand in place of the title.
-    options |= {name: HOSTILE for name in ("label",) if options.get(name)}
-    context = WidgetContext(HOSTILE, options, signals_of(demo), widget.name, "cell-0", outputs)
-    html = str(render_widget(widget, context))
+    labels = {name: HOSTILE for name in ("label",) if context.options.get(name)}
+    hostile = replace(
+        context,
+        title=HOSTILE,
+        options={**context.options, **labels},
+        outputs=dict.fromkeys(context.outputs, HOSTILE),
+    )
+    html = str(render_widget(widget, hostile))
     assert "&lt;img src=x onerror=alert(1)&gt;" in html
-    assert "—" in html
+    assert "—" in html or not widget.inputs
     assert 'id="cell-0-' in html
     for tag, attributes in Page(html).elements:
         assert tag not in ("script", "img", "style", "link", "iframe")
@@ -128,7 +137,8 @@ def test_a_template_without_its_command_has_no_dead_control(folder: Path) -> Non
     if not read(folder, "widget.yaml").get("outputs"):
         return  # what it does needs no command, as STOP
     widget = widget_of(folder)
+    _, context = contexts(widget)["normal"]
     options = {**dict.fromkeys(widget.options), **option_defaults(widget)}
-    signals = signals_of(read(folder, "demo.yaml"))
-    html = str(render_widget(widget, WidgetContext("T", options, signals, widget.name, "cell-0")))
+    bare = replace(context, title="T", options=options, outputs={})
+    html = str(render_widget(widget, bare))
     assert not {"button", "input", "select"} & {tag for tag, _ in Page(html).elements}

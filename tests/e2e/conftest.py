@@ -35,14 +35,20 @@ class PageMaker:
         self._contexts: list[BrowserContext] = []
         self._faults: dict[Page, PageFaults] = {}
 
-    async def __call__(self, size: Size = "desktop", theme: Theme = "light") -> Page:
-        """Return an empty page of its own browser context, so that nothing is shared."""
+    async def __call__(
+        self, size: Size = "desktop", theme: Theme = "light", *, is_kept: bool = False
+    ) -> Page:
+        """Return an empty page of its own browser context, so that nothing is shared.
+
+        `is_kept`: the pages may install their service worker, as they do for people.
+        """
         width, height = SIZES[size]
         context = await self._browser.new_context(
             viewport={"width": width, "height": height},
             color_scheme=theme,
             locale=LOCALE,
             has_touch=size != "desktop",
+            service_workers="allow" if is_kept else "block",
         )
         self._contexts.append(context)
         await context.add_init_script(WATCH_POLICY)

@@ -143,7 +143,9 @@ async def test_a_command_under_way_locks_its_button(
     answered = asyncio.Event()
     ask = FakeRobot.command
 
-    async def slow(robot: FakeRobot, name: str, arguments: Mapping[str, Value]) -> object:
+    async def slow(
+        robot: FakeRobot, name: str, arguments: Mapping[str, Value], **people: object
+    ) -> object:
         reply = await ask(robot, name, arguments)
         await answered.wait()
         raise CommandFailed("timed-out", f"no answer to {reply.command}")

@@ -1,21 +1,16 @@
-"""Widgets in a real browser: their demo states, hostile texts, and what a broken one may cost."""
+"""Widgets in a real browser: hostile texts, and what a broken one may cost."""
 
 from pathlib import Path
-from typing import Any
 
 import pytest
-import yaml
 
 from tests.e2e.conftest import PageMaker
 from tests.e2e.dashboards import running_dashboard, until, until_text
 from urc.model.interface import WidgetUse
 from urc.model.values import Limits, Signal
-from urc.shipped import shipped
 from urc.testing.dashboard import BATTERY, FakeRobot, dashboard_profile, plain_widget
 
 pytestmark = pytest.mark.anyio
-
-WIDGETS = sorted(path.name for path in shipped("widgets").iterdir() if path.is_dir())
 
 HOSTILE = [
     "<img src=x onerror=alert(1)>",
@@ -29,50 +24,6 @@ HOSTILE = [
     "&lt;b&gt;",
     "\x1b[31mred\x07",
 ]
-
-
-def demo_of(widget: str) -> Any:
-    """Return the widget's demo document."""
-    return yaml.safe_load((shipped("widgets") / widget / "demo.yaml").read_text("utf-8"))
-
-
-@pytest.mark.parametrize("widget", WIDGETS)
-async def test_a_widget_shows_each_state_of_its_demo(new_page: PageMaker, widget: str) -> None:
-    """All states side by side on one page, each with the texts that its demo promises."""
-    demo = demo_of(widget)
-    signals: dict[str, Signal] = {}
-    uses: list[WidgetUse] = []
-    for state, shown in demo["states"].items():
-        bind = {}
-        for name, given in demo["signals"].items():
-            signal = f"{state}_{name}"
-            bind[name] = signal
-            signals[signal] = Signal(
-                signal, **{**given, "limits": Limits(**given.get("limits", {}))}
-            )
-        options, title = shown.get("options", {}), shown.get("title", "")
-        uses.append(WidgetUse(state, widget, bind, demo.get("outputs", {}), options, title))
-    robot = FakeRobot(dashboard_profile(signals=signals, uses=uses))
-    async with running_dashboard(robot) as address:
-        page = await new_page(size="tablet")
-        await page.goto(f"{address}robots/puppet/")
-        await until(lambda: robot.is_open)
-        for state, shown in demo["states"].items():
-            for name, value in shown["values"].items():
-                alarm = shown.get("alarms", {}).get(name, "")
-                age_s = shown.get("age_s", 0.0)
-                robot.say(f"{state}_{name}", value, alarm=alarm, age_s=age_s)
-        for index, (state, shown) in enumerate(demo["states"].items()):
-            await page.locator(f"[data-cell='{index}']").scroll_into_view_if_needed()
-            (
-                await page.wait_for_function(
-                    "([index, texts]) => texts.every((text) =>"
-                    " document.querySelector(`[data-cell='${index}']`).textContent.includes(text))",
-                    arg=[index, shown["shows"]],
-                ),
-                state,
-            )
-        assert await page.locator(".urc-fault").count() == 0
 
 
 async def test_hostile_texts_are_shown_as_they_are(new_page: PageMaker) -> None:

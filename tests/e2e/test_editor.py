@@ -19,7 +19,7 @@ from scripts.node import node_executable
 from urc.config.shape import KINDS, read_schema
 
 ROOT = Path(__file__).resolve().parents[2]
-TIMEOUT_S = 30
+TIMEOUT_S = 45.0
 
 ROBOT = """\
 # yaml-language-server: $schema=../schemas/robot.schema.json

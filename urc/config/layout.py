@@ -1,62 +1,78 @@
-"""A sensible look for a profile that says nothing about it."""
+"""A sensible look for a profile that says nothing about it: where everything stands."""
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from typing import Final
 
-from urc.config.parse_widget import Shelf
-from urc.model.driver import Driver
 from urc.model.interface import Grid, Interface, Slot, WidgetUse
 
-__all__ = ["default_interface", "default_slots"]
+__all__ = ["default_interface"]
 
 _COLUMNS: Final = {"wide": 4, "phone": 2}
 """Most columns of a made grid."""
-_PLAIN_WIDGET: Final = "value"
-"""Shows any signal."""
+_BIG: Final = frozenset(
+    (
+        *("attitude", "camera", "depth", "dpad", "image", "joystick", "log", "map", "pano360"),
+        *("path-pad", "plot", "scan", "scene3d", "table", "terminal", "vector-pad"),
+    )
+)
+"""Widgets that get two rows and two columns."""
 
 
-def default_slots(driver: Driver, shelf: Shelf) -> dict[str, WidgetUse]:
-    """Return a slot for each signal, with the widget that shows any value."""
-    widget = shelf.get(_PLAIN_WIDGET)
-    if widget is None:
-        return {}
-    slots = {}
-    for name, signal in driver.signals.items():
-        for port in widget.inputs.values():
-            if signal.type in port.types and port.unit in ("", signal.unit):
-                slots[name] = WidgetUse(
-                    name,
-                    widget.name,
-                    {port.name: name},
-                    {},
-                    _defaults(widget.options),
-                    signal.title,
-                )
-                break
-    return slots
+def default_interface(slots: Mapping[str, WidgetUse], title: str) -> Interface:
+    """Return an interface named ``default`` that shows every slot.
 
-
-def _defaults(options: Mapping[str, object]) -> dict[str, object]:
-    return {
-        name: schema["default"]
-        for name, schema in options.items()
-        if isinstance(schema, dict) and "default" in schema
-    }
-
-
-def default_interface(slots: Iterable[str], title: str) -> Interface:
-    """Return an interface named ``default`` that shows every slot, row by row."""
-    names = list(slots)
+    What is looked at stands on top, the large before the small; what is steered with is at the
+    bottom right, where the thumb is, and other controls take the places that are left.
+    """
     return Interface(
         name="default",
         title=title,
-        grids={screen: _grid(names, most) for screen, most in _COLUMNS.items()},
+        grids={screen: _grid(slots, most) for screen, most in _COLUMNS.items()},
     )
 
 
-def _grid(names: list[str], most: int) -> Grid:
-    columns = max(1, min(most, math.ceil(math.sqrt(len(names)))))
-    rows = max(1, math.ceil(len(names) / columns))
-    slots = (Slot(name, place // columns, place % columns) for place, name in enumerate(names))
-    return Grid(rows, columns, tuple(slots))
+def _grid(slots: Mapping[str, WidgetUse], most: int) -> Grid:
+    sizes = {name: 2 if use.widget in _BIG else 1 for name, use in slots.items()}
+    area = sum(size * size for size in sizes.values())
+    columns = max(1, min(most, math.ceil(math.sqrt(area))), *sizes.values())
+    taken: set[tuple[int, int]] = set()
+    placed: dict[str, Slot] = {}
+    ranks = {name: _rank(use) for name, use in slots.items()}
+    # Where nothing fits beside what steers, that comes last: at the bottom, and nothing below it.
+    last = {name: rank if columns > 2 or rank != _STEERED else 4 for name, rank in ranks.items()}
+    for name in sorted(slots, key=lambda name: last[name]):
+        is_steered = ranks[name] == _STEERED
+        first = max((row for row, _ in taken), default=-1) + 1 if is_steered else 0
+        row, column = _free(taken, columns, sizes[name], first, is_from_right=is_steered)
+        taken |= _cells(row, column, sizes[name])
+        placed[name] = Slot(name, row, column, sizes[name], sizes[name])
+    rows = max((row for row, _ in taken), default=0) + 1
+    return Grid(rows, columns, tuple(placed.values()))
+
+
+_STEERED: Final = 2
+
+
+def _rank(use: WidgetUse) -> int:
+    """Return which comes first: large views, small ones, what steers, small controls."""
+    if use.widget in _BIG:
+        return _STEERED if use.outputs and not use.inputs else 0
+    return 3 if use.outputs else 1
+
+
+def _free(
+    taken: set[tuple[int, int]], columns: int, size: int, first: int, *, is_from_right: bool
+) -> tuple[int, int]:
+    """Return the first place at or below the row `first` where a square has room."""
+    places = range(columns - size + 1)
+    row = first
+    while True:
+        for column in reversed(places) if is_from_right else places:
+            if not taken & _cells(row, column, size):
+                return row, column
+        row += 1
+
+
+def _cells(row: int, column: int, size: int) -> set[tuple[int, int]]:
+    return {(row + down, column + right) for down in range(size) for right in range(size)}

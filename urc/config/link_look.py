@@ -1,8 +1,10 @@
 """Names on the side of the look: which widget fills a slot, and what it is bound to."""
 
 from collections.abc import Mapping
+from typing import NamedTuple, TypeVar
 
 from urc.config.gather import Sources
+from urc.config.link_files import link_files
 from urc.config.link_outputs import link_output
 from urc.config.parse_widget import Shelf
 from urc.config.part import Findings, Part
@@ -10,10 +12,13 @@ from urc.config.shape import check_options
 from urc.config.suggest import did_you_mean, listed
 from urc.model.driver import Driver
 from urc.model.interface import Given, Interface, WidgetUse
+from urc.model.units import conversion
 from urc.model.values import Signal
 from urc.model.widget import Port, Widget
 
-__all__ = ["link_interface", "link_slots"]
+__all__ = ["link_interface", "link_slots", "misfit"]
+
+_T = TypeVar("_T")
 
 
 def link_slots(
@@ -48,8 +53,7 @@ def link_interface(
         shelf: the widgets there are.
         findings: takes what is wrong.
     """
-    shown = {slot.name for grid in interface.grids.values() for slot in grid.slots}
-    shown.add(interface.background)
+    shown = set(interface.shown)
     uses = {}
     for slot, inner in part.named("widgets").items():
         if slot not in shown:
@@ -58,7 +62,7 @@ def link_interface(
                 "slot-not-shown",
                 f"no grid of this interface has a slot {slot!r}",
                 key=True,
-                hint=did_you_mean(slot, shown - {""}, "slots"),
+                hint=did_you_mean(slot, shown, "slots"),
             )
         use = _use(inner, slots.get(slot), driver, shelf, findings)
         if use is not None:
@@ -108,41 +112,46 @@ def _use(
                 hint=shelf.hint(name),
             )
         return None  # a broken manifest is told where it stands
-    inputs, outputs, given = _bindings(part, widget, base, driver, findings)
+    bound = _bindings(part, widget, base, driver, findings)
+    options, files = _options(part, widget, base, findings)
     return WidgetUse(
         slot=part.name,
         widget=name,
-        inputs=inputs,
-        outputs=outputs,
-        options=_options(part, widget, base, findings),
+        inputs=bound.inputs,
+        outputs=bound.outputs,
+        options=options,
         title=part.text("title", base.title if base else ""),
-        given=given,
+        given=bound.given,
+        lists=bound.lists,
+        files=files,
     )
+
+
+class _Bound(NamedTuple):
+    """What is bound so far; the fields are those of `WidgetUse`."""
+
+    inputs: dict[str, str]
+    lists: dict[str, tuple[str, ...]]
+    outputs: dict[str, str]
+    given: dict[str, Given]
 
 
 def _bindings(
     part: Part, widget: Widget, base: WidgetUse | None, driver: Driver | None, findings: Findings
-) -> tuple[dict[str, str], dict[str, str], dict[str, Given]]:
-    inputs = _kept(base.inputs if base else {}, widget.inputs)
-    outputs = _kept(base.outputs if base else {}, widget.outputs)
-    given = {key: one for key, one in (base.given if base else {}).items() if key in outputs}
+) -> _Bound:
+    old = base or WidgetUse("", "")
+    outputs = _kept(old.outputs, widget.outputs)
+    given = {key: one for key, one in old.given.items() if key in outputs}
+    bound = _Bound(
+        _kept(old.inputs, {key: port for key, port in widget.inputs.items() if not port.is_many}),
+        _kept(old.lists, {key: port for key, port in widget.inputs.items() if port.is_many}),
+        outputs,
+        given,
+    )
     for key, inner in part.named("bind").items():
         if key in widget.inputs:
-            if not isinstance(inner.data, str):
-                findings.error(
-                    inner,
-                    "wrong-type",
-                    f"{key!r} is an input: the name of a signal is expected",
-                    hint="only outputs take a command with its arguments",
-                )
-                continue
-            inputs[key] = inner.data
-            if driver is not None:
-                _check_signal(inner, widget, widget.inputs[key], driver, findings)
-        elif key in widget.outputs:
-            port = widget.outputs[key]
-            outputs[key], given[key] = link_output(inner, port, widget, driver, findings)
-        else:
+            _bind_input(inner, widget, bound, driver, findings)
+        elif key not in widget.outputs:
             findings.error(
                 inner,
                 "unknown-input",
@@ -150,27 +159,73 @@ def _bindings(
                 key=True,
                 hint=did_you_mean(key, (*widget.inputs, *widget.outputs), "inputs"),
             )
+        elif isinstance(inner.data, list):
+            findings.error(
+                inner,
+                "wrong-type",
+                f"{key!r} is an output: the name of a command is expected",
+                hint="only inputs that take many signals have a list",
+            )
+        else:
+            port = widget.outputs[key]
+            outputs[key], given[key] = link_output(inner, port, widget, driver, findings)
     if driver is not None:
-        ports = [*widget.inputs.values(), *widget.outputs.values()]
-        for port in ports:
-            if port.is_required and port.name not in inputs and port.name not in outputs:
-                findings.error(
-                    part,
-                    "unbound-input",
-                    f"{port.name!r} of widget {widget.name!r} is not bound",
-                    at="bind" if "bind" in part.data else "",
-                    key=True,
-                    hint=_binding_hint(port, driver),
-                )
-    return inputs, outputs, given
+        _check_required(part, widget, {**bound.inputs, **bound.lists, **outputs}, driver, findings)
+    return bound
 
 
-def _kept(bound: Mapping[str, str], ports: Mapping[str, Port]) -> dict[str, str]:
+def _bind_input(
+    part: Part, widget: Widget, bound: _Bound, driver: Driver | None, findings: Findings
+) -> None:
+    """Add the signal, or the signals, of one input."""
+    port = widget.inputs[part.name]
+    if isinstance(part.data, dict):
+        findings.error(
+            part,
+            "wrong-type",
+            f"{port.name!r} is an input: the name of a signal is expected",
+            hint="only outputs take a command with its arguments",
+        )
+    elif isinstance(part.data, list) and not port.is_many:
+        findings.error(
+            part,
+            "wrong-type",
+            f"{port.name!r} of widget {widget.name!r} takes one signal, not a list",
+        )
+    elif port.is_many:
+        each = part.items() if isinstance(part.data, list) else [part]
+        bound.lists[port.name] = tuple(inner.data for inner in each)
+        if driver is not None:
+            for inner in each:
+                _check_signal(inner, widget, port, driver, findings)
+    else:
+        bound.inputs[port.name] = part.data
+        if driver is not None:
+            _check_signal(part, widget, port, driver, findings)
+
+
+def _check_required(
+    part: Part, widget: Widget, bound: Mapping[str, object], driver: Driver, findings: Findings
+) -> None:
+    tried = part.named("bind")  # what is wrong with those has been told
+    for port in (*widget.inputs.values(), *widget.outputs.values()):
+        if port.is_required and port.name not in bound and port.name not in tried:
+            findings.error(
+                part,
+                "unbound-input",
+                f"{port.name!r} of widget {widget.name!r} is not bound",
+                at="bind" if "bind" in part.data else "",
+                key=True,
+                hint=_binding_hint(port, driver),
+            )
+
+
+def _kept(bound: Mapping[str, _T], ports: Mapping[str, Port]) -> dict[str, _T]:
     return {key: target for key, target in bound.items() if key in ports}
 
 
 def _binding_hint(port: Port, driver: Driver) -> str:
-    fitting = [signal.name for signal in driver.signals.values() if not _misfit(port, signal)]
+    fitting = [signal.name for signal in driver.signals.values() if not misfit(port, signal)]
     return f"signals that fit: {listed(fitting)}" if fitting else "no signal of the driver fits"
 
 
@@ -186,23 +241,28 @@ def _check_signal(
             hint=did_you_mean(part.data, driver.signals, "signals"),
         )
         return
-    misfit = _misfit(port, signal)
-    if misfit:
-        code = "wrong-unit" if misfit.startswith("unit") else "wrong-type"
+    wrong = misfit(port, signal)
+    if wrong:
+        code = "wrong-unit" if wrong.startswith("unit") else "wrong-type"
         findings.error(
             part,
             code,
-            f"signal {signal.name!r} does not fit {port.name!r} of widget"
-            f" {widget.name!r}: {misfit}",
+            f"signal {signal.name!r} does not fit {port.name!r} of widget {widget.name!r}: {wrong}",
         )
 
 
-def _misfit(port: Port, signal: Signal) -> str:
+def misfit(port: Port, signal: Signal) -> str:
     """Return why a signal cannot be bound to an input, or "" when it can."""
     types = (*port.types, "integer") if "number" in port.types else port.types
     if signal.type not in types:
         return f"type {' or '.join(port.types)} is wanted, the signal is {signal.type}"
-    if port.unit and signal.unit != port.unit:
+    if signal.type == "array":
+        of = (*port.of, "integer") if "number" in port.of else port.of
+        if of and signal.of not in of:
+            return f"an array of {' or '.join(port.of)} is wanted, the signal is of {signal.of}"
+        if None not in (port.size, signal.size) and port.size != signal.size:
+            return f"an array of {port.size} elements is wanted, the signal has {signal.size}"
+    if port.unit and conversion(signal.unit, port.unit) is None:
         has = f"in {signal.unit!r}" if signal.unit else "without a unit"
         return f"unit {port.unit!r} is wanted, the signal is {has}"
     return ""
@@ -210,17 +270,22 @@ def _misfit(port: Port, signal: Signal) -> str:
 
 def _options(
     part: Part, widget: Widget, base: WidgetUse | None, findings: Findings
-) -> dict[str, object]:
-    """Return the options with the manifest's defaults filled in."""
+) -> tuple[dict[str, object], dict[str, str]]:
+    """Return the options with the manifest's defaults filled in, and the files they name."""
     options: dict[str, object] = {
         name: schema["default"]
         for name, schema in widget.options.items()
         if isinstance(schema, dict) and "default" in schema
     }
+    files: dict[str, str] = {}
     if base is not None and base.widget == widget.name:
         options |= base.options
+        files |= base.files
     given = part.get("options")
     if given is not None:
-        findings.problems += check_options(given.document, given.path, given.data, widget.options)
+        problems = check_options(given.document, given.path, given.data, widget.options)
+        findings.problems += problems
         options |= given.data
-    return options
+        if not problems:
+            files |= link_files(given, widget, findings)
+    return options, files

@@ -8,13 +8,14 @@ from collections.abc import Iterable
 from os import PathLike, fspath
 from typing import NamedTuple
 
+from urc.config.automatic import automatic_slots
 from urc.config.gather import Sources, gather
-from urc.config.layout import default_interface, default_slots
+from urc.config.layout import default_interface
 from urc.config.link_look import link_interface, link_slots
 from urc.config.link_tests import link_test
 from urc.config.link_wire import link_driver, link_simulator
 from urc.config.parse_driver import parse_driver, spoken_name
-from urc.config.parse_interface import parse_interface
+from urc.config.parse_interface import check_names, parse_interface
 from urc.config.parse_profile import parse_setting
 from urc.config.parse_simulator import parse_simulator
 from urc.config.parse_test import parse_test
@@ -130,6 +131,8 @@ def _profile(
     sources: Sources, catalog: Catalog, shelf: Shelf, findings: Findings
 ) -> Profile | None:
     driver = parse_driver(sources.driver, findings, catalog)
+    if sources.kind == "robot":
+        check_names(sources.root, findings)
     parsed = _Parsed(
         driver=driver,
         settings={name: parse_setting(part, findings) for name, part in sources.settings.items()},
@@ -164,7 +167,7 @@ def _link(sources: Sources, parsed: _Parsed, shelf: Shelf, findings: Findings) -
     name = root.text("name")
     title = root.text("title", spoken_name(name))
     if not interfaces:
-        slots = slots or default_slots(driver, shelf)
+        slots = slots or automatic_slots(driver, shelf)
         interfaces = {"default": default_interface(slots, title)}
     used = {use.widget for use in slots.values()}
     used |= {use.widget for one in interfaces.values() for use in one.widgets.values()}

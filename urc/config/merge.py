@@ -14,7 +14,7 @@ from urc.source import Document, Mark, Path
 __all__ = ["Tree", "children", "count_nodes", "item_name", "mark_inside", "merge"]
 
 _NAMES: Final = ("name", "id")
-_EXCLUSIVE: Final = (frozenset(("grid", "grids")),)
+_EXCLUSIVE: Final = (frozenset(("grid", "grids", "tabs")),)
 """Keys of which a mapping has at most one, beside the forms of frames."""
 
 

@@ -5,9 +5,9 @@ from typing import Final
 
 from urc.config.parse_driver import spoken_name
 from urc.config.part import Findings, Part
-from urc.model.interface import Grid, Interface, Slot
+from urc.model.interface import DEBUG, Grid, Interface, Slot, Tab
 
-__all__ = ["parse_interface"]
+__all__ = ["check_names", "parse_interface"]
 
 _MOST: Final = 48
 """Rows or columns of one grid."""
@@ -19,12 +19,83 @@ _Cell = tuple[str, int]
 
 def parse_interface(part: Part, name: str, findings: Findings) -> Interface:
     """Return the layout at `part`, without what its slots are filled with."""
+    title = part.text("title", spoken_name(name))
+    pages = part.named("tabs")
+    tabs = {key: _tab(inner, findings, part) for key, inner in pages.items()}
+    only = Tab()
+    if pages:
+        _check_beside_tabs(part, findings)
+    else:
+        only = _tab(part, findings)
+    background = part.text("background")
+    interface = Interface(
+        name=name,
+        title=title,
+        grids=only.grids,
+        summary=part.text("summary"),
+        licence=part.text("licence"),
+        author=part.text("author"),
+        left=only.left,
+        is_mirrored=only.is_mirrored,
+        tabs=tabs,
+    )
+    if background in interface.shown:
+        findings.error(
+            part,
+            "misplaced-key",
+            f"{background!r} is in the grid too",
+            at="background",
+            hint="a background lies behind the grid",
+        )
+    return interface._replace(background=background)
+
+
+def check_names(root: Part, findings: Findings) -> None:
+    """Report an interface that has the name of the one that is made."""
+    if DEBUG in root.named("interfaces"):
+        findings.error(
+            root.must("interfaces"),
+            "bad-name",
+            f"{DEBUG!r} is the interface that every robot has by itself",
+            at=DEBUG,
+            key=True,
+            hint="give yours another name",
+        )
+
+
+def _check_beside_tabs(part: Part, findings: Findings) -> None:
+    for key in ("grid", "grids", "left"):
+        if part.get(key) is not None:
+            findings.error(
+                part,
+                "misplaced-key",
+                f"'{key}' and 'tabs' exclude each other",
+                at=key,
+                key=True,
+                hint="each of the tabs has its own pictures",
+            )
+
+
+def _tab(part: Part, findings: Findings, around: Part | None = None) -> Tab:
+    """Return one page; what `around` says of mirroring holds for each of its tabs."""
+    is_mirrored = around.flag("mirror", default=True) if around is not None else True
+    left = part.get("left")
+    return Tab(
+        name=part.name if around is not None else "",
+        title=part.text("title", spoken_name(part.name)) if around is not None else "",
+        grids=_pictures(part, findings, is_tab=around is not None),
+        left=_by_screen(left, findings) if left is not None else {},
+        is_mirrored=part.flag("mirror", default=is_mirrored),
+    )
+
+
+def _pictures(part: Part, findings: Findings, *, is_tab: bool) -> dict[str, Grid]:
     one, several = part.get("grid"), part.get("grids")
     if one is None and several is None:
         findings.error(
             part,
             "missing-key",
-            "'grid' is missing from an interface",
+            f"'grid' is missing from {'a tab' if is_tab else 'an interface'}",
             key=True,
             hint="draw it: a line for each row, a word for each cell, '.' for none",
         )
@@ -36,32 +107,17 @@ def parse_interface(part: Part, name: str, findings: Findings) -> Interface:
             key=True,
             hint="put the picture of 'grid' into 'grids' as 'wide'",
         )
-    pictures = {"wide": one} if one is not None else {}
-    for screen in ("wide", "tall", "phone"):
-        picture = several.get(screen) if several is not None else None
-        if picture is not None:
-            pictures[screen] = picture
-    grids = {screen: _grid(picture, findings) for screen, picture in pictures.items()}
-    background = part.text("background")
-    for grid in grids.values():
-        if background and any(slot.name == background for slot in grid.slots):
-            findings.error(
-                part,
-                "misplaced-key",
-                f"{background!r} is in the grid too",
-                at="background",
-                hint="a background lies behind the grid",
-            )
-            break
-    return Interface(
-        name=name,
-        title=part.text("title", spoken_name(name)),
-        grids=grids,
-        background=background,
-        summary=part.text("summary"),
-        licence=part.text("licence"),
-        author=part.text("author"),
-    )
+    found = {"wide": _grid(one, findings)} if one is not None else {}
+    return found | (_by_screen(several, findings) if several is not None else {})
+
+
+def _by_screen(several: Part, findings: Findings) -> dict[str, Grid]:
+    pictures = {screen: several.get(screen) for screen in ("wide", "tall", "phone")}
+    return {
+        screen: _grid(picture, findings)
+        for screen, picture in pictures.items()
+        if picture is not None
+    }
 
 
 def _grid(part: Part, findings: Findings) -> Grid:

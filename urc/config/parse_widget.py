@@ -1,7 +1,6 @@
 """A widget's manifest → `Widget`, and the shelf that reads manifests by name."""
 
 import re
-from collections.abc import Iterable
 from pathlib import Path as FilePath
 
 from urc.config.part import Findings, Part
@@ -38,7 +37,7 @@ def parse_widget(document: Document, findings: Findings) -> Widget:
         name=name,
         title=part.text("title"),
         folder=folder,
-        inputs={key: _port(inner) for key, inner in part.named("inputs").items()},
+        inputs={key: _input(inner) for key, inner in part.named("inputs").items()},
         outputs={key: _output(inner) for key, inner in part.named("outputs").items()},
         options={key: inner.data for key, inner in part.named("options").items()},
         min_cells=(smallest[0], smallest[1]) if smallest else (1, 1),
@@ -49,18 +48,28 @@ def parse_widget(document: Document, findings: Findings) -> Widget:
 
 
 def _port(part: Part) -> Port:
-    types = part.get("type")
-    if types is None:
-        names: Iterable[str] = ()
-    else:
-        names = [types.data] if isinstance(types.data, str) else types.data
     return Port(
         name=part.name,
-        types=tuple(names),
+        types=_one_or_more(part.get("type")),
         unit=part.text("unit"),
         is_required=part.flag("required", default=True),
         description=part.text("description"),
     )
+
+
+def _input(part: Part) -> Port:
+    size = part.get("size")
+    return _port(part)._replace(
+        of=_one_or_more(part.get("of")),
+        size=None if size is None else int(size.data),
+        is_many=part.flag("many", default=False),
+    )
+
+
+def _one_or_more(part: Part | None) -> tuple[str, ...]:
+    if part is None:
+        return ()
+    return (part.data,) if isinstance(part.data, str) else tuple(part.data)
 
 
 def _output(part: Part) -> Port:

@@ -10,10 +10,12 @@ from collections.abc import Iterator, Mapping
 from typing import Final, NamedTuple
 
 from urc.config.gather import Sources, gather
+from urc.config.made_look import made_look
 from urc.config.merge import Tree, merge
 from urc.config.parse_widget import Shelf
 from urc.config.part import Part
 from urc.config.shape import read_schema
+from urc.model.profile import Profile
 from urc.problems import Problem, has_errors, printable
 from urc.source import Document, Mark
 
@@ -38,12 +40,14 @@ class Resolved(NamedTuple):
     problems: tuple[Problem, ...]
 
 
-def resolve(path: str, shelf: Shelf) -> Resolved:
+def resolve(path: str, shelf: Shelf, profile: Profile | None = None) -> Resolved:
     """Return the document at `path` with everything that it is made of.
 
     Args:
         path: a robot, driver, interface or widget.
         shelf: the widgets there are.
+        profile: the same as loaded; then the look that is made, where the document says nothing of
+            it, stands in it too.
     """
     sources, problems, _, _ = gather(path)
     if sources is None:
@@ -52,7 +56,11 @@ def resolve(path: str, shelf: Shelf) -> Resolved:
             problems.append(Problem("partial-document", text, path))
         return Resolved("", tuple(problems))
     lines = [f"# {path}, put together by 'urc resolve'."]
-    for key, node in _sections(sources, shelf):
+    made = made_look(sources, profile)
+    if made:
+        told = " and ".join(f"'{key}'" for key in made)
+        lines.append(f"# It says nothing of its look, so {told} below: URC made them.")
+    for key, node in (*_sections(sources, shelf), *made.items()):
         lines += _entry(key, node, 0)
     return Resolved("\n".join(lines) + "\n", tuple(problems))
 

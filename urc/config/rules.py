@@ -84,12 +84,7 @@ def _check_slots(sources: Sources, interfaces: dict[str, Interface], findings: F
     """
     if not sources.interfaces:
         return
-    shown = {
-        slot.name
-        for interface in interfaces.values()
-        for grid in interface.grids.values()
-        for slot in grid.slots
-    } | {interface.background for interface in interfaces.values()}
+    shown = {name for interface in interfaces.values() for name in interface.shown}
     for name, parts in sources.slots.items():
         part = parts[-1]
         if name not in shown and part.document is sources.root.document:
@@ -98,7 +93,7 @@ def _check_slots(sources: Sources, interfaces: dict[str, Interface], findings: F
                 "slot-not-shown",
                 f"no interface has a slot {name!r}",
                 key=True,
-                hint=did_you_mean(name, shown - {""}, "slots"),
+                hint=did_you_mean(name, shown, "slots"),
             )
 
 

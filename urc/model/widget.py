@@ -23,6 +23,12 @@ class Port(NamedTuple):
     """Of an output: it is given by holding, so it may be bound to motion, and to nothing else."""
     arguments: tuple[str, ...] = ()
     """Of an output: names of the values that it gives along, each from -1 to 1."""
+    of: tuple[str, ...] = ()
+    """Of an input that takes arrays: kinds of the elements it can show; () takes any."""
+    size: int | None = None
+    """Of an input that takes arrays: how many elements they must have; None takes any."""
+    is_many: bool = False
+    """Of an input: it takes a list of signals, each of which must fit."""
 
 
 class Widget(NamedTuple):

@@ -7,7 +7,7 @@ import asyncio
 import time
 from collections.abc import AsyncIterator, Iterable, Mapping
 from contextlib import asynccontextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from http import HTTPStatus
 from ipaddress import ip_address
 from pathlib import Path
@@ -21,15 +21,19 @@ from starlette.types import ASGIApp
 from starlette.websockets import WebSocket
 
 from urc import __version__
+from urc.model.widget import Widget
 from urc.runtime.audit import AuditLog
 from urc.runtime.latch import LatchFile
 from urc.runtime.trail import Trail
 from urc.shipped import vendored
-from urc.web import wire
-from urc.web.assets import STATIC, Assets, folder_assets, import_map, widget_assets
-from urc.web.dev import Dev, no_dev_routes
+from urc.web import wire, words
+from urc.web.assets import STATIC, Assets, folder_assets, import_map, script, widget_assets
+from urc.web.dev import Dev, dev_url, no_dev_routes
 from urc.web.dev_secrets import secret_texts
 from urc.web.dev_watch import Remake
+from urc.web.files import robot_file, tile
+from urc.web.gallery import Gallery
+from urc.web.interfaces import KEPT, chosen
 from urc.web.pages import Head, error_page, menu_page, robot_page
 from urc.web.policy import Policy
 from urc.web.robots import LINGER_S, Robot, Station, missing_settings
@@ -48,6 +52,7 @@ def build_app(
     allowed_hosts: Iterable[str] = (),
     linger_s: float = LINGER_S,
     data: Path | None = None,
+    tiles: Path | None = None,
     remake: Mapping[str, Remake] | None = None,
 ) -> Starlette:
     """Return the application that serves `robots`.
@@ -57,6 +62,7 @@ def build_app(
         allowed_hosts: names it answers to, besides addresses, ``localhost`` and ``*.local``.
         linger_s: how long a robot stays connected after its last client has gone, in seconds.
         data: folder in which a stop is kept over a restart, and the audit; None: neither is.
+        tiles: folder of map pictures, ``z/x/y.png``; None: there are none.
         remake: makes each robot anew when its document is saved, and turns the dev pages on; None:
             there are none.
 
@@ -83,6 +89,7 @@ def build_app(
             widget for robot in robots.values() for widget in robot.profile.widgets.values()
         ),
         audit=audit,
+        tiles=tiles,
     )
     dev = remake and Dev(
         routes.stations,
@@ -113,6 +120,7 @@ class _Dashboard(Starlette):
     ) -> None:
         self._allowed_hosts = allowed_hosts
         routes.dev = dev
+        gallery = routes.gallery = Gallery(routes.modules, routes.brought, is_dev=dev is not None)
         super().__init__(
             routes=[
                 Route("/", routes.menu),
@@ -121,9 +129,15 @@ class _Dashboard(Starlette):
                 Route("/api/v1/robots/{name}/stop", routes.stop, methods=["POST"]),
                 Route("/api/v1/robots/{name}/timeline", routes.timeline),
                 Route("/favicon.ico", routes.favicon),
+                Route("/app.webmanifest", routes.manifest),
+                Route("/sw.js", routes.worker),
+                Route("/words/{tag}.js", routes.words),
                 Route("/static/{file:path}", routes.static_file),
                 Route("/vendor/{file:path}", routes.vendor_file),
+                *gallery.routes(),
                 Route("/widgets/{file:path}", routes.widget_file),
+                Route("/robots/{name}/files/{file:path}", routes.robot_file),
+                Route("/tiles/{z:int}/{x:int}/{y:int}.{kind}", routes.tile),
                 WebSocketRoute("/ws", routes.socket),
                 *(dev.routes() if dev else no_dev_routes()),
             ],
@@ -133,7 +147,8 @@ class _Dashboard(Starlette):
 
     def build_middleware_stack(self) -> ASGIApp:
         """Put the policy around everything, the handler of unexpected errors included."""
-        return Policy(super().build_middleware_stack(), allowed_hosts=self._allowed_hosts)
+        inside = words.Reader(super().build_middleware_stack())
+        return Policy(inside, allowed_hosts=self._allowed_hosts)
 
 
 @dataclass(slots=True)
@@ -145,7 +160,13 @@ class _Routes:
     vendor: Assets
     widgets: Assets
     audit: AuditLog | None = None
+    tiles: Path | None = None
     dev: Dev | None = None
+    gallery: Gallery = field(init=False)
+
+    def brought(self) -> list[Widget]:
+        """Return the widgets that the robots bring."""
+        return [one for each in self.robots.values() for one in each.profile.widgets.values()]
 
     def renew(self, name: str, robot: Robot, latch: LatchFile | None) -> None:
         """Go on with another version of a robot; raise `UrcError` when its widgets clash."""
@@ -182,22 +203,25 @@ class _Routes:
         name = request.path_params["name"]
         robot = self.robots.get(name)
         if robot is None:
-            raise HTTPException(404, "No robot of that name is served here.")
+            raise HTTPException(404, words.t("No robot of that name is served here."))
         if missing_settings(robot):
             return RedirectResponse("/", status_code=303)
-        interfaces = robot.profile.interfaces
-        wanted = request.query_params.get("interface", next(iter(interfaces)))
-        interface = interfaces.get(wanted)
+        query = request.query_params
+        kept = request.cookies.get(KEPT, "")
+        interface = chosen(robot.profile, query.get("interface"), kept)
         if interface is None:
-            raise HTTPException(404, "This robot has no interface of that name.")
-        is_watching = "watch" in request.query_params
+            raise HTTPException(404, words.t("This robot has no interface of that name."))
+        is_here = self.dev is not None and not _guest(request).place
         html = robot_page(
             request.state.nonce,
             name,
             robot.profile,
             interface,
             self.modules,
-            is_watching=is_watching,
+            is_watching="watch" in query,
+            tab=query.get("tab", ""),
+            wire=dev_url(name) if is_here else "",
+            is_part="part" in query,
         )
         return HTMLResponse(html, headers=_PAGE)
 
@@ -226,14 +250,43 @@ class _Routes:
     async def favicon(self, request: Request) -> Response:
         return self.static.respond("favicon.svg", request)
 
+    async def manifest(self, request: Request) -> Response:
+        return self.static.respond("app.webmanifest", request)
+
+    async def worker(self, request: Request) -> Response:
+        """Serve the service worker from the root: it may only look after what lies below it."""
+        return self.static.respond("sw.js", request)
+
+    async def words(self, request: Request) -> Response:
+        """Serve what pages say, in one language, as a module."""
+        tag = request.path_params["tag"]
+        if tag not in words.LANGUAGES:
+            raise HTTPException(404)
+        return script(words.module(tag), request)
+
     async def static_file(self, request: Request) -> Response:
         return self.static.respond(request.path_params["file"], request)
 
     async def vendor_file(self, request: Request) -> Response:
         return self.vendor.respond(request.path_params["file"], request)
 
+    async def robot_file(self, request: Request) -> Response:
+        """Serve what a robot's documents name for their widgets."""
+        robot = self.robots.get(request.path_params["name"])
+        if robot is None:
+            raise HTTPException(404)
+        return robot_file(robot.profile, request.path_params["file"], request)
+
+    async def tile(self, request: Request) -> Response:
+        """Serve a square of a map, where a folder with tiles was given."""
+        if self.tiles is None:
+            raise HTTPException(404)
+        return tile(self.tiles, **request.path_params, request=request)
+
     async def widget_file(self, request: Request) -> Response:
-        return self.widgets.respond(request.path_params["file"], request)
+        file = request.path_params["file"]
+        table = self.widgets if file in self.widgets.files else self.gallery.assets
+        return table.respond(file, request)
 
     async def socket(self, websocket: WebSocket) -> None:
         await websocket.accept()
@@ -266,12 +319,16 @@ async def _told(request: Request, error: Exception) -> Response:
     if not isinstance(error, HTTPException):
         raise error
     standard = HTTPStatus(error.status_code).phrase
-    text = "There is no such page." if error.detail == standard == "Not Found" else error.detail
+    text = (
+        words.t("There is no such page.")
+        if error.detail == standard == "Not Found"
+        else error.detail
+    )
     html = error_page(request.state.nonce, error.status_code, text)
     headers = {**_PAGE, **(error.headers or {})}
     return HTMLResponse(html, status_code=error.status_code, headers=headers)
 
 
 async def _broken(request: Request, _: Exception) -> Response:
-    text = "Something broke inside URC. The server's log says what."
+    text = words.t("Something broke inside URC. The server's log says what.")
     return HTMLResponse(error_page(request.state.nonce, 500, text), 500, headers=_PAGE)

@@ -17,18 +17,28 @@ from starlette.responses import Response
 from urc.model.widget import Widget
 from urc.problems import UrcError
 
-__all__ = ["Assets", "folder_assets", "import_map", "widget_assets"]
+__all__ = ["Assets", "folder_assets", "import_map", "script", "widget_assets"]
 
 STATIC = Path(__file__).resolve().parent / "static"
+KIT = ("curve", "giving", "kit", "motion", "padmap", "palette", "scale", "stroke")
+"""Modules of ours that widgets import as ``urc/…``."""
 WIDGET_FILES = ("widget.js", "widget.css")
+MOST_FILES = 200
+"""That pages may load of one widget."""
 MEDIA_TYPES = {
     ".css": "text/css; charset=utf-8",
     ".js": "text/javascript; charset=utf-8",
     ".mjs": "text/javascript; charset=utf-8",
     ".json": "application/json",
+    ".webmanifest": "application/manifest+json",
     ".map": "application/json",
     ".svg": "image/svg+xml",
     ".png": "image/png",
+    ".jpg": "image/jpeg",
+    ".webp": "image/webp",
+    ".urdf": "application/xml",
+    ".stl": "model/stl",
+    ".dae": "application/xml",
     ".woff2": "font/woff2",
     ".wasm": "application/wasm",
 }
@@ -47,7 +57,7 @@ class _File:
         stamp = (found.st_mtime_ns, found.st_size)
         if stamp != self.stamp:
             self.body = self.path.read_bytes()
-            self.tag = f'"{hashlib.blake2b(self.body, digest_size=12).hexdigest()}"'
+            self.tag = _tag(self.body)
             self.stamp = stamp
 
 
@@ -66,11 +76,24 @@ class Assets:
             file.refresh()
         except OSError as error:
             raise HTTPException(404) from error
-        headers = {"etag": file.tag, "cache-control": "no-cache"}
-        if file.tag in request.headers.get("if-none-match", ""):
-            return Response(status_code=304, headers=headers)
-        media_type = MEDIA_TYPES[file.path.suffix]
-        return Response(file.body, media_type=media_type, headers=headers)
+        return _kept(file.body, file.tag, MEDIA_TYPES[file.path.suffix], request)
+
+
+def script(source: str, request: Request) -> Response:
+    """Return a module that was made, not read; 304 when the browser has it already."""
+    body = source.encode()
+    return _kept(body, _tag(body), MEDIA_TYPES[".js"], request)
+
+
+def _kept(body: bytes, tag: str, media_type: str, request: Request) -> Response:
+    headers = {"etag": tag, "cache-control": "no-cache"}
+    if tag in request.headers.get("if-none-match", ""):
+        return Response(status_code=304, headers=headers)
+    return Response(body, media_type=media_type, headers=headers)
+
+
+def _tag(body: bytes) -> str:
+    return f'"{hashlib.blake2b(body, digest_size=12).hexdigest()}"'
 
 
 def folder_assets(folder: Path) -> Assets:
@@ -85,10 +108,13 @@ def folder_assets(folder: Path) -> Assets:
 
 
 def widget_assets(widgets: Iterable[Widget]) -> Assets:
-    """Return the module and the style sheet of each widget, as ``<id>/<file>``.
+    """Return what pages load of each widget: modules, style sheet and small assets.
+
+    The names are ``<widget>/<path in its folder>``. A link that leads out of the folder is left
+    out, and so is what is hidden.
 
     Raises:
-        UrcError: two widgets of one name come from different folders.
+        UrcError: two widgets of one name come from different folders, or one has too many files.
     """
     found = Assets()
     folders: dict[str, Path] = {}
@@ -99,17 +125,33 @@ def widget_assets(widgets: Iterable[Widget]) -> Assets:
                 f"two robots bring different widgets named {widget.name!r}: "
                 f"{folder} and {widget.folder}"
             )
+        # Also when they are not there yet: a widget is written while the page is open.
         for name in WIDGET_FILES:
             found.files[f"{widget.name}/{name}"] = _File(widget.folder / name)
+        for name, file in _more_files(widget):
+            found.files[f"{widget.name}/{name}"] = file
     return found
 
 
+def _more_files(widget: Widget) -> Iterable[tuple[str, _File]]:
+    more = folder_assets(widget.folder).files
+    mine = {name: file for name, file in more.items() if not any(map(_is_hidden, name.split("/")))}
+    if len(mine) > MOST_FILES:
+        raise UrcError(f"widget {widget.name!r} has {len(mine)} files; {MOST_FILES} are allowed")
+    return mine.items()
+
+
+def _is_hidden(part: str) -> bool:
+    return part.startswith((".", "_"))
+
+
 def import_map(vendor: Path | None) -> Mapping[str, object]:
-    """Return the import map of the third-party modules, empty when the build brought none."""
+    """Return the page's import map: our kit, and the third-party modules that the build brought."""
+    imports = {f"urc/{name}": f"/static/{name}.js" for name in KIT}
+    imports["urc/words"] = "/words/en.js"
     place = vendor / "importmap.json" if vendor else None
-    if place is None or not place.is_file():
-        return {"imports": {}}
-    written: dict[str, str] = json.loads(place.read_text(encoding="utf-8"))["imports"]
-    # The build writes them relative to its folder, which pages see as /vendor/.
-    imports = {name: f"/vendor/{url.removeprefix('./')}" for name, url in written.items()}
+    if place is not None and place.is_file():
+        written: dict[str, str] = json.loads(place.read_text(encoding="utf-8"))["imports"]
+        # The build writes them relative to its folder, which pages see as /vendor/.
+        imports |= {name: f"/vendor/{url.removeprefix('./')}" for name, url in written.items()}
     return {"imports": imports}

@@ -6,7 +6,7 @@ takes them are thinned: the newest wins, and the last one always arrives.
 """
 
 from collections.abc import Callable
-from typing import Protocol
+from typing import Literal, Protocol
 
 from urc.model.driver import Driver
 from urc.motion.fresh import Input
@@ -15,7 +15,9 @@ from urc.motion.lease import Client, LeaseState, Role
 from urc.motion.pace import Pace
 from urc.runtime.audit import Entry
 from urc.runtime.clock import Alarm, Clock
+from urc.runtime.hub import Hub, Note
 from urc.runtime.latch import LatchFile
+from urc.runtime.lateness import TOO_LATE_S, LoopWatch
 from urc.runtime.motion import Frames, MotionDesk, Movers
 from urc.runtime.trail import Trail
 from urc.web import wire_drive as wire
@@ -41,6 +43,10 @@ class Drivable(Protocol):
     def movers(self) -> Movers | None:
         """Who writes motion; None where the robot has no held command."""
 
+    @property
+    def hub(self) -> Hub:
+        """Takes what everybody should know."""
+
 
 class Seat:
     """One screen at the controls."""
@@ -59,6 +65,8 @@ class Seat:
         self.alarms: dict[str, Alarm] = {}
         self.moved_s: dict[str, float] = {}
         """Control → when a tick of it was last taken."""
+        self.dropped = 0
+        """Ticks that a newer one took the place of: nothing was made of them."""
 
     def notice(self, key: str, text: str) -> None:
         """Tell it; a newer line about the same replaces one that was not taken yet."""
@@ -96,12 +104,21 @@ class Controls:
         self._driver = driver
         self._clock = clock
         self._file = file
+        self._hub: Hub | None = None
         self._seats: dict[str, Seat] = {}
         self._guests = 0
         self._number = 0
         """Of the newest lease."""
         self._beating: Alarm | None = None
         self._expiring: Alarm | None = None
+        self.watch = LoopWatch(clock, self._held_up)
+        """Runs while the robot is connected."""
+        self._heed(file)
+
+    @property
+    def seats(self) -> tuple[Seat, ...]:
+        """The screens that look at the robot."""
+        return tuple(self._seats.values())
 
     @property
     def commands(self) -> tuple[str, ...]:
@@ -119,6 +136,7 @@ class Controls:
                 seat.forget(command)
             seat.paces.clear()
         self._driver, self._file = driver, file
+        self._heed(file)
         self.desk = self._desk(driver, kept)
         for seat in self._seats.values():
             self.desk.join(seat.client)
@@ -137,12 +155,18 @@ class Controls:
         movers = session.movers
         if movers is None or not self.desk.can_move:
             return
+        self._hub = session.hub
+        if self._file is not None and self._file.fault:
+            self._latch_fault(self._file.fault)
+        self.watch.start()
         self.desk.attach(session.frames, movers)
         try:
             while True:
                 for command, reason in await movers.stops():
                     self._stopped(command, reason)
         finally:
+            self.watch.end()
+            self._hub = None
             self.desk.detach()
             now = self._clock.now()
             for command in self.commands:  # its movers stop what moves, and report no more
@@ -175,9 +199,7 @@ class Controls:
     def take(self, seat: Seat) -> list[str]:
         """Return the messages that bring a screen up to date."""
         texts: list[str] = []
-        if not self.desk.can_move:
-            return texts
-        if seat.seen != self._number:
+        if self.desk.can_move and seat.seen != self._number:
             seat.seen = self._number
             texts.append(self._lease_text(seat))
         texts += seat.notices.values()
@@ -220,13 +242,16 @@ class Controls:
 
     def _thin(self, seat: Seat, tick: wire.Tick) -> None:
         now = self._clock.now()
-        if tick.command not in self.commands:
+        if not self.desk.holds(tick.command):
             text = f"{tick.command!r} is no held command of this robot"
             seat.notice("tick", wire.encode_refused("tick", "", text))
             self.trail.refused(seat.client, tick.command, text, now)
             return
-        pace = seat.paces.setdefault(tick.command, Pace(THINNED_S))
+        pace = seat.paces.get(tick.command)
+        if pace is None:
+            pace = seat.paces[tick.command] = Pace(THINNED_S)
         if tick.command in seat.alarms or not pace.take(now):
+            seat.dropped += tick.command in seat.pending
             seat.pending[tick.command] = tick
             if tick.command not in seat.alarms:
                 alarm = self._clock.call_at(pace.free_at, lambda: self._ripe(seat, tick.command))
@@ -265,6 +290,36 @@ class Controls:
         for seat in self._seats.values():
             seat.moved_s.pop(command, None)
             seat.notice(command, wire.encode_stopped(command, reason))
+
+    def _heed(self, file: LatchFile | None) -> None:
+        if file is not None:
+            file.on_fault = self._latch_fault
+
+    def _latch_fault(self, fault: str) -> None:
+        """Let everybody know that a stop would not outlast a restart, or does again."""
+        if fault:
+            text = f"STOP works, but would not outlast a restart of the server: {fault}"
+            self._tell("error", text)
+            for seat in self._seats.values():
+                seat.notice("latch", wire.encode_refused("latch", "", text))
+        else:
+            self._tell("info", "STOP outlasts a restart of the server again")
+
+    def _held_up(self, late_s: float, is_first: bool) -> None:
+        if late_s > TOO_LATE_S:
+            now = self._clock.now()
+            for command in self.desk.halt():
+                self.trail.stopped(command, "the server was held up", now)
+                for seat in self._seats.values():
+                    seat.forget(command)
+                    seat.moved_s.pop(command, None)
+                    seat.notice(command, wire.encode_stopped(command, "expired"))
+        if is_first:
+            self._tell("warning", f"the server was held up for {late_s * 1000:.0f} ms")
+
+    def _tell(self, level: Literal["info", "warning", "error"], text: str) -> None:
+        if self._hub is not None:
+            self._hub.note(Note(self._clock.now(), level, "URC", text))
 
     def _changed(self, state: LeaseState) -> None:
         self._number += 1

@@ -10,13 +10,13 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Literal, NamedTuple
 
-from urc.config.load import Shelf, check
+from urc.config.load import check
 from urc.model.profile import Profile
 from urc.problems import Problem, UrcError, has_errors
 from urc.runtime.catalog import built_in_catalog
 from urc.runtime.changes import PERIOD_S, Watched
 from urc.runtime.selftest import exercise
-from urc.shipped import shipped
+from urc.runtime.shelves import shelf_of
 from urc.web.robots import Robot, Station
 
 __all__ = ["Examined", "ProfileWatch", "Remake", "examine"]
@@ -40,7 +40,7 @@ class Examined(NamedTuple):
 
 def examine(file: str) -> Examined:
     """Check a document and run its own tests."""
-    checked = check(file, built_in_catalog(), Shelf(shipped("widgets")))
+    checked = check(file, built_in_catalog(), shelf_of(file))
     problems = checked.problems
     if checked.profile is not None:
         problems = (*problems, *exercise(checked.profile).problems)

@@ -9,9 +9,13 @@ values merged into one frame, and is nobody else's problem.
 from dataclasses import dataclass
 from typing import Protocol
 
+from urc.model.values import Sample
 from urc.runtime.clock import Clock, LoopClock
-from urc.runtime.hub import Hub, LinkStatus
+from urc.runtime.hub import Hub, LinkStatus, Progress
+from urc.web.picture_shelf import PictureShelf, is_picture
 from urc.web.wire import encode_links, encode_log, encode_values
+from urc.web.wire_ask import encode_progress
+from urc.web.wire_picture import as_frame
 
 __all__ = ["FRAMES_PER_SECOND", "Fanout", "Listener", "Pacer", "Place"]
 
@@ -36,6 +40,8 @@ class Place:
     """Hub revision up to which it has the values."""
     links: int = 0
     """Number of the link state it has."""
+    progress: int = 0
+    """Number of the state of the sequences it has."""
     notes: int = 0
     """Log lines it has, or was told it lost."""
 
@@ -85,8 +91,14 @@ class Fanout:
         self._pacer = Pacer(rate_hz)
         self._head = 0
         self._frames: dict[int, _Frame] = {}
+        self._framed = ("", b"")
+        self._looked_at = -1
         self._links: tuple[LinkStatus, ...] = ()
         self._links_number = 0
+        self._pictures = {name for name, signal in hub.signals.items() if is_picture(signal)}
+        self.shelf = PictureShelf(hub, self._clock)
+        self._progress: tuple[Progress, ...] = ()
+        self._progress_number = 0
 
     async def run(self) -> None:
         """Flush for ever; ends by being cancelled."""
@@ -101,7 +113,7 @@ class Fanout:
                 subscription.seen = self._head
 
     def flush(self) -> None:
-        """Forget the last frame and wake everybody. Touches no socket."""
+        """Forget the last frame and wake everybody."""
         self._head = self.hub.revision
         self._frames.clear()
         for listener in self.listeners:
@@ -113,8 +125,32 @@ class Fanout:
 
     def take(self, place: Place) -> list[str]:
         """Return the messages that bring `place` up to date, and move it there."""
-        messages = [self._take_links(place), self._take_values(place), self._take_log(place)]
-        return [message for message in messages if message]
+        if self._looked_at != self.hub.revision:
+            self._look()
+        messages = []
+        if place.links != self._links_number:
+            place.links = self._links_number
+            messages.append(encode_links(self._links, self._clock.now()))
+        if values := self._take_values(place):
+            messages.append(values)
+        if log := self._take_log(place):
+            messages.append(log)
+        if place.progress != self._progress_number:
+            place.progress = self._progress_number
+            messages.append(encode_progress(self._progress))
+        return messages
+
+    def _look(self) -> None:
+        """Number what is not a value anew, when it has changed; once for all clients."""
+        self._looked_at = self.hub.revision
+        links = tuple(self.hub.links.values())
+        if links != self._links:
+            self._links = links
+            self._links_number += 1
+        progress = tuple(self.hub.progress.values())
+        if progress != self._progress:
+            self._progress = progress
+            self._progress_number += 1
 
     def _take_values(self, place: Place) -> str:
         if place.revision >= self._head:
@@ -122,21 +158,27 @@ class Fanout:
         now_s = self._clock.now()
         frame = self._frames.get(place.revision)
         if frame is None or now_s - frame.time_s > SHARED_FOR_S:
-            samples = self.hub.changed_since(place.revision)
+            samples = self._plain(self.hub.changed_since(place.revision))
             text = encode_values(samples, self.hub.index, now_s) if samples else ""
             frame = self._frames[place.revision] = _Frame(text, self.hub.revision, now_s)
         place.revision = frame.revision
         return frame.text
 
-    def _take_links(self, place: Place) -> str:
-        links = tuple(self.hub.links.values())
-        if links != self._links:
-            self._links = links
-            self._links_number += 1
-        if place.links == self._links_number:
-            return ""
-        place.links = self._links_number
-        return encode_links(links, self._clock.now())
+    def frame_of(self, text: str) -> bytes:
+        """Return a message of `take` as a WebSocket frame; made once for all who got the same."""
+        if text is not self._framed[0]:
+            self._framed = (text, as_frame(text.encode(), is_text=True))
+        return self._framed[1]
+
+    def _plain(self, samples: list[Sample]) -> list[Sample]:
+        """Return the readings without the images, which only go to those who show them."""
+        if not self._pictures:
+            return samples
+        return [
+            sample
+            for sample in samples
+            if sample.signal not in self._pictures or sample.value is None
+        ]
 
     def _take_log(self, place: Place) -> str:
         wanted = self.hub.notes_count - place.notes

@@ -4,39 +4,110 @@ Floor 5. Pure. The rules hold numbers only, so nothing out of a document can end
 
 A row or column in which no slot stands is a margin: it keeps its place in the picture, and gets an
 eighth of the room of one that is used. A phone has no room for margins: they are left out there.
-Held upright it stacks more than two columns in reading order, unless there is a ``phone`` grid.
+Held upright it shows the ``phone`` grid, else the ``tall`` one, else the wide one; of the latter
+two it stacks more than two columns in reading order.
+
+Over a background, what is empty is a window: it keeps its full size on every screen.
+
+The pages of an interface share its cells: which page is open says ``data-page`` on the grid, and a
+cell that is in two pages stays what it is.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from typing import NamedTuple
 
-from urc.model.interface import Grid, Interface, Slot
+from urc.model.interface import Grid, Interface, Slot, Tab
 
-__all__ = ["grid_css"]
+__all__ = ["grid_css", "mirrored", "needs_turning"]
 
 PHONE = "(max-width: 599.98px)"
 SHORT = "(max-height: 479.98px)"
 TALL = "(orientation: portrait)"
 PHONE_COLUMNS = 2
+LEFT_HAND = ':root[data-hand="left"]'
+"""Who works with the left hand; ``hand.js`` sets it."""
 _USED_COLUMN, _USED_ROW, _MARGIN = "minmax(0,1fr)", "minmax(8rem,1fr)", "minmax(0,.12fr)"
+_LOW_ROW = "minmax(6.5rem,1fr)"
+"""On a phone that lies on its side: two of them fit."""
+_WINDOW = ("minmax(5rem,1fr)", "minmax(0,1fr)")
+"""A row and a column through which the background is seen."""
 
 
 def grid_css(interface: Interface, slots: Sequence[str]) -> str:
     """Return the rules for the cells, which are numbered in the order of `slots`."""
-    grids = dict(interface.grids)
+    css = ""
+    canvas = _Canvas(slots, interface.background if interface.background in slots else "")
+    for number, page in enumerate(interface.pages):
+        place = f'.urc-grid[data-page="{number}"]'
+        right = _placed(page.grids, canvas)
+        css += _screens(place, right, canvas)
+        left = _left_hand(page, right, canvas)
+        if left != right:
+            css += _screens(f"{LEFT_HAND} {place}", left, canvas)
+    return css
+
+
+class _Canvas(NamedTuple):
+    """What the pictures are filled with."""
+
+    slots: Sequence[str]
+    background: str
+    """Slot behind everything; what is empty lets it through, so it keeps its full size."""
+
+
+def _left_hand(page: Tab, right: Mapping[str, Grid], canvas: _Canvas) -> dict[str, Grid]:
+    """Return the pictures for who works with the left hand: drawn, mirrored, or the same."""
+    if page.left:
+        turn = mirrored if page.is_mirrored else Grid._replace
+        others = {screen: turn(grid) for screen, grid in page.grids.items()}
+        return _placed({**others, **page.left}, canvas)
+    if not page.is_mirrored:
+        return dict(right)
+    # What is stacked is in reading order for everybody, so this comes last.
+    return {screen: mirrored(grid) for screen, grid in right.items()}
+
+
+def mirrored(grid: Grid) -> Grid:
+    """Return the grid with its columns the other way round."""
+    slots = tuple(
+        slot._replace(column=grid.columns - slot.column - slot.column_span) for slot in grid.slots
+    )
+    return grid._replace(slots=slots)
+
+
+def needs_turning(page: Tab, slots: Sequence[str]) -> bool:
+    """Return whether a phone that is held upright shows another picture than was drawn."""
+    base = _placed(page.grids, _Canvas(slots, "")).get("base")
+    is_drawn = "phone" in page.grids or "tall" in page.grids
+    return base is not None and not is_drawn and _cropped(base).columns > PHONE_COLUMNS
+
+
+def _placed(grids: Mapping[str, Grid], canvas: _Canvas) -> dict[str, Grid]:
+    """Return the grid for each kind of screen, without the slots that nobody fills."""
     if not grids:
-        return ""
-    base = grids.get("wide") or next(iter(grids.values()))
-    css = _rules(_filled(base, slots), slots, interface.background)
+        return {}
+    crop = Grid._replace if canvas.background else _cropped
+    wide = grids.get("wide") or next(iter(grids.values()))
+    base = _filled(wide, canvas.slots)
+    placed = {"base": base}
     if "tall" in grids:
-        tall = _filled(grids["tall"], slots)
-        css += f"@media {TALL}{{{_rules(tall, slots, interface.background)}}}"
-    short = _cropped(_filled(base, slots))
-    css += f"@media {SHORT}{{{_rules(short, slots, interface.background)}}}"
-    drawn = grids.get("phone")
-    phone = _cropped(_filled(drawn or base, slots))
-    if drawn is None and phone.columns > PHONE_COLUMNS:
-        phone = _stacked(phone)
-    return css + f"@media {PHONE}{{{_rules(phone, slots, interface.background)}}}"
+        placed[TALL] = _filled(grids["tall"], canvas.slots)
+    placed[SHORT] = crop(base)
+    upright = grids.get("phone") or grids.get("tall") or wide
+    phone = crop(_filled(upright, canvas.slots))
+    if "phone" not in grids and phone.columns > PHONE_COLUMNS:
+        # The first row stays empty where there is something to see behind it.
+        phone = _stacked(phone, first=1 if canvas.background else 0)
+    placed[PHONE] = phone
+    return placed
+
+
+def _screens(place: str, grids: Mapping[str, Grid], canvas: _Canvas) -> str:
+    css = ""
+    for screen, grid in grids.items():
+        rules = _rules(place, grid, canvas, _LOW_ROW if screen == SHORT else _USED_ROW)
+        css += rules if screen == "base" else f"@media {screen}{{{rules}}}"
+    return css
 
 
 def _filled(grid: Grid, names: Sequence[str]) -> Grid:
@@ -44,19 +115,17 @@ def _filled(grid: Grid, names: Sequence[str]) -> Grid:
     return Grid(grid.rows, grid.columns, tuple(slot for slot in grid.slots if slot.name in names))
 
 
-def _rules(grid: Grid, names: Sequence[str], background: str) -> str:
-    rows = _tracks(grid.rows, _used((slot.row, slot.row_span) for slot in grid.slots), _USED_ROW)
-    columns = _tracks(
-        grid.columns,
-        _used((slot.column, slot.column_span) for slot in grid.slots),
-        _USED_COLUMN,
-    )
-    css = f".urc-grid{{grid-template-rows:{rows};grid-template-columns:{columns}}}"
+def _rules(place: str, grid: Grid, canvas: _Canvas, row: str) -> str:
+    empty_row, empty_column = _WINDOW if canvas.background else (_MARGIN, _MARGIN)
+    used_rows = _used((slot.row, slot.row_span) for slot in grid.slots)
+    used_columns = _used((slot.column, slot.column_span) for slot in grid.slots)
+    rows = _tracks(grid.rows, used_rows, row, empty_row)
+    columns = _tracks(grid.columns, used_columns, _USED_COLUMN, empty_column)
+    css = f"{place}{{grid-template-rows:{rows};grid-template-columns:{columns}}}"
     places = {slot.name: slot for slot in grid.slots}
-    for index, name in enumerate(names):
-        if name == background:
-            continue
-        css += f'[data-cell="{index}"]{{{_place(places.get(name))}}}'
+    for index, name in enumerate(canvas.slots):
+        if name != canvas.background:
+            css += f'{place} [data-cell="{index}"]{{{_place(places.get(name))}}}'
     return css
 
 
@@ -68,8 +137,8 @@ def _place(slot: Slot | None) -> str:
     return f"display:grid;grid-area:{area}"
 
 
-def _tracks(count: int, used: set[int], size: str) -> str:
-    return " ".join(size if place in used else _MARGIN for place in range(count)) or "none"
+def _tracks(count: int, used: set[int], size: str, empty: str) -> str:
+    return " ".join(size if place in used else empty for place in range(count)) or "none"
 
 
 def _used(spans: Iterable[tuple[int, int]]) -> set[int]:
@@ -89,8 +158,8 @@ def _cropped(grid: Grid) -> Grid:
     return Grid(len(rows), len(columns), slots)
 
 
-def _stacked(grid: Grid) -> Grid:
-    """Return the slots one below the other, in reading order."""
+def _stacked(grid: Grid, first: int) -> Grid:
+    """Return the slots one below the other, in reading order, from the row `first`."""
     ordered = sorted(grid.slots, key=lambda slot: (slot.row, slot.column))
-    slots = tuple(Slot(slot.name, row, 0) for row, slot in enumerate(ordered))
-    return Grid(len(slots), 1, slots)
+    slots = tuple(Slot(slot.name, row, 0) for row, slot in enumerate(ordered, first))
+    return Grid(len(slots) + first, 1, slots)

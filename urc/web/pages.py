@@ -10,6 +10,7 @@ import logging
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
+from typing import cast
 from urllib.parse import quote
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined, Template
@@ -23,8 +24,22 @@ from urc.model.profile import Profile, Setting
 from urc.model.values import Signal, Value
 from urc.model.widget import Widget
 from urc.shipped import shipped
+from urc.web import words
+from urc.web.files import linked_options
+from urc.web.interfaces import (
+    DEBUG_STYLES,
+    DEBUGGING,
+    Choice,
+    DebugPart,
+    PageTab,
+    choices,
+    debug_part,
+    is_turned,
+    page_tabs,
+)
 from urc.web.layout import grid_css
-from urc.web.outputs import motion_lines, output_config
+from urc.web.markdown import markdown
+from urc.web.outputs import inputs_config, motion_lines, output_config
 from urc.web.robots import Robot, missing_settings
 
 __all__ = [
@@ -41,6 +56,7 @@ __all__ = [
     "render",
     "render_widget",
     "robot_page",
+    "widget_cell",
     "widget_context",
 ]
 
@@ -54,7 +70,7 @@ class Head:
     nonce: str
     """Of this one response; every script and style element carries it."""
     title: str
-    import_map: Mapping[str, object] = field(default_factory=lambda: {"imports": {}})
+    import_map: Mapping[str, object] = field(default_factory=lambda: with_words({"imports": {}}))
     widget_styles: tuple[str, ...] = ()
     """URLs of widget style sheets."""
     grid_css: str = ""
@@ -112,15 +128,6 @@ class Cell:
 
 
 @dataclass(frozen=True, slots=True)
-class Tab:
-    """Another interface of the same robot."""
-
-    title: str
-    url: str
-    is_current: bool
-
-
-@dataclass(frozen=True, slots=True)
 class RobotPage:
     """``robot.html.j2``: one interface of one robot, live."""
 
@@ -128,8 +135,18 @@ class RobotPage:
     title: str
     socket: str
     """Path and query of the WebSocket."""
-    tabs: tuple[Tab, ...]
-    """Empty when there is only one interface."""
+    interfaces: tuple[Choice, ...]
+    """All that the robot has."""
+    tabs: tuple[PageTab, ...]
+    """Pages of this interface; empty when it has but one."""
+    number: int
+    """Of the page that is open."""
+    is_turned: bool
+    """Whether the picture is only seen as it was drawn on a phone that lies on its side."""
+    is_part: bool
+    """Whether ``interfaces.js`` asks, which takes out the stage and what its style is made of."""
+    debug: DebugPart | None
+    """What stands in place of a grid, in the interface for finding faults."""
     cells: tuple[Cell, ...]
     stop_url: str
     """Where STOP goes when the socket is down."""
@@ -160,8 +177,9 @@ class WidgetContext:
     else the widget's title."""
     options: Mapping[str, object]
     """Checked against the manifest; every declared option has a key, None where nothing is set."""
-    inputs: Mapping[str, Signal]
-    """Input → the signal bound to it; inputs that are not bound are missing."""
+    inputs: Mapping[str, Signal | tuple[Signal, ...]]
+    """Input → the signal bound to it, of one that takes many all of them; inputs that are not bound
+    are missing."""
     widget: str
     """The widget's name."""
     uid: str
@@ -185,6 +203,9 @@ def robot_page(
     modules: Mapping[str, object],
     *,
     is_watching: bool = False,
+    tab: str = "",
+    wire: str = "",
+    is_part: bool = False,
 ) -> str:
     """Return the page of one interface.
 
@@ -195,6 +216,9 @@ def robot_page(
         interface: one of its interfaces.
         modules: the import map.
         is_watching: the page is never to drive.
+        tab: name of the page of it that is open; "" or an unknown one: the first.
+        wire: path of the dev page; "" where there is none for who asks.
+        is_part: a page that is open already wants the interface in place of another.
     """
     uses = _uses(profile, interface)
     slots = tuple(uses)
@@ -202,26 +226,28 @@ def robot_page(
     head = Head(
         nonce=nonce,
         title=profile.title,
-        import_map=modules,
-        widget_styles=tuple(f"/widgets/{quote(widget)}/widget.css" for widget in widgets),
+        import_map=with_words(modules),
+        widget_styles=DEBUG_STYLES
+        if interface is DEBUGGING
+        else tuple(f"/widgets/{quote(widget)}/widget.css" for widget in widgets),
         grid_css=grid_css(interface, slots),
     )
     place = quote(name, safe="")
     url, watch = f"/robots/{place}/", "&watch" if is_watching else ""
     lines = motion_lines(profile.driver)
-    tabs = tuple(
-        Tab(
-            each.title or each.name, f"{url}?interface={quote(each.name)}{watch}", each is interface
-        )
-        for each in profile.interfaces.values()
-    )
+    tabs = page_tabs(interface, tab)
     page = RobotPage(
         head=head,
         title=profile.title,
         socket=f"/ws?robot={place}{watch}",
-        tabs=tabs if len(tabs) > 1 else (),
+        interfaces=choices(profile, interface, url, watch),
+        tabs=tabs,
+        number=next((each.number for each in tabs if each.is_current), 0),
+        is_turned=is_turned(interface, slots),
+        is_part=is_part,
+        debug=debug_part(profile, wire) if interface is DEBUGGING else None,
         cells=tuple(
-            _cell(index, use, profile, is_background=slot == interface.background)
+            widget_cell(index, use, profile, is_background=slot == interface.background)
             for index, (slot, use) in enumerate(uses.items())
         ),
         stop_url=f"/api/v1/robots/{place}/stop",
@@ -229,6 +255,12 @@ def robot_page(
         can_move=bool(lines),
     )
     return render("robot.html.j2", page)
+
+
+def with_words(modules: Mapping[str, object]) -> Mapping[str, object]:
+    """Return the import map with the words of the reader's language in it."""
+    imports = cast("Mapping[str, str]", modules["imports"])
+    return {"imports": {**imports, "urc/words": words.address(words.language.get())}}
 
 
 def error_page(nonce: str, status: int, message: str) -> str:
@@ -251,11 +283,14 @@ def render_widget(widget: Widget, context: WidgetContext) -> Markup:
 def widget_context(use: WidgetUse, widget: Widget, profile: Profile, uid: str) -> WidgetContext:
     """Return what the widget's template may know."""
     signals = profile.driver.signals
-    inputs = {name: signals[signal] for name, signal in use.inputs.items()}
+    single = {name: signals[signal] for name, signal in use.inputs.items()}
+    several = {name: tuple(signals[one] for one in many) for name, many in use.lists.items()}
     outputs = {name: _called(command, profile.driver) for name, command in use.outputs.items()}
     declared: dict[str, object] = dict.fromkeys(widget.options)
-    title = use.title or _heading(widget, inputs, outputs)
-    return WidgetContext(title, {**declared, **use.options}, inputs, widget.name, uid, outputs)
+    first = single | {name: many[0] for name, many in several.items() if many}
+    title = use.title or _heading(widget, first, outputs)
+    options = {**declared, **linked_options(use, profile.name)}
+    return WidgetContext(title, options, {**single, **several}, widget.name, uid, outputs)
 
 
 def _heading(widget: Widget, inputs: Mapping[str, Signal], outputs: Mapping[str, str]) -> str:
@@ -272,7 +307,10 @@ def _called(command: str, driver: Driver) -> str:
     return (known and known.title) or _spoken(command)
 
 
-def _cell(index: int, use: WidgetUse, profile: Profile, *, is_background: bool) -> Cell:
+def widget_cell(
+    index: int, use: WidgetUse, profile: Profile, *, is_background: bool = False
+) -> Cell:
+    """Return one slot with its widget; whatever the widget's template raises costs this one."""
     widget = profile.widgets[use.widget]
     context = widget_context(use, widget, profile, uid=f"cell-{index}")
     html, error = Markup(), ""
@@ -285,7 +323,7 @@ def _cell(index: int, use: WidgetUse, profile: Profile, *, is_background: bool) 
         "slot": use.slot,
         "widget": use.widget,
         "title": context.title,
-        "inputs": dict(use.inputs),
+        **inputs_config(use, widget, profile.driver),
         "outputs": {name: output_config(use, name, widget, profile.driver) for name in use.outputs},
         "options": dict(context.options),
     }
@@ -294,11 +332,9 @@ def _cell(index: int, use: WidgetUse, profile: Profile, *, is_background: bool) 
 
 def _uses(profile: Profile, interface: Interface) -> dict[str, WidgetUse]:
     """Return slot → widget, in reading order; slots that nobody fills are left out."""
-    names: dict[str, None] = dict.fromkeys((interface.background,) if interface.background else ())
-    for grid in interface.grids.values():
-        ordered = sorted(grid.slots, key=lambda slot: (slot.row, slot.column))
-        names |= dict.fromkeys(slot.name for slot in ordered)
-    found = {name: interface.widgets.get(name) or profile.slots.get(name) for name in names}
+    found = {
+        name: interface.widgets.get(name) or profile.slots.get(name) for name in interface.shown
+    }
     return {name: use for name, use in found.items() if use is not None}
 
 
@@ -336,20 +372,25 @@ def _spoken(name: str) -> str:
 
 @lru_cache(maxsize=1)
 def _pages() -> Environment:
-    return Environment(
+    pages = Environment(
         loader=FileSystemLoader(shipped("templates")),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
     )
+    pages.globals.update(t=words.t, language=words.language.get, languages=words.LANGUAGES)
+    return pages
 
 
 @lru_cache(maxsize=1)
 def _widgets() -> Environment:
-    return ImmutableSandboxedEnvironment(
+    widgets = ImmutableSandboxedEnvironment(
         autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
+    widgets.globals["t"] = words.t
+    widgets.filters["markdown"] = markdown
+    return widgets
 
 
 @lru_cache(maxsize=256)

@@ -12,16 +12,19 @@ from contextlib import AbstractAsyncContextManager, contextmanager
 from dataclasses import dataclass
 from typing import Protocol
 
+from urc.model.codec import Payload
 from urc.model.driver import Driver
 from urc.model.profile import Profile, Setting
 from urc.model.values import Reading, Value
 from urc.problems import UrcError
 from urc.protocol.events import Replied
+from urc.protocol.reins import Pull
 from urc.runtime.clock import Clock, LoopClock
 from urc.runtime.hub import Hub
 from urc.runtime.latch import LatchFile
 from urc.runtime.motion import Frames, Movers
 from urc.runtime.trail import Trail
+from urc.web.consent import Consent
 from urc.web.controls import Controls
 from urc.web.fanout import Fanout
 
@@ -63,8 +66,18 @@ class SessionLike(Protocol):
     def movers(self) -> Movers | None:
         """Who writes them; None where the robot has no held command."""
 
-    async def command(self, name: str, arguments: Mapping[str, Reading]) -> Replied:
+    async def command(
+        self,
+        name: str,
+        arguments: Mapping[str, Reading],
+        *,
+        confirmed_by: tuple[str, ...] = (),
+        on_sent: Callable[[Payload], None] | None = None,
+    ) -> Replied:
         """Run one command and return its reply; raise `CommandFailed` when there is none."""
+
+    def pull(self, sequence: str, what: Pull) -> None:
+        """Let a sequence pause, do one more step, go on, or end."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,6 +146,7 @@ class Station:
         self.robot = robot
         self.clock: Clock = clock or LoopClock()
         self.controls = Controls(robot.profile.driver, self.clock, latch, trail)
+        self.consent = Consent(lambda: self.controls.seats, self.clock)
         self._linger_s = linger_s
         self._visitors = 0
         self._stirred = asyncio.Event()

@@ -21,6 +21,7 @@ from uvicorn.server import ServerState
 from urc.problems import UrcError
 from urc.web.addresses import local_addresses
 from urc.web.connection import CONNECTIONS, REQUEST_S, Connection
+from urc.web.frames import Frames
 from urc.web.wire import INBOUND_BYTES
 
 __all__ = ["reachable_urls", "serve"]
@@ -101,11 +102,22 @@ class _Flow:
 
     def __init__(self) -> None:
         self.transport: asyncio.Transport | None = None
+        self.sink: Callable[[bytes], bool] | None = None
         self.writable = asyncio.Event()
         self.writable.set()
 
+    def is_free(self) -> bool:
+        return self.writable.is_set()
+
     async def drained(self) -> None:
         await self.writable.wait()
+
+    def write(self, frame: bytes) -> None:
+        if self.transport and not self.transport.is_closing():
+            self.transport.write(frame)
+
+    def listen(self, sink: Callable[[bytes], bool]) -> None:
+        self.sink = sink
 
     def abort(self) -> None:
         if self.transport:
@@ -128,6 +140,8 @@ class _DashboardSocket(WebSocketsSansIOProtocol):
         _loop: asyncio.AbstractEventLoop | None = None,
     ) -> None:
         self._urc_flow = _Flow()
+        self._urc_frames: Frames | None = None
+        """None before the handshake, which is what comes first."""
         super().__init__(config, server_state, {**app_state, "flow": self._urc_flow}, _loop)
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
@@ -140,6 +154,17 @@ class _DashboardSocket(WebSocketsSansIOProtocol):
         """Let a waiting writer go on, to learn that the line is gone."""
         super().connection_lost(exc)
         self._urc_flow.writable.set()
+
+    def data_received(self, data: bytes) -> None:
+        """Pass a whole text on at once, if the client takes it; all else goes its usual way."""
+        if self._urc_frames is None:
+            self._urc_frames = Frames()
+            super().data_received(data)
+            return
+        text = self._urc_frames.whole(data)
+        sink = self._urc_flow.sink
+        if text is None or sink is None or not sink(text):
+            super().data_received(data)
 
     def pause_writing(self) -> None:
         """Tell the client that the kernel is full."""

@@ -1,8 +1,8 @@
 """One browser client: what it sends is checked, what it gets is never queued behind another's.
 
 Floor 5. Reads and writes are two tasks of one group. The writer takes the newest state when the
-line is free, so a client that cannot keep up skips frames; one that takes nothing at all for
-`STALL_S` is cut off.
+line is free, so a client that cannot keep up skips frames; one that takes nothing for `STALL_S` is
+cut off.
 """
 
 import asyncio
@@ -10,16 +10,20 @@ import logging
 import math
 from collections import deque
 from collections.abc import Mapping
-from typing import NamedTuple, Protocol
+from time import time
 
 from starlette.types import Message
 from starlette.websockets import WebSocketDisconnect
 
+from urc.model.codec import Payload
 from urc.model.values import NOTHING, Reading
-from urc.motion.lease import Role
+from urc.protocol.commands import questions
 from urc.runtime.session import CommandFailed
 from urc.web import wire
 from urc.web.controls import Seat
+from urc.web.fanout import Place
+from urc.web.line import Allowance, Flow, Guest, Line
+from urc.web.picture_shelf import Looks
 from urc.web.robots import (
     HELD,
     Live,
@@ -28,13 +32,17 @@ from urc.web.robots import (
     missing_settings,
     needs_holding,
 )
+from urc.web.wire_ask import Agree, Steer
 from urc.web.wire_drive import Drive, Driving, Release, Stop, Tick
+from urc.web.wire_picture import Show
 
 __all__ = ["Allowance", "Client", "Flow", "Guest", "Line"]
 
 MESSAGES_PER_S = 100
 TICKS_PER_S = 2000
 """Ticks of held controls are thinned, not refused: only a flood of them closes the line."""
+TICK = b'{"t":"tick",'
+"""So a page's ticks begin; written otherwise they only take the longer way."""
 BAD_MESSAGES = 10
 COMMANDS_AT_ONCE = 16
 COMMAND_TIMEOUT_S = 30.0
@@ -42,56 +50,6 @@ STALL_S = 15.0
 GOODBYE_S = 2.0
 
 log = logging.getLogger(__name__)
-
-
-class Line(Protocol):
-    """The part of an accepted WebSocket that a client needs."""
-
-    async def receive(self) -> Message:
-        """Return the next ASGI message."""
-
-    async def send_text(self, data: str) -> None:
-        """Send one text message."""
-
-    async def close(self, code: int = 1000, reason: str | None = None) -> None:
-        """Begin the closing handshake."""
-
-
-class Flow(Protocol):
-    """What the server knows of the socket below, where it can be reached."""
-
-    async def drained(self) -> None:
-        """Return when the kernel has taken everything written so far."""
-
-    def abort(self) -> None:
-        """Cut the connection without waiting for anything."""
-
-
-class Allowance:
-    """How many messages may come: a bucket that holds one second's worth."""
-
-    def __init__(self, rate_hz: float, now_s: float) -> None:
-        self._rate_hz = rate_hz
-        self._left = rate_hz
-        self._time_s = now_s
-
-    def take(self, now_s: float) -> bool:
-        """Count one message; False when it is one too many."""
-        earned = (now_s - self._time_s) * self._rate_hz
-        self._left = min(self._rate_hz, self._left + earned)
-        self._time_s = now_s
-        if self._left < 1:
-            return False
-        self._left -= 1
-        return True
-
-
-class Guest(NamedTuple):
-    """Who is at the other end."""
-
-    place: str = ""
-    """Address, for the others; "" for this machine."""
-    role: Role = "driver"
 
 
 class Client:
@@ -112,6 +70,10 @@ class Client:
         self._news = asyncio.Event()
         self._answers: deque[str] = deque()
         self._pong = ""
+        self._looks = Looks()
+        self._place = Place()
+        self._idle: Live | None = None  # set while the writer waits for news
+        self._is_listening = False
         self._closing: tuple[int, str] | None = None
         self._commands: set[asyncio.Task[None]] = set()
         self._allowance = Allowance(MESSAGES_PER_S, station.clock.now())
@@ -119,8 +81,20 @@ class Client:
         self.bad_messages = 0
 
     def wake(self) -> None:
-        """Look for news; called by the fan-out."""
-        self._news.set()
+        """Take what is new; called by the fan-out at each flush.
+
+        A line that is free is written to at once: the turns of a task cost more than the frame.
+        """
+        live, flow = self._idle, self._flow
+        if live is None or flow is None or self._news.is_set() or not flow.is_free():
+            self._news.set()
+            return
+        for text in live.fanout.take(self._place):
+            flow.write(live.fanout.frame_of(text))
+        while flow.is_free() and (picture := live.fanout.shelf.take(self._looks)):
+            flow.write(picture.frame)
+        if not flow.is_free() or live.ended.is_set():
+            self._news.set()  # the newest, once the line is free; or the end
 
     async def serve(self) -> None:
         """Be this client from the accepted socket to its end."""
@@ -157,7 +131,8 @@ class Client:
         live.fanout.listeners.add(self)
         controls = self._station.controls
         try:
-            self._seat = controls.sit(self._guest.place, self._guest.role, self.wake)
+            self._seat = controls.sit(self._guest.place, self._guest.role, self._news.set)
+            self._station.consent.welcome(self._seat)
             async with asyncio.TaskGroup() as group:
                 writing = group.create_task(self._write(live))
                 reading = group.create_task(self._read(live, group, first))
@@ -190,22 +165,47 @@ class Client:
         profile = self._station.robot.profile
         hello = wire.encode_hello(profile, live.number, self._station.clock.now())
         await self._line.send_text(hello)
-        place = live.fanout.newcomer()
+        self._place = live.fanout.newcomer()
         while True:
             # Only what is taken after the line is free is the newest.
             if self._flow:
                 async with asyncio.timeout(STALL_S):
                     await self._flow.drained()
             self._news.clear()
-            for text in (*live.fanout.take(place), *self._take_controls(), *self._take_answers()):
+            for text in (
+                *live.fanout.take(self._place),
+                *self._take_controls(),
+                *self._take_answers(),
+            ):
                 async with asyncio.timeout(STALL_S):
                     await self._line.send_text(text)
+            # One image, then whatever else is new: nothing waits behind a second one.
+            if not self._closing and await self._send_picture(live):
+                self._news.set()
             if live.ended.is_set() and not self._closing:
                 self._closing = (wire.CLOSE_FAILED, "the robot's session ended")
             if self._closing:
                 await self._line.close(*self._closing)
                 return
+            self._idle = live
             await self._news.wait()
+            self._idle = None
+
+    async def _send_picture(self, live: Live) -> bool:
+        """Send the newest image that the page has not got; return whether there is one."""
+        if not self._looks.names:
+            return False
+        async with asyncio.timeout(STALL_S):
+            if self._flow:
+                await self._flow.drained()
+            picture = live.fanout.shelf.take(self._looks)
+            if picture is None:
+                return False
+            if self._flow:
+                self._flow.write(picture.frame)
+            else:
+                await self._line.send_bytes(picture.message)
+        return True
 
     def _take_controls(self) -> list[str]:
         return self._station.controls.take(self._seat) if self._seat is not None else []
@@ -222,10 +222,32 @@ class Client:
     # Reading
 
     async def _read(self, live: Live, group: asyncio.TaskGroup, first: Message | None) -> None:
-        message = first or await self._line.receive()
+        if self._flow:
+            self._flow.listen(self._offered)
+        message = first or await self._listen()
         while message["type"] != "websocket.disconnect" and not self._closing:
             self._take(message, live, group)
-            message = await self._line.receive()
+            message = await self._listen()
+
+    async def _listen(self) -> Message:
+        self._is_listening = True
+        try:
+            return await self._line.receive()
+        finally:
+            self._is_listening = False
+
+    def _offered(self, data: bytes) -> bool:
+        """Take a tick that has just come, with nothing before it; all else is for `_take`."""
+        if not (self._is_listening and data.startswith(TICK)) or self._closing:
+            return False
+        try:
+            said = wire.decode(data)
+        except wire.BadMessage:
+            return False
+        if not isinstance(said, Tick) or not self._ticks.take(self._station.clock.now()):
+            return False
+        self._hear(said)
+        return True
 
     def _take(self, message: Message, live: Live, group: asyncio.TaskGroup) -> None:
         now_s = self._station.clock.now()
@@ -246,16 +268,35 @@ class Client:
             self._count_bad(fault)
         elif isinstance(asked, Drive):
             self._hear(asked)
+        elif isinstance(asked, Show):
+            self._looks.show(asked.signals)
+            self._news.set()
+        elif isinstance(asked, (Agree, Steer)):
+            self._advise(asked, live)
         elif isinstance(asked, wire.Ping):
             if math.isfinite(asked.c):
-                self._pong = wire.encode_pong(asked, now_s)
-                self.wake()
+                self._pong = wire.encode_pong(asked, now_s, time())
+                self._news.set()
         else:
             self._start(asked, live, group)
 
     def _hear(self, said: Driving) -> None:
         if self._seat is not None:
             self._station.controls.hear(self._seat, said)
+
+    def _advise(self, said: Agree | Steer, live: Live) -> None:
+        if self._seat is None:
+            return
+        if isinstance(said, Agree):
+            self._station.consent.hear(self._seat, said)
+        elif self._seat.client.role == "viewer":
+            text = "this page only watches"
+            now_s = self._station.clock.now()
+            self._station.controls.trail.refused(self._seat.client, said.command, text, now_s)
+        else:
+            live.session.pull(said.command, said.verb)
+            trail = self._station.controls.trail
+            trail.ran(self._seat.client, said.command, {}, f"told to {said.verb}")
 
     def _count_bad(self, reason: str) -> None:
         self.bad_messages += 1
@@ -270,7 +311,7 @@ class Client:
 
     def _answer(self, text: str) -> None:
         self._answers.append(text)
-        self.wake()
+        self._news.set()
 
     def _start(self, asked: wire.Run, live: Live, group: asyncio.TaskGroup) -> None:
         if len(self._commands) + len(self._answers) >= COMMANDS_AT_ONCE:
@@ -289,22 +330,47 @@ class Client:
         if needs_holding(self._station.robot.profile.driver, asked.command):
             self._reply(asked, code="refused", message=HELD)
             return
+        sent: deque[Payload] = deque(maxlen=1)  # what went out last
         try:
-            async with asyncio.timeout(COMMAND_TIMEOUT_S):
-                replied = await live.session.command(asked.command, asked.arguments)
+            people = await self._confirmed(asked)
+            async with asyncio.timeout(self._limit_s(asked.command)):
+                replied = await live.session.command(
+                    asked.command, asked.arguments, confirmed_by=people, on_sent=sent.append
+                )
         except asyncio.CancelledError:
             if self._seat is not None:
                 text = "nobody waited for the answer"
                 trail = self._station.controls.trail
-                trail.ran(self._seat.client, asked.command, asked.arguments, text)
+                trail.ran(self._seat.client, asked.command, asked.arguments, text, _last(sent))
             raise
         except TimeoutError:
             text = f"no answer within {COMMAND_TIMEOUT_S:g} s"
-            self._reply(asked, code="timed-out", message=text)
+            self._reply(asked, code="timed-out", message=text, sent=_last(sent))
         except CommandFailed as failed:
-            self._reply(asked, code=failed.code, message=failed.message)
+            self._reply(asked, code=failed.code, message=failed.message, sent=_last(sent))
         else:
-            self._reply(asked, values=replied.values)
+            self._reply(asked, values=replied.values, people=people, sent=_last(sent))
+
+    def _limit_s(self, command: str) -> float | None:
+        """Return how long a command may take; a sequence ends by itself, however long it is."""
+        known = self._station.robot.profile.driver.commands.get(command)
+        return None if known is not None and known.steps else COMMAND_TIMEOUT_S
+
+    async def _confirmed(self, asked: wire.Run) -> tuple[str, ...]:
+        """Return who has said yes to a command; raise `CommandFailed` while somebody must."""
+        known = self._station.robot.profile.driver.commands.get(asked.command)
+        asks = questions(known, asked.arguments) if known is not None else ()
+        if not asks or known is None or self._seat is None:
+            return ()
+        if not asked.confirmed:
+            text = f"nobody was asked first: {asks[0].text or known.title or known.name}"
+            raise CommandFailed("not-confirmed", text)
+        people = (self._seat.client.name,)
+        two = next((one for one in asks if one.is_two_person), None)
+        if two is None:
+            return people
+        name = known.title or known.name
+        return (*people, await self._station.consent.second(self._seat, asked.id, name, two))
 
     def _reply(
         self,
@@ -313,6 +379,8 @@ class Client:
         values: Mapping[str, Reading] = NOTHING,
         code: str = "",
         message: str = "",
+        people: tuple[str, ...] = (),
+        sent: Payload = b"",
     ) -> None:
         """Answer a command, and leave in the audit what it came to."""
         self._answer(wire.encode_reply(asked, values=values, code=code, message=message))
@@ -323,4 +391,10 @@ class Client:
             trail.refused(who, asked.command, message, self._station.clock.now())
         else:
             outcome = f"{code}: {message}" if code else "done"
-            trail.ran(who, asked.command, asked.arguments, outcome, answer=values)
+            if people:
+                outcome += f"; confirmed by {', '.join(people)}"
+            trail.ran(who, asked.command, asked.arguments, outcome, sent, answer=values)
+
+
+def _last(sent: deque[Payload]) -> Payload:
+    return sent[-1] if sent else b""

@@ -18,9 +18,14 @@ Server → page, by ``t``::
     stopped a control stopped without being let go: nothing moves before a new gesture
     refused a tick, or a wish about the controls, was not taken
 
-Page → server: ``ping``, ``run``, and for the controls ``drive``, ``tick``, ``release`` and
-``stop``. The types below bound their nesting: anything deeper than an argument map of plain values
-is refused by the decoder without being read further.
+    ask     a question that a second person must answer; ``asked``: it is over
+    progress where the sequences stand
+
+Images go as binary messages, see `wire_picture`.
+
+Page → server: ``ping``, ``run``, ``show``, ``agree``, ``steer``, and for the controls ``drive``,
+``tick``, ``release`` and ``stop``. The types below bound their nesting: anything deeper than an
+argument map of plain values is refused by the decoder without being read further.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -31,7 +36,9 @@ from urc.model.driver import Command, Driver, Poll
 from urc.model.profile import Profile
 from urc.model.values import Reading, Sample, Signal
 from urc.runtime.hub import LinkStatus, Note
+from urc.web.wire_ask import Agree, Steer
 from urc.web.wire_drive import Drive, Release, Stop, Tick
+from urc.web.wire_picture import Show
 from urc.web.wire_text import Outbound, cut, encoded, milliseconds
 
 __all__ = [
@@ -86,6 +93,8 @@ class _Signal(msgspec.Struct, omit_defaults=True, frozen=True):
     stale_after_s: float = 0.0
     sources: tuple[str, ...] = ()
     """Transports that bring it: when none of them is live, the value is old at once."""
+    axes: str = ""
+    """Which way its axes point; "" says nothing of it."""
 
 
 class _Hello(Outbound, tag="hello", omit_defaults=False, frozen=True):
@@ -145,6 +154,8 @@ class _Reply(Outbound, tag="reply", frozen=True):
 class _Pong(Outbound, tag="pong", frozen=True):
     c: float
     n: int
+    u: int = 0
+    """Milliseconds since 1970, by the server's clock; left out where nobody has told it."""
 
 
 class _Error(Outbound, tag="error", frozen=True):
@@ -167,9 +178,11 @@ class Run(msgspec.Struct, tag_field="t", tag="run", forbid_unknown_fields=True, 
     id: int
     command: str
     arguments: dict[str, bool | int | float | str | tuple[_Scalar, ...] | None] = {}
+    confirmed: bool = False
+    """Whether somebody was asked what the driver wants people to be asked, and said yes."""
 
 
-Inbound = Ping | Run | Drive | Tick | Release | Stop
+Inbound = Ping | Run | Show | Agree | Steer | Drive | Tick | Release | Stop
 
 _decoder: msgspec.json.Decoder[Inbound] = msgspec.json.Decoder(Inbound)
 
@@ -254,9 +267,9 @@ def encode_reply(
     return encoded(_Reply(run.id, ok=True, values=plain))
 
 
-def encode_pong(ping: Ping, now_s: float) -> str:
-    """Return the answer to a ping."""
-    return encoded(_Pong(ping.c, milliseconds(now_s)))
+def encode_pong(ping: Ping, now_s: float, utc_s: float = 0.0) -> str:
+    """Return the answer to a ping; `utc_s` is the time of day, in seconds since 1970."""
+    return encoded(_Pong(ping.c, milliseconds(now_s), milliseconds(utc_s)))
 
 
 def encode_error(code: str, message: str) -> str:
@@ -299,6 +312,7 @@ def _signal(signal: Signal, sources: tuple[str, ...]) -> _Signal:
         limits=limits or None,
         stale_after_s=signal.stale_after_s,
         sources=sources,
+        axes=signal.axes,
     )
 
 

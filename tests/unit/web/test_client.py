@@ -2,7 +2,7 @@
 
 import asyncio
 import json
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from typing import Any
 
@@ -33,6 +33,7 @@ class FakeLine:
         self.free = asyncio.Event()
         self.free.set()
         self.was_aborted = False
+        self.frames: list[bytes] = []
 
     async def receive(self) -> Message:
         return await self.inbox.get()
@@ -40,9 +41,24 @@ class FakeLine:
     async def send_text(self, data: str) -> None:
         self.sent.append(json.loads(data))
 
+    async def send_bytes(self, data: bytes) -> None:
+        self.frames.append(data)
+
+    def is_free(self) -> bool:
+        return self.free.is_set()
+
+    def write(self, frame: bytes) -> None:
+        if frame[0] == 0x81:  # a text
+            self.sent.append(json.loads(frame[frame.index(b"{") :]))
+        else:
+            self.frames.append(frame)
+
     async def close(self, code: int = 1000, reason: str | None = None) -> None:
         self.closed = (code, reason)
         self.leave()
+
+    def listen(self, sink: Callable[[bytes], bool]) -> None:
+        self.sink = sink
 
     async def drained(self) -> None:
         await self.free.wait()
@@ -126,7 +142,9 @@ async def test_a_ping_is_answered_with_its_own_number() -> None:
     async with scene() as it:
         it.line.say({"t": "ping", "c": 12.5})
         await settle()
-        assert it.line.of_type("pong") == [{"t": "pong", "c": 12.5, "n": 1_000_000}]
+        (pong,) = it.line.of_type("pong")
+        assert pong.pop("u") > 0
+        assert pong == {"t": "pong", "c": 12.5, "n": 1_000_000}
 
 
 async def test_a_command_gets_exactly_one_reply() -> None:
@@ -147,6 +165,7 @@ async def test_a_command_gets_exactly_one_reply() -> None:
             {"t": "reply", "id": 3, "ok": True, "values": {"battery": 7}},
             {"t": "reply", "id": 4, "ok": False, "code": "refused", "message": "not now"},
         ]
+        assert {e.data for e in it.audit} == {b"ask".hex()}
         assert [(e.what, e.who, e.command, e.arguments, e.outcome) for e in it.audit] == [
             ("ran", "screen 1", "ask", '{"x": 1}', 'done: {"battery": 7}'),
             ("ran", "screen 1", "ask", "{}", "refused: not now"),
@@ -157,7 +176,7 @@ async def test_a_command_whose_page_has_gone_is_in_the_audit() -> None:
     """It was given, whoever waits for its answer."""
     async with scene() as it:
 
-        async def wait(name: str, arguments: object) -> Replied:
+        async def wait(name: str, arguments: object, **people: object) -> Replied:
             await asyncio.Event().wait()
             raise AssertionError
 
@@ -239,7 +258,7 @@ async def test_commands_at_once_are_bounded() -> None:
     async with scene() as it:
         gate = asyncio.Event()
 
-        async def slow(name: str, arguments: object) -> object:
+        async def slow(name: str, arguments: object, **people: object) -> object:
             await gate.wait()
             raise CommandFailed("refused", "late")
 
@@ -300,3 +319,25 @@ async def test_what_is_no_message_about_the_controls_is_counted_as_bad(message: 
         it.line.say(message)
         await settle()
         assert it.client.bad_messages == 1
+
+
+async def test_a_tick_that_has_just_come_is_taken_at_once_and_nothing_else() -> None:
+    """Not before something that waits, not what is no tick, and not one too many."""
+    async with scene() as it:
+        tick = b'{"t":"tick","command":"go","epoch":1,"number":1,"echo":1}'
+        assert it.line.sink(tick)
+        await settle()
+        (refused,) = it.line.of_type("refused")
+        assert "'go' is no held command" in refused["message"]
+        for other in (b'{"t":"stop"}', b"", b"\xff", tick[:-1], b'{"t":"tick","a":1}', b"[" * 9999):
+            assert not it.line.sink(other)
+        it.line.say({"t": "ping", "n": 1, "c": 2.0})
+        await asyncio.sleep(0)
+        await settle()
+        assert it.line.sink(tick)
+        for _ in range(TICKS_PER_S):
+            it.line.sink(tick)
+        assert not it.line.sink(tick), "the usual way closes the line over it"
+        it.line.leave()
+        await settle()
+        assert not it.line.sink(tick)

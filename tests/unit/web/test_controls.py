@@ -4,13 +4,16 @@ import asyncio
 import json
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
+from pathlib import Path
 from typing import Any
 
 import pytest
 
-from tests.unit.runtime.test_motion import DRIVER
+from tests.unit.runtime.desks import DRIVER
 from urc.motion.lease import Role
 from urc.runtime.audit import Entry
+from urc.runtime.hub import Hub
+from urc.runtime.latch import LatchFile
 from urc.runtime.trail import Trail
 from urc.testing.clock import FakeClock, settle
 from urc.testing.movers import FakeFrames, FakeMovers
@@ -23,13 +26,14 @@ pytestmark = pytest.mark.anyio
 class Scene:
     """Controls with a robot that is connected."""
 
-    def __init__(self) -> None:
+    def __init__(self, file: LatchFile | None = None) -> None:
         self.clock = FakeClock()
         self.audit: list[Entry] = []
         trail = Trail("rover", self.audit.append, utc=lambda: 99.0)
-        self.controls = Controls(DRIVER, self.clock, trail=trail)
+        self.controls = Controls(DRIVER, self.clock, file, trail)
         self.frames = FakeFrames(DRIVER)
         self.movers = FakeMovers(self.clock)
+        self.hub = Hub({})
         self.told: dict[str, list[dict[str, Any]]] = {}
         self.beats: dict[str, int] = {}
         self._numbers = 0
@@ -64,10 +68,10 @@ class Scene:
 
 
 @asynccontextmanager
-async def scene() -> AsyncIterator[Scene]:
+async def scene(file: LatchFile | None = None) -> AsyncIterator[Scene]:
     """Attach the robot; it is gone after the test."""
-    it = Scene()
-    task = asyncio.create_task(it.controls.serve(it))  # type: ignore[arg-type]  # it has both
+    it = Scene(file)
+    task = asyncio.create_task(it.controls.serve(it))  # type: ignore[arg-type]  # it has all
     await settle()
     yield it
     task.cancel()
@@ -267,3 +271,71 @@ async def test_an_audit_that_breaks_keeps_nobody_from_driving_and_stopping() -> 
         it.controls.stop("ann")
         assert it.movers.texts[-1].endswith("stop")
         assert it.controls.desk.lease.state.latched_by == "ann"
+
+
+async def test_a_latch_that_cannot_be_written_is_told_and_stops_all_the_same(
+    tmp_path: Path,
+) -> None:
+    """In the log of the page, and to everybody at a screen, once; and when all is well again."""
+    (tmp_path / "latches").write_text("a file where the folder should be")
+    file = LatchFile(tmp_path / "latches", "rover")
+    async with scene(file) as it:
+        ann, bob = it.sit(), it.sit()
+        it.say(ann, "take")
+        it.tick(ann)
+        await file.settle()
+        it.controls.stop("bob")
+        await file.settle()
+        await settle()
+        assert it.movers.texts[-2:] == ["drive stop", "lift stop"]
+        assert it.controls.desk.is_confirmed
+        (note,) = it.hub.notes
+        assert (note.level, note.source) == ("error", "URC")
+        assert note.text.startswith("STOP works, but would not outlast a restart")
+        told = [one for one in it.read(bob) if one["t"] == "refused"]
+        assert [one["message"] for one in told] == [note.text]
+        (tmp_path / "latches").unlink()
+        it.say(bob, "reset")
+        await file.settle()
+        assert it.hub.notes[-1].text == "STOP outlasts a restart of the server again"
+
+
+async def test_a_server_that_was_held_up_stops_what_moves() -> None:
+    """A short time is told alone; after half a second whoever drives begins anew."""
+    async with scene() as it:
+        ann = it.sit()
+        it.say(ann, "take")
+        it.tick(ann)
+        await it.clock.advance(0.05)
+        await it.clock.hold_up(0.2)
+        assert [note.text for note in it.hub.notes] == ["the server was held up for 150 ms"]
+        it.tick(ann)
+        assert it.movers.texts[-1] == "drive speed=0.5"
+        await it.clock.hold_up(0.7)
+        assert it.movers.texts[-1] == "drive stop"
+        assert {"t": "stopped", "command": "drive", "reason": "expired"} in it.read(ann)
+        it.tick(ann)
+        assert it.movers.texts[-1] == "drive stop"
+        assert it.controls.watch.count == 2
+        assert len(it.hub.notes) == 1
+
+
+async def test_a_flood_costs_no_more_than_its_thinned_rate() -> None:
+    """What is too much is counted and dropped before anything is made of it."""
+    async with scene() as it:
+        ann = it.sit()
+        it.say(ann, "take")
+        made = 0
+        frame = it.frames.motion_frame
+
+        def counted(*words: Any) -> Any:
+            nonlocal made
+            made += 1
+            return frame(*words)
+
+        it.frames.motion_frame = counted  # type: ignore[method-assign]
+        for step in range(2000):
+            it.tick(ann, step / 2000)
+            await it.clock.advance(0.0005)
+        assert made <= 1.0 / THINNED_S + 2
+        assert made + ann.dropped + len(ann.pending) == 2000

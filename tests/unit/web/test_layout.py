@@ -1,7 +1,9 @@
 """The picture of an interface as CSS."""
 
-from urc.model.interface import Grid, Interface, Slot
-from urc.web.layout import grid_css
+import pytest
+
+from urc.model.interface import Grid, Interface, Slot, Tab
+from urc.web.layout import LEFT_HAND, grid_css, needs_turning
 
 MARGIN = "minmax(0,.12fr)"
 ROW = "minmax(8rem,1fr)"
@@ -60,3 +62,71 @@ def test_the_rules_hold_nothing_out_of_a_document() -> None:
     """A slot's name cannot end the style element."""
     text = css(("wide", Grid(1, 1, (Slot("</style><b>", 0, 0),))), slots=("</style><b>",))
     assert "<" not in text.replace("minmax", "")
+
+
+def test_the_left_hand_gets_the_columns_the_other_way_round() -> None:
+    """Only for who asked for it; what is stacked stays in reading order."""
+    wide = Grid(1, 3, (Slot("a", 0, 0, 1, 2), Slot("b", 0, 2)))
+    text = css(("wide", wide), slots=("a", "b"))
+    right, left = text.split(LEFT_HAND, 1)
+    assert '[data-cell="0"]{display:grid;grid-area:1/1/2/3}' in right
+    assert '[data-cell="0"]{display:grid;grid-area:1/2/2/4}' in left
+    assert '[data-cell="1"]{display:grid;grid-area:1/1/2/2}' in left
+    stacked = text.split("@media (max-width: 599.98px)")[2]
+    assert '[data-cell="0"]{display:grid;grid-area:1/1/2/2}' in stacked
+
+
+def test_an_author_may_forbid_it_or_draw_it() -> None:
+    """A picture for the left hand goes before the mirrored one, screen by screen."""
+    wide = Grid(1, 2, (Slot("a", 0, 0), Slot("b", 0, 1)))
+    tall = Grid(2, 1, (Slot("a", 0, 0), Slot("b", 1, 0)))
+    fixed = Interface("i", grids={"wide": wide}, is_mirrored=False)
+    assert LEFT_HAND not in grid_css(fixed, ("a", "b"))
+    own = Grid(1, 2, (Slot("b", 0, 0, 1, 2),))
+    drawn = Interface("i", grids={"wide": wide, "tall": tall}, left={"wide": own})
+    left = grid_css(drawn, ("a", "b")).split(LEFT_HAND, 1)[1]
+    assert '[data-cell="0"]{display:none}' in left.split("@media")[0]
+    assert '[data-cell="0"]{display:grid;grid-area:1/1/2/2}' in left.split("portrait")[1]
+
+
+def test_each_page_places_the_cells_that_all_pages_share() -> None:
+    """A cell that is in two pages stays the same; one that is not in a page is hidden there."""
+    first = Tab("one", "One", {"wide": Grid(1, 2, (Slot("a", 0, 0), Slot("b", 0, 1)))})
+    second = Tab("two", "Two", {"wide": Grid(1, 1, (Slot("b", 0, 0),))})
+    both = Interface("i", tabs={"one": first, "two": second})
+    text = grid_css(both, both.shown)
+    assert '.urc-grid[data-page="0"] [data-cell="1"]{display:grid;grid-area:1/2/2/3}' in text
+    assert '.urc-grid[data-page="1"] [data-cell="1"]{display:grid;grid-area:1/1/2/2}' in text
+    assert '.urc-grid[data-page="1"] [data-cell="0"]{display:none}' in text
+
+
+def test_over_a_background_what_is_empty_keeps_its_size() -> None:
+    """Through it the background is seen, on a phone above what is stacked."""
+    wide = Grid(2, 3, (Slot("a", 0, 0), Slot("b", 0, 2)))
+    text = grid_css(Interface("i", grids={"wide": wide}, background="v"), ("v", "a", "b"))
+    assert MARGIN not in text
+    phone = text.split("@media (max-width: 599.98px)")[1]
+    assert '[data-cell="1"]{display:grid;grid-area:2/1/3/2}' in phone
+    assert '[data-cell="0"]' not in text
+
+
+def test_a_phone_upright_falls_back_on_the_tall_picture() -> None:
+    """It is nearer to it than the wide one."""
+    wide = Grid(1, 2, (Slot("a", 0, 0), Slot("b", 0, 1)))
+    tall = Grid(2, 1, (Slot("b", 0, 0), Slot("a", 1, 0)))
+    phone = css(("wide", wide), ("tall", tall), slots=("a", "b"))
+    rules = phone.split("@media (max-width: 599.98px)")[1]
+    assert '[data-cell="0"]{display:grid;grid-area:2/1/3/2}' in rules
+
+
+@pytest.mark.parametrize(
+    ("grids", "is_turned"),
+    [(("wide",), True), (("wide", "phone"), False), (("wide", "tall"), False)],
+)
+def test_only_a_picture_that_is_stacked_asks_for_turning(
+    grids: tuple[str, ...], is_turned: bool
+) -> None:
+    """Who has drawn the phone upright needs no hint."""
+    wide = Grid(1, 3, (Slot("a", 0, 0), Slot("b", 0, 1), Slot("c", 0, 2)))
+    page = Tab(grids=dict.fromkeys(grids, wide))
+    assert needs_turning(page, ("a", "b", "c")) is is_turned

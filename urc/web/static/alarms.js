@@ -6,8 +6,10 @@
  * @typedef {import("./store.js").Store} Store
  */
 
+import { t } from "./words.js";
+
 /** @type {Record<Alarm, string>} */
-const WORDS = { "": "", lolo: "very low", low: "low", high: "high", hihi: "very high" };
+const WORDS = { "": "", lolo: t("very low"), low: t("low"), high: t("high"), hihi: t("very high") };
 
 export class Alarms {
   /** @param {HTMLElement} el an element with role alert */

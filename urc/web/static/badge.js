@@ -8,6 +8,8 @@
  * @typedef {"good" | "connecting" | "caution" | "bad"} Sign
  */
 
+import { t } from "./words.js";
+
 const CAUTION_MS = 100;
 const POOR_MS = 250;
 /** From worst to best: the worst link decides. @type {Link["state"][]} */
@@ -41,21 +43,21 @@ export class Badge {
  * @returns {[Sign, string]}
  */
 function summary(store, hasFailed) {
-  if (!store.isUp) return hasFailed ? ["bad", "No connection to URC"] : ["connecting", "Connecting"];
+  if (!store.isUp) return hasFailed ? ["bad", t("No connection to URC")] : ["connecting", t("Connecting")];
   const links = [...store.links.values()];
   const worst = WORST_FIRST.find((state) => links.some((link) => link.state === state));
-  const name = links.length > 1 ? links.find((link) => link.state === worst)?.transport : "Robot";
+  const name = links.length > 1 ? links.find((link) => link.state === worst)?.transport : t("Robot");
   switch (worst) {
     case "lost":
-      return ["bad", `${name} lost`];
+      return ["bad", t("{name} lost", { name: name ?? "" })];
     case "silent":
-      return ["caution", `${name} silent`];
+      return ["caution", t("{name} silent", { name: name ?? "" })];
     case "live":
-      return ["good", "Live"];
+      return ["good", t("Live")];
     case "idle":
     case "connecting":
     case undefined:
-      return ["connecting", "Connecting"];
+      return ["connecting", t("Connecting")];
   }
 }
 

@@ -8,6 +8,7 @@
  * @typedef {import("./types.js").StopState} StopState
  */
 import { part } from "./badge.js";
+import { said, t } from "./words.js";
 
 /** @type {Verb[]} */
 const VERBS = ["reset", "take", "ask", "force", "yes", "no", "leave"];
@@ -70,7 +71,7 @@ export class Controls {
       if (button.hidden === shown[verb]) button.hidden = !shown[verb];
     }
     const leftS = Math.max(0, Math.ceil((drive.handedMs - nowMs) / 1000));
-    const text = drive.refusal ? `◆ ${drive.refusal}` : this.words(isMine, isAsked, iAsk, leftS);
+    const text = drive.refusal ? `◆ ${said(drive.refusal)}` : this.words(isMine, isAsked, iAsk, leftS);
     if (this.who.textContent !== text) this.who.textContent = text;
     const state = isLatched ? "latched" : isMine ? "mine" : isOthers ? "others" : "free";
     if (this.el.dataset["state"] !== state) this.el.dataset["state"] = state;
@@ -84,13 +85,15 @@ export class Controls {
    */
   words(isMine, isAsked, iAsk, leftS) {
     const lease = this.drive.lease;
-    if (!lease) return "Not connected to URC";
-    if (lease.latched) return `■ Stopped by ${lease.latched === lease.name ? "you" : lease.latched}`;
-    if (isAsked) return `◆ ${lease.asker?.name} asks to drive: ${leftS} s`;
-    if (isMine) return "● You drive";
-    if (iAsk) return `Asked ${lease.holder?.name}: ${leftS} s`;
-    if (lease.holder) return `${lease.holder.name} drives`;
-    return lease.drives ? "Nobody drives" : "Nobody drives; this page only watches";
+    if (!lease) return t("Not connected to URC");
+    if (lease.latched === lease.name && lease.latched) return t("■ Stopped by you");
+    if (lease.latched) return t("■ Stopped by {who}", { who: said(lease.latched) });
+    const [asker, holder] = [said(lease.asker?.name ?? ""), said(lease.holder?.name ?? "")];
+    if (isAsked) return t("◆ {who} asks to drive: {seconds} s", { who: asker, seconds: leftS });
+    if (isMine) return t("● You drive");
+    if (iAsk) return t("Asked {who}: {seconds} s", { who: holder, seconds: leftS });
+    if (lease.holder) return t("{who} drives", { who: holder });
+    return lease.drives ? t("Nobody drives") : t("Nobody drives; this page only watches");
   }
 
   /** @param {StopState} state */
@@ -98,14 +101,15 @@ export class Controls {
     const isSent = phase !== "" && phase !== "sending" && phase !== "failed";
     this.stop.dataset["phase"] = fault && !isConfirmed ? "fault" : phase;
     const steps = [
-      [isSent, "sent"],
-      [isConfirmed, "confirmed"],
-      [isLatched, "latched"],
-    ].filter(([isDone]) => isDone).map(([, word]) => `✓ ${word}`);
+      isSent && t("✓ sent"),
+      isConfirmed && t("✓ confirmed"),
+      isLatched && t("✓ latched"),
+    ].filter(Boolean);
     let note = steps.join(" ");
-    if (phase === "sending") note = "… sending";
+    if (phase === "sending") note = t("… sending");
     if (phase === "failed" || (fault && !isConfirmed)) {
-      note = `▲ NO LINK${phase === "failed" ? ": stop it by hand" : isLatched ? ", latched" : ""}`;
+      if (phase === "failed") note = t("▲ NO LINK: stop it by hand");
+      else note = isLatched ? t("▲ NO LINK, latched") : t("▲ NO LINK");
     }
     if (this.stopNote.textContent !== note) this.stopNote.textContent = note;
   }

@@ -51,8 +51,12 @@ const line = new Socket(address(root.dataset["socket"]), {
 });
 const desk = {
   ask: (/** @type {object} */ message) => request(line, message),
-  run: async (/** @type {string} */ command, /** @type {Record<string, unknown>} */ args) => {
-    const reply = await request(values, { t: "run", command, arguments: args });
+  run: async (
+    /** @type {string} */ command,
+    /** @type {Record<string, unknown>} */ args,
+    /** @type {boolean} */ confirmed,
+  ) => {
+    const reply = await request(values, { t: "run", command, arguments: args, confirmed });
     if (!reply.ok) throw new Error(reply.message ?? reply.code ?? "it was not done");
     return reply.values ?? {};
   },

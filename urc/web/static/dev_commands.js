@@ -40,7 +40,7 @@
  *
  * @typedef {object} Desk Where questions and commands go.
  * @property {(message: object) => Promise<any>} ask
- * @property {(command: string, args: Record<string, unknown>) => Promise<Record<string, unknown>>} run
+ * @property {(command: string, args: Record<string, unknown>, isConfirmed: boolean) => Promise<Record<string, unknown>>} run
  */
 import { bytesOf, element, hexOf, listElement, sizeText, textOf, visible, wordsOf } from "./dev_bytes.js";
 
@@ -140,7 +140,7 @@ export class Commands {
       return;
     }
     const yes = button("Yes, send it", "button");
-    yes.addEventListener("click", () => void this.run(command, values, result), { once: true });
+    yes.addEventListener("click", () => void this.run(command, values, result, true), { once: true });
     result.append(yes);
     yes.focus();
   }
@@ -149,11 +149,12 @@ export class Commands {
    * @param {Command} command
    * @param {Record<string, unknown>} values
    * @param {HTMLElement} result
+   * @param {boolean} isConfirmed whether somebody was asked first, and said yes
    */
-  async run(command, values, result) {
+  async run(command, values, result, isConfirmed = false) {
     result.replaceChildren(element("p", "dev-quiet", "… waiting for the robot"));
     try {
-      const reply = await this.desk.run(command.name, values);
+      const reply = await this.desk.run(command.name, values, isConfirmed);
       const told = Object.entries(reply).map(([name, value]) => `${name} = ${JSON.stringify(value)}`);
       result.replaceChildren(element("p", "", "✓ done"), listElement(told));
     } catch (error) {
@@ -202,7 +203,7 @@ function about(command) {
  * @param {string} text
  * @param {"submit" | "button"} type
  */
-function button(text, type) {
+export function button(text, type) {
   const el = document.createElement("button");
   el.className = "urc-button";
   el.type = type;
@@ -214,7 +215,7 @@ function button(text, type) {
  * @param {Argument} argument
  * @returns {{argument: Argument, label: HTMLElement, read: () => unknown}}
  */
-function field(argument) {
+export function field(argument) {
   const label = element("label", "dev-field");
   label.append(caption(argument));
   const choices = argument.type === "boolean" ? [true, false] : argument.choices;

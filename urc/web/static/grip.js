@@ -2,8 +2,9 @@
 /**
  * One thing that a hand can hold, and the command that it moves.
  *
- * A grip is held by one hand at a time: the pointer that went down first, keys, or a gamepad. What
- * it does with that is up to whoever holds all of them.
+ * A grip is held by one hand at a time: the pointer that went down first, keys, or a gamepad. A
+ * lever may stay where it was put when the pointer lets it go, for as long as another hand holds
+ * the robot's controls. What becomes of all that is up to whoever holds all grips.
  *
  * @typedef {import("./output.js").Output} Output
  * @typedef {import("./types.js").Hand} Hand
@@ -13,10 +14,19 @@
  *
  * @typedef {object} Holder
  * @property {(grip: Grip) => void} begin
+ * @property {(grip: Grip) => void} moved What the hand does has changed.
+ * @property {(grip: Grip) => boolean} isGuarded Whether another hand is there, so that it may stay.
  * @property {(grip: Grip) => void} end
  * @property {(grip: Grip) => void} forget
  */
+import { takesKeys, takesText } from "./keys.js";
+import { feel } from "./haptics.js";
 import { argumentsOf } from "./output.js";
+
+/** Every kind of hand: what lets go of all. @type {Hand["kind"][]} */
+export const ANY = ["pointer", "keys", "pad", "stay"];
+/** The longest step of time that a widget is told: what was missed is not caught up on. */
+const LONGEST_STEP_S = 0.1;
 
 /** One held command, and the grips that hold it now: two sticks may share a command. */
 export class Control {
@@ -35,6 +45,11 @@ export class Control {
     this.sentMs = -Infinity;
     this.sent = "";
     this.isReleaseOwed = false;
+  }
+
+  /** How long its motion lasts when nothing is heard. */
+  get leaseMs() {
+    return Math.min(...[...this.grips].map((grip) => grip.output.leaseMs));
   }
 }
 
@@ -56,6 +71,9 @@ export class Grip {
     this.pointerId = -1;
     /** @type {Set<string>} */
     this.keys = new Set();
+    /** What the widget said last, by the names of its output; null while nothing holds it. */
+    this.values = /** @type {Record<string, Value> | null} */ (null);
+    this.takenMs = 0;
     this.shown = "";
   }
 
@@ -66,60 +84,120 @@ export class Grip {
     el.style.touchAction = "none";
     el.style.userSelect = "none";
     el.addEventListener("pointerdown", (event) => this.down(event), options);
+    // The raw event comes before the frame's, in secure contexts; where there is none, the other does.
+    el.addEventListener("pointerrawupdate", (event) => this.move(/** @type {PointerEvent} */ (event)), options);
     el.addEventListener("pointermove", (event) => this.move(event), options);
-    for (const name of /** @type {const} */ (["pointerup", "pointercancel", "lostpointercapture"])) {
-      el.addEventListener(name, (event) => this.up(event.pointerId), options);
+    el.addEventListener("pointerup", (event) => this.up(event.pointerId, true), options);
+    for (const name of /** @type {const} */ (["pointercancel", "lostpointercapture"])) {
+      el.addEventListener(name, (event) => this.up(event.pointerId, false), options);
     }
     // A long press must stay a press: no menu, no selection, no zoom.
     el.addEventListener("touchstart", (event) => event.preventDefault(), { signal, passive: false });
-    el.addEventListener("keydown", (event) => this.keyDown(event), options);
-    el.addEventListener("keyup", (event) => this.keyUp(event.code), options);
-    el.addEventListener("blur", () => this.drop(["keys"]), options);
+    document.addEventListener("keydown", (event) => this.keyDown(event), options);
+    document.addEventListener("keyup", (event) => this.keyUp(event.code), options);
+    document.addEventListener("focusin", (event) => this.focusMoved(event.target), options);
+    for (const place of [el, ...(this.spec.keysOn ?? [])]) {
+      place.addEventListener("focusout", () => this.focusLeft(), options);
+    }
     signal.addEventListener("abort", () => this.holder.forget(this));
   }
 
   /** @param {PointerEvent} event */
   down(event) {
-    if (event.button !== 0 || this.hand) return;
+    if (event.button !== 0 || (this.hand && this.hand.kind !== "stay")) return;
+    if (this.spec.isFree && !this.spec.isFree(event.target)) return;
     this.pointerId = event.pointerId;
     this.spec.el.setPointerCapture(event.pointerId);
     const { clientX: x, clientY: y } = event;
-    this.begin({ kind: "pointer", x, y, startX: x, startY: y, keys: this.keys, axes: [0, 0] });
+    const hand = { ...this.newHand("pointer"), x, y, startX: x, startY: y };
+    if (this.hand) this.hand = hand; // it had stayed: the same gesture goes on
+    else this.begin(hand);
   }
 
   /** @param {PointerEvent} event */
   move(event) {
-    if (this.hand?.kind !== "pointer" || event.pointerId !== this.pointerId) return;
-    this.hand.x = event.clientX;
-    this.hand.y = event.clientY;
+    const { hand } = this;
+    if (hand?.kind !== "pointer" || event.pointerId !== this.pointerId) return;
+    if (hand.x === event.clientX && hand.y === event.clientY) return;
+    hand.x = event.clientX;
+    hand.y = event.clientY;
+    this.holder.moved(this);
   }
 
-  /** @param {number} pointerId */
-  up(pointerId) {
-    if (pointerId === this.pointerId) this.drop(["pointer"]);
+  /**
+   * @param {number} pointerId
+   * @param {boolean} isMeant whether a person has let it go
+   */
+  up(pointerId, isMeant) {
+    if (pointerId !== this.pointerId) return;
+    const { hand, spec } = this;
+    if (isMeant && hand?.kind === "pointer" && spec.stays && this.holder.isGuarded(this)) {
+      this.pointerId = -1;
+      this.hand = { ...hand, kind: "stay" };
+      this.holder.moved(this);
+    } else {
+      this.drop(["pointer"]);
+    }
   }
 
   /** @param {KeyboardEvent} event */
   keyDown(event) {
-    if (!this.spec.keys.includes(event.code)) return;
+    const { spec } = this;
+    const isTap = Object.hasOwn(spec.taps ?? {}, event.code);
+    if (!isTap && !spec.keys.includes(event.code)) return;
     if (event.ctrlKey || event.altKey || event.metaKey) return;
+    if (event.defaultPrevented || !this.isHeard(event.target)) return;
     event.preventDefault(); // the arrows must not scroll
     if (event.repeat) return;
-    this.keys.add(event.code);
-    if (!this.hand && this.keys.size === 1) {
-      this.begin({ kind: "keys", x: 0, y: 0, startX: 0, startY: 0, keys: this.keys, axes: [0, 0] });
+    if (isTap) {
+      spec.taps?.[event.code]?.();
+      return;
     }
+    this.keys.add(event.code);
+    if (!this.hand && this.keys.size === 1) this.begin(this.newHand("keys"));
+    else if (this.hand?.kind === "keys") this.holder.moved(this);
+  }
+
+  /**
+   * Whether keys that go to an element are for this grip.
+   *
+   * @param {EventTarget | null} target
+   */
+  isHeard(target) {
+    const { el, keysOn = [], page } = this.spec;
+    if (target instanceof Node && [el, ...keysOn].some((place) => place.contains(target))) return true;
+    const which = page?.() ?? "none";
+    return which === "all" ? !takesText(target) : which === "free" && !takesKeys(target);
   }
 
   /** @param {string} code */
   keyUp(code) {
-    this.keys.delete(code);
+    if (!this.keys.delete(code)) return;
     if (this.keys.size === 0) this.drop(["keys"]);
+    else if (this.hand?.kind === "keys") this.holder.moved(this);
+  }
+
+  /** The focus has gone somewhere: what is typed there holds nothing. @param {EventTarget | null} target */
+  focusMoved(target) {
+    if (this.spec.page && takesText(target)) this.drop(["keys"]);
+  }
+
+  focusLeft() {
+    if (!this.spec.page) this.drop(["keys"]);
+  }
+
+  /**
+   * @param {Hand["kind"]} kind
+   * @returns {Hand}
+   */
+  newHand(kind) {
+    return { kind, x: 0, y: 0, startX: 0, startY: 0, keys: this.keys, axes: [0, 0] };
   }
 
   /** @param {Hand} hand */
   begin(hand) {
     this.hand = hand;
+    this.take(performance.now(), true);
     this.holder.begin(this);
   }
 
@@ -134,6 +212,7 @@ export class Grip {
     const { el } = this.spec;
     const pointerId = this.hand.kind === "pointer" ? this.pointerId : -1;
     this.hand = null;
+    this.values = null;
     this.pointerId = -1;
     if (pointerId >= 0 && el.hasPointerCapture(pointerId)) el.releasePointerCapture(pointerId);
     this.holder.end(this);
@@ -141,24 +220,38 @@ export class Grip {
 
   /** Let go of a pointer that was taken away: a browser tells that with the next move only. */
   check() {
+    if (this.hand?.kind === "stay" && !this.holder.isGuarded(this)) this.drop(["stay"]);
     if (this.hand?.kind !== "pointer") return;
     if (!this.spec.el.hasPointerCapture(this.pointerId)) this.drop(["pointer"]);
   }
 
-  /** @returns {Record<string, Value>} by the command's own names */
-  sample() {
-    if (!this.hand) return {};
-    return argumentsOf(this.output, this.spec.sample(this.hand));
+  /**
+   * Ask the widget what the hand means now.
+   *
+   * @param {number} nowMs
+   * @param {boolean} isNew whether motion may begin only now, so that it begins at nothing
+   */
+  take(nowMs, isNew = false) {
+    if (!this.hand) return;
+    const gapS = Math.max(0.0001, (nowMs - this.takenMs) / 1000);
+    this.takenMs = nowMs;
+    this.values = this.spec.sample(this.hand, isNew ? 0 : Math.min(LONGEST_STEP_S, gapS));
+  }
+
+  /** @returns {Record<string, Value>} what was taken, by the command's own names */
+  given() {
+    return this.values ? argumentsOf(this.output, this.values) : {};
   }
 
   /** @param {boolean} isForced */
   show(isForced = false) {
     const { phase, reason } = this.control;
-    const isHeld = this.hand !== null;
-    const values = this.hand ? this.spec.sample(this.hand) : null;
-    const look = `${phase} ${reason} ${isHeld} ${JSON.stringify(values)}`;
+    const kind = this.hand?.kind ?? "";
+    const look = `${phase} ${reason} ${kind} ${JSON.stringify(this.values)}`;
     if (look === this.shown && !isForced) return;
     this.shown = look;
-    this.spec.show({ phase: isHeld || phase === "spent" ? phase : "idle", reason, values });
+    const isHeld = this.hand !== null;
+    feel(this, isHeld, phase === "spent", this.values);
+    this.spec.show({ phase: isHeld || phase === "spent" ? phase : "idle", reason, values: this.values });
   }
 }

@@ -3,25 +3,30 @@
  * What hands do: held controls, sampled on the page's main thread, and every way of letting go.
  *
  * A grip is one thing that a hand holds: by one pointer, by keys, or by a gamepad. While it is held
- * its widget is asked for the values in every animation frame, and a tick of them goes out every
- * 50 ms, or sooner when they change. There is no timer that could go on when the page does not: a
- * page that is hidden, frozen, blocked or gone draws no frames, so it sends nothing, and the server
- * stops the robot.
+ * its widget is asked for the values when the hand moves and in every animation frame, and a tick of
+ * them goes out at once when they change, and every 50 ms. There is no timer that could go on when
+ * the page does not: a page that is hidden, frozen, blocked or gone draws no frames, so it sends
+ * nothing, and the server stops the robot.
  *
  * Whatever else happens to the page while a control is held means neutral, and the end of that
  * gesture. After that, and after a stop or a refusal, nothing is sent before a new gesture.
  *
  * @typedef {import("./drive.js").Drive} Drive
  * @typedef {import("./output.js").Output} Output
+ * @typedef {import("./types.js").GateSpec} GateSpec
  * @typedef {import("./types.js").HoldSpec} HoldSpec
  * @typedef {import("./types.js").Value} Value
  */
-import { Control, Grip } from "./grip.js";
+import { Gate } from "./gate.js";
+import { ANY, Control, Grip } from "./grip.js";
 import { Pads } from "./pad.js";
+import { t } from "./words.js";
 
 const TICK_MS = 50;
 /** So long the server may take to grant the controls. */
 const ASK_MS = 1500;
+/** Ticks of one control are so far apart at least; what comes between goes out with the frame. */
+const SOONEST_MS = 4;
 
 export class Input {
   /** @param {Drive} drive */
@@ -31,6 +36,8 @@ export class Input {
     this.controls = new Map();
     /** @type {Set<Grip>} */
     this.grips = new Set();
+    /** @type {Set<Gate>} */
+    this.gates = new Set();
     this.pads = new Pads(() => this.run());
     this.isRunning = false;
     this.frameMs = 0;
@@ -42,23 +49,23 @@ export class Input {
   /** Everything that means neutral, whoever holds what. */
   watch() {
     const all = (/** @type {string} */ why) => () => this.letGo(why);
-    addEventListener("blur", all("the window lost the focus"));
-    addEventListener("pagehide", all("the page was left"));
-    addEventListener("resize", all("the window changed its size"));
-    addEventListener("orientationchange", all("the screen was turned"));
-    screen.orientation?.addEventListener("change", all("the screen was turned"));
-    addEventListener("gamepaddisconnected", all("the gamepad is gone"));
-    document.addEventListener("freeze", all("the page was frozen"));
-    document.addEventListener("fullscreenchange", all("full screen began or ended"));
+    addEventListener("blur", all(t("the window lost the focus")));
+    addEventListener("pagehide", all(t("the page was left")));
+    addEventListener("resize", all(t("the window changed its size")));
+    addEventListener("orientationchange", all(t("the screen was turned")));
+    screen.orientation?.addEventListener("change", all(t("the screen was turned")));
+    addEventListener("gamepaddisconnected", all(t("the gamepad is gone")));
+    document.addEventListener("freeze", all(t("the page was frozen")));
+    document.addEventListener("fullscreenchange", all(t("full screen began or ended")));
     document.addEventListener("visibilitychange", () => {
-      if (document.hidden) this.letGo("the page was hidden");
+      if (document.hidden) this.letGo(t("the page was hidden"));
     });
     document.addEventListener("contextmenu", (event) => {
       const target = event.target;
-      for (const { spec } of this.grips) {
+      for (const { spec } of this.gripped()) {
         if (target instanceof Node && spec.el.contains(target)) event.preventDefault();
       }
-      this.letGo("a menu was opened");
+      this.letGo(t("a menu was opened"));
     });
   }
 
@@ -74,6 +81,37 @@ export class Input {
     this.grips.add(grip);
     grip.listen(signal);
     grip.show(true);
+  }
+
+  /**
+   * @param {GateSpec} spec
+   * @param {AbortSignal} signal
+   */
+  gate(spec, signal) {
+    const gate = new Gate(this, spec);
+    this.gates.add(gate);
+    gate.listen(signal);
+    signal.addEventListener("abort", () => {
+      gate.forget();
+      this.gates.delete(gate);
+    });
+  }
+
+  /** All that can be gripped; dead-man controls first, since the others ask for them. */
+  gripped() {
+    return [...[...this.gates].map((gate) => gate.grip), ...this.grips];
+  }
+
+  /** Whether anything is held that moves the robot. */
+  isDriving() {
+    return [...this.grips].some((grip) => grip.hand);
+  }
+
+  /** @param {Grip} grip */
+  isGuarded(grip) {
+    if ([...this.gates].some((gate) => gate.isHeld)) return true;
+    const others = [...grip.control.grips].filter((other) => other !== grip);
+    return others.some(({ hand }) => hand && hand.kind !== "stay");
   }
 
   /** @param {Grip} grip */
@@ -96,18 +134,35 @@ export class Input {
     control.askedMs = performance.now();
     control.sent = "";
     const epoch = drive.lease?.epoch ?? -1;
-    if (drive.isMine && epoch > control.closedEpoch) return;
     const refusal = this.refusal();
-    if (refusal || !drive.say("take")) this.spend(control, refusal || "no connection to URC");
+    if (!refusal && drive.isMine && epoch > control.closedEpoch) return;
+    if (refusal || !drive.say("take")) this.spend(control, refusal || t("no connection to URC"));
   }
 
   /** Why nothing can be driven now; "" when it can be asked for. */
   refusal() {
     const { lease, isMine } = this.drive;
-    if (!lease) return "no connection to URC";
-    if (lease.latched) return `stopped by ${lease.latched}: reset it first`;
-    if (!lease.drives) return "this page only watches";
-    return lease.holder && !isMine ? `${lease.holder.name} has the controls` : "";
+    if (!lease) return t("no connection to URC");
+    if (lease.latched) return t("stopped by {name}: reset it first", { name: lease.latched });
+    if (!lease.drives) return t("this page only watches");
+    if (lease.holder && !isMine) return t("{name} has the controls", { name: lease.holder.name });
+    return this.gates.size === 0 || [...this.gates].some((gate) => gate.isOpen)
+      ? ""
+      : t("hold the dead-man control first");
+  }
+
+  /**
+   * The hand of a grip has moved: that goes out at once, not with the next frame.
+   *
+   * @param {Grip} grip
+   */
+  moved(grip) {
+    const { control } = grip;
+    const nowMs = performance.now();
+    if (control.phase !== "held" || nowMs - control.sentMs < SOONEST_MS) return;
+    if (nowMs - this.frameMs > control.leaseMs) return; // held up: the next frame ends the gesture
+    grip.take(nowMs);
+    this.stepOne(control, nowMs);
   }
 
   /** @param {Grip} grip */
@@ -118,6 +173,7 @@ export class Input {
       this.release(control);
       if (control.phase !== "spent") control.phase = "idle";
     }
+    for (const other of [...control.grips]) other.check(); // what has stayed goes with the last hand
     grip.show();
   }
 
@@ -150,7 +206,11 @@ export class Input {
       if (!grip.hand) continue;
       grip.control.phase = "spent";
       grip.control.reason = reason;
-      grip.drop(["pointer", "keys", "pad"]);
+      grip.drop(ANY);
+    }
+    for (const gate of this.gates) {
+      gate.close(reason);
+      gate.grip.drop(ANY);
     }
   }
 
@@ -216,19 +276,21 @@ export class Input {
   step(nowMs) {
     const gapMs = nowMs - this.frameMs;
     this.frameMs = nowMs;
-    this.pads.step(this.grips);
+    this.pads.step(this.gripped(), nowMs);
+    for (const gate of this.gates) gate.step(nowMs);
     for (const control of this.controls.values()) {
       for (const grip of [...control.grips]) grip.check();
       if (control.grips.size === 0) continue;
-      const leaseMs = Math.min(...[...control.grips].map((grip) => grip.output.leaseMs));
-      if (gapMs > leaseMs && control.phase === "held") {
-        this.spend(control, "the page was held up");
+      if (gapMs > control.leaseMs && control.phase === "held") {
+        this.spend(control, t("the page was held up"));
         this.release(control);
       }
+      for (const grip of control.grips) grip.take(nowMs, control.phase !== "held");
       this.stepOne(control, nowMs);
       for (const grip of control.grips) grip.show();
     }
-    return this.pads.isConnected || [...this.grips].some((grip) => grip.hand);
+    const isOpen = [...this.gates].some((gate) => gate.isOpen);
+    return this.pads.isConnected || isOpen || this.isDriving();
   }
 
   /**
@@ -243,12 +305,12 @@ export class Input {
         control.phase = "held";
         control.epoch = lease.epoch;
       } else if (nowMs - control.askedMs > ASK_MS) {
-        this.spend(control, "URC did not answer");
+        this.spend(control, t("URC did not answer"));
       }
     }
     if (control.phase !== "held") return;
     if (!lease || !drive.isMine || lease.epoch !== control.epoch) {
-      this.spend(control, this.refusal() || "the controls were taken anew");
+      this.spend(control, this.refusal() || t("the controls were taken anew"));
       return;
     }
     this.tick(control, nowMs);
@@ -263,7 +325,7 @@ export class Input {
     /** @type {Record<string, Value>} */
     let values = {};
     for (const { output } of control.grips) values = { ...values, ...output.neutral };
-    for (const grip of control.grips) values = { ...values, ...grip.sample() };
+    for (const grip of control.grips) values = { ...values, ...grip.given() };
     const text = JSON.stringify(values);
     if (text === control.sent && nowMs - control.sentMs < TICK_MS) return;
     if (drive.socket.unsent > 0) return; // the newest goes when the line is free, not after others
@@ -282,7 +344,7 @@ export class Input {
 
   /** @param {Grip} grip */
   forget(grip) {
-    grip.drop(["pointer", "keys", "pad"]);
+    grip.drop(ANY);
     this.grips.delete(grip);
   }
 }

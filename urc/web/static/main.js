@@ -6,20 +6,27 @@
  * @typedef {import("./types.js").Value} Value
  */
 import { Alarms } from "./alarms.js";
+import { Asks } from "./asks.js";
 import { Badge, part } from "./badge.js";
 import { Controls } from "./controls.js";
 import { Drive } from "./drive.js";
+import { Alerts, Follows, Log, Themes } from "./follow.js";
+import { frameOf } from "./frames.js";
 import { Host } from "./host.js";
 import { Input } from "./input.js";
 import { Panel } from "./panel.js";
+import { FullScreen, WakeLock } from "./screen.js";
 import { Socket } from "./socket.js";
+import { Stage } from "./stage.js";
 import { StopButton } from "./stop.js";
 import { Store } from "./store.js";
+import { offerSystems } from "./units.js";
+import { said, t } from "./words.js";
 
 /** What the server says of a stop that nobody's hand made. @type {Record<string, string>} */
 const STOPPED = {
-  expired: "too long without a sign of this page",
-  revoked: "the line to the robot was cut",
+  expired: t("too long without a sign of this page"),
+  revoked: t("the line to the robot was cut"),
 };
 /** How often ages are looked at when nothing arrives. */
 const AGE_EVERY_MS = 250;
@@ -40,13 +47,15 @@ const address = new URL(root.dataset["socket"] ?? "/ws", location.href);
 address.protocol = address.protocol === "https:" ? "wss:" : "ws:";
 const socket = new Socket(address.href, {
   message: take,
+  picture: takePicture,
   trip: wake,
   state(isUp) {
     store.setUp(isUp, performance.now());
     if (!isUp) {
       giveUpCommands();
       drive.lost();
-      input.spendAll("the connection to URC was lost");
+      asks.lost();
+      input.spendAll(t("the connection to URC was lost"));
     }
     wake();
   },
@@ -54,9 +63,58 @@ const socket = new Socket(address.href, {
 const drive = new Drive(socket, root.dataset["stop"] ?? "", wake);
 const input = new Input(drive);
 const stop = new StopButton(drive, input, store, JSON.parse(root.dataset["lines"] ?? "[]"));
+const asks = new Asks(part(root, ".urc-bar"), (message) => socket.send(message));
+/** Where sequences stand. @type {Record<string, import("./types.js").Progress>} */
+let sequences = {};
 const bar = root.querySelector("[data-controls]");
 const controls = bar instanceof HTMLElement ? new Controls(bar, drive, stop) : null;
-const host = new Host(store, { run, wake, input, stop });
+const log = new Log();
+const alerts = new Alerts();
+const themes = new Themes(wake);
+const follows = new Follows(
+  {
+    links: () => {
+      const value = { isUp: store.isUp, links: [...store.links.values()] };
+      return { look: JSON.stringify(value), value };
+    },
+    log: () => log.news(),
+    lease: () => {
+      const value = { lease: drive.lease, isMine: drive.isMine, refusal: drive.refusal };
+      return { look: JSON.stringify(value), value };
+    },
+    alarms: () => alerts.news(store, performance.now()),
+    latency: () => {
+      const { isUp, tripMs, failures, skewMs, messages, bytes } = socket;
+      const value = { isUp, tripMs, failures, skewMs, messages, bytes };
+      return { look: JSON.stringify(value), value };
+    },
+    sequences: () => ({ look: JSON.stringify(sequences), value: sequences }),
+    theme: () => themes.news(),
+  },
+  wake,
+);
+const host = new Host(store, {
+  run,
+  asks,
+  steer: (command, verb) => void socket.send({ t: "steer", command, verb }),
+  drive: (wish) => {
+    drive.say(wish);
+    drive.changed();
+  },
+  wake,
+  input,
+  stop,
+  follows,
+});
+const note = part(root, "[data-note]");
+const tell = (/** @type {string} */ text) => {
+  note.textContent = text;
+};
+new FullScreen(root.querySelector("[data-fullscreen]"), tell);
+const wakeLock = new WakeLock(tell);
+const stage = new Stage(root, { store, run, input, asks, host, panel: panel.el, wake });
+/** Which images the server was told to send. */
+let shown = "";
 
 /** Ask for the one animation frame in which everything is drawn. */
 function wake() {
@@ -69,11 +127,30 @@ function draw() {
   isFrameDue = false;
   const nowMs = performance.now();
   host.frame(nowMs);
+  follows.frame();
+  askPictures();
   badge.frame(store, socket);
   panel.frame(store, socket.reason);
   alarms.frame(store, nowMs);
   stop.frame();
   controls?.frame(nowMs);
+  stage.frame(nowMs);
+  wakeLock.want(drive.isMine);
+}
+
+/** Ask for the images that can be seen, and for no others. */
+function askPictures() {
+  const signals = host.pictures();
+  const wanted = JSON.stringify(signals);
+  if (wanted !== shown && socket.send({ t: "show", signals })) shown = wanted;
+}
+
+/** @param {ArrayBuffer} data */
+function takePicture(data) {
+  const frame = frameOf(data);
+  if (!frame) return;
+  store.picture(frame, performance.now());
+  wake();
 }
 
 /** @param {any} message */
@@ -86,12 +163,22 @@ function take(message) {
     case "hello":
       store.hello(message, nowMs);
       session = message.session;
+      sequences = {};
+      shown = "[]"; // a new connection sends none until it is asked
       break;
     case "links":
       store.setLinks(message.links, nowMs);
       break;
     case "log":
+      log.add(message.lines, message.first, session);
       panel.addLines(message.lines, message.first, session);
+      break;
+    case "ask":
+    case "asked":
+      asks.take(message);
+      break;
+    case "progress":
+      sequences = Object.fromEntries(message.sequences.map((/** @type {import("./types.js").Progress} */ one) => [one.command, one]));
       break;
     case "pong":
       store.pong(message.n, nowMs, socket.tripMs);
@@ -110,10 +197,10 @@ function take(message) {
       input.stopped(message.command, STOPPED[message.reason] ?? message.reason);
       break;
     case "refused":
-      if (message.command) input.stopped(message.command, message.message);
+      if (message.command) input.stopped(message.command, said(message.message));
       else {
         drive.refused(message.message);
-        input.refused(message.message);
+        input.refused(said(message.message));
       }
       break;
     case "error":
@@ -125,17 +212,20 @@ function take(message) {
 
 /**
  * @param {string} command
- * @param {Record<string, Value>} args
+ * @param {Record<string, import("./types.js").Given>} args
+ * @param {import("./asks.js").Ticket} [ticket] of the question that was answered first
  * @returns {Promise<Record<string, Value>>}
  */
-function run(command, args) {
+function run(command, args, ticket) {
   lastId += 1;
   const id = lastId;
   return new Promise((resolve, reject) => {
     waiting.set(id, { resolve, reject });
-    if (!socket.send({ t: "run", id, command, arguments: args })) {
+    const said = { t: "run", id, command, arguments: args };
+    ticket?.began(id);
+    if (!socket.send(ticket ? { ...said, confirmed: true } : said)) {
       waiting.delete(id);
-      reject(new Error("there is no connection to URC"));
+      reject(new Error(t("no connection to URC")));
     }
   });
 }
@@ -145,18 +235,18 @@ function settle(reply) {
   const asked = waiting.get(reply.id);
   waiting.delete(reply.id);
   if (reply.ok) asked?.resolve(reply.values ?? {});
-  else asked?.reject(new Error(reply.message ?? reply.code ?? "it was not done"));
+  else asked?.reject(new Error(said(reply.message ?? reply.code ?? t("it was not done"))));
 }
 
 /** One command, one answer: without a line there will be none. Nothing is ever sent again. */
 function giveUpCommands() {
   for (const { reject } of waiting.values()) {
-    reject(new Error("the connection to URC was lost; whether it was done is not known"));
+    reject(new Error(t("the connection to URC was lost; whether it was done is not known")));
   }
   waiting.clear();
 }
 
-host.mountAll(root);
+offerSystems((system) => store.setUnits(system));
 socket.open();
 setInterval(wake, AGE_EVERY_MS);
 

@@ -2,6 +2,7 @@
 /**
  * From what a widget gives to what a command takes. Knows no widget, no socket.
  *
+ * @typedef {import("./types.js").Given} Given
  * @typedef {import("./types.js").Value} Value
  *
  * @typedef {object} Range Where -1, 0 and 1 of a widget lie in an argument of the command.
@@ -24,7 +25,25 @@
  * @property {boolean} isHeld Whether it is motion, and given by holding.
  * @property {number} leaseMs How long motion lasts when nothing is heard.
  * @property {boolean} isAnswered Whether the robot says that it was done.
+ * @property {string} [title] What the command is called; "" when the driver does not say.
+ * @property {Record<string, import("./types.js").Argument>} [arguments] Those that are not fixed.
+ * @property {import("./types.js").Question[]} [asks] What people are asked before it.
+ * @property {{text: string, what: string}[]} [steps] Of a sequence.
  */
+
+/**
+ * Return what a widget may know of the command that an output of it is bound to.
+ *
+ * @param {Output | undefined} output
+ * @returns {import("./types.js").Described | null}
+ */
+export function describe(output) {
+  if (output === undefined) return null;
+  const { command, title = "", asks = [], steps = [], names } = output;
+  const known = Object.entries(output.arguments ?? {});
+  const called = known.map(([name, one]) => [Object.hasOwn(names, name) ? names[name] : name, one]);
+  return { command, title, asks, steps, arguments: Object.fromEntries(called) };
+}
 
 /**
  * Return the command's arguments.
@@ -32,9 +51,10 @@
  * A value goes where `names` says, else to the argument of its own name. What is fixed, no widget
  * can change.
  *
+ * @template {Given} V
  * @param {Output} output
- * @param {Record<string, Value>} given by the names that the widget's manifest declares
- * @returns {Record<string, Value>}
+ * @param {Record<string, V>} given by the names that the widget's manifest declares
+ * @returns {Record<string, V | Value>}
  */
 export function argumentsOf({ names, fixed, ranges = {}, isHeld }, given) {
   const renamed = new Set(Object.values(names));
@@ -49,9 +69,10 @@ export function argumentsOf({ names, fixed, ranges = {}, isHeld }, given) {
 }
 
 /**
- * @param {Value | undefined} value
+ * @template {Given} V
+ * @param {V | undefined} value
  * @param {Range | undefined} range
- * @returns {Value}
+ * @returns {V | Value}
  */
 function scale(value, range) {
   if (typeof value !== "number" || !range) return value ?? null;

@@ -10,17 +10,18 @@
  */
 import { part } from "./badge.js";
 import { ageText } from "./store.js";
+import { said, t } from "./words.js";
 
 const LINES_KEPT = 200;
 const WIDE = "(width >= 68.75rem)"; // the same as in robot.css
 
 /** @type {Record<Link["state"], string>} */
 const STATES = {
-  idle: "idle",
-  connecting: "◌ connecting",
-  live: "● live",
-  silent: "◆ silent",
-  lost: "▲ lost",
+  idle: t("idle"),
+  connecting: `◌ ${t("connecting")}`,
+  live: `● ${t("live")}`,
+  silent: `◆ ${t("silent")}`,
+  lost: `▲ ${t("lost")}`,
 };
 /** @type {Record<Line["level"], string>} */
 const SIGNS = { info: "", warning: "◆", error: "▲" };
@@ -47,7 +48,9 @@ export class Panel {
    */
   frame(store, reason) {
     const links = [...store.links.values()];
-    const lost = `No connection to URC; trying again.${reason ? ` Its last words: ${reason}` : ""}`;
+    const trying = t("No connection to URC; trying again.");
+    const last = reason ? t("Its last words: {reason}", { reason: said(reason) }) : "";
+    const lost = `${trying} ${last}`.trim();
     const key = store.isUp ? JSON.stringify(links) : lost;
     if (key === this.shown) return;
     this.shown = key;
@@ -69,8 +72,9 @@ export class Panel {
       this.next = first;
     }
     if (first > this.next) {
-      const missing = first - this.next;
-      const text = `${missing} lines are missing here: they came too fast for this connection`;
+      const text = t("{n} lines are missing here: they came too fast for this connection", {
+        n: first - this.next,
+      });
       this.log.prepend(lineElement({ age: 0, level: "warning", source: "URC", text }));
     }
     for (const line of lines.slice(Math.max(0, this.next - first))) {
@@ -89,9 +93,9 @@ function linkElement(link) {
   el.append(element("span", "urc-link-more", link.address));
   if (link.detail) el.append(element("span", "urc-link-more", link.detail));
   const counts = [
-    link.attempts > 0 ? `${link.attempts} failed attempts` : "",
-    link.faults > 0 ? `${link.faults} faults` : "",
-    link.state === "lost" && link.since >= 1000 ? `for ${ageText(link.since / 1000)}` : "",
+    link.attempts > 0 ? t("{n} failed attempts", { n: link.attempts }) : "",
+    link.faults > 0 ? t("{n} faults", { n: link.faults }) : "",
+    link.state === "lost" && link.since >= 1000 ? t("for {age}", { age: ageText(link.since / 1000) }) : "",
   ].filter(Boolean);
   if (counts.length > 0) el.append(element("span", "urc-link-more", counts.join(" · ")));
   return el;

@@ -6,6 +6,7 @@
  *
  * @typedef {object} Listener
  * @property {(message: any) => void} message A message of the server, in order.
+ * @property {(data: ArrayBuffer) => void} [picture] A binary message.
  * @property {(isUp: boolean) => void} state Called on every change of `isUp`.
  * @property {() => void} trip A new round trip was measured.
  */
@@ -25,6 +26,11 @@ export class Socket {
     this.listener = listener;
     /** Round trip in milliseconds; null while unknown. @type {number | null} */
     this.tripMs = null;
+    /** What has come since the page was opened. */
+    this.messages = 0;
+    this.bytes = 0;
+    /** How far this device's clock is before URC's, in milliseconds; null while unknown. @type {number | null} */
+    this.skewMs = null;
     /** Connections lost and attempts failed since the last good one. */
     this.failures = 0;
     /** Why the server closed, in its words. */
@@ -78,6 +84,7 @@ export class Socket {
     clearTimeout(this.retry);
     const line = new WebSocket(this.url);
     this.line = line;
+    line.binaryType = "arraybuffer";
     this.pingedMs = performance.now(); // an opening that hangs is given up like a missing pong
     clearInterval(this.beat);
     this.beat = window.setInterval(() => this.tick(), PING_EVERY_MS);
@@ -91,6 +98,9 @@ export class Socket {
 
   /** @param {unknown} data */
   take(data) {
+    this.messages += 1;
+    this.bytes += data instanceof ArrayBuffer ? data.byteLength : String(data).length;
+    if (data instanceof ArrayBuffer) this.listener.picture?.(data);
     if (typeof data !== "string") return;
     const message = JSON.parse(data);
     if (message.t === "hello") {
@@ -104,6 +114,7 @@ export class Socket {
     } else if (message.t === "pong") {
       this.tripMs = performance.now() - message.c;
       this.pingedMs = 0;
+      if (message.u) this.skewMs = Date.now() - message.u - this.tripMs / 2;
       this.listener.message(message);
       this.listener.trip();
     } else {

@@ -7,6 +7,8 @@
  * @typedef {import("./store.js").Store} Store
  * @typedef {import("./types.js").StopState} StopState
  */
+import { takesSpace, takesText } from "./keys.js";
+import { t } from "./words.js";
 
 export class StopButton {
   /**
@@ -29,7 +31,27 @@ export class StopButton {
         event.preventDefault();
         this.press();
       });
+      // Before anything that has the focus: while something is held, Space is STOP wherever it is.
+      addEventListener("keydown", (event) => this.space(event), { capture: true });
     }
+  }
+
+  /** Space is STOP; with nothing held it still presses a button that has the focus. @param {KeyboardEvent} event */
+  space(event) {
+    if (event.code !== "Space" || event.ctrlKey || event.altKey || event.metaKey) return;
+    if (takesText(event.target) || (takesSpace(event.target) && !this.input.isDriving())) return;
+    event.preventDefault();
+    event.stopImmediatePropagation();
+    if (event.repeat) return;
+    // A button is pressed when its key comes up: not this one.
+    const end = new AbortController();
+    const swallow = (/** @type {KeyboardEvent} */ up) => {
+      if (up.code !== "Space") return;
+      up.preventDefault();
+      end.abort();
+    };
+    addEventListener("keyup", swallow, { capture: true, signal: end.signal });
+    this.press();
   }
 
   press() {
@@ -59,9 +81,9 @@ export class StopButton {
 
   /** Why STOP would not reach the robot now. */
   fault() {
-    if (!this.store.isUp && !this.drive.isConfirmed) return "no connection to URC";
+    if (!this.store.isUp && !this.drive.isConfirmed) return t("no connection to URC");
     const lost = this.lines.filter((line) => this.store.links.get(line)?.state === "lost");
-    return lost.length > 0 ? "the robot is not connected" : "";
+    return lost.length > 0 ? t("the robot is not connected") : "";
   }
 
   frame() {

@@ -8,16 +8,23 @@
  * buffer is as old as it is.
  *
  * @typedef {import("./types.js").Alarm} Alarm
+ * @typedef {import("./types.js").Conversion} Conversion
+ * @typedef {import("./types.js").Held} Held
  * @typedef {import("./types.js").Hello} Hello
  * @typedef {import("./types.js").Link} Link
+ * @typedef {import("./types.js").Picture} Picture
  * @typedef {import("./types.js").Reading} Reading
  * @typedef {import("./types.js").Signal} Signal
  * @typedef {import("./types.js").State} State
- * @typedef {import("./types.js").Value} Value
  * @typedef {import("./types.js").Values} Values
  *
- * @typedef {{value: Value, alarm: Alarm, timeMs: number, serial: number}} Sample
+ * @typedef {{value: Held, alarm: Alarm, timeMs: number, serial: number, image?: Picture}} Sample
  */
+import { ageText, textOf } from "./texts.js";
+import { converted, Units } from "./units.js";
+import { t } from "./words.js";
+
+export { ageText, DASH } from "./texts.js";
 
 /** After so many times its greatest age a value is not shown any more. */
 const GONE_AFTER = 10;
@@ -30,8 +37,6 @@ const CUT_OFF_MS = 60_000;
 const DRIFT = 1e-4;
 const SHORT_TRIP_MS = 250;
 const LONG_LAG_MS = 1000;
-
-export const DASH = "—";
 
 export class Store {
   constructor() {
@@ -53,6 +58,9 @@ export class Store {
     this.edition = 0;
     this.skewMs = Infinity;
     this.skewSetMs = 0;
+    this.units = new Units();
+    /** Signals in the unit that an input asks for. @type {WeakMap<Conversion, Signal>} */
+    this.wanted = new WeakMap();
   }
 
   /**
@@ -101,6 +109,32 @@ export class Store {
   }
 
   /**
+   * Take an image, or whatever bytes a signal holds.
+   *
+   * @param {import("./frames.js").BinaryFrame} frame
+   * @param {number} nowMs
+   */
+  picture({ index, sentMs, ageMs, type, bytes }, nowMs) {
+    const timeMs = nowMs - this.lagMs(sentMs, nowMs) - ageMs;
+    const name = this.names[index];
+    if (name === undefined) return;
+    this.serial += 1;
+    const image = { blob: new Blob([bytes], { type }), type, serial: this.serial };
+    const value = { bytes: bytes.byteLength };
+    this.samples.set(name, { value, alarm: "", timeMs, serial: this.serial, image });
+  }
+
+  /**
+   * Show all values to people in the units of a system.
+   *
+   * @param {string} system
+   */
+  setUnits(system) {
+    this.units.use(system);
+    this.edition += 1;
+  }
+
+  /**
    * @param {Link[]} links
    * @param {number} nowMs
    */
@@ -131,25 +165,51 @@ export class Store {
   /**
    * @param {string} name
    * @param {number} nowMs
+   * @param {Conversion} [conversion] into the unit that the input asks for
    * @returns {Reading}
    */
-  reading(name, nowMs) {
-    const signal = this.signals.get(name) ?? { name, type: "string" };
+  reading(name, nowMs, conversion) {
+    const declared = this.signals.get(name) ?? { name, type: "string" };
     const sample = this.samples.get(name);
     const ageMs = sample ? Math.max(0, nowMs - sample.timeMs) : 0;
-    const state = this.stateOf(signal, sample, ageMs, nowMs);
+    const state = this.stateOf(declared, sample, ageMs, nowMs);
     const isShown = sample && (state === "live" || state === "stale");
-    const value = isShown ? sample.value : null;
+    const signal = conversion ? this.wantedAs(declared, conversion) : declared;
+    const value = isShown ? converted(sample.value, conversion) : null;
+    const shown = this.units.shown(signal.unit ?? "");
     return {
       value,
       state,
       alarm: isShown ? sample.alarm : "",
-      text: textOf(value, signal),
+      text: textOf(shown.factor === 1 && !shown.offset ? value : converted(value, shown), signal),
+      unit: shown.symbol,
       age: state === "stale" || state === "gone" ? ageText(ageMs / 1000) : "",
       time: (sample?.timeMs ?? 0) / 1000,
       serial: sample?.serial ?? 0,
       signal,
+      image: isShown ? (sample.image ?? null) : null,
     };
+  }
+
+  /**
+   * The signal as if the robot had declared it in another unit.
+   *
+   * @param {Signal} signal
+   * @param {Conversion} conversion
+   */
+  wantedAs(signal, conversion) {
+    const known = this.wanted.get(conversion);
+    if (known?.name === signal.name && known.edition === this.edition) return known;
+    const made = { ...signal, unit: conversion.symbol, edition: this.edition };
+    const { factor, offset } = conversion;
+    if (signal.min !== undefined) made.min = signal.min * factor + offset;
+    if (signal.max !== undefined) made.max = signal.max * factor + offset;
+    const limits = Object.entries(signal.limits ?? {});
+    if (signal.limits) {
+      made.limits = Object.fromEntries(limits.map(([key, at]) => [key, at * factor + offset]));
+    }
+    this.wanted.set(conversion, made);
+    return made;
   }
 
   /**
@@ -195,10 +255,10 @@ export class Store {
    * @param {boolean} isMotion nothing waits for a line that is still being made
    */
   hindrance(transport, isMotion = false) {
-    if (!this.isUp) return "no connection to URC";
+    if (!this.isUp) return t("no connection to URC");
     const state = this.links.get(transport)?.state;
-    if (state === "lost") return "the robot is not connected";
-    return isMotion && transport && !isConnected(state) ? "the robot is not connected yet" : "";
+    if (state === "lost") return t("the robot is not connected");
+    return isMotion && transport && !isConnected(state) ? t("the robot is not connected yet") : "";
   }
 
   /**
@@ -219,29 +279,4 @@ export class Store {
 /** @param {Link["state"] | undefined} state */
 function isConnected(state) {
   return state === "live" || state === "silent";
-}
-
-/**
- * @param {Value} value
- * @param {Signal} signal
- */
-function textOf(value, signal) {
-  if (value === null) return DASH;
-  if (typeof value === "number" && signal.precision !== undefined) {
-    return value.toFixed(signal.precision);
-  }
-  const text = String(value);
-  return signal.states && Object.hasOwn(signal.states, text) ? signal.states[text] ?? text : text;
-}
-
-/**
- * Whole numbers only: a reader wants to know "old", not tenths.
- *
- * @param {number} seconds
- */
-export function ageText(seconds) {
-  if (seconds < 1) return "< 1 s";
-  if (seconds < 60) return `${Math.floor(seconds)} s`;
-  if (seconds < 3600) return `${Math.floor(seconds / 60)} min`;
-  return `${Math.floor(seconds / 3600)} h`;
 }

@@ -20,6 +20,8 @@
     else delete document.documentElement.dataset["theme"];
   };
 
+  const YEAR_S = 365 * 24 * 3600;
+
   show(kept());
   document.addEventListener("DOMContentLoaded", () => {
     for (const choice of document.querySelectorAll("select[data-theme-choice]")) {
@@ -32,6 +34,14 @@
         } catch {
           // Private mode: the choice lasts as long as this page.
         }
+      });
+    }
+    for (const choice of document.querySelectorAll("select[data-language-choice]")) {
+      if (!(choice instanceof HTMLSelectElement)) continue;
+      choice.addEventListener("change", () => {
+        // A cookie, since the server writes the page's words.
+        document.cookie = `urc-language=${choice.value};path=/;max-age=${YEAR_S};samesite=strict`;
+        location.reload();
       });
     }
   });

@@ -1,0 +1,101 @@
+"""The robots that ship: whole documents, whose tests leave nothing out and whose pages render."""
+
+import os
+import re
+from pathlib import Path
+
+import pytest
+from starlette.testclient import TestClient
+
+from tests.contract.test_protocols import Conversation
+from urc.config.load import check
+from urc.model.profile import Profile
+from urc.problems import to_text
+from urc.runtime.catalog import built_in_catalog
+from urc.runtime.coverage import measure
+from urc.runtime.selftest import exercise, sample_settings
+from urc.testing.dashboard import FakeRobot
+from urc.web.app import build_app
+from urc.web.robots import Robot
+
+FOLDER = Path(__file__).parents[2] / "robots"
+FILES = sorted(FOLDER.glob("*.yaml"))
+SHARED = sorted([*FOLDER.glob("drivers/*.yaml"), *FOLDER.glob("interfaces/*.yaml")])
+
+LISTENED_S = 20.0
+"""How long the emulated robot is listened to: more than twice the slowest poll."""
+UNSAID = {
+    "create-2": {"cliff_front_left", "virtual_wall"},  # only once a stream is asked for
+    "gpsd": {"complaint", "status"},  # nothing to complain of, and a plain fix
+    "tello": {"mission_pad"},  # it sees none
+}
+
+
+@pytest.fixture(params=FILES, ids=lambda file: file.stem)
+def file(request: pytest.FixtureRequest) -> Path:
+    """The document of one robot."""
+    path: Path = request.param
+    return path
+
+
+def profile_of(file: Path) -> Profile:
+    """Return the profile in a document that is without a finding, warnings included."""
+    checked = check(os.fspath(file), built_in_catalog())
+    assert [to_text(problem) for problem in checked.problems] == []
+    assert checked.profile is not None
+    return checked.profile
+
+
+def test_the_robots_of_the_thesis_and_those_that_people_own_are_there() -> None:
+    """By the names that the documentation gives them."""
+    owned = "ardupilot-rover create-2 esp32-cam generic-ros1 generic-ros2 gpsd nmea-gps tello"
+    owned += " turtlebot3 turtlebot4 ur-e-series"
+    thesis = "absolem amphibot-ii amphibot-iii puppet roveo-mini salamandra-i salamandra-ii"
+    assert {file.stem for file in FILES} >= {*owned.split(), *thesis.split()}
+
+
+@pytest.mark.parametrize("shared", SHARED, ids=lambda file: f"{file.parent.name}-{file.stem}")
+def test_what_robots_share_is_without_a_finding(shared: Path) -> None:
+    """A driver or interface that is shipped can be built on."""
+    checked = check(os.fspath(shared), built_in_catalog())
+    assert [to_text(problem) for problem in checked.problems] == []
+
+
+def test_its_own_tests_pass_and_leave_nothing_out(file: Path) -> None:
+    """No finding, and every command, poll and message is exercised."""
+    profile = profile_of(file)
+    outcome = exercise(profile)
+    assert [to_text(problem) for problem in outcome.problems] == []
+    assert measure(os.fspath(file), profile.driver, outcome.exercised).untested == ()
+
+
+def test_motion_says_what_the_robot_does_when_commands_stop(file: Path) -> None:
+    """In the summary, which the page of the robot begins with."""
+    profile = profile_of(file)
+    if any(command.hold for command in profile.driver.commands.values()):
+        assert "fail-safe" in profile.summary.lower()
+
+
+def test_its_page_is_made_with_every_slot_of_each_interface(file: Path) -> None:
+    """The default interface and all others, the one for finding faults among them."""
+    profile = profile_of(file)
+    robot = Robot(profile, sample_settings(profile.settings), FakeRobot(profile).open)
+    with TestClient(build_app({profile.name: robot}), base_url="http://localhost:8080") as client:
+        for name, interface in profile.interfaces.items():
+            page = client.get(f"/robots/{profile.name}/?interface={name}")
+            assert page.status_code == 200, name
+            cells = re.findall(
+                r'class="urc-cell[^"]*" data-cell="[^>]*data-error="([^"]*)"', page.text
+            )
+            assert cells == [""] * len(interface.shown), name
+
+
+def test_its_emulated_robot_says_all_that_there_is(file: Path) -> None:
+    """Greetings, polls and messages without a fault on either side; every signal gets a value."""
+    profile = profile_of(file)
+    talk = Conversation(profile)
+    talk.begin()
+    talk.wait(LISTENED_S)
+    refused = {name: line.last_fault for name, line in talk.lines.items() if line.faults}
+    assert (talk.faults, refused) == ([], {})
+    assert set(profile.driver.signals) - talk.read == UNSAID.get(profile.name, set())

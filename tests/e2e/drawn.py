@@ -1,0 +1,51 @@
+"""Pictures that tests push, and the pixels that they look for."""
+
+import struct
+import zlib
+
+from playwright.async_api import Page
+
+__all__ = ["BLUE", "GREEN", "GREY", "RED", "plain", "png", "until_pixel"]
+
+RED, BLUE, GREEN, GREY = (200, 0, 0), (0, 0, 200), (0, 200, 0), (90, 90, 90)
+
+PIXEL = """
+([selector, x, y]) => {
+  const canvas = document.querySelector(selector);
+  const { width, height } = canvas;
+  const place = [Math.floor(x * width), Math.floor(y * height), 1, 1];
+  return [...canvas.getContext("2d").getImageData(...place).data];
+}
+"""
+
+
+def png(rows: list[list[tuple[int, int, int]]] | list[list[int]]) -> bytes:
+    """Return a picture: colours, or one grey channel of 16 bits."""
+
+    def chunk(kind: bytes, body: bytes) -> bytes:
+        return (
+            struct.pack(">I", len(body)) + kind + body + struct.pack(">I", zlib.crc32(kind + body))
+        )
+
+    is_grey = isinstance(rows[0][0], int)
+    lines = b"".join(
+        b"\0" + b"".join(struct.pack(">H", p) if isinstance(p, int) else bytes(p) for p in row)
+        for row in rows
+    )
+    size = struct.pack(">II", len(rows[0]), len(rows))
+    head = size + (b"\x10\0\0\0\0" if is_grey else b"\x08\x02\0\0\0")
+    parts = chunk(b"IHDR", head) + chunk(b"IDAT", zlib.compress(lines)) + chunk(b"IEND", b"")
+    return b"\x89PNG\r\n\x1a\n" + parts
+
+
+def plain(colour: tuple[int, int, int]) -> bytes:
+    """Return a picture of one colour."""
+    return png([[colour] * 8] * 6)
+
+
+async def until_pixel(page: Page, selector: str, x: float, y: float, is_one: str) -> None:
+    """Wait until a pixel of a canvas is what an expression over r, g, b and a says."""
+    await page.wait_for_function(
+        f"(given) => {{ const [r, g, b, a] = ({PIXEL})(given); return {is_one}; }}",
+        arg=[selector, x, y],
+    )

@@ -1,0 +1,56 @@
+// Run in the gallery's page. Returns per cell what hangs over, which text is cut, and whether there is
+// nothing at all. An ellipsis is meant, and so is what can be scrolled to; a text that is only for
+// screen readers is not seen; the figures of a scale that moves (data-scale) come and go at its ends.
+() => {
+  const SLACK = 2;
+  const clips = (style) => [style.overflowX, style.overflowY].some((each) => each !== "visible");
+  const scrolls = (style) => /auto|scroll/.test(style.overflowX + style.overflowY);
+  const found = [];
+  for (const cell of document.querySelectorAll("[data-state-name]")) {
+    const name = `${cell.dataset.widget} ${cell.dataset.stateName}`;
+    const over = cell.scrollWidth - cell.clientWidth;
+    if (over > SLACK) found.push(`${name}: ${over} px wider than its cell`);
+    const room = cell.getBoundingClientRect();
+    let isBlank = !cell.querySelector("canvas, svg, img, input, button");
+    const words = document.createTreeWalker(cell, NodeFilter.SHOW_TEXT);
+    for (let node = words.nextNode(); node; node = words.nextNode()) {
+      const text = node.textContent.trim();
+      const el = node.parentElement;
+      if (!text || !el.checkVisibility({ opacityProperty: true, visibilityProperty: true })) continue;
+      isBlank = false;
+      if (el.closest(".urc-hidden, [data-scale], option, title, desc, script, style")) continue;
+      const range = document.createRange();
+      range.selectNodeContents(node);
+      const boxes = [...range.getClientRects()].filter(({ width, height }) => width > 1 && height > 1);
+      if (boxes.length === 0) continue;
+      let box = { left: room.left, top: room.top, right: room.right, bottom: room.bottom };
+      let isMeant = false;
+      for (let up = el; up && up !== cell; up = up.parentElement) {
+        const style = getComputedStyle(up);
+        const isHidden = style.clipPath !== "none" || style.position === "absolute" && up.clientWidth <= 1;
+        if (isHidden || style.textOverflow === "ellipsis" || style.webkitLineClamp !== "none" ||
+            scrolls(style) || up instanceof SVGElement && up.tagName !== "svg" && style.display === "none") {
+          isMeant = true;
+          break;
+        }
+        if (!clips(style) || up instanceof SVGElement) continue;
+        const edge = up.getBoundingClientRect();
+        box = { left: Math.max(box.left, edge.left), top: Math.max(box.top, edge.top),
+                right: Math.min(box.right, edge.right), bottom: Math.min(box.bottom, edge.bottom) };
+      }
+      if (isMeant) continue;
+      for (const each of boxes) {
+        const cut = Math.max(box.left - each.left, box.top - each.top, each.right - box.right,
+                             each.bottom - box.bottom);
+        // A line is higher than its letters: a fifth of it may be out of sight.
+        const slack = Math.max(SLACK, each.height / 5);
+        if (cut > slack) {
+          found.push(`${name}: ${Math.round(cut)} px of ${JSON.stringify(text.slice(0, 40))} are cut`);
+          break;
+        }
+      }
+    }
+    if (isBlank) found.push(`${name}: nothing is shown`);
+  }
+  return found;
+}

@@ -1,0 +1,342 @@
+"""Interfaces in a real browser: by screen, by hand, in tabs, over a picture, and one for faults."""
+
+import asyncio
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+import pytest
+from playwright.async_api import FloatRect, Locator, Page, expect
+
+from tests.e2e.conftest import PageMaker
+from tests.e2e.dashboards import WAIT_S, running_dashboard, until, until_text
+from tests.e2e.dev_pages import served
+from tests.e2e.motion.driving import (
+    CALM_LEASE_S,
+    USES,
+    Wire,
+    centre,
+    driven,
+    held,
+    number,
+    opened,
+    push,
+)
+from tests.e2e.processes import UrcProcess
+from urc.model.codec import WriteSpec
+from urc.model.driver import Argument, Command
+from urc.model.flow import Confirm
+from urc.model.interface import Grid, Interface, Slot, Tab, WidgetUse
+from urc.model.values import Signal, Value
+from urc.runtime.session import CommandFailed
+from urc.testing.dashboard import FakeRobot, dashboard_profile
+from urc.testing.movers import FakeMovers
+
+pytestmark = pytest.mark.anyio
+
+PHONE, PHONE_LYING, TABLET, DESKTOP = (390, 844), (844, 390), (820, 1180), (1440, 900)
+A, B, C = "[data-cell='0']", "[data-cell='1']", "[data-cell='2']"
+
+
+def row(*names: str) -> Grid:
+    """Return a grid of one row."""
+    return Grid(1, len(names), tuple(Slot(name, 0, place) for place, name in enumerate(names)))
+
+
+def column(*names: str) -> Grid:
+    """Return a grid of one column."""
+    return Grid(len(names), 1, tuple(Slot(name, place, 0) for place, name in enumerate(names)))
+
+
+def gauged(*interfaces: Interface) -> FakeRobot:
+    """Return a robot with three values, `a` to `c`, and these interfaces."""
+    uses = [WidgetUse(name, "value", {"value": name}) for name in "abc"]
+    profile = dashboard_profile(signals={name: Signal(name) for name in "abc"}, uses=uses)
+    named = {each.name: each for each in interfaces}
+    return FakeRobot(profile._replace(interfaces=named or profile.interfaces))
+
+
+def steered(*interfaces: Interface) -> Wire:
+    """Return a robot with two sticks and a button, and these interfaces."""
+    robot = Wire(lease_s=CALM_LEASE_S)
+    named = {each.name: each for each in interfaces}
+    robot.profile = robot.profile._replace(interfaces=named)
+    return robot
+
+
+async def box(page: Page, selector: str) -> FloatRect:
+    """Return where an element is."""
+    found = await page.locator(selector).bounding_box()
+    assert found is not None, selector
+    return found
+
+
+async def is_on_top(page: Page, selector: str) -> bool:
+    """Return whether a finger on the middle of an element meets it, and nothing above it."""
+    return bool(
+        await page.evaluate(
+            """(selector) => {
+                const el = document.querySelector(selector);
+                const { left, top, width, height } = el.getBoundingClientRect();
+                const met = document.elementFromPoint(left + width / 2, top + height / 2);
+                return el.contains(met);
+            }""",
+            selector,
+        )
+    )
+
+
+async def turned(page: Page, size: tuple[int, int]) -> None:
+    """Give the page another screen."""
+    await page.set_viewport_size({"width": size[0], "height": size[1]})
+
+
+async def test_each_screen_has_its_own_picture(new_page: PageMaker) -> None:
+    """Wide, tall, and a phone both ways; what a picture leaves out is not shown there."""
+    grids = {"wide": row("a", "b", "c"), "tall": column("c", "b", "a"), "phone": row("b", "a")}
+    async with running_dashboard(gauged(Interface("x", "X", grids))) as address:
+        page = await new_page()
+        await page.goto(f"{address}robots/puppet/")
+        for size in (DESKTOP, PHONE_LYING):
+            await turned(page, size)
+            lefts = [(await box(page, one))["x"] for one in (A, B, C)]
+            assert lefts == sorted(lefts), size
+            assert lefts[0] < lefts[1] < lefts[2], size
+        await turned(page, TABLET)
+        tops = [(await box(page, one))["y"] for one in (C, B, A)]
+        assert tops[0] < tops[1] < tops[2]
+        await turned(page, PHONE)
+        assert (await box(page, B))["x"] < (await box(page, A))["x"]
+        await expect(page.locator(C)).to_be_hidden()
+
+
+async def test_the_left_hand_is_kept_on_the_device(new_page: PageMaker) -> None:
+    """The columns are the other way round, also after the page was opened anew."""
+    async with running_dashboard(gauged()) as address:
+        page = await new_page()
+        await page.goto(f"{address}robots/puppet/")
+        assert (await box(page, A))["x"] < (await box(page, C))["x"]
+        await page.get_by_role("button", name="This device").click()
+        await page.select_option("[data-hand-choice]", "left")
+        assert (await box(page, C))["x"] < (await box(page, A))["x"]
+        await page.reload()
+        assert (await box(page, C))["x"] < (await box(page, A))["x"]
+
+
+async def test_a_tab_hides_what_it_does_not_show(new_page: PageMaker) -> None:
+    """Its cells get nothing; a cell that is in both goes on; the address says which is open."""
+    tabs = {
+        "one": Tab("one", "One", {"wide": row("a", "b")}),
+        "two": Tab("two", "Two", {"wide": row("b", "c")}),
+    }
+    robot = gauged(Interface("x", "X", tabs=tabs))
+    async with running_dashboard(robot) as address:
+        page = await new_page(size="phone")
+        await page.goto(f"{address}robots/puppet/")
+        await until(lambda: robot.is_open)
+        robot.say("a", 1)
+        robot.say("b", 2)
+        await until_text(page, f"{A} .value-text", "1")
+        await page.get_by_role("tab", name="One").focus()
+        await page.keyboard.press("ArrowRight")
+        await expect(page.get_by_role("tab", name="Two")).to_be_focused()
+        await expect(page.get_by_role("tab", name="Two")).to_have_attribute("aria-selected", "true")
+        await expect(page.get_by_role("tabpanel", name="Two")).to_be_visible()
+        await expect(page.locator(A)).to_be_hidden()
+        await expect(page.locator("[data-badge]")).to_be_visible()
+        robot.say("a", 11)
+        robot.say("b", 12)
+        await until_text(page, f"{B} .value-text", "12")
+        await until_text(page, f"{A} .value-text", "1")
+        assert page.url.endswith("tab=two")
+        await page.reload()
+        await expect(page.locator(A)).to_be_hidden()
+        await expect(page.locator("[data-badge-text]")).to_have_text("Live")
+        robot.say("a", 11)
+        await page.get_by_role("tab", name="Two").press("Home")
+        await until_text(page, f"{A} .value-text", "11")
+
+
+async def test_another_tab_lets_go_of_what_is_held(new_page: PageMaker) -> None:
+    """The robot stops, and STOP stays where it is."""
+    names = [use.slot for use in USES]
+    tabs = {
+        "drive": Tab("drive", "Drive", {"wide": row(*names)}),
+        "more": Tab("more", "More", {"wide": row(names[2])}),
+    }
+    async with driven(robot=steered(Interface("x", "X", tabs=tabs))) as (robot, address):
+        page = await opened(new_page, address)
+        place = await box(page, "[data-stop-button]")
+        await push(page)
+        await robot.until_moving()
+        await page.get_by_role("tab", name="Drive").focus()
+        await page.keyboard.press("End")
+        await robot.until_stopped()
+        assert await box(page, "[data-stop-button]") == place
+        assert await is_on_top(page, "[data-stop-button]")
+
+
+async def test_another_interface_keeps_the_connection(new_page: PageMaker) -> None:
+    """What is held is let go; the values are there at once; the way back leads back."""
+    sticks = Interface("sticks", "Sticks", {"wide": row(*(use.slot for use in USES))})
+    lift = Interface("lift", "Lift", {"wide": row("up")})
+    async with driven(robot=steered(sticks, lift)) as (robot, address):
+        page = await opened(new_page, address)
+        await push(page)
+        await robot.until_moving()
+        choice = page.get_by_label("Interface")
+        assert (await box(page, "[data-interface-choice]"))["height"] >= 48
+        await choice.select_option("lift")
+        await robot.until_stopped()
+        await expect(page.locator(".urc-cell")).to_have_count(1)
+        await expect(page.locator("#cell-0-main")).to_contain_text("Lift")
+        assert page.url.endswith("interface=lift")
+        await expect(page.locator("[data-badge-text]")).to_have_text("Live")
+        assert robot.opened == 1
+        await page.mouse.up()
+        await page.locator("#cell-0-main").hover()
+        await page.mouse.down()
+        await robot.until_moving("lift")
+        await page.mouse.up()
+        await robot.until_stopped("lift")
+        await page.go_back()
+        await expect(page.locator(".urc-cell")).to_have_count(len(USES))
+        await expect(choice).to_have_value("sticks")
+        await choice.select_option("lift")
+        await expect(page.locator(".urc-cell")).to_have_count(1)
+        await page.goto(address)
+        await expect(choice).to_have_value("lift")
+
+
+async def test_an_interface_that_cannot_be_opened_leaves_this_one(new_page: PageMaker) -> None:
+    """It is said, and what is shown goes on."""
+    robot = gauged()
+    async with running_dashboard(robot) as address:
+        page = await new_page()
+        new_page.allow(page, lambda text: "ERR_FAILED" in text)
+        await page.goto(f"{address}robots/puppet/")
+        await until(lambda: robot.is_open)
+        await page.route("**/*interface=debug*", lambda route: route.abort())
+        await page.get_by_label("Interface").select_option("debug")
+        await expect(page.locator("[data-note]")).to_contain_text("no connection to URC")
+        await expect(page.get_by_label("Interface")).to_have_value("default")
+        robot.say("a", 5)
+        await until_text(page, f"{A} .value-text", "5")
+
+
+async def test_the_background_fills_the_stage_and_controls_lie_above_it(
+    new_page: PageMaker,
+) -> None:
+    """On each screen; STOP is never covered."""
+    grid = Grid(2, 3, (Slot("a", 0, 0), Slot("b", 1, 2)))
+    async with running_dashboard(
+        gauged(Interface("x", "X", {"wide": grid}, background="c"))
+    ) as address:
+        page = await new_page()
+        await page.goto(f"{address}robots/puppet/")
+        for size in (PHONE, PHONE_LYING, TABLET, DESKTOP):
+            await turned(page, size)
+            stage, back = await box(page, "[data-stage]"), await box(page, ".urc-background")
+            assert back == stage, size
+            assert await is_on_top(page, "[data-cell='1']"), size
+
+
+async def test_every_robot_has_an_interface_for_finding_faults(new_page: PageMaker) -> None:
+    """Two hundred signals and a hundred commands, on a phone."""
+    signals = {f"s{place}": Signal(f"s{place}", unit="V") for place in range(200)}
+    argument = Argument("c", "number", unit="degC", min=0, max=90)
+    plain = {
+        f"c{place}": Command(f"c{place}", "wire", WriteSpec("text", {})) for place in range(98)
+    }
+    asked = Command(
+        "set", "wire", WriteSpec("text", {}), {"c": argument}, confirm=Confirm(text="Sure?")
+    )
+    commands = {**plain, "set": asked, "lift": held("lift", number("rate"), lease_s=CALM_LEASE_S)}
+    uses = [WidgetUse("a", "value", {"value": "s0"})]
+    robot = FakeRobot(dashboard_profile(signals=signals, uses=uses, commands=commands))
+    async with running_dashboard(robot) as address:
+        page = await new_page(size="phone")
+        await page.goto(f"{address}robots/puppet/?interface=debug")
+        await until(lambda: robot.is_open)
+        await expect(page.locator("[data-signal]")).to_have_count(200)
+        await expect(page.locator("[data-command]")).to_have_count(100)
+        robot.say("s1", 12.5, alarm="hihi")
+        first = page.locator("[data-signal='s1']")
+        await expect(first).to_contain_text("12.5 V")
+        await expect(first).to_contain_text("▲ Very high")
+        await expect(first.locator("[data-age]")).to_contain_text("s")
+        await page.get_by_label("Find a signal").fill("s199")
+        await expect(page.locator("[data-signal]:visible")).to_have_count(1)
+        robot.say("s199", 7)
+        await expect(page.locator("[data-signal='s199']")).to_contain_text("7 V")
+        assert await page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+        await refused_asked_and_given(page, robot)
+        await held_by_its_form(page, robot)
+
+
+YES = "(el) => [...el.querySelectorAll('button')].find((one) => one.textContent === 'Yes')?.click()"
+
+
+async def agree(form: Locator) -> None:
+    """Say yes until it counts: a question that nobody can have read yet takes no answer."""
+    yes = form.get_by_role("button", name="Yes")
+    await expect(yes).to_be_visible()
+    async with asyncio.timeout(WAIT_S):
+        while await yes.count():
+            await form.evaluate(YES)
+            await asyncio.sleep(0.05)
+
+
+async def refused_asked_and_given(page: Page, robot: FakeRobot) -> None:
+    """Fill in the form of `set`."""
+
+    def answer(name: str, arguments: Mapping[str, object]) -> Mapping[str, Value]:
+        if "c" not in arguments:
+            raise CommandFailed("bad-argument", "c is missing")
+        return {"now": 21.0}
+
+    robot.on_command = answer
+    form = page.locator("[data-command='set']")
+    await page.get_by_label("Find a command").fill("set")
+    await form.locator("summary").click()
+    await expect(form).to_contain_text("c (number, 0 to 90, degC)")
+    await form.get_by_role("button", name="Send").click()
+    await agree(form)
+    await expect(form.get_by_role("status")).to_contain_text("▲ c is missing")
+    await form.get_by_label("c (number").fill("20")
+    await form.get_by_role("button", name="Send").click()
+    await expect(form.get_by_role("status")).to_contain_text("Sure?")
+    await agree(form)
+    await expect(form.get_by_role("status")).to_contain_text("now = 21")
+    assert robot.commands[-1] == ("set", {"c": 20})
+
+
+async def held_by_its_form(page: Page, robot: FakeRobot) -> None:
+    """Hold the button of `lift`."""
+    await page.get_by_label("Find a command").fill("lift")
+    form = page.locator("[data-command='lift']")
+    await form.locator("summary").click()
+    await form.get_by_label("rate").fill("0.5")
+    hold = form.get_by_role("button", name="Hold to move")
+    await hold.scroll_into_view_if_needed()
+    x, y = await centre(page, "[data-command='lift'] button")
+    await page.mouse.move(x, y)
+    await page.mouse.down()
+    line = robot.movers
+    assert isinstance(line, FakeMovers)
+    await until(lambda: any("rate=0.5" in text for text in line.texts))
+    await page.mouse.up()
+    await until(lambda: line.texts[-1].startswith("lift stop"))
+
+
+async def test_where_there_is_a_dev_page_the_wire_is_shown_too(
+    new_page: PageMaker, urc_process: Callable[..., UrcProcess], tmp_path: Path
+) -> None:
+    """In the interface for finding faults, and with the values on one page."""
+    page = await new_page()
+    async with served(page, urc_process, tmp_path):
+        await page.goto(page.url.replace("/dev", "/?interface=debug"))
+        ring = page.locator("[data-command='ring']")
+        await ring.locator("summary").click()
+        await ring.get_by_role("button", name="Send").click()
+        await expect(page.locator(".dev-row", has_text="RING 1")).to_be_visible()
+        await expect(page.locator("[data-signal]").first).to_contain_text("12")

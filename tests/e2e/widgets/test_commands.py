@@ -1,0 +1,351 @@
+"""Widgets that give commands, in a real browser: what people do, and what the robot gets."""
+
+import asyncio
+from collections.abc import AsyncIterator, Awaitable, Callable
+from contextlib import asynccontextmanager
+from pathlib import Path
+
+import pytest
+from playwright.async_api import Locator, Page
+
+from tests.e2e.conftest import PageMaker
+from tests.e2e.dashboards import until, until_attribute, until_text
+from tests.e2e.processes import UrcProcess
+
+pytestmark = pytest.mark.anyio
+
+PROFILE = """\
+urc: 1
+kind: robot
+name: crane
+title: Crane
+transports:
+  wire:
+    type: tcp
+    host: 127.0.0.1
+    port: PORT
+    framing: { type: delimiter, tx: LF, rx: LF }
+signals:
+  lamp: { type: boolean }
+  mode: { type: string }
+  volts: { type: number }
+messages:
+  told: { regex: '^(?P<lamp>on|off),(?P<mode>\\w+),(?P<volts>[\\d.]+)$' }
+commands:
+  set_lamp:
+    send: "LAMP {{ 1 if lit else 0 }}"
+    args: { lit: { type: boolean } }
+    reply: { equals: OK }
+  set_mode:
+    send: "MODE {{ mode }}"
+    args: { mode: { type: string, choices: [idle, auto] } }
+    reply: { equals: OK }
+  set_volts:
+    send: "VOLT {{ volts }}"
+    args: { volts: { type: number, min: 0, max: 10, unit: V } }
+    reply: { equals: OK }
+  say: { send: "SAY {{ words }}", args: { words: { type: string } }, reply: { equals: OK } }
+  raw: { send: "{{ line }}", args: { line: { type: string } }, reply: { equals: OK } }
+  beep: { send: BEEP, reply: { equals: OK } }
+  unlock: { send: UNLOCK, reply: { equals: OK } }
+  arm: { send: ARM, reply: { equals: OK } }
+  dock: { send: DOCK, reply: { equals: OK }, confirm: { text: Dock now? } }
+  erase:
+    send: ERASE
+    reply: { equals: OK }
+    confirm: { level: hazardous, text: The map is lost }
+  beam:
+    send: BEAM
+    reply: { equals: OK }
+    confirm: { level: hazardous, text: The beam goes on, two_person: true }
+sequences:
+  take_off: [{ run: unlock }, { run: arm }, { run: beep }]
+WIDGETS
+"""
+
+
+class Crane:
+    """A robot that keeps the lines that it is sent, and says OK to each."""
+
+    def __init__(self) -> None:
+        self.lines: list[str] = []
+        self._writers: list[asyncio.StreamWriter] = []
+
+    async def talk(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        """Serve one connection."""
+        self._writers.append(writer)
+        try:
+            while line := await reader.readline():
+                self.lines.append(line.decode())
+                writer.write(b"OK\n")
+                await writer.drain()
+        except ConnectionError:
+            pass
+        finally:
+            writer.close()
+
+    def tell(self, lamp: str, mode: str, volts: str) -> None:
+        """Say how it is."""
+        for writer in self._writers:
+            writer.write(f"{lamp},{mode},{volts}\n".encode())
+
+    async def until_got(self, *lines: str) -> None:
+        """Wait for exactly these lines, and forget them."""
+        wanted = [f"{line}\n" for line in lines]
+        await until(lambda: len(self.lines) >= len(wanted))
+        assert self.lines == wanted
+        self.lines.clear()
+
+
+@asynccontextmanager
+async def crane(
+    urc_process: Callable[..., UrcProcess], folder: Path, widgets: str
+) -> AsyncIterator[tuple[Crane, str]]:
+    """Serve a crane with these widgets, each in the slot of its name; give it and its page."""
+    robot = Crane()
+    server = await asyncio.start_server(robot.talk, "127.0.0.1", 0)
+    names = [line.split(":")[0].strip() for line in widgets.strip().splitlines()]
+    slots = "\n".join(f"  {line.strip()}" for line in widgets.strip().splitlines())
+    rows = [names[start : start + 3] for start in range(0, len(names), 3)]
+    grid = "\n".join("      " + " ".join((*row, *"." * (3 - len(row)))) for row in rows)
+    shown = f"widgets:\n{slots}\ninterfaces:\n  default:\n    grid: |\n{grid}\n"
+    text = PROFILE.replace("WIDGETS", shown)
+    file = folder / "crane.yaml"
+    file.write_text(text.replace("PORT", str(server.sockets[0].getsockname()[1])), "utf-8")
+    try:
+        process = urc_process("serve", str(file), "--port", "0")
+        address = (await process.wait_for_async(r"(http://\S+)"))[1]
+        yield robot, f"{address}robots/crane/"
+    finally:
+        server.close()
+
+
+async def ready(page: Page, selector: str) -> Locator:
+    """Return a control that can be used."""
+    await until_attribute(page, selector, "aria-disabled", "false")
+    return page.locator(selector)
+
+
+CONTROLS = """
+  lamp: { use: switch, bind: { state: lamp, change: set_lamp } }
+  mode: { use: select, bind: { state: mode, change: set_mode }, options: { look: segmented } }
+  volts: { use: slider, bind: { state: volts, change: set_volts }, options: { step: 0.5 } }
+  turn: { use: knob, bind: { change: set_volts }, options: { step: 1, send: release } }
+  exact: { use: number, bind: { change: set_volts } }
+  words: { use: text, bind: { change: say } }
+  console: { use: terminal, bind: { typed: raw } }
+  beep: { use: button, bind: { press: beep }, options: { gesture: double } }
+  horn: { use: button, bind: { press: arm }, options: { gesture: hold } }
+  ready: { use: checklist, bind: { complete: unlock }, options: { items: [Sky, Fuel] } }
+"""
+
+
+async def test_each_control_gives_exactly_its_command(
+    new_page: PageMaker, urc_process: Callable[..., UrcProcess], tmp_path: Path
+) -> None:
+    """By finger and by key; what is shown is what the robot says, and a difference is marked."""
+    async with crane(urc_process, tmp_path, CONTROLS) as (robot, address):
+        page = await new_page(size="desktop")
+        await page.goto(address)
+        await ready(page, ".switch-on")
+        robot.tell("off", "idle", "2.5")
+
+        # A switch shows the robot's state, never the wish.
+        await until_text(page, ".switch-word", "off")
+        await page.click(".switch-main")
+        await robot.until_got("LAMP 1")
+        await until_text(page, ".switch-word", "off …")
+        robot.tell("on", "idle", "2.5")
+        await until_text(page, ".switch-word", "on")
+        await page.focus(".switch-main")
+        await page.keyboard.press("Space")
+        await robot.until_got("LAMP 0")
+        await until_attribute(page, ".switch", "data-wish", "missed")
+        assert await page.inner_text(".switch-word") == "on ≠"
+        robot.tell("off", "idle", "2.5")
+        await until_attribute(page, ".switch", "data-wish", "")
+
+        await page.get_by_role("radio", name="auto").click()
+        await robot.until_got("MODE auto")
+        assert await page.get_by_role("radio", name="idle").is_checked()
+        robot.tell("off", "auto", "2.5")
+        await until_text(page, ".select-now", "auto")
+
+        track = await ready(page, ".slider-track")
+        await until_attribute(page, ".slider-track", "aria-valuetext", "2.5 V")
+        await track.focus()
+        await page.keyboard.press("ArrowRight")
+        await robot.until_got("VOLT 3")
+        robot.tell("off", "auto", "3")
+        await until_attribute(page, ".slider-track", "aria-valuetext", "3.0 V")
+        for key, line, said in (("PageDown", "VOLT 2", "2.0 V"), ("End", "VOLT 10", "10.0 V")):
+            await page.keyboard.press(key)
+            await robot.until_got(line)
+            robot.tell("off", "auto", line.split()[1])
+            await until_attribute(page, ".slider-track", "aria-valuetext", said)
+        box = await track.bounding_box()
+        assert box is not None
+        await track.click(position={"x": box["width"] / 2, "y": box["height"] / 2})
+        await robot.until_got("VOLT 5")
+
+        await page.locator(".knob-dial").focus()
+        await page.keyboard.press("Home")
+        await robot.until_got("VOLT 0")
+        await until_attribute(page, ".knob-dial", "aria-valuetext", "0 V")
+        await page.click(".knob-more")
+        await robot.until_got("VOLT 1")
+
+        await page.fill(".number-field", "11")
+        await page.keyboard.press("Enter")
+        await page.locator(".number-note", has_text="not above 10.0 V").wait_for()
+        await page.fill(".number-field", "7,25 V")
+        await page.keyboard.press("Enter")
+        await robot.until_got("VOLT 7.25")
+
+        await page.fill(".text-field", "a\u0007b")
+        await page.locator(".text-note", has_text="control characters").wait_for()
+        await page.keyboard.press("Enter")
+        await page.fill(".text-field", "hello {{ 1 }}")
+        await page.keyboard.press("Enter")
+        await robot.until_got("SAY hello {{ 1 }}")
+
+        await page.fill(".terminal-field", "STATUS 1")
+        await page.keyboard.press("Enter")
+        await robot.until_got("STATUS 1")
+        await until_attribute(page, ".terminal", "data-phase", "done")
+        await page.keyboard.press("ArrowUp")
+        assert await page.input_value(".terminal-field") == "STATUS 1"
+
+        beep = page.get_by_role("button", name="Beep")
+        await beep.dblclick()
+        await robot.until_got("BEEP")
+        horn = page.get_by_role("button", name="Arm")
+        await horn.focus()
+        await page.keyboard.down("Enter")
+        await robot.until_got("ARM")
+        await page.keyboard.up("Enter")
+
+        done = page.get_by_role("button", name="Unlock")
+        await page.get_by_label("Sky").check()
+        await done.click(force=True)
+        await page.get_by_label("Fuel").check()
+        await done.click()
+        await robot.until_got("UNLOCK")
+        await page.reload()
+        await until_text(page, ".checklist-note", "✓ all is ticked")
+        assert await page.get_by_label("Fuel").is_checked()
+        assert robot.lines == []
+
+
+ASKING = """
+  dock: { use: button, bind: { press: dock } }
+  erase: { use: button, bind: { press: erase } }
+  beam: { use: button, bind: { press: beam } }
+"""
+
+
+async def test_what_the_driver_asks_is_asked_in_the_place_of_the_widget(
+    new_page: PageMaker, urc_process: Callable[..., UrcProcess], tmp_path: Path
+) -> None:
+    """No sends nothing; a hazard is slid; two people are two screens, and one may take it back."""
+    async with crane(urc_process, tmp_path, ASKING) as (robot, address):
+        page = await new_page(size="desktop")
+        await page.goto(address)
+        dock, erase, beam = (page.locator(f"[data-cell='{place}']") for place in range(3))
+        await ready(page, "[data-cell='0'] .button-main")
+        await dock.locator(".button-main").click()
+        await dock.get_by_text("Dock now?").wait_for()
+        await page.keyboard.press("Escape")
+        await dock.locator(".button-note", has_text="not sent").wait_for()
+        await dock.locator(".button-main").click()
+        await dock.get_by_role("button", name="Yes").click()
+        await robot.until_got("DOCK")
+
+        await confirmed(page, erase, lambda: as_soon(bool(robot.lines)))
+        await robot.until_got("ERASE")
+
+        other = await new_page(size="phone")
+        await other.goto(address)
+        await ready(other, "[data-cell='2'] .button-main")
+        for answer in ("Refuse", "Slide to agree"):
+            await confirmed(page, beam, beam.get_by_text("Waiting for a second person").is_visible)
+            asked = other.locator(".urc-asked", has_text="The beam goes on")
+            await asked.wait_for()
+            assert robot.lines == []
+            if answer == "Refuse":
+                await asked.get_by_role("button", name=answer).click()
+                await beam.locator(".button-note", has_text="somebody said no").wait_for()
+            else:
+                agree = asked.get_by_role("slider", name=answer)
+                await agree.focus()
+                await slid(other, agree)
+                await robot.until_got("BEAM")
+            await asked.wait_for(state="detached")
+
+
+async def as_soon(is_so: bool) -> bool:
+    """Return what is known already, where something is awaited."""
+    return is_so
+
+
+async def confirmed(page: Page, cell: Locator, is_done: Callable[[], Awaitable[bool]]) -> None:
+    """Slide what is asked; a slow machine lets a question lapse, which is then asked again."""
+    slide = cell.get_by_role("slider", name="Slide to confirm")
+    for _ in range(500):
+        is_asked = await cell.locator(".urc-ask").count() > 0
+        if await is_done():
+            return
+        if not is_asked:
+            await cell.locator(".button-main").click()
+        elif await slide.count():
+            await slide.evaluate_all("(found) => found[0]?.focus()")
+            await page.keyboard.press("ArrowRight")
+    pytest.fail("it was never confirmed")
+
+
+async def slid(page: Page, slide: Locator) -> None:
+    """Slide something to its end by its keys; it may take a moment before it can be."""
+    while await slide.count():
+        await page.keyboard.press("ArrowRight")
+
+
+STEPPED = """
+  fly: { use: sequence, bind: { run: take_off }, options: { confirm_each: true } }
+  own: { use: sequence, bind: { step_1: unlock, step_2: beep } }
+"""
+
+
+async def test_a_sequence_is_gone_through_step_by_step(
+    new_page: PageMaker, urc_process: Callable[..., UrcProcess], tmp_path: Path
+) -> None:
+    """Nothing begins before somebody says so; every screen sees where it stands, and can end it."""
+    async with crane(urc_process, tmp_path, STEPPED) as (robot, address):
+        page, other = await new_page(size="desktop"), await new_page(size="phone")
+        await page.goto(address)
+        await other.goto(address)
+        fly, own = page.locator("[data-cell='0']"), page.locator("[data-cell='1']")
+        await ready(page, "[data-cell='0'] .sequence-start")
+        assert await fly.locator("li").all_inner_texts() == [
+            "○ run unlock",
+            "○ run arm",
+            "○ run beep",
+        ]
+        await fly.locator(".sequence-start").click()
+        for place, line in enumerate(("UNLOCK", "ARM", "BEEP")):
+            note = f"paused before step {place + 1} of 3"
+            await other.locator("[data-cell='0'] .sequence-note", has_text=note).wait_for()
+            await fly.locator(".sequence-note", has_text=note).wait_for()
+            assert robot.lines == []
+            await fly.locator(".sequence-next").click()
+            await robot.until_got(line)
+        await fly.locator(".sequence-note", has_text="✓ done").wait_for()
+
+        await fly.locator(".sequence-start").click()
+        await fly.locator(".sequence-note", has_text="paused before step 1").wait_for()
+        await other.locator("[data-cell='0'] .sequence-abort").click()
+        await fly.locator(".sequence-note", has_text="somebody ended it").wait_for()
+        assert robot.lines == []
+
+        await own.locator(".sequence-start").click()
+        await own.locator(".sequence-note", has_text="✓ done").wait_for()
+        await robot.until_got("UNLOCK", "BEEP")

@@ -1,0 +1,282 @@
+"""What a robot says, on the widgets that show it: needles, bars, tapes, traces and pictures."""
+
+import csv
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+from playwright.async_api import Page
+
+from tests.e2e.conftest import PageMaker
+from tests.e2e.dashboards import running_dashboard, until, until_attribute, until_text
+from urc.model.codec import WriteSpec
+from urc.model.driver import Argument, Command
+from urc.model.interface import Grid, Interface, Slot, WidgetUse
+from urc.model.values import Limits, Signal
+from urc.testing.dashboard import FakeRobot, dashboard_profile
+from urc.web.demos import colour_bars as made_picture
+
+pytestmark = pytest.mark.anyio
+
+SIGNALS = {
+    signal.name: signal
+    for signal in (
+        Signal("amps", unit="A", min=0, max=30, precision=1, limits=Limits(high=20, hihi=25)),
+        Signal("goal", unit="A"),
+        Signal("pace", unit="m/s", min=-2, max=2),
+        Signal("height", unit="m"),
+        Signal("yaw", unit="rad"),
+        Signal("way", unit="rad"),
+        Signal("turned", "array", of="number", size=4),
+        Signal("rssi", "integer", unit="dBm"),
+        Signal("cells", "array", of="number", unit="V", precision=2),
+        Signal("mode", "string"),
+        Signal("report", "object"),
+        Signal("seen", "image"),
+    )
+}
+NO_EASING = """
+(selectors) => selectors.map((selector) => {
+  const { transitionDuration, animationName } = getComputedStyle(document.querySelector(selector));
+  return `${transitionDuration} ${animationName}`;
+})
+"""
+
+
+def use(widget: str, inputs: dict[str, str], slot: str = "", **options: Any) -> WidgetUse:
+    """Return a widget with inputs and options."""
+    return WidgetUse(slot or widget, widget, inputs, {}, options)
+
+
+@asynccontextmanager
+async def shown(
+    new_page: PageMaker, *uses: WidgetUse, columns: int = 4, **commands: Command
+) -> AsyncIterator[tuple[FakeRobot, Page]]:
+    """Show widgets on one page, in a grid."""
+    profile = dashboard_profile(signals=SIGNALS, uses=uses, commands=commands)
+    slots = tuple(
+        Slot(each.slot, place // columns, place % columns) for place, each in enumerate(uses)
+    )
+    grid = Grid(-(-len(uses) // columns), columns, slots)
+    robot = FakeRobot(
+        profile._replace(interfaces={"default": Interface("default", "", {"wide": grid})})
+    )
+    async with running_dashboard(robot) as address:
+        page = await new_page()
+        await page.goto(f"{address}robots/puppet/")
+        await until(lambda: robot.is_open)
+        yield robot, page
+
+
+async def transform(page: Page, selector: str) -> str:
+    """Return what moves an element."""
+    found: str = await page.eval_on_selector(selector, "(el) => el.style.transform")
+    return found
+
+
+async def test_needles_bars_and_tapes_stand_where_the_value_is(new_page: PageMaker) -> None:
+    """Each at once and without easing, in the frame that writes the number."""
+    uses = (
+        use("gauge", {"value": "amps", "target": "goal"}, extremes=True),
+        use("bar", {"value": "pace"}, origin=0),
+        use("speed", {"measured": "pace"}, unit="km/h"),
+        use("altitude", {"altitude": "height"}, reference="home"),
+        use("compass", {"heading": "yaw", "target": "way"}, convention="yaw"),
+        use("attitude", {"orientation": "turned"}, axes="FLU", roll_limit=30),
+        use("state", {"value": "mode"}, meanings={"leak": "alarm"}),
+        use("battery", {"cells": "cells"}, imbalance=0.2),
+    )
+    async with shown(new_page, *uses) as (robot, page):
+        robot.say("amps", 20.0)
+        await until_text(page, ".gauge-text", "20.0")
+        robot.say("amps", 15.0)
+        robot.say("goal", 30)
+        robot.say("pace", -1.0)
+        robot.say("height", 31.25)
+        robot.say("yaw", 0.0)  # east
+        robot.say("way", 1.5707963)  # north
+        robot.say("turned", (0.17364818, 0.0, 0.0, 0.98480775))  # 20 degrees about x
+        robot.say("mode", "leak")
+        robot.say("cells", (3.9, 3.5, None))
+        await until_text(page, ".gauge-text", "15.0")
+        assert await transform(page, ".gauge-needle") == "rotate(0deg)"
+        await until_attribute(page, ".gauge-target", "visibility", "visible")
+        assert await transform(page, ".gauge-target") == "rotate(135deg)"
+        marks = await page.locator(".gauge-extremes path").evaluate_all(
+            "(all) => all.map((el) => el.style.transform)"
+        )
+        assert marks == ["rotate(0deg)", "rotate(45deg)"]
+
+        await until_text(page, ".bar-text", "-1")
+        fill = "(el) => ['--bar-from', '--bar-long'].map((name) => el.style.getPropertyValue(name))"
+        assert await page.eval_on_selector(".bar-fill", fill) == ["0.2500", "0.2500"]
+        await until_text(page, ".speed-text", "-3.6")
+        await until_text(page, ".altitude-text", "31.3")  # half up, as JavaScript rounds 31.25
+        assert await transform(page, ".altitude-tape") == "translateY(-87.5px)"
+        await until_text(page, ".altitude-reference", "above home")
+
+        await until_text(page, ".compass-note", "target 90° left")
+        await until_text(page, ".compass-text", "090")
+        assert await transform(page, ".compass-needle") == "rotate(90deg)"
+        await until_text(page, ".attitude-words", "right side down 20°")
+        assert await transform(page, ".attitude-world") == "rotate(-20deg) translateY(0px)"
+        await until_text(page, ".state-shape", "▲")
+        await until_text(page, ".battery-note", "◆ Cells differ by 0.40 V")
+        figures = await page.locator(".battery-figure").all_text_contents()
+        assert figures == ["3.90", "3.50", "—"]
+
+        moved = (".gauge-needle", ".bar-fill", ".altitude-tape", ".compass-needle")
+        assert await page.evaluate(NO_EASING, list(moved)) == ["0s none"] * len(moved)
+
+        robot.say("turned", (0.5, 0.0, 0.0, 0.8660254))  # 60 degrees
+        await until_text(page, ".attitude-note", "▲ Leans too far")
+        robot.say("turned", (0.0, 0.0, 0.0, 0.0))  # no orientation at all
+        await until_text(page, ".attitude-words", "—")
+        await until_attribute(page, ".attitude", "data-known", "no")
+
+
+async def test_a_table_puts_the_gravest_first_and_filters(new_page: PageMaker) -> None:
+    """Diagnostics of the robot and signals of any kind stand in one list."""
+    uses = (WidgetUse("table", "table", {"report": "report"}, lists={"values": ("amps", "mode")}),)
+    async with shown(new_page, *uses) as (robot, page):
+        robot.say("amps", 22.0, alarm="high")
+        robot.say("mode", "docked")
+        robot.say("report", {"lid": {"level": 2, "message": "open"}, "radio": "ok"})
+        await until_text(page, ".table-count", "2 not OK")
+        names = "(rows) => rows.map((row) => row.children[1].textContent)"
+        rows = page.locator(".table-body tr")
+        assert await rows.evaluate_all(names) == ["lid", "amps", "radio", "mode"]
+        await page.fill(".table-filter", "WARN")
+        await page.wait_for_function(
+            "() => document.querySelectorAll('.table-body tr').length === 1"
+        )
+        assert await rows.evaluate_all(names) == ["amps"]
+        await page.fill(".table-filter", "nothing has this")
+        await until_text(page, ".table-body td:nth-child(2)", "no row fits the filter")
+
+
+async def test_a_heading_is_chosen_and_then_sent(new_page: PageMaker) -> None:
+    """A tap on the rose chooses, the keys turn it, and only the button sends it."""
+    compass = WidgetUse("compass", "compass", {"heading": "yaw"}, {"set_heading": "turn_to"})
+    compass = compass._replace(options={"convention": "bearing"})
+    command = Command("turn_to", "wire", WriteSpec("text"), {"value": Argument("value")})
+    async with shown(new_page, compass, columns=1, turn_to=command) as (robot, page):
+        robot.on_command = lambda name, arguments: {}
+        robot.say("yaw", 0.0)
+        await until_text(page, ".compass-text", "000")
+        assert await page.is_disabled(".compass-set")
+        box = await page.locator(".compass-body").bounding_box()
+        assert box is not None
+        middle = (box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+        await page.mouse.click(middle[0] + box["height"] / 3, middle[1])
+        await until_text(page, ".compass-set", "Set 090°")
+        await page.keyboard.press("ArrowRight")
+        await until_text(page, ".compass-set", "Set 091°")
+        assert robot.commands == []
+        await page.click(".compass-set")
+        await until(lambda: bool(robot.commands))
+        (name, arguments), *more = robot.commands
+        assert (name, more) == ("turn_to", [])
+        assert arguments["value"] == pytest.approx(1.5882496)  # 91 degrees in the robot's rad
+        await until_text(page, ".compass-set", "Set heading")
+
+
+LINES = 10
+LAST_VALUE_IS = """
+(text) => document.querySelector("li:last-child .plot-value")?.textContent === text
+"""
+COLOURS = """
+() => {
+  const canvas = document.querySelector(".plot-canvas");
+  const { width, height } = canvas;
+  const pixels = canvas.getContext("2d").getImageData(0, 0, width, height).data;
+  const found = new Set();
+  for (let place = 0; place < pixels.length; place += 4) {
+    if (pixels[place + 3] === 255) found.add(pixels.slice(place, place + 3).join());
+  }
+  return found.size;
+}
+"""
+
+
+async def test_a_plot_draws_each_signal_and_can_be_looked_at(
+    new_page: PageMaker, tmp_path: Path
+) -> None:
+    """Lines as they come; paused, a cursor reads them; what is seen is saved."""
+    names = [f"m{place}" for place in range(LINES)]
+    signals = {name: Signal(name, unit="A", precision=1, stale_after_s=60) for name in names}
+    plot = WidgetUse("plot", "plot", {}, {}, {"window": "10s"}, "Currents")
+    plot = plot._replace(lists={"series": tuple(names)})
+    robot = FakeRobot(dashboard_profile(signals=signals, uses=[plot]))
+    async with running_dashboard(robot) as address:
+        page = await new_page()
+        await page.goto(f"{address}robots/puppet/")
+        await until(lambda: robot.is_open)
+        for step in range(6):
+            for place, name in enumerate(names):
+                robot.say(name, place + step % 2 / 2, age_s=(6 - step) / 5)
+            value = f"{9 + step % 2 / 2:.1f} A"
+            await page.wait_for_function(
+                LAST_VALUE_IS,
+                arg=value,
+            )
+        # Six colours, and the rest of the ten lines in the same with dashes.
+        await page.wait_for_function(f"() => ({COLOURS})() >= 6")
+        await page.click(".plot-entry >> nth=0")
+        await until_attribute(page, ".plot-entry", "aria-pressed", "false")
+        await page.click(".plot-entry >> nth=0")
+
+        await page.click(".plot-pause")
+        await page.wait_for_selector(".plot-history .u-over")
+        await until_attribute(page, ".plot-pause", "aria-pressed", "true")
+        await page.focus(".plot-history")
+        for _ in range(3):
+            await page.keyboard.press("ArrowRight")
+        await page.wait_for_function(
+            "() => /\\d:\\d\\d/.test(document.querySelector('.plot-note').textContent)"
+        )
+        async with page.expect_download() as download:
+            await page.click(".plot-save")
+        file = tmp_path / "plot.csv"
+        await (await download.value).save_as(file)
+        rows = list(csv.reader(file.read_text("utf-8").splitlines()))
+        assert rows[0] == ["time", *(f"{name} (A)" for name in names)]
+        assert sorted(float(row[10]) for row in rows[1:] if row[10]) == [9.0] * 3 + [9.5] * 3
+
+        await page.click(".plot-pause")
+        await page.wait_for_selector(".plot-canvas", state="visible")
+        assert await page.locator(".plot-history .u-over").count() == 0
+        robot.say("m0", 40.0)  # far above the scale, which grows at once
+        await page.wait_for_function(
+            "() => Number([...document.querySelectorAll('.plot-figure')].at(-1).textContent) >= 40"
+        )
+
+
+async def test_the_newest_picture_is_shown(new_page: PageMaker) -> None:
+    """In its own size, fitted by the style sheet; a picture of the options stands there before."""
+    source = "data:image/svg+xml,%3Csvg xmlns='http://www.w3.org/2000/svg' width='9' height='9'/%3E"
+    async with shown(new_page, use("image", {"picture": "seen"}, source=source)) as (robot, page):
+        await page.wait_for_selector(".image-place img")
+        robot.say("seen", made_picture(40, 30))
+        await page.wait_for_selector(".image-place canvas")
+        await page.wait_for_function(
+            "() => document.querySelector('.image-place canvas').width === 40"
+        )
+        assert await page.locator(".image-place img").count() == 0
+        assert await page.get_attribute(".image-place canvas", "role") == "img"
+
+
+async def test_a_note_is_rendered_without_markup_of_its_own(new_page: PageMaker) -> None:
+    """Markdown is; HTML in it is text, links lead elsewhere, and there are no pictures."""
+    text = "# Go\n\n**now** <b>x</b> ![p](/x.png) [a](https://example.org) [b](javascript:alert(1))"
+    async with shown(new_page, use("markdown", {}, text=text)) as (_, page):
+        note = page.locator(".markdown-text")
+        assert await note.locator("h4").inner_text() == "Go"
+        assert await note.locator("strong").inner_text() == "now"
+        assert await note.locator("b, img, script").count() == 0
+        links = note.locator("a")
+        assert await links.count() == 2  # the picture's address is one, too
+        assert await links.last.get_attribute("rel") == "noopener noreferrer"
+        assert await links.last.get_attribute("href") == "https://example.org"

@@ -1,0 +1,279 @@
+"""What hands do to each input, in a real browser, and what then reaches the robot."""
+
+import asyncio
+
+import pytest
+
+from tests.e2e.conftest import PageMaker
+from tests.e2e.dashboards import until, until_attribute, until_text
+from tests.e2e.motion.driving import (
+    centre,
+    fingers_on,
+    fire,
+)
+from tests.e2e.widgets.inputs import PLAIN, drag, shown, until_values, use
+
+pytestmark = pytest.mark.anyio
+
+
+async def test_a_stick_goes_where_its_options_say(new_page: PageMaker) -> None:
+    """Gate, turned axis, speed step by button and by key; what it says is beside the thumb."""
+    stick = use("joystick", gate="cross", invert_y=True, **PLAIN)
+    async with shown(new_page, stick) as (robot, page):
+        await drag(page, ".joystick-pad", 300, 320)
+        await until_values(robot, x=1.0)
+        await until_text(page, ".joystick-beside", "+1.00  0.00")
+        slider = page.get_by_role("slider", name="joystick: forward and backward")
+        assert await slider.get_attribute("aria-valuetext") == "forward 100 %"
+        await page.mouse.move(0, 450)
+        await until(lambda: robot.values("go").get("y", 0) < 0)
+        await page.mouse.up()
+        await robot.until_stopped("go")
+        await page.get_by_role("button", name="Speed 30 %").click()
+        await slider.focus()
+        await page.keyboard.down("KeyW")
+        await until_values(robot, x=0.15)
+        await page.keyboard.press("Digit2")
+        await until_values(robot, x=0.3)
+        await page.keyboard.up("KeyW")
+        await robot.until_stopped("go")
+
+
+async def test_slew_holds_up_speeding_up_and_never_stopping(new_page: PageMaker) -> None:
+    """It begins at nothing and grows; letting go is a stop at once."""
+    async with shown(new_page, use("joystick", slew=2.0, **PLAIN)) as (robot, page):
+        await drag(page, ".joystick-pad", 0, 400)
+        await until_values(robot, x=1.0)
+        speeds = [
+            float(text.split("x=")[1].split()[0])
+            for text in robot.line.texts
+            if text.startswith("go x")
+        ]
+        assert speeds == sorted(speeds)
+        assert speeds[0] == 0
+        assert len(set(speeds)) > 5, "it took several steps"
+        await page.mouse.up()
+        await robot.until_stopped("go")
+
+
+async def test_a_raw_pointer_event_sends_without_waiting_for_a_frame(new_page: PageMaker) -> None:
+    """In a secure context the tick leaves within the event of the pointer."""
+    async with shown(new_page, use("joystick", **PLAIN)) as (robot, page):
+        await fire(
+            page,
+            """
+            window.isRaw = false; window.rawTicks = 0;
+            addEventListener("pointerrawupdate", () => { window.isRaw = true; }, true);
+            addEventListener("pointerrawupdate", () => { window.isRaw = false; });
+            const send = WebSocket.prototype.send;
+            WebSocket.prototype.send = function (text) {
+              if (window.isRaw && text.includes('"tick"')) window.rawTicks += 1;
+              return send.call(this, text);
+            };
+            null;
+            """,
+        )
+        await drag(page, ".joystick-pad", 0, 30)
+        await until(lambda: robot.values("go").get("x", 0) > 0)
+        x, y = await centre(page, ".joystick-pad")
+        for step in range(40):
+            await page.mouse.move(x, y - 30 - step)
+            await asyncio.sleep(0.01)
+        await page.wait_for_function("() => window.rawTicks > 5")
+
+
+async def test_a_cross_of_arrows_needs_no_dragging(new_page: PageMaker) -> None:
+    """A press is full on, the thumb may slide, and keys hold it."""
+    async with shown(new_page, use("dpad", level=0.5)) as (robot, page):
+        await page.get_by_role("button", name="forward", exact=True).hover()
+        await page.mouse.down()
+        await until_values(robot, x=0.5)
+        await until_attribute(page, "[data-at='1 0']", "aria-pressed", "true")
+        await page.get_by_role("button", name="forward and to the right").hover()
+        await until_values(robot, x=0.5, y=-0.5)
+        await page.mouse.up()
+        await robot.until_stopped("go")
+        await page.get_by_role("button", name="to the left", exact=True).focus()
+        await page.keyboard.down("Enter")
+        await until_values(robot, y=0.5)
+        await page.keyboard.up("Enter")
+        await robot.until_stopped("go")
+
+
+async def test_a_lever_stays_only_while_a_dead_man_is_held(new_page: PageMaker) -> None:
+    """Let go by itself it returns; beside a dead-man it stays, and stops with it."""
+    lever = use("axis", "level", stay=True, **PLAIN)
+    async with shown(new_page, lever, use("deadman"), size="tablet") as (robot, page):
+        hands = await fingers_on(page)
+        x, y = await centre(page, ".axis-lever")
+        await hands.put(0, x, y)
+        await until_text(page, ".axis-note", "◆ hold the dead-man control first")
+        await hands.lift(0)
+        assert robot.line.texts == []
+        await hands.put(1, *(await centre(page, ".deadman-main")))
+        await until_attribute(page, ".deadman", "data-open", "yes")
+        await hands.put(0, x, y)
+        await hands.put(0, x, y - 400)
+        await until_values(robot, "level", value=1.0)
+        await hands.lift(0)
+        count = len(robot.line.written)
+        await until(lambda: len(robot.after(count)) > 5)
+        assert robot.values("level") == {"value": 1.0}, "it stays"
+        await hands.put(0, x, y)
+        await hands.put(0, x, y + 1)
+        count = len(robot.line.written)
+        await until(lambda: len(robot.after(count)) > 2)
+        assert robot.values("level")["value"] > 0.9, "taken hold of again, it does not jump"
+        await hands.lift(0)
+        await hands.lift(1)
+        await robot.until_stopped("level")
+        await until_text(page, ".axis-note", "◆ the dead-man was let go")
+
+
+async def test_an_axis_without_a_spring_stays_and_the_other_returns(new_page: PageMaker) -> None:
+    """Beside a dead-man's key; the face that floats comes to the thumb, and goes home."""
+    stick = use("joystick", spring_x=False, origin="floating", gate="square", **PLAIN)
+    async with shown(new_page, stick, use("deadman")) as (robot, page):
+        await fire(page, "document.activeElement.blur()")
+        await page.keyboard.down("ShiftLeft")
+        await until_attribute(page, ".deadman", "data-open", "yes")
+        x, y = await centre(page, ".joystick-pad")
+        await page.mouse.move(x + 40, y + 40)
+        await page.mouse.down()
+        assert await page.get_attribute(".joystick-all", "transform") != "translate(0.0 0.0)"
+        await page.mouse.move(x - 300, y - 300, steps=3)
+        await until_values(robot, x=1.0, y=1.0)
+        await page.mouse.up()
+        await until_values(robot, x=1.0)
+        await until_attribute(page, ".joystick-all", "transform", "translate(0.0 0.0)")
+        await page.keyboard.up("ShiftLeft")
+        await robot.until_stopped("go")
+
+
+async def test_a_dead_man_is_a_key_too_or_a_switch_with_an_end(new_page: PageMaker) -> None:
+    """Shift holds it from anywhere; a switched one goes off by itself, and says why."""
+    stick = use("joystick", **PLAIN)
+    async with shown(new_page, stick, use("deadman")) as (robot, page):
+        await page.focus(".joystick-pad")
+        await page.keyboard.down("ShiftLeft")
+        await page.keyboard.down("KeyW")
+        await until_values(robot, x=0.5)
+        await page.keyboard.up("ShiftLeft")
+        await robot.until_stopped("go")
+        await page.keyboard.up("KeyW")
+    switched = use("deadman", mode="toggle", timeout=1.0)
+    async with shown(new_page, stick, switched) as (robot, page):
+        await page.get_by_role("button", name="deadman").click()
+        await page.focus(".joystick-pad")
+        await page.keyboard.down("KeyW")
+        await until_values(robot, x=0.5)
+        await page.keyboard.up("KeyW")
+        await until_attribute(page, ".deadman", "data-open", "no")
+        await until_text(page, ".deadman-note", "◆ nothing was driven for too long")
+
+
+async def test_keys_drive_from_anywhere_once_they_are_switched_on(new_page: PageMaker) -> None:
+    """Not while somebody types; Space is STOP, whatever has the focus."""
+    async with shown(new_page, use("keyboard", level=0.5)) as (robot, page):
+        await fire(page, "document.activeElement.blur()")
+        await page.keyboard.press("KeyW")
+        assert robot.line.texts == []
+        await page.get_by_role("button", name="On the whole page").click()
+        await page.keyboard.down("KeyW")
+        await page.keyboard.down("KeyQ")
+        await until_values(robot, x=0.5, turn=0.5)
+        await page.keyboard.up("KeyW")
+        await until_values(robot, turn=0.5)
+        await page.keyboard.up("KeyQ")
+        await robot.until_stopped("go")
+        await fire(
+            page,
+            "document.querySelector('.urc-bar').append(document.createElement('textarea'));"
+            "document.querySelector('textarea').focus()",
+        )
+        count = len(robot.line.written)
+        await page.keyboard.type("wasd ")
+        assert await page.input_value("textarea") == "wasd "
+        assert robot.after(count) == []
+        await page.get_by_role("button", name="On the whole page").focus()
+        await page.keyboard.down("KeyS")
+        await until_values(robot, x=-0.5)
+        await page.keyboard.press("Space")
+        await robot.until_stopped("go")
+        await page.wait_for_selector("[data-controls][data-state='latched']")
+        on = page.get_by_role("button", name="On the whole page")
+        assert await on.get_attribute("aria-pressed") == "true", "Space pressed no button"
+
+
+STRANGE_PAD = """
+window.pad = { id: "Strange", index: 0, connected: true, mapping: "", axes: [0, 0, -1, 0, 0],
+  timestamp: 1, buttons: Array.from({ length: 6 }, () => ({ pressed: false })) };
+navigator.getGamepads = () => [window.pad];
+dispatchEvent(new Event("gamepadconnected"));
+setInterval(() => { if (!window.isFrozen) window.pad.timestamp += 1; }, 20);
+"""
+
+
+async def test_a_strange_gamepad_is_learnt_kept_and_driven(new_page: PageMaker) -> None:
+    """Its axes and buttons are shown; what was learnt is kept on the device; frozen, it lets go."""
+    async with shown(new_page, use("gamepad", **PLAIN)) as (robot, page):
+        await fire(page, STRANGE_PAD)
+        await page.wait_for_selector(".gamepad-device:has-text('nobody knows')")
+        await fire(page, "pad.axes[3] = -1; pad.buttons[2].pressed = true")
+        await until_text(page, ".gamepad-axis:nth-child(4)", "3: −1.00")
+        await until_text(page, ".gamepad-button:nth-child(3)", "● 2")
+        await fire(page, "pad.axes[3] = 0; pad.buttons[2].pressed = false")
+        await page.click(".gamepad-map summary")
+        await page.get_by_role("button", name="Change: Left stick, along").click()
+        await page.wait_for_selector(".gamepad-learn:has-text('pull it back')")
+        await fire(page, "pad.axes[3] = -1")
+        await page.wait_for_selector(".gamepad-part:nth-child(2):has-text('3 ↔')")
+        await fire(page, "pad.axes[3] = 0")
+        await page.get_by_role("button", name="Change: Enables the left stick").click()
+        await page.wait_for_selector(".gamepad-learn:has-text('press a button')")
+        await fire(page, "pad.buttons[2].pressed = true")
+        await page.wait_for_selector(".gamepad-learn:has-text('press a button')", state="hidden")
+        kept = await page.evaluate("JSON.parse(localStorage['urc-pad:Strange'])")
+        assert (kept["axes"][1], kept["turned"][1], kept["left"]) == (3, True, [2])
+        assert robot.line.texts == [], "a button that was down already enables nothing"
+        await fire(page, "pad.axes[2] = 0; pad.buttons[2].pressed = false")
+        await until_text(page, ".gamepad-button:nth-child(3)", "○ 2")
+        await fire(page, "pad.buttons[2].pressed = true")
+        await until_values(robot)
+        await fire(page, "pad.axes[3] = 1")  # its sign is turned: ahead
+        await until_values(robot, x=1.0)
+        await fire(page, "window.isFrozen = true")
+        await robot.until_stopped("go")
+        count = len(robot.line.written)
+        await fire(page, "window.isFrozen = false; pad.axes[3] = 0")
+        await until_text(page, ".gamepad-axis:nth-child(4)", "3: 0.00")
+        await fire(page, "pad.axes[3] = 1")
+        await until_text(page, ".gamepad-axis:nth-child(4)", "3: +1.00")
+        assert robot.after(count) == [], "it needs a new press"
+
+
+TILT = (
+    "dispatchEvent(new DeviceOrientationEvent('deviceorientation',"
+    " {{ alpha: 0, beta: {beta}, gamma: {gamma} }}))"
+)
+
+
+async def test_tilt_drives_while_the_pad_is_held_and_so_does_dragging(new_page: PageMaker) -> None:
+    """How it was held when the pad was touched is the middle, anew at each press."""
+    async with shown(new_page, use("tilt", range=20.0, **PLAIN)) as (robot, page):
+        await fire(page, TILT.format(beta=40, gamma=0))
+        await drag(page, ".tilt-pad", 0, 400)
+        await until_values(robot, x=1.0)
+        await page.mouse.up()
+        await robot.until_stopped("go")
+        await page.get_by_role("button", name="Use tilt").click()
+        await until_text(page, ".tilt-state", "Hold the pad and tilt the device.")
+        await fire(page, TILT.format(beta=60, gamma=0))
+        count = len(robot.line.written)
+        await drag(page, ".tilt-pad", 0, 50)
+        await until(lambda: len(robot.after(count)) > 3)
+        assert not any(robot.values("go").values()), "the middle is where it is"
+        await fire(page, TILT.format(beta=50, gamma=-10))
+        await until_values(robot, x=0.5, y=0.5)
+        await page.mouse.up()
+        await robot.until_stopped("go")

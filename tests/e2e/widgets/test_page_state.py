@@ -1,0 +1,64 @@
+"""Widgets that show what the page knows beside signals, in a real browser: log, alerts, links."""
+
+from pathlib import Path
+
+import pytest
+
+from tests.e2e.conftest import PageMaker
+from tests.e2e.dashboards import running_dashboard, until, until_text
+from urc.model.interface import WidgetUse
+from urc.model.values import Signal
+from urc.testing.dashboard import FakeRobot, dashboard_profile
+
+pytestmark = pytest.mark.anyio
+
+
+async def test_what_the_page_knows_is_shown_and_acted_upon(new_page: PageMaker) -> None:
+    """Lines by level and words; alerts until somebody has seen them; the controls of the robot."""
+    uses = [
+        WidgetUse("log", "log", title="Messages"),
+        WidgetUse("alerts", "alerts"),
+        WidgetUse("link", "link"),
+    ]
+    volts = Signal("volts", "number", title="Battery", unit="V", stale_after_s=60)
+    robot = FakeRobot(dashboard_profile(uses=uses, signals={"volts": volts}))
+    async with running_dashboard(robot) as address:
+        page = await new_page(size="desktop")
+        await page.goto(f"{address}robots/puppet/")
+        await until(lambda: robot.is_open)
+        robot.tell("<b>one</b>")
+        robot.tell("two")
+        lines = page.locator(".log-lines > li")
+        await lines.nth(1).wait_for()
+        assert "<b>one</b>" in await lines.nth(0).inner_text()
+        await page.fill(".log-filter", "TWO wire")
+        await until_text(page, ".log-lines > li:only-child > .log-sign", "")
+        await page.fill(".log-filter", "")
+        await page.click(".log-pause")
+        robot.tell("three")
+        await page.locator(".log-note", has_text="held still; 1 newer").wait_for()
+        assert await lines.count() == 2
+        await page.click(".log-pause")
+        await lines.nth(2).wait_for()
+        async with page.expect_download() as saving:
+            await page.click(".log-save")
+        saved = Path(await (await saving.value).path()).read_text("utf-8").splitlines()
+        assert [line.split("\t")[1:] for line in saved[-1:]] == [["info", "wire", "three"]]
+
+        robot.say("volts", 9.8, alarm="low")
+        await until_text(page, ".alerts-note", "1 not acknowledged")
+        assert "Battery: Low, 9.8 V" in await page.inner_text(".alerts-said")
+        await page.click(".alerts-seen")
+        await until_text(page, ".alerts-note", "0 not acknowledged")
+        robot.say("volts", 9.0, alarm="lolo")  # worse is new
+        await until_text(page, ".alerts-note", "1 not acknowledged")
+        await page.click(".alerts-later")
+        await page.locator(".alerts-note", has_text="1 put off").wait_for()
+        robot.say("volts", 12.0)
+        await until_text(page, ".alerts-note", "— ✓ no alert")
+
+        await page.locator(".link-now", has_text="Live").wait_for()
+        await page.locator(".link-facts dd", has_text="tcp 127.0.0.1:6789").wait_for()
+        robot.link("lost", "pulled")
+        await page.locator(".link-now", has_text="▲ Robot lost").wait_for()
+        await page.locator(".link-facts dd", has_text="pulled").wait_for()

@@ -1,0 +1,115 @@
+// What the command widgets reckon: steps, dials, typed numbers and bytes, lines, alerts, round trips.
+import assert from "node:assert/strict";
+import { test } from "node:test";
+
+import { boundsOf, keyed, snapped } from "../../urc/web/static/giving.js";
+import { Book } from "../../widgets/alerts/book.js";
+import { angleOf, arc, ray, shareAt, sharePulled } from "../../widgets/knob/dial.js";
+import { quality, Trips } from "../../widgets/link/trips.js";
+import { chosen, fileOf } from "../../widgets/log/lines.js";
+import { numberOf } from "../../widgets/number/typed.js";
+import { hexOf, pairsOf, plain, Typed } from "../../widgets/terminal/hex.js";
+
+const VOLTS = { type: "number", title: "", unit: "V", min: 0, max: 10, choices: [], default: null, allowsControl: false };
+
+test("an option narrows what a command takes, and never widens it", () => {
+  assert.deepEqual(boundsOf(VOLTS, {}), { min: 0, max: 10, step: 0.1, digits: 1, unit: "V" });
+  assert.deepEqual(boundsOf(VOLTS, { min: -5, max: 4, step: 0.25 }), { min: 0, max: 4, step: 0.25, digits: 2, unit: "V" });
+  const whole = boundsOf({ ...VOLTS, type: "integer", max: 1000 }, {});
+  assert.deepEqual([whole.step, whole.digits], [10, 0]);
+  assert.deepEqual(boundsOf(undefined, {}), { min: 0, max: 100, step: 1, digits: 0, unit: "" });
+});
+
+test("keys step, leap and go to the ends, on the grid and within the bounds", () => {
+  const bounds = { min: 0, max: 10, step: 0.1 };
+  assert.equal(keyed("ArrowRight", 0.2, bounds), 0.3);
+  assert.equal(keyed("ArrowDown", 0, bounds), 0);
+  assert.equal(keyed("PageUp", 2, bounds), 3);
+  assert.equal(keyed("End", 2, bounds), 10);
+  assert.equal(keyed("Enter", 2, bounds), null);
+  assert.equal(snapped(3.26, { min: 0, max: 10, step: 0.5 }), 3.5);
+  assert.equal(snapped(99, { min: 1, max: 10, step: 4 }), 10);
+});
+
+test("a dial goes three quarters round and does not leap over its gap", () => {
+  assert.deepEqual([angleOf(0), angleOf(0.5), angleOf(1)], [-135, 0, 135]);
+  assert.equal(shareAt(0, -1), 0.5);
+  assert.equal(shareAt(0.1, 0.1), null);
+  assert.equal(shareAt(-0.01, 1), 0);
+  assert.equal(sharePulled(-0.01, 1, 0.97), 1);
+  assert.equal(sharePulled(0, 0, 0.4), 0.4);
+  assert.match(arc(10, 0, 1), /^M-7.07 7.07A10 10 0 1 1 7.07 7.07$/);
+  assert.equal(ray(1, 2, 0.5), "M0 -1L0 -2");
+});
+
+test("a number is taken as people write it, and refused with the reason", () => {
+  const bounds = { min: -5, max: 10, unit: "V", isWhole: false };
+  assert.deepEqual(numberOf(" 7,25 V", bounds), { value: 7.25 });
+  assert.deepEqual(numberOf("−3", bounds), { value: -3 });
+  assert.deepEqual(numberOf("1e1", bounds), { value: 10 });
+  for (const [text, fault] of [["", "empty"], ["1.2.3", "none"], ["0x10", "none"], ["NaN", "none"], ["-6", "low"], ["11", "high"]]) {
+    assert.deepEqual(numberOf(text, bounds), { fault });
+  }
+  assert.deepEqual(numberOf("2.5", { ...bounds, isWhole: true }), { fault: "whole" });
+});
+
+test("bytes are pairs of digits, and control characters are shown and not obeyed", () => {
+  assert.deepEqual(pairsOf("0x06, 05 fF"), { value: "06 05 ff" });
+  assert.deepEqual(pairsOf(" "), { fault: "empty" });
+  assert.deepEqual(pairsOf("060"), { fault: "odd" });
+  assert.deepEqual(pairsOf("0g"), { fault: "letters" });
+  assert.deepEqual(pairsOf("00".repeat(513)), { fault: "long" });
+  assert.equal(hexOf("Aé"), "41 c3 a9");
+  assert.equal(plain("\x1b[31mred\x07\x9b"), "␛[31mred␇�");
+});
+
+test("lines that were typed come back in both directions, and the draft is kept", () => {
+  const typed = new Typed(["a"]);
+  typed.add("b");
+  typed.add("b");
+  assert.deepEqual(typed.lines, ["a", "b"]);
+  assert.deepEqual(
+    [typed.go(-1, "new"), typed.go(-1, "b"), typed.go(-1, "a"), typed.go(1, "a"), typed.go(1, "b"), typed.go(1, "new")],
+    ["b", "a", "a", "b", "new", "new"],
+  );
+});
+
+const LINES = [
+  { number: 0, time: 0, level: "info", source: "wire", text: "connected" },
+  { number: 1, time: 1000, level: "warning", source: "wire", text: "late\tanswer" },
+  { number: 2, time: 2000, level: "error", source: "arm", text: "lost" },
+];
+
+test("lines are chosen by level and by all words, the newest of them", () => {
+  const numbers = (wanted) => chosen(LINES, { level: "info", words: "", most: 9, ...wanted }).map(({ number }) => number);
+  assert.deepEqual(numbers({}), [0, 1, 2]);
+  assert.deepEqual(numbers({ level: "warning" }), [1, 2]);
+  assert.deepEqual(numbers({ words: "ANSWER wire" }), [1]);
+  assert.deepEqual(numbers({ most: 1 }), [2]);
+  assert.equal(fileOf(LINES.slice(1, 2)), "1970-01-01T00:00:01.000Z\twarning\twire\tlate answer\n");
+});
+
+test("an alert is new once, again when it is worse, and again when its rest is over", () => {
+  const book = new Book(null);
+  const alert = (alarm) => [{ signal: "v", title: "V", alarm, text: "1", unit: "", since: 0 }];
+  assert.equal(book.take(alert("low"), 0).length, 1);
+  assert.equal(book.take(alert("low"), 1).length, 0);
+  book.acknowledge("v");
+  assert.equal(book.state("v", 1), "seen");
+  assert.equal(book.take(alert("lolo"), 2).length, 1);
+  assert.equal(book.state("v", 2), "new");
+  book.shelve("v", 100);
+  assert.equal(book.state("v", 50), "shelved");
+  assert.equal(new Book(book.kept()).take(alert("lolo"), 60).length, 0);
+  assert.equal(book.take(alert("lolo"), 101).length, 1);
+  book.take([], 102);
+  assert.equal(book.take(alert("lolo"), 103).length, 1);
+});
+
+test("round trips have a middle, a tail and a grade", () => {
+  const trips = new Trips();
+  assert.deepEqual([trips.share(0.5), trips.late()], [null, null]);
+  for (const ms of [10, 20, 30, 300]) trips.add(ms);
+  assert.deepEqual([trips.share(0.5), trips.share(0.95), trips.late()], [30, 300, 0.25]);
+  assert.deepEqual([null, 10, 150, 400].map(quality), ["", "good", "caution", "bad"]);
+});

@@ -1,0 +1,212 @@
+// @ts-check
+/** The parts of the page that know no page: budget, pictures, follow, frames, units, store, kit. */
+import assert from "node:assert/strict";
+import { test } from "node:test";
+
+import { Budget } from "../../urc/web/static/budget.js";
+import { Alerts, Follows, Log } from "../../urc/web/static/follow.js";
+import { frameOf } from "../../urc/web/static/frames.js";
+import { DASH, clamp, format, many, number, numbers, t } from "../../urc/web/static/kit.js";
+import { Decoder } from "../../urc/web/static/picture.js";
+import { Store } from "../../urc/web/static/store.js";
+import { Units, converted } from "../../urc/web/static/units.js";
+
+test("a widget that is long in twenty of sixty calls is called once a second", () => {
+  const budget = new Budget();
+  for (let call = 0; call < 19; call += 1) budget.count(call * 16, 51);
+  assert.equal(budget.isSlow, false);
+  budget.count(19 * 16, 51);
+  assert.equal(budget.isSlow, true);
+  assert.equal(budget.allows(19 * 16 + 999), false);
+  assert.equal(budget.allows(19 * 16 + 1000), true);
+});
+
+test("long calls that are sixty calls ago are forgotten, and one that got quick is quick again", () => {
+  const budget = new Budget();
+  for (let call = 0; call < 600; call += 1) budget.count(call * 16, call % 4 === 0 ? 60 : 1);
+  assert.equal(budget.isSlow, false);
+  for (let call = 0; call < 20; call += 1) budget.count(10_000 + call, 60);
+  assert.equal(budget.isSlow, true);
+  for (let call = 0; call < 61; call += 1) budget.count(20_000 + call * 1000, 1);
+  assert.equal(budget.isSlow, false);
+});
+
+test("one that stops the page even once a second has spent what it had", () => {
+  const budget = new Budget();
+  for (let call = 0; call < 29; call += 1) budget.count(call * 1000, 600);
+  assert.equal(budget.isSpent, true);
+});
+
+/** @param {string} name */
+function bitmap(name) {
+  return { name, isClosed: false, width: 1, height: 1, close() { this.isClosed = true; } };
+}
+
+test("of three images that come while one is decoded, only the newest is decoded next", async () => {
+  /** @type {((value: ImageBitmap) => void)[]} */
+  const waiting = [];
+  /** @type {number[]} */
+  const shown = [];
+  const decoder = new Decoder(
+    (_, picture) => shown.push(picture.serial),
+    () => assert.fail("nothing failed"),
+    () => new Promise((resolve) => waiting.push(resolve)),
+  );
+  const blob = new Blob(["x"]);
+  for (const serial of [1, 2, 3, 4]) decoder.take({ blob, type: "image/png", serial });
+  assert.equal(waiting.length, 1);
+  const [first, second] = [bitmap("a"), bitmap("b")];
+  waiting[0]?.(/** @type {any} */ (first));
+  await new Promise((resolve) => setImmediate(resolve));
+  assert.deepEqual([shown, waiting.length, first.isClosed], [[1], 2, false]);
+  waiting[1]?.(/** @type {any} */ (second));
+  await new Promise((resolve) => setImmediate(resolve));
+  assert.deepEqual([shown, first.isClosed, second.isClosed], [[1, 4], true, false]);
+  decoder.take({ blob, type: "image/png", serial: 4 });
+  assert.equal(waiting.length, 2, "what is shown already is not decoded again");
+  decoder.end();
+  assert.equal(second.isClosed, true);
+});
+
+test("an image that is none is told, and the next one is shown", async () => {
+  const faults = [];
+  const shown = [];
+  const decoder = new Decoder(
+    () => shown.push(1),
+    (error) => faults.push(error),
+    async (blob) => {
+      if (blob.size === 1) throw new Error("no image");
+      return /** @type {any} */ (bitmap("b"));
+    },
+  );
+  decoder.take({ blob: new Blob(["x"]), type: "", serial: 1 });
+  await new Promise((resolve) => setImmediate(resolve));
+  decoder.take({ blob: new Blob(["xy"]), type: "", serial: 2 });
+  await new Promise((resolve) => setImmediate(resolve));
+  assert.deepEqual([faults.length, shown.length], [1, 1]);
+});
+
+test("who follows is told in a frame: at once, on change, and not after the end", () => {
+  let name = "dark";
+  let woken = 0;
+  const theme = () => ({ look: name, value: { name } });
+  const follows = new Follows(/** @type {any} */ ({ theme }), () => (woken += 1));
+  const end = new AbortController();
+  /** @type {string[]} */
+  const told = [];
+  follows.listen("theme", (news) => told.push(news.name), end.signal);
+  assert.deepEqual([told, woken], [[], 1]);
+  follows.frame();
+  follows.frame();
+  name = "night";
+  follows.frame();
+  end.abort();
+  name = "light";
+  follows.frame();
+  assert.deepEqual(told, ["dark", "night"]);
+  assert.throws(() => follows.listen(/** @type {any} */ ("weather"), () => {}, end.signal), /only theme/);
+});
+
+/** @param {number} count @param {number} [from] */
+function lines(count, from = 0) {
+  return Array.from({ length: count }, (_, index) => ({
+    age: 0,
+    level: /** @type {"info"} */ ("info"),
+    source: "wire",
+    text: `line ${from + index}`,
+  }));
+}
+
+test("lines of the log that come again are skipped, and lost ones are counted", () => {
+  const log = new Log();
+  log.add(lines(3), 0, "one");
+  log.add(lines(4, 1), 1, "one");
+  assert.deepEqual(log.lines.map(({ number, text }) => `${number} ${text}`), [
+    "0 line 0", "1 line 1", "2 line 2", "3 line 3", "4 line 4",
+  ]);
+  log.add(lines(1, 9), 9, "one");
+  assert.equal(log.news().value.missing, 4);
+  log.add(lines(600), 100, "two");
+  assert.deepEqual([log.lines.length, log.lines.at(-1)?.number], [500, 699]);
+});
+
+/** @param {Partial<import("../../urc/web/static/types.js").Signal>[]} signals */
+function storeOf(...signals) {
+  const store = new Store();
+  const named = signals.map((signal, index) => ({ name: `s${index}`, type: "number", ...signal }));
+  store.hello({ robot: "", title: "", now: 0, signals: named }, 0);
+  store.setUp(true, 0);
+  return store;
+}
+
+test("alarms are told the worst first, each since it began", () => {
+  const store = storeOf({ title: "A" }, { title: "B" });
+  const alerts = new Alerts();
+  store.values({ n: 0, i: [0, 1], v: [1, 2], a: [0, 0], s: ["high", "lolo"] }, 0);
+  const first = alerts.news(store, 1000).value;
+  assert.deepEqual(first.map(({ title, alarm, since }) => [title, alarm, since]), [
+    ["B", "lolo", 1], ["A", "high", 1],
+  ]);
+  store.values({ n: 1, i: [1], v: [2], a: [0] }, 1);
+  assert.deepEqual(alerts.news(store, 2000).value.map(({ title, since }) => [title, since]), [["A", 1]]);
+});
+
+test("elements of an array are converted like a number, and its limits too", () => {
+  const store = storeOf({ type: "array", unit: "rad", max: 2, limits: { high: 1 } });
+  store.values({ n: 0, i: [0], v: [[0, 1, null]], a: [0] }, 0);
+  const reading = store.reading("s0", 0, { factor: 10, offset: 1, symbol: "dd" });
+  assert.deepEqual(reading.value, [1, 11, null]);
+  assert.deepEqual([reading.signal.unit, reading.signal.max, reading.signal.limits?.high], ["dd", 21, 11]);
+});
+
+test("people see their own units, the value stays as it is declared", () => {
+  const store = storeOf({ unit: "m/s", precision: 1 });
+  store.setUnits("everyday");
+  store.values({ n: 0, i: [0], v: [10], a: [0] }, 0);
+  const { value, text, unit } = store.reading("s0", 0);
+  assert.deepEqual([value, text, unit], [10, "36.0", "km/h"]);
+  assert.equal(new Units("imperial").shown("degC").symbol, "°F");
+  assert.equal(converted(100, new Units("imperial").shown("degC")), 212);
+  assert.equal(new Units("toString").shown("m").symbol, "m");
+  assert.equal(converted("fast", { factor: 2, offset: 0 }), "fast");
+});
+
+test("a binary frame is an image with its signal, age and type", () => {
+  const type = "image/png";
+  const data = new ArrayBuffer(16 + type.length + 2);
+  const view = new DataView(data);
+  view.setUint8(0, 1);
+  view.setUint8(1, type.length);
+  view.setUint16(2, 513);
+  view.setUint32(4, 40);
+  view.setFloat64(8, 1000);
+  new Uint8Array(data).set([...type].map((letter) => letter.charCodeAt(0)), 16);
+  new Uint8Array(data).set([7, 8], 16 + type.length);
+  const frame = frameOf(data);
+  assert.deepEqual([frame?.index, frame?.ageMs, frame?.sentMs, frame?.type], [513, 40, 1000, type]);
+  assert.deepEqual([...(frame?.bytes ?? [])], [7, 8]);
+  for (const size of [0, 15, 20]) assert.equal(frameOf(data.slice(0, size)), null);
+  view.setUint8(0, 2);
+  assert.equal(frameOf(data), null);
+});
+
+test("an image has an age like every value, and goes with it", () => {
+  const store = storeOf({ type: "image", stale_after_s: 1 });
+  store.picture({ index: 0, ageMs: 500, sentMs: 0, type: "image/png", bytes: new Uint8Array(9) }, 0);
+  const fresh = store.reading("s0", 0);
+  assert.deepEqual([fresh.state, fresh.value, fresh.image?.blob.size], ["live", { bytes: 9 }, 9]);
+  assert.equal(store.reading("s0", 600).state, "stale");
+  assert.deepEqual([store.reading("s0", 60_000).state, store.reading("s0", 60_000).image], ["gone", null]);
+});
+
+test("the kit writes numbers for people, and never takes none for zero", () => {
+  assert.equal(format(12.3456, 2), "12.35");
+  assert.equal(format(-0.001, 1), "0.0");
+  assert.equal(format(123456.789), "123500");
+  for (const none of [null, undefined, NaN, Infinity, "3", true]) assert.equal(format(none), DASH);
+  const reading = storeOf({}).reading("s0", 0);
+  assert.deepEqual([number(reading), numbers(reading), many(reading)], [null, null, []]);
+  assert.deepEqual(numbers({ ...reading, value: [1, null, NaN] }), [1, null, null]);
+  assert.equal(clamp(5, 0, 3), 3);
+  assert.equal(t("{n} of {m}", { n: 1 }), "1 of {m}");
+});

@@ -1,0 +1,196 @@
+"""Demos of widgets, the gallery's pages, and which files of a widget's folder are served."""
+
+import base64
+import json
+import os
+from pathlib import Path
+
+import pytest
+from starlette.testclient import TestClient
+
+from urc.config.parse_widget import Shelf
+from urc.model.widget import Port, Widget
+from urc.problems import UrcError
+from urc.shipped import shipped
+from urc.testing.dashboard import FakeRobot, dashboard_profile
+from urc.web.app import Robot, build_app
+from urc.web.assets import MOST_FILES, widget_assets
+from urc.web.demos import DemoState, colour_bars, demo_states
+
+DEMO = """
+signals:
+  level: { type: number, unit: V }
+  series: [{ type: number }, { type: number, title: Second }]
+  eye: { type: image }
+outputs:
+  moved: drive
+  press: { command: go, title: Go, arguments: { power: { type: number, max: 2 } }, reply: true }
+states:
+  normal:
+    values: { level: 1, series: [2, 3], eye: { picture: [4, 2] } }
+    alarms: { level: low }
+    age_s: { level: 7 }
+    history: { level: [[3, 0.5]] }
+    shows: [one]
+  none: { values: {} }
+"""
+
+
+def made(folder: Path, demo: str = DEMO) -> Widget:
+    """Return a widget of a folder with this demo."""
+    (folder / "demo.yaml").write_text(demo, "utf-8")
+    inputs = {name: Port(name, is_many=name == "series") for name in ("level", "series", "eye")}
+    outputs = {"moved": Port("moved", is_held=True, arguments=("x",)), "press": Port("press")}
+    return Widget("lamp", "Lamp", folder, inputs, outputs)
+
+
+def states(folder: Path, demo: str = DEMO) -> dict[str, DemoState]:
+    """Return the states of that demo."""
+    return {state.name: state for state in demo_states(made(folder, demo))}
+
+
+def test_a_demo_is_a_robot_with_just_that_widget(tmp_path: Path) -> None:
+    """Lists bind lists, what is held is held, and what is answered is answered."""
+    state = states(tmp_path)["normal"]
+    assert dict(state.use.inputs) == {"level": "level", "eye": "eye"}
+    assert dict(state.use.lists) == {"series": ("series_0", "series_1")}
+    assert state.profile.driver.signals["series_1"].title == "Second"
+    drive, go = (state.profile.driver.commands[name] for name in ("drive", "go"))
+    assert drive.hold is not None
+    assert (drive.arguments["x"].min, drive.arguments["x"].max) == (-1, 1)
+    assert (go.title, go.hold, go.arguments["power"].max) == ("Go", None, 2)
+    assert go.reply is not None
+    assert state.shows == ("one",)
+
+
+def test_a_demo_says_a_reading_for_each_signal_that_has_a_value(tmp_path: Path) -> None:
+    """With age, alarm, and images as their bytes; those without a value are not named."""
+    news = json.loads(states(tmp_path)["normal"].news)
+    assert [signal["name"] for signal in news["hello"]["signals"]][:2] == ["level", "series_0"]
+    level, first, second, eye = news["readings"]
+    assert level == {"signal": "level", "age": 7, "alarm": "low", "value": 1}
+    assert (first["value"], second["value"]) == (2, 3)
+    assert eye["type"] == "image/png"
+    assert base64.b64decode(eye["picture"]) == colour_bars(4, 2)
+    assert news["history"] == {"level": [[3, 0.5]]}
+    assert json.loads(states(tmp_path)["none"].news)["readings"] == []
+
+
+@pytest.mark.parametrize(
+    ("value", "told"),
+    [
+        ("{ file: ../secret.png }", "there is no file '../secret.png'"),
+        ("{ file: missing.png }", "there is no file 'missing.png'"),
+        ("{ base64: '?' }", "base64"),
+        ("{ picture: [0, 1] }", "1 to 2048 pixels"),
+        ("{ picture: [1, 2, 3] }", "TypeError"),
+    ],
+)
+def test_an_image_that_cannot_be_had_is_told_in_one_line(
+    tmp_path: Path, value: str, told: str
+) -> None:
+    """No file outside of the widget's folder is read."""
+    (tmp_path / "secret.png").write_bytes(b"secret")
+    folder = tmp_path / "lamp"
+    folder.mkdir()
+    demo = DEMO.replace("{ picture: [4, 2] }", value)
+    with pytest.raises(UrcError) as caught:
+        states(folder, demo)
+    assert told in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_widget_serves_its_modules_and_small_files_and_nothing_else(tmp_path: Path) -> None:
+    """No hidden file, no template, no manifest, and no link that leads out."""
+    folder = tmp_path / "lamp"
+    (folder / "parts").mkdir(parents=True)
+    outside = tmp_path / "outside.js"
+    outside.write_text("secret", "utf-8")
+    for name in ("widget.js", "widget.css", "more.js", "parts/a.svg", ".b.js", "_c.js", "d.yaml"):
+        (folder / name).write_text("", "utf-8")
+    os.symlink(outside, folder / "link.js")
+    files = widget_assets([Widget("lamp", "Lamp", folder)]).files
+    names = ("more.js", "parts/a.svg", "widget.css", "widget.js")
+    assert sorted(files) == [f"lamp/{name}" for name in names]
+
+
+def test_a_widget_with_too_many_files_is_refused(tmp_path: Path) -> None:
+    """A folder is no place for a library."""
+    for number in range(MOST_FILES + 1):
+        (tmp_path / f"f{number}.js").write_text("", "utf-8")
+    with pytest.raises(UrcError, match=f"{MOST_FILES} are allowed"):
+        widget_assets([Widget("lamp", "Lamp", tmp_path)])
+
+
+@pytest.fixture
+def client() -> TestClient:
+    """Return a client of a dashboard; its robot has no part in the gallery."""
+    robot = FakeRobot(dashboard_profile())
+    app = build_app({"puppet": Robot(robot.profile, {}, robot.open)})
+    return TestClient(app, base_url="http://localhost")
+
+
+def test_the_gallery_lists_every_widget_and_the_menu_leads_there(client: TestClient) -> None:
+    """With its title and what it is for."""
+    page = client.get("/widgets").text
+    shelf = Shelf(shipped("widgets"))
+    for name in shelf.names():
+        assert f'href="/widgets/{name}/"' in page
+    assert 'href="/widgets"' in client.get("/").text
+
+
+def test_a_page_shows_each_state_of_the_widgets_that_it_names(client: TestClient) -> None:
+    """And serves their files, whether a robot uses them or not."""
+    page = client.get("/widgets/value+button/")
+    assert page.status_code == 200
+    for name in ("value", "button"):
+        widget = Shelf(shipped("widgets")).get(name)
+        assert widget is not None
+        assert page.text.count(f'data-widget="{name}"') == len(demo_states(widget))
+        assert client.get(f"/widgets/{name}/widget.js").status_code == 200
+    assert client.get("/widgets/value/widget.yaml").status_code == 404
+
+
+@pytest.mark.parametrize(
+    "path", ["/widgets/nothing/", "/widgets/value+nothing/", "/widgets/..%2fx/", "/widgets/+/"]
+)
+def test_a_widget_that_there_is_not_has_no_page(client: TestClient, path: str) -> None:
+    """Also when the others on the page are there."""
+    assert client.get(path).status_code == 404
+
+
+def test_only_a_page_for_developers_asks_whether_a_file_was_saved(client: TestClient) -> None:
+    """Without --dev nobody can make the server look at files again and again."""
+    assert client.get("/widgets/value/stamp").status_code == 404
+    assert 'data-stamp=""' in client.get("/widgets/value/").text
+
+
+def test_a_page_for_developers_sees_every_file_that_is_saved(tmp_path: Path) -> None:
+    """Also one that is new; and nothing when nothing was saved."""
+    folder = tmp_path / "battery"
+    folder.mkdir()
+    widget = made(folder)._replace(name="battery")
+    robot = FakeRobot(dashboard_profile(widgets=[widget]))
+    served = Robot(robot.profile, {}, robot.open)
+    app = build_app({"puppet": served}, remake={"puppet": lambda _: served})
+    browser = TestClient(app, base_url="http://localhost")
+    seen = [browser.get("/widgets/battery/stamp").text for _ in range(2)]
+    (folder / "widget.js").write_text("// new", "utf-8")
+    seen.append(browser.get("/widgets/battery/stamp").text)
+    (folder / "widget.js").write_text("// and longer", "utf-8")
+    seen.append(browser.get("/widgets/battery/stamp").text)
+    assert seen[0] == seen[1]
+    assert len(set(seen)) == 3
+
+
+def test_a_widget_of_a_robot_stands_before_the_shipped_one(tmp_path: Path) -> None:
+    """What the gallery shows is what the robot's page shows."""
+    folder = tmp_path / "battery"
+    folder.mkdir()
+    (folder / "template.html.j2").write_text("<p>mine</p>", "utf-8")
+    (folder / "demo.yaml").write_text("states: { normal: { values: {} } }", "utf-8")
+    own = Widget("battery", "Mine", folder, {"level": Port("level")})
+    robot = FakeRobot(dashboard_profile(widgets=[own]))
+    app = build_app({"puppet": Robot(robot.profile, {}, robot.open)})
+    page = TestClient(app, base_url="http://localhost").get("/widgets/battery/").text
+    assert "<p>mine</p>" in page

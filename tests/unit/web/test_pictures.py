@@ -1,0 +1,209 @@
+"""Images to those who show them: the newest, encoded once, and nothing that waits."""
+
+import asyncio
+import json
+import struct
+
+import pytest
+
+from tests.unit.web.test_client import FakeLine
+from urc.model.interface import WidgetUse
+from urc.model.values import Sample, Signal
+from urc.runtime.hub import Hub
+from urc.testing.clock import FakeClock, settle
+from urc.testing.dashboard import FakeRobot, dashboard_profile
+from urc.web import wire
+from urc.web.demos import colour_bars
+from urc.web.fanout import Fanout
+from urc.web.picture_shelf import SHARED_FOR_S, Looks, PictureShelf
+from urc.web.robots import Robot, Station
+from urc.web.socket import Client
+from urc.web.wire_picture import Show, as_frame, encode_picture, media_type
+
+pytestmark = pytest.mark.anyio
+
+USE = WidgetUse("cam", "camera", {"image": "cam"})
+JPEG = b"\xff\xd8\xff\xe0 and so on"
+
+
+def robot() -> tuple[Hub, PictureShelf, FakeClock]:
+    """Return a hub with two cameras and a number, and its shelf."""
+    clock = FakeClock()
+    hub = Hub(
+        {"a": Signal("a"), "left": Signal("left", "image"), "right": Signal("right", "image")}
+    )
+    return hub, PictureShelf(hub, clock), clock
+
+
+def looking_at(*names: str) -> Looks:
+    """Return a client that shows these."""
+    looks = Looks()
+    looks.show(names)
+    return looks
+
+
+def test_a_picture_says_its_signal_age_time_and_type() -> None:
+    """The header is the one that the page reads."""
+    message = encode_picture(513, JPEG, 40, 1234)
+    kind, length, index, age_ms, now_ms = struct.unpack(">BBHId", message[:16])
+    assert (kind, index, age_ms, now_ms) == (1, 513, 40, 1234)
+    assert message[16 : 16 + length] == b"image/jpeg"
+    assert message[16 + length :] == JPEG
+    assert struct.unpack(">I", encode_picture(0, JPEG, -5, 0)[4:8]) == (0,)
+    assert struct.unpack(">I", encode_picture(0, JPEG, 1 << 40, 0)[4:8]) == (2**32 - 1,)
+
+
+@pytest.mark.parametrize(
+    ("data", "kind"),
+    [
+        (JPEG, "image/jpeg"),
+        (colour_bars(2, 2), "image/png"),
+        (b"GIF89a", "image/gif"),
+        (b"RIFF\0\0\0\0WEBPVP8 ", "image/webp"),
+        (b"\0\0\0\x1cftypavif", "image/avif"),
+        (b"RIFF\0\0\0\0WAVE", "application/octet-stream"),
+        (b"<svg onload=alert(1)>", "application/octet-stream"),
+        (b"", "application/octet-stream"),
+    ],
+)
+def test_a_type_is_told_by_how_the_bytes_begin(data: bytes, kind: str) -> None:
+    """Never by what a robot says, and never one that can run."""
+    assert media_type(data) == kind
+
+
+@pytest.mark.parametrize("size", [0, 125, 126, 65535, 65536])
+def test_a_frame_has_the_length_that_the_protocol_wants(size: int) -> None:
+    """RFC 6455, 5.2: seven bits, two bytes, or eight; final, binary, not masked."""
+    frame = as_frame(b"x" * size)
+    assert frame[0] == 0x82
+    if size < 126:
+        assert (frame[1], len(frame)) == (size, size + 2)
+    elif size < 1 << 16:
+        assert (frame[1], int.from_bytes(frame[2:4]), len(frame)) == (126, size, size + 4)
+    else:
+        assert (frame[1], int.from_bytes(frame[2:10]), len(frame)) == (127, size, size + 10)
+
+
+def test_who_was_away_gets_the_newest_and_no_other() -> None:
+    """Three came, one is sent; then there is nothing until the next."""
+    hub, shelf, clock = robot()
+    looks = looking_at("left")
+    for data in (b"one", b"two", b"three"):
+        hub.put([Sample("left", data, clock.now())])
+    made = shelf.take(looks)
+    assert made is not None
+    assert made.message.endswith(b"three")
+    assert shelf.take(looks) is None
+    hub.put([Sample("left", b"three", clock.now())])  # the same bytes are news: they are younger
+    assert shelf.take(looks) is not None
+
+
+async def test_an_image_is_encoded_once_for_all_who_take_it_soon() -> None:
+    """Later ones get its age of then."""
+    hub, shelf, clock = robot()
+    hub.put([Sample("left", JPEG, clock.now())])
+    one, two = shelf.take(looking_at("left")), shelf.take(looking_at("left"))
+    assert one is not None
+    assert one is two
+    await clock.advance(SHARED_FOR_S + 0.01)
+    three = shelf.take(looking_at("left"))
+    assert three is not None
+    assert three.number == one.number
+    assert three.message != one.message
+
+
+def test_two_cameras_take_turns_however_fast_one_is() -> None:
+    """A client that can take one image at a time gets both."""
+    hub, shelf, clock = robot()
+    looks = looking_at("left", "right")
+    order = []
+    for _ in range(4):
+        hub.put([Sample("left", b"L", clock.now()), Sample("right", b"R", clock.now())])
+        made = shelf.take(looks)
+        assert made is not None
+        order.append(made.sample.signal)
+    assert order == ["left", "right", "left", "right"]
+
+
+def test_nobody_gets_what_is_no_image_or_is_not_there() -> None:
+    """Names come from a page: any text may be among them."""
+    hub, shelf, clock = robot()
+    hub.put([Sample("a", 1.0, clock.now()), Sample("right", None, clock.now())])
+    assert shelf.take(looking_at("a", "left", "right", "__proto__", "")) is None
+
+
+def test_a_camera_that_is_shown_again_is_sent_again() -> None:
+    """The page may have thrown its image away meanwhile."""
+    hub, shelf, clock = robot()
+    hub.put([Sample("left", JPEG, clock.now())])
+    looks = looking_at("left")
+    assert shelf.take(looks) is not None
+    looks.show(())
+    assert shelf.take(looks) is None
+    looks.show(("left",))
+    assert shelf.take(looks) is not None
+
+
+def test_images_are_no_part_of_the_frames_of_values() -> None:
+    """Only that there is none any more is told to all."""
+    clock = FakeClock()
+    hub = Hub({"a": Signal("a"), "left": Signal("left", "image")})
+    fanout = Fanout(hub, clock=clock)
+    place = fanout.newcomer()
+    hub.put([Sample("a", 1.0, clock.now()), Sample("left", JPEG, clock.now())])
+    fanout.flush()
+    (frame,) = (json.loads(text) for text in fanout.take(place) if '"t":"v"' in text)
+    assert frame["i"] == [0]
+    hub.put([Sample("left", None, clock.now())])
+    fanout.flush()
+    (frame,) = (json.loads(text) for text in fanout.take(place) if '"t":"v"' in text)
+    assert (frame["i"], frame["v"]) == ([1], [None])
+
+
+async def test_a_slow_line_drops_images_and_costs_nobody_else_any() -> None:
+    """One client takes nothing: it gets the newest when it can, the other gets them all."""
+    clock = FakeClock()
+    profile = dashboard_profile(signals={"cam": Signal("cam", "image")}, uses=[USE])
+    robot = FakeRobot(profile, clock)
+    station = Station(Robot(profile, {}, robot.open), clock=clock)
+    running = asyncio.create_task(station.run())
+    quick, slow = FakeLine(), FakeLine()
+    tasks = [asyncio.create_task(Client(line, station, line).serve()) for line in (quick, slow)]
+    try:
+        await settle()
+        for line in (quick, slow):
+            line.say({"t": "show", "signals": ["cam"]})
+        await settle()
+        slow.free.clear()
+        for number in range(20):
+            robot.say("cam", b"image %d." % number)
+            await clock.advance(0.05)
+        got = [frame[frame.rindex(b"image ") :] for frame in quick.frames]
+        assert got == [b"image %d." % number for number in range(20)]
+        before = len(slow.frames)
+        slow.free.set()
+        await settle()
+        assert len(slow.frames) - before == 1
+        assert slow.frames[-1].endswith(b"image 19.")
+        # Shown no more: nothing comes, and the values go on.
+        quick.say({"t": "show", "signals": []})
+        await settle()
+        robot.say("cam", b"image 20.")
+        await clock.advance(0.05)
+        assert len(quick.frames) == 20
+    finally:
+        for line in (quick, slow):
+            line.leave()
+        await settle()
+        for task in (running, *tasks):
+            task.cancel()
+        await settle()
+
+
+def test_a_page_may_ask_for_so_many_images_and_no_more() -> None:
+    """What it says is bounded, like all that comes from outside."""
+    names = [f"s{number}" for number in range(64)]
+    assert wire.decode(json.dumps({"t": "show", "signals": names})) == Show(tuple(names))
+    for bad in ([*names, "one more"], ["x" * 257], "left", [1]):
+        with pytest.raises(wire.BadMessage):
+            wire.decode(json.dumps({"t": "show", "signals": bad}))

@@ -1,0 +1,254 @@
+"""Which widget shows a signal or gives a command, where a profile says nothing about its look.
+
+Pure: the same driver and the same widgets give the same slots. A widget that is not there, or that
+does not take what it would be given, is passed over for a plainer one. Commands that need several
+values are left out: the interface for finding faults has a form for each.
+"""
+
+import re
+from collections.abc import Iterator, Mapping
+from typing import Final
+
+from urc.config.link_look import misfit
+from urc.config.parse_widget import Shelf
+from urc.model.driver import Argument, Command, Driver
+from urc.model.interface import Given, WidgetUse
+from urc.model.values import Signal
+from urc.model.widget import Widget
+
+__all__ = ["automatic_slots"]
+
+MOST_PLAIN: Final = 24
+"""Signals with a cell of their own, when a table can take the others."""
+MOST_COMMANDS: Final = 16
+
+_BATTERY: Final = re.compile(r"batter|charge|\bsoc\b", re.IGNORECASE)
+_FORWARD: Final = ("x", "forward", "linear", "vx", "v", "speed", "throttle", "surge")
+_TURN: Final = ("y", "turn", "angular", "wz", "w", "yaw", "steering", "rotation", "vy", "sideways")
+_GROUPS: Final[tuple[tuple[str, Mapping[str, tuple[str, ...]], frozenset[str]], ...]] = (
+    (
+        "map",
+        {
+            "latitude": ("latitude", "lat"),
+            "longitude": ("longitude", "lon", "lng", "long"),
+        },
+        frozenset(("latitude", "longitude")),
+    ),
+    (
+        "attitude",
+        {"roll": ("roll",), "pitch": ("pitch",), "yaw": ("yaw",), "heading": ("heading",)},
+        frozenset(("roll", "pitch")),
+    ),
+    ("compass", {"heading": ("heading", "bearing", "course")}, frozenset(("heading",))),
+    ("compass", {"yaw": ("yaw",)}, frozenset(("yaw",))),
+)
+"""Widget, its inputs by the last words of signals' names, and the inputs that it needs at least."""
+
+
+def automatic_slots(driver: Driver, shelf: Shelf) -> dict[str, WidgetUse]:
+    """Return the widget for each slot: what shows the signals first, then what gives commands."""
+    slots: dict[str, WidgetUse] = {}
+    left = dict(driver.signals)
+    for use in _grouped(left, shelf):
+        _put(slots, use)
+    plain = [one for one in left.values() if one.type not in ("blob", "object", "array")]
+    table = _table(plain[MOST_PLAIN:], shelf) if len(plain) > MOST_PLAIN else None
+    for signal in plain[:MOST_PLAIN] if table is not None else plain:
+        shown = _shown(signal, shelf)
+        if shown is not None:
+            _put(slots, shown)
+    if table is not None:
+        _put(slots, table)
+    given = [_given(one, driver, shelf) for one in driver.commands.values()]
+    for use in [one for one in given if one is not None][:MOST_COMMANDS]:
+        _put(slots, use)
+    return slots
+
+
+def _put(slots: dict[str, WidgetUse], use: WidgetUse) -> None:
+    """Add what fills a slot, under a name that a grid can draw and nobody has."""
+    name = re.sub(r"[^a-z0-9_-]", "-", use.slot.lower()).lstrip("-_0123456789")[:60] or "slot"
+    names = (name, *(f"{name}-{number}" for number in range(2, len(slots) + 3)))
+    free = next(one for one in names if one not in slots)
+    slots[free] = use._replace(slot=free)
+
+
+# ---- signals
+
+
+def _grouped(left: dict[str, Signal], shelf: Shelf) -> Iterator[WidgetUse]:
+    """Yield the widgets that take several signals, and take those out of `left`."""
+    for widget_name, inputs, needed in _GROUPS:
+        widget = shelf.get(widget_name)
+        if widget is None or not needed <= widget.inputs.keys():
+            continue
+        for stem, found in _stems(left, inputs).items():
+            bound = {
+                name: signal
+                for name, signal in found.items()
+                if name in widget.inputs and not misfit(widget.inputs[name], signal)
+            }
+            if needed <= bound.keys():
+                for signal in bound.values():
+                    del left[signal.name]
+                title = stem.replace("_", " ").capitalize()
+                names = {name: signal.name for name, signal in bound.items()}
+                yield _use(widget, stem or widget_name, names, title)
+
+
+def _stems(
+    signals: Mapping[str, Signal], inputs: Mapping[str, tuple[str, ...]]
+) -> dict[str, dict[str, Signal]]:
+    """Return what precedes the last word of a name → input → signal: ``gps_lat``, ``gps_lon``."""
+    stems: dict[str, dict[str, Signal]] = {}
+    for signal in signals.values():
+        stem, _, last = signal.name.rpartition("_")
+        for name, words in inputs.items():
+            if last.lower() in words:
+                stems.setdefault(stem, {}).setdefault(name, signal)
+    return stems
+
+
+def _shown(signal: Signal, shelf: Shelf) -> WidgetUse | None:
+    """Return the first widget that shows a signal, from the most telling to the plainest."""
+    for name in _candidates(signal):
+        use = _one_input(shelf.get(name), signal)
+        if use is not None:
+            return use
+    return None
+
+
+def _candidates(signal: Signal) -> tuple[str, ...]:
+    if signal.type == "image":
+        return ("camera", "image")
+    if signal.type == "boolean" or signal.states:
+        return ("state", "value")
+    if signal.type not in ("integer", "number"):
+        return ("value",)
+    if signal.unit == "%" and _BATTERY.search(f"{signal.name} {signal.title}".replace("_", " ")):
+        return ("battery", "gauge", "value")
+    if signal.min is not None and signal.max is not None:
+        return ("gauge", "bar", "value")
+    return ("value",)
+
+
+def _one_input(widget: Widget | None, signal: Signal) -> WidgetUse | None:
+    """Return the widget with the signal at its first input that takes it, if that is enough."""
+    if widget is None:
+        return None
+    fitting = [
+        port.name
+        for port in sorted(widget.inputs.values(), key=lambda port: not port.is_required)
+        if not port.is_many and not misfit(port, signal)
+    ]
+    needed = {port.name for port in widget.inputs.values() if port.is_required}
+    if not fitting or needed - {fitting[0]}:
+        return None
+    return _use(widget, signal.name, {fitting[0]: signal.name}, signal.title)
+
+
+def _table(signals: list[Signal], shelf: Shelf) -> WidgetUse | None:
+    widget = shelf.get("table")
+    port = next((one for one in widget.inputs.values() if one.is_many), None) if widget else None
+    if widget is None or port is None:
+        return None
+    fitting = tuple(one.name for one in signals if not misfit(port, one))
+    if len(fitting) < len(signals):
+        return None
+    return _use(widget, "more", {}, "More")._replace(lists={port.name: fitting})
+
+
+# ---- commands
+
+
+def _given(command: Command, driver: Driver, shelf: Shelf) -> WidgetUse | None:
+    """Return what gives a command; None when it takes more values than any widget has."""
+    if command.hold is not None:
+        held = _held(command, shelf)
+        return held if held is not None and _is_complete(held, command) else None
+    needed = [one for one in command.arguments.values() if one.is_required]
+    if not needed:
+        return _output(shelf.get("button"), command, {})
+    if len(needed) > 1:
+        return None
+    for name in _inputs_for(needed[0]):
+        use = _output(shelf.get(name), command, {needed[0].name: "value"})
+        if use is not None:
+            return _with_state(use, needed[0], driver, shelf)
+    return None
+
+
+def _inputs_for(argument: Argument) -> tuple[str, ...]:
+    if argument.type == "boolean":
+        return ("switch", "select")
+    if argument.choices:
+        return ("select",)
+    if argument.type in ("integer", "number"):
+        has_range = argument.min is not None and argument.max is not None
+        return ("slider", "number") if has_range else ("number",)
+    return ("text",) if argument.type == "string" else ()
+
+
+def _held(command: Command, shelf: Shelf) -> WidgetUse | None:
+    axes = [
+        one.name
+        for one in command.arguments.values()
+        if one.type in ("integer", "number") and one.max is not None
+    ]
+    if len(axes) == 1:
+        return _output(shelf.get("axis"), command, {axes[0]: "value"}) or _output(
+            shelf.get("hold-button"), command, {axes[0]: "level"}
+        )
+    if axes:
+        forward = next((one for one in axes if _says(one, _FORWARD)), axes[0])
+        others = [one for one in axes if one != forward]
+        turn = next((one for one in others if _says(one, _TURN)), others[0])
+        return _output(shelf.get("joystick"), command, {forward: "x", turn: "y"})
+    return _output(shelf.get("hold-button"), command, {})
+
+
+def _is_complete(use: WidgetUse, command: Command) -> bool:
+    """Return whether the command gets all that it needs: else it would never move."""
+    given = {name for one in use.given.values() for name in one.names}
+    needed = {
+        name for name, one in command.arguments.items() if one.is_required and one.default is None
+    }
+    return needed <= given
+
+
+def _says(name: str, words: tuple[str, ...]) -> bool:
+    return name.lower() in words or name.lower().rpartition("_")[2] in words
+
+
+def _output(widget: Widget | None, command: Command, names: Mapping[str, str]) -> WidgetUse | None:
+    """Return the widget with the command at its first output that gives these values."""
+    if widget is None or any(port.is_required for port in widget.inputs.values()):
+        return None
+    is_held = command.hold is not None
+    for port in widget.outputs.values():
+        if port.is_held is is_held and set(names.values()) <= set(port.arguments):
+            given = {port.name: Given(dict(names))}
+            use = _use(widget, command.name, {}, command.title)
+            return use._replace(outputs={port.name: command.name}, given=given)
+    return None
+
+
+def _with_state(use: WidgetUse, argument: Argument, driver: Driver, shelf: Shelf) -> WidgetUse:
+    """Show what the robot says of it, where a signal has the name of the argument or command."""
+    widget = shelf.get(use.widget)
+    port = widget.inputs.get("state") if widget is not None else None
+    command = next(iter(use.outputs.values()))
+    for name in (argument.name, command):
+        signal = driver.signals.get(name)
+        if port is not None and signal is not None and not misfit(port, signal):
+            return use._replace(inputs={port.name: name})
+    return use
+
+
+def _use(widget: Widget, slot: str, inputs: Mapping[str, str], title: str) -> WidgetUse:
+    options = {
+        name: schema["default"]
+        for name, schema in widget.options.items()
+        if isinstance(schema, dict) and "default" in schema
+    }
+    return WidgetUse(slot, widget.name, dict(inputs), {}, options, title)

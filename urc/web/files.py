@@ -1,0 +1,109 @@
+"""Files that a robot's documents name for their widgets, and tiles of maps: looked up, never found.
+
+Floor 5. A URL is a key into a table made from the loaded profile, or three numbers; no path is ever
+made from what a browser sends.
+"""
+
+import hashlib
+from collections.abc import Mapping
+from http import HTTPStatus
+from pathlib import Path
+from urllib.parse import quote
+
+from starlette.exceptions import HTTPException
+from starlette.requests import Request
+from starlette.responses import FileResponse, Response
+
+from urc.model.interface import WidgetUse
+from urc.model.profile import Profile
+
+__all__ = ["TILE_TYPES", "linked_options", "robot_file", "tile"]
+
+MEDIA_TYPES = {
+    ".urdf": "application/xml",
+    ".dae": "application/xml",
+    ".svg": "image/svg+xml",
+    ".png": "image/png",
+    ".jpg": "image/jpeg",
+    ".jpeg": "image/jpeg",
+    ".webp": "image/webp",
+    ".gif": "image/gif",
+    ".json": "application/json",
+    ".wav": "audio/wav",
+    ".mp3": "audio/mpeg",
+    ".ogg": "audio/ogg",
+    **dict.fromkeys((".md", ".txt", ".csv"), "text/plain; charset=utf-8"),
+}
+"""Whatever else there is goes as bytes."""
+
+TILE_TYPES = {"png": "image/png", "jpg": "image/jpeg", "jpeg": "image/jpeg", "webp": "image/webp"}
+DEEPEST_ZOOM = 25
+
+EMPTY_TILE = bytes.fromhex(
+    "89504e470d0a1a0a0000000d4948445200000001000000010804000000b51c0c020000"
+    "000b49444154789c636060000000030001b8ad3a630000000049454e44ae426082"
+)
+"""A clear pixel: where a map has no picture, what lies below it is seen."""
+
+
+def linked_options(use: WidgetUse, robot: str) -> dict[str, object]:
+    """Return a widget's options as the page gets them: instead of a file, its address."""
+    if not use.files:
+        return dict(use.options)
+    urls = {name: _url(robot, name, place) for name, place in use.files.items()}
+    return {name: _linked(value, urls) for name, value in use.options.items()}
+
+
+def _linked(value: object, urls: Mapping[str, str]) -> object:
+    if isinstance(value, str):
+        return urls.get(value, value)
+    return [_linked(each, urls) for each in value] if isinstance(value, (list, tuple)) else value
+
+
+def _url(robot: str, name: str, place: str) -> str:
+    return f"/robots/{quote(robot, safe='')}/files/{quote(_key(name, place))}"
+
+
+def _key(name: str, place: str) -> str:
+    # Two documents may call different files the same; what follows is for models, which name their
+    # parts by path.
+    return f"{hashlib.blake2b(place.encode(), digest_size=6).hexdigest()}/{name}"
+
+
+def robot_file(profile: Profile, key: str, request: Request) -> Response:
+    """Return a file that the profile names for a widget; raise 404 for any other."""
+    uses = [*profile.slots.values()]
+    uses += [use for interface in profile.interfaces.values() for use in interface.widgets.values()]
+    table = {_key(name, place): place for use in uses for name, place in use.files.items()}
+    if key not in table:
+        raise HTTPException(404)
+    place = Path(table[key])
+    return _served(
+        place, MEDIA_TYPES.get(place.suffix.lower(), "application/octet-stream"), request
+    )
+
+
+def tile(folder: Path, z: int, x: int, y: int, kind: str, request: Request) -> Response:
+    """Return one square of a map from ``folder/z/x/y.kind``; a clear one where there is none.
+
+    Raises:
+        HTTPException: 404, when the numbers name no square, or the type is none of a tile.
+    """
+    if kind not in TILE_TYPES or not 0 <= z <= DEEPEST_ZOOM or not (0 <= x < 2**z > y >= 0):
+        raise HTTPException(404)
+    place = folder / str(z) / str(x) / f"{y}.{kind}"
+    if not place.is_file():
+        return Response(EMPTY_TILE, media_type="image/png", headers={"cache-control": "no-cache"})
+    return _served(place, TILE_TYPES[kind], request)
+
+
+def _served(place: Path, media_type: str, request: Request) -> Response:
+    try:
+        found = place.stat()
+    except OSError as error:
+        raise HTTPException(404) from error
+    tag = f'"{found.st_mtime_ns:x}-{found.st_size:x}"'
+    headers = {"etag": tag, "cache-control": "no-cache"}
+    if tag in request.headers.get("if-none-match", ""):
+        return Response(status_code=HTTPStatus.NOT_MODIFIED, headers=headers)
+    return FileResponse(place, media_type=media_type, headers=headers, stat_result=found)

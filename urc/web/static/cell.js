@@ -1,0 +1,295 @@
+// @ts-check
+/**
+ * One widget in its cell: its context, its frames, and what happens when it breaks.
+ *
+ * Whatever a widget throws costs its own cell, which then shows a card; so does one that again and
+ * again takes the page's time. A cell that cannot be seen is sent nothing.
+ *
+ * @typedef {import("./types.js").Conversion} Conversion
+ * @typedef {import("./types.js").Instance} Instance
+ * @typedef {import("./types.js").Outlet} Outlet
+ * @typedef {import("./types.js").PadDesk} PadDesk
+ * @typedef {import("./types.js").Reading} Reading
+ * @typedef {import("./types.js").Given} Given
+ * @typedef {import("./types.js").Value} Value
+ * @typedef {import("./types.js").WidgetModule} WidgetModule
+ * @typedef {import("./output.js").Output} Output
+ * @typedef {import("./store.js").Store} Store
+ *
+ * @typedef {object} Config
+ * @property {string} slot
+ * @property {string} widget
+ * @property {string} title
+ * @property {Record<string, string | string[]>} inputs Input → its signal, or its signals.
+ * @property {Record<string, (Conversion | null)[]>} conversions Input → for each of its signals, how
+ *   it becomes what the input asks for; left out where nothing has to be done.
+ * @property {Record<string, Output>} outputs
+ * @property {Record<string, unknown>} options
+ *
+ * @typedef {(command: string, args: Record<string, Given>, ticket?: import("./asks.js").Ticket) => Promise<Record<string, Value>>} Run
+ *
+ * @typedef {object} Doors Where what widgets do goes.
+ * @property {Run} run
+ * @property {import("./asks.js").Asks} asks
+ * @property {(command: string, verb: string) => void} steer
+ * @property {(wish: import("./types.js").Wish) => void} drive
+ * @property {() => void} wake asks for an animation frame
+ * @property {Pick<import("./input.js").Input, "hold" | "gate" | "letGo" | "refusal"> & {pads: PadDesk}} input
+ * @property {Pick<import("./stop.js").StopButton, "press" | "follow">} stop
+ * @property {Pick<import("./follow.js").Follows, "listen">} follows
+ * @property {Store} store
+ */
+import { Budget } from "./budget.js";
+import { contextOf } from "./context.js";
+import { t } from "./kit.js";
+
+/** A widget that has not come up by then says so. */
+const LOADING_MS = 5000;
+const PICTURES = new Set(["image", "blob"]);
+
+/** Signals of one input. @typedef {{input: string, signals: string[], isMany: boolean}} Bound */
+
+export class Cell {
+  /**
+   * @param {HTMLElement} el
+   * @param {Doors} doors
+   */
+  constructor(el, doors) {
+    this.el = el;
+    this.doors = doors;
+    /** @type {Config} */
+    this.config = JSON.parse(el.dataset["config"] ?? "{}");
+    /** @type {Bound[]} */
+    this.inputs = Object.entries(this.config.inputs).map(([input, bound]) => {
+      const isMany = Array.isArray(bound);
+      return { input, isMany, signals: isMany ? bound : [bound] };
+    });
+    this.outputs = Object.entries(this.config.outputs);
+    this.end = new AbortController();
+    /** @type {Instance} */
+    this.instance = {};
+    this.isMounted = false;
+    this.isVisible = true;
+    this.budget = new Budget();
+    /** @type {Map<string, ((reading: Reading) => void)[]>} */
+    this.listeners = new Map();
+    /** What each input and output was like when the widget last saw it. @type {Map<string, string>} */
+    this.seen = new Map();
+    /** @type {{width: number, height: number} | null} */
+    this.size = null;
+    /** Said over the widget: that it is still loading, or slow. @type {HTMLElement | null} */
+    this.note = null;
+  }
+
+  async mount() {
+    const refused = this.el.dataset["error"];
+    if (refused) {
+      this.fail(new Error(refused));
+      return;
+    }
+    const late = setTimeout(() => this.remark(t("◌ still loading")), LOADING_MS);
+    try {
+      const url = this.el.dataset["module"] ?? `/widgets/${encodeURIComponent(this.config.widget)}/widget.js`;
+      /** @type {WidgetModule} */
+      const module = await import(url);
+      const instance = await module.default.mount(contextOf(this));
+      if (this.end.signal.aborted) return;
+      this.instance = instance ?? {};
+      this.isMounted = true;
+      this.remark("");
+      this.doors.wake();
+    } catch (error) {
+      this.fail(error);
+    } finally {
+      clearTimeout(late);
+    }
+  }
+
+  /** @param {string} name */
+  output(name) {
+    return Object.hasOwn(this.config.outputs, name) ? this.config.outputs[name] : undefined;
+  }
+
+  /**
+   * @param {string} input
+   * @param {(reading: Reading) => void} listener
+   */
+  listen(input, listener) {
+    this.listeners.set(input, [...(this.listeners.get(input) ?? []), listener]);
+  }
+
+  /**
+   * Let what a listener throws cost this cell only.
+   *
+   * @template T
+   * @param {(news: T) => void} listener
+   * @returns {(news: T) => void}
+   */
+  guarded(listener) {
+    return (news) => {
+      if (this.end.signal.aborted) return;
+      try {
+        listener(news);
+      } catch (error) {
+        this.fail(error);
+      }
+    };
+  }
+
+  /**
+   * @param {Bound} bound
+   * @param {number} place which of its signals
+   * @param {Store} store
+   * @param {number} nowMs
+   */
+  reading({ input, signals }, place, store, nowMs) {
+    const conversions = this.config.conversions ?? {};
+    const conversion = Object.hasOwn(conversions, input) ? conversions[input]?.[place] : undefined;
+    return store.reading(signals[place] ?? "", nowMs, conversion ?? undefined);
+  }
+
+  /** Whether the widget may be called now. @param {number} nowMs */
+  isDue(nowMs) {
+    return this.isMounted && this.isVisible && this.budget.allows(nowMs);
+  }
+
+  /** Names of the images that it shows now. @param {Store} store */
+  pictures(store) {
+    if (!this.isMounted || !this.isVisible) return [];
+    const names = this.inputs.flatMap(({ signals }) => signals);
+    return names.filter((name) => PICTURES.has(store.signals.get(name)?.type ?? ""));
+  }
+
+  /**
+   * Give the widget what has changed. Called in an animation frame.
+   *
+   * @param {Store} store
+   * @param {number} nowMs
+   */
+  frame(store, nowMs) {
+    if (!this.isDue(nowMs)) return;
+    /** An input of many signals is a list. @type {Record<string, any>} */
+    const readings = Object.create(null);
+    /** @type {string[]} */
+    const changed = [];
+    const outlets = this.outlets(store);
+    const outlook = JSON.stringify(outlets);
+    const isOutputNews = this.seen.get("") !== outlook; // no input has this name
+    this.seen.set("", outlook);
+    for (const bound of this.inputs) {
+      const each = bound.signals.map((_, place) => this.reading(bound, place, store, nowMs));
+      const looks = each.map(({ serial, state, age }) => `${serial} ${state} ${age}`);
+      const look = `${looks.join()} ${store.edition}`;
+      readings[bound.input] = bound.isMany ? each : each[0];
+      if (this.seen.get(bound.input) !== look) {
+        this.seen.set(bound.input, look);
+        changed.push(bound.input);
+      }
+    }
+    if (changed.length === 0 && !isOutputNews && !this.size) return;
+    this.measured(nowMs, () => this.call(readings, changed, outlets, isOutputNews));
+  }
+
+  /**
+   * @param {Record<string, Reading>} readings
+   * @param {string[]} changed
+   * @param {Record<string, Outlet>} outlets
+   * @param {boolean} isOutputNews
+   */
+  call(readings, changed, outlets, isOutputNews) {
+    if (this.size) {
+      this.instance.resize?.(this.size);
+      this.size = null;
+    }
+    if (changed.length === 0 && !isOutputNews) return;
+    for (const input of changed) {
+      const reading = readings[input];
+      if (reading) this.listeners.get(input)?.forEach((listener) => listener(reading));
+    }
+    this.instance.update?.(readings, outlets);
+  }
+
+  /**
+   * Call the widget, and count the time that it takes.
+   *
+   * @param {number} nowMs
+   * @param {() => void} work
+   */
+  measured(nowMs, work) {
+    const startMs = performance.now();
+    try {
+      work();
+    } catch (error) {
+      this.fail(error);
+      return;
+    }
+    const wasSlow = this.budget.isSlow;
+    this.budget.count(nowMs, performance.now() - startMs);
+    if (this.budget.isSpent) this.fail(new Error(t("it stops the page again and again")));
+    else if (this.budget.isSlow !== wasSlow) {
+      this.remark(this.budget.isSlow ? t("◆ slow: shown once a second") : "");
+    }
+  }
+
+  /**
+   * @param {Store} store
+   * @returns {Record<string, Outlet>}
+   */
+  outlets(store) {
+    /** @type {Record<string, Outlet>} */
+    const found = Object.create(null);
+    for (const [name, { line, refusal, isAnswered, isHeld }] of this.outputs) {
+      const shared = refusal || store.hindrance(line, isHeld);
+      const reason = shared || (isHeld ? this.doors.input.refusal() : "");
+      found[name] = { isReady: reason === "", reason, isAnswered };
+    }
+    return found;
+  }
+
+  /**
+   * Say something over the widget; "" takes it away.
+   *
+   * @param {string} text
+   */
+  remark(text) {
+    this.note?.remove();
+    this.note = null;
+    if (!text || this.end.signal.aborted) return;
+    this.note = document.createElement("p");
+    this.note.className = "urc-remark";
+    this.note.setAttribute("role", "status");
+    this.note.textContent = text;
+    this.el.append(this.note);
+  }
+
+  /**
+   * Replace the widget by a card that says what happened.
+   *
+   * @param {unknown} error
+   */
+  fail(error) {
+    console.warn(`widget ${this.config.widget} in slot ${this.config.slot}:`, error);
+    this.unmount();
+    const card = document.createElement("div");
+    card.className = "urc-fault";
+    card.setAttribute("role", "group");
+    const title = document.createElement("strong");
+    title.textContent = t("◆ {title}: this widget does not work", { title: this.config.title });
+    const reason = document.createElement("p");
+    reason.textContent = error instanceof Error ? error.message : String(error);
+    card.append(title, reason);
+    this.el.replaceChildren(card);
+  }
+
+  unmount() {
+    const { destroy } = this.instance;
+    this.isMounted = false;
+    this.instance = {};
+    this.end.abort();
+    try {
+      destroy?.();
+    } catch (error) {
+      console.warn(`widget ${this.config.widget}: destroy failed:`, error);
+    }
+  }
+}

@@ -1,0 +1,125 @@
+// @ts-check
+/**
+ * What a widget is given, and all it may use: every door out of its cell.
+ *
+ * @typedef {import("./cell.js").Cell} Cell
+ * @typedef {import("./types.js").Context} Context
+ * @typedef {import("./types.js").GateSpec} GateSpec
+ * @typedef {import("./types.js").Given} Given
+ * @typedef {import("./types.js").HoldSpec} HoldSpec
+ * @typedef {import("./types.js").Reading} Reading
+ * @typedef {import("./types.js").StopState} StopState
+ * @typedef {import("./types.js").Topics} Topics
+ */
+import { questionsOf } from "./asks.js";
+import { t } from "./kit.js";
+import { memoryOf } from "./memory.js";
+import { argumentsOf, describe } from "./output.js";
+import { Decoder } from "./picture.js";
+import { loadStyle } from "./style.js";
+
+/**
+ * @param {Cell} cell
+ * @returns {Context}
+ */
+export function contextOf(cell) {
+  const { doors, end } = cell;
+  return Object.freeze({
+    el: cell.el,
+    options: Object.freeze(cell.config.options),
+    signal: end.signal,
+    on: (/** @type {string} */ input, /** @type {(reading: Reading) => void} */ listener) => {
+      cell.listen(input, listener);
+    },
+    send: (/** @type {string} */ output, /** @type {Record<string, Given>} */ args = {}) => {
+      const bound = cell.output(output);
+      if (bound === undefined) {
+        return Promise.reject(new Error(`the output ${output} is not bound to a command`));
+      }
+      return give(cell, bound.command, argumentsOf(bound, args), bound.asks ?? []);
+    },
+    command: (/** @type {string} */ output) => describe(cell.output(output)),
+    steer: (/** @type {string} */ output, /** @type {string} */ verb) => {
+      const bound = cell.output(output);
+      if (bound !== undefined) doors.steer(bound.command, verb);
+    },
+    drive: doors.drive,
+    memory: memoryOf(cell.config.slot),
+    hold: (/** @type {string} */ output, /** @type {HoldSpec} */ spec) => {
+      const bound = cell.output(output);
+      if (bound === undefined) throw new Error(`the output ${output} is not bound to a command`);
+      doors.input.hold(bound, spec, end.signal);
+    },
+    gate: (/** @type {GateSpec} */ spec) => doors.input.gate(spec, end.signal),
+    pads: doors.input.pads,
+    stop: () => doors.stop.press(),
+    onStop: (/** @type {(state: StopState) => void} */ listener) => {
+      doors.stop.follow(cell.guarded(listener), end.signal);
+    },
+    follow: (/** @type {keyof Topics} */ what, /** @type {(news: any) => void} */ listener) => {
+      doors.follows.listen(what, cell.guarded(listener), end.signal);
+    },
+    picture: (/** @type {string} */ input, /** @type {(bitmap: ImageBitmap, reading: Reading) => void} */ show) => {
+      picture(cell, input, show);
+    },
+    t,
+    unit: (/** @type {string} */ input) => unit(cell, input),
+    style: loadStyle,
+  });
+}
+
+/**
+ * Give a command, after the questions that the driver has for people.
+ *
+ * @param {Cell} cell
+ * @param {string} command
+ * @param {Record<string, Given>} args
+ * @param {readonly import("./types.js").Question[]} asks
+ */
+async function give(cell, command, args, asks) {
+  const questions = questionsOf(asks, args);
+  if (questions.length === 0) return cell.doors.run(command, args);
+  const ticket = await cell.doors.asks.ask(cell.el, questions, cell.end.signal);
+  try {
+    return await cell.doors.run(command, args, ticket);
+  } finally {
+    ticket.close();
+  }
+}
+
+/**
+ * @param {Cell} cell
+ * @param {string} input
+ * @param {(bitmap: ImageBitmap, reading: Reading) => void} show
+ */
+function picture(cell, input, show) {
+  /** @type {Reading | null} */
+  let newest = null;
+  const draw = cell.guarded((/** @type {ImageBitmap} */ bitmap) => {
+    if (newest) show(bitmap, newest);
+  });
+  const decoder = new Decoder(draw, (error) => {
+    console.info(`widget ${cell.config.widget}: an image could not be decoded:`, error);
+  });
+  cell.end.signal.addEventListener("abort", () => decoder.end());
+  const take = (/** @type {Reading} */ reading) => {
+    newest = reading;
+    if (reading.image) decoder.take(reading.image);
+  };
+  cell.listen(input, take);
+}
+
+/**
+ * @param {Cell} cell
+ * @param {string} input
+ */
+function unit(cell, input) {
+  const bound = cell.inputs.find((each) => each.input === input);
+  const { store } = cell.doors;
+  const reading = bound ? cell.reading(bound, 0, store, 0) : null;
+  const shown = store.units.shown(reading?.signal.unit ?? "");
+  return {
+    symbol: shown.symbol,
+    factor: (/** @type {number} */ value) => value * shown.factor + shown.offset,
+  };
+}

@@ -1,0 +1,156 @@
+// @ts-check
+/**
+ * Changes to another interface of the robot while the page goes on: the connection stays, and with it
+ * every value. What is held is let go first.
+ *
+ * The server draws an interface as a whole page, whoever asks; here only its stage is taken out of
+ * it. So an address leads to the same whether it is opened or changed to.
+ *
+ * @typedef {object} Doors
+ * @property {(reason: string) => void} letGo
+ * @property {() => void} leave ends what is on the stage
+ * @property {() => void} enter begins what is there now
+ */
+import { t } from "urc/kit";
+import { part } from "./badge.js";
+
+const FETCH_MS = 10_000;
+/** So long the styles of widgets may take; after that the page is shown as it is. */
+const STYLES_MS = 3000;
+const KEPT_S = 365 * 24 * 3600;
+
+export class Interfaces {
+  /**
+   * @param {ParentNode} root
+   * @param {Doors} doors
+   */
+  constructor(root, doors) {
+    this.doors = doors;
+    this.stage = part(document, "[data-stage]");
+    this.note = part(root, "[data-note]");
+    const choice = part(root, "[data-interface-choice]");
+    if (!(choice instanceof HTMLSelectElement)) throw new Error("the choice is no select");
+    this.choice = choice;
+    this.current = choice.value;
+    /** Of two that are on their way, the last one counts. */
+    this.round = 0;
+    keep(this.current);
+    // The page's own address may name none, and mean another one when it is come back to.
+    history.replaceState({ url: this.url }, "");
+    choice.addEventListener("change", () => void this.open(this.url, true));
+    addEventListener("popstate", ({ state }) => void this.open(state?.url ?? location.href, false));
+  }
+
+  /** Of the interface that is chosen. */
+  get url() {
+    return this.choice.selectedOptions[0]?.dataset["url"] ?? location.href;
+  }
+
+  /**
+   * @param {string} url
+   * @param {boolean} isNew whether the history gets a step
+   */
+  async open(url, isNew) {
+    this.round += 1;
+    const { round } = this;
+    this.doors.letGo(t("another interface was opened"));
+    this.note.textContent = "";
+    try {
+      const page = await fetched(url);
+      await styled(page);
+      if (round !== this.round) return;
+      this.show(page);
+    } catch (error) {
+      if (round !== this.round) return;
+      console.warn("URC: the interface could not be opened:", error);
+      this.choice.value = this.current;
+      this.note.textContent = t("It could not be opened: {reason}", {
+        reason: error instanceof Error ? error.message : String(error),
+      });
+      return;
+    }
+    if (isNew) history.pushState({ url }, "", url);
+    keep(this.current);
+  }
+
+  /** @param {Document} page */
+  show(page) {
+    const stage = part(page, "[data-stage]");
+    const choice = part(page, "[data-interface-choice]");
+    if (!(choice instanceof HTMLSelectElement)) throw new Error("the choice is no select");
+    this.doors.leave();
+    part(document, "[data-grid-style]").textContent = `@layer page{${stage.dataset["grid"] ?? ""}}`;
+    this.stage.replaceChildren(...[...stage.childNodes].map((node) => document.importNode(node, true)));
+    this.stage.scrollTop = 0;
+    this.current = choice.value;
+    this.choice.value = choice.value;
+    document.title = page.title;
+    this.doors.enter();
+  }
+}
+
+/**
+ * Fetch a page as a document. A parser that takes text is closed to scripts here (trusted types);
+ * this one is the browser's own, and runs no script of the page.
+ *
+ * @param {string} url
+ * @returns {Promise<Document>}
+ */
+function fetched(url) {
+  const request = new XMLHttpRequest();
+  const address = new URL(url, location.href);
+  address.searchParams.set("part", "");
+  request.open("GET", address);
+  request.responseType = "document";
+  request.timeout = FETCH_MS;
+  return new Promise((resolve, reject) => {
+    const fail = () => reject(new Error(t("no connection to URC")));
+    request.addEventListener("error", fail);
+    request.addEventListener("timeout", fail);
+    request.addEventListener("load", () => {
+      const page = request.responseXML;
+      if (request.status === 200 && page?.querySelector("[data-stage]")) resolve(page);
+      else reject(new Error(page?.querySelector("main p")?.textContent || `HTTP ${request.status}`));
+    });
+    request.send();
+  });
+}
+
+/**
+ * Add the styles of widgets that the page has not loaded yet, and wait until they are there.
+ *
+ * @param {Document} page
+ */
+async function styled(page) {
+  const own = part(document, "[data-widget-styles]");
+  const known = [...document.querySelectorAll("[data-widget-styles]")].map((el) => el.textContent);
+  /** @type {string[]} */
+  const wanted = JSON.parse(part(page, "[data-stage]").dataset["styles"] ?? "[]");
+  const rules = wanted.map((url) => `@import url("${url}") layer(widgets);`);
+  const missing = rules.filter((rule) => !known.some((text) => text?.includes(rule)));
+  if (missing.length === 0) return;
+  const style = document.createElement("style");
+  style.nonce = own.nonce ?? "";
+  style.dataset["widgetStyles"] = "";
+  style.textContent = missing.join("\n");
+  await new Promise((resolve) => {
+    const alarm = setTimeout(resolve, STYLES_MS);
+    const done = () => {
+      clearTimeout(alarm);
+      resolve(undefined);
+    };
+    style.addEventListener("load", done);
+    style.addEventListener("error", done);
+    document.head.append(style);
+  });
+}
+
+/**
+ * Keep which interface this device shows, for the next time that the robot is opened.
+ *
+ * @param {string} name
+ */
+function keep(name) {
+  const path = location.pathname;
+  document.cookie = `urc-interface=${encodeURIComponent(name)}; path=${path}; max-age=${KEPT_S}; samesite=strict`;
+}

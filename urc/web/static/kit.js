@@ -1,0 +1,243 @@
+// @ts-check
+/**
+ * What widgets need again and again: `import { part, write } from "urc/kit"`.
+ *
+ * Nothing here reads the layout, and what writes does so on change only, so all of it may be called
+ * in `update`. Knows no widget, no socket, no store.
+ *
+ * @typedef {import("./types.js").Alarm} Alarm
+ * @typedef {import("./types.js").Reading} Reading
+ */
+
+import { mark } from "./words.js";
+
+export { mark, t } from "./words.js";
+
+/** "None": what is not known is never shown as 0. */
+export const DASH = "—";
+
+const SVG = "http://www.w3.org/2000/svg";
+
+/** How a limit that was passed is written: a shape and a word, since colour is never alone. */
+export const ALARMS = Object.freeze({
+  "": "",
+  lolo: mark("▲ Very low"),
+  low: mark("◆ Low"),
+  high: mark("◆ High"),
+  hihi: mark("▲ Very high"),
+});
+
+/**
+ * Return the element of the template that a widget cannot do without.
+ *
+ * @param {ParentNode} root
+ * @param {string} selector
+ * @returns {HTMLElement}
+ */
+export function part(root, selector) {
+  const found = root.querySelector(selector);
+  if (!(found instanceof HTMLElement)) throw new Error(`the template has no ${selector}`);
+  return found;
+}
+
+/**
+ * The same for a drawing.
+ *
+ * @param {ParentNode} root
+ * @param {string} selector
+ * @returns {SVGElement}
+ */
+export function drawing(root, selector) {
+  const found = root.querySelector(selector);
+  if (!(found instanceof SVGElement)) throw new Error(`the template has no ${selector}`);
+  return found;
+}
+
+/**
+ * Write a text, on change only.
+ *
+ * @param {Element} el
+ * @param {string} text
+ */
+export function write(el, text) {
+  const only = el.childNodes.length === 1 ? el.firstChild : null;
+  if (text && only instanceof Text) {
+    // The node stays: another one would have the browser match the page's selectors anew.
+    if (only.data !== text) only.data = text;
+  } else if (el.textContent !== text) {
+    el.textContent = text;
+  }
+}
+
+/**
+ * Write an attribute, on change only; null takes it away.
+ *
+ * @param {Element} el
+ * @param {string} name
+ * @param {string | null} value
+ */
+export function attribute(el, name, value) {
+  if (value === null) {
+    if (el.hasAttribute(name)) el.removeAttribute(name);
+  } else if (el.getAttribute(name) !== value) {
+    el.setAttribute(name, value);
+  }
+}
+
+/**
+ * Write a property of the element's style, on change only.
+ *
+ * @param {Element} el
+ * @param {string} name as "--value-share" or "transform"
+ * @param {string} value
+ */
+export function style(el, name, value) {
+  if (!(el instanceof HTMLElement || el instanceof SVGElement)) return;
+  if (el.style.getPropertyValue(name) !== value) el.style.setProperty(name, value);
+}
+
+/**
+ * Make an element of a drawing.
+ *
+ * @template {keyof SVGElementTagNameMap} T
+ * @param {T} name
+ * @param {Record<string, string | number>} [attributes]
+ * @returns {SVGElementTagNameMap[T]}
+ */
+export function svg(name, attributes = {}) {
+  const made = document.createElementNS(SVG, name);
+  for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, String(value));
+  return made;
+}
+
+/**
+ * @param {number} value
+ * @param {number} least
+ * @param {number} most
+ */
+export function clamp(value, least, most) {
+  return Math.min(most, Math.max(least, value));
+}
+
+/**
+ * Return a number for people; "—" for whatever is none.
+ *
+ * @param {unknown} value
+ * @param {number} [digits] after the point; four that mean something when left out
+ */
+export function format(value, digits) {
+  if (typeof value !== "number" || !Number.isFinite(value)) return DASH;
+  const text = digits === undefined ? String(Number(value.toPrecision(4))) : value.toFixed(digits);
+  return Number(text) === 0 ? text.replace("-", "") : text; // no "-0"
+}
+
+/**
+ * Return the number that a reading holds; null when it holds none that can be drawn.
+ *
+ * @param {Reading | undefined} reading
+ * @returns {number | null}
+ */
+export function number(reading) {
+  const value = reading?.value;
+  return typeof value === "number" && Number.isFinite(value) ? value : null;
+}
+
+/**
+ * Return the numbers that a reading of an array holds, null for those that are not known; null when
+ * there is no array.
+ *
+ * @param {Reading | undefined} reading
+ * @returns {(number | null)[] | null}
+ */
+export function numbers(reading) {
+  const value = reading?.value;
+  if (!Array.isArray(value)) return null;
+  return value.map((each) => (typeof each === "number" && Number.isFinite(each) ? each : null));
+}
+
+/**
+ * Return the readings of an input that takes many signals, in the order in which they are bound.
+ *
+ * @param {Reading | undefined} readings
+ * @returns {readonly Reading[]}
+ */
+export function many(readings) {
+  return Array.isArray(readings) ? readings : [];
+}
+
+/**
+ * Return what is to be said beside a value: that there is none, how old it is, which limit it passed.
+ *
+ * @param {Pick<Reading, "state" | "age" | "alarm">} reading
+ * @param {(text: string, names?: Record<string, string | number>) => string} t the context's
+ */
+export function noteOf({ state, age, alarm }, t) {
+  if (state === "none") return t("no value yet");
+  if (state === "gone") return t("last seen {age} ago", { age });
+  const old = state === "stale" ? t("{age} old", { age }) : "";
+  return [alarm ? t(ALARMS[alarm]) : "", old].filter(Boolean).join(" · ");
+}
+
+/**
+ * Return how several readings are that are shown as one, for `noteOf`: the oldest of those that are
+ * known, and the gravest alarm. Readings that are not there do not count beside others that are.
+ *
+ * @param {readonly (Reading | undefined)[]} readings
+ * @returns {{state: Reading["state"], age: string, alarm: Alarm}}
+ */
+export function worst(readings) {
+  const bound = readings.flatMap((reading) => (reading ? [reading] : []));
+  const order = /** @type {const} */ (["stale", "live", "gone"]);
+  const found = order.map((state) => bound.find((reading) => reading.state === state)).find(Boolean);
+  const alarms = /** @type {const} */ (["hihi", "lolo", "high", "low"]);
+  const alarm = alarms.find((name) => bound.some((reading) => reading.alarm === name)) ?? "";
+  return { state: found?.state ?? "none", age: found?.age ?? "", alarm };
+}
+
+/**
+ * Return a canvas's context, sized to the box it has in the page and to the screen's pixels, and
+ * wiped. Call it in `resize` and when drawing: it sets the size on change only.
+ *
+ * @param {HTMLCanvasElement} canvas
+ * @param {{width: number, height: number}} size in CSS pixels
+ * @returns {CanvasRenderingContext2D}
+ */
+export function board(canvas, { width, height }) {
+  const context = canvas.getContext("2d");
+  if (!context) throw new Error("this browser draws no canvas");
+  const density = Math.min(3, globalThis.devicePixelRatio || 1);
+  const [across, down] = [Math.max(1, Math.round(width * density)), Math.max(1, Math.round(height * density))];
+  if (canvas.width !== across) canvas.width = across;
+  if (canvas.height !== down) canvas.height = down;
+  context.setTransform(density, 0, 0, density, 0, 0);
+  context.clearRect(0, 0, width, height);
+  return context;
+}
+
+/**
+ * Return the colours of the theme by their tokens, for a canvas: `{ level: "rgb(…)" }` for
+ * `--urc-level`. It reads styles: ask when mounting, and whenever `ctx.follow("theme", …)` calls.
+ *
+ * @template {string} T
+ * @param {Element} el
+ * @param {readonly T[]} names without `--urc-`
+ * @returns {Record<T, string>}
+ */
+export function colours(el, names) {
+  // Only a used colour is resolved: the token itself may say `light-dark(…)`, or a system colour.
+  const probe = document.createElement("span");
+  probe.hidden = true;
+  el.append(probe);
+  const look = getComputedStyle(probe);
+  const pairs = names.map((name) => {
+    probe.style.color = `var(--urc-${name})`;
+    return [name, look.color];
+  });
+  probe.remove();
+  return /** @type {Record<T, string>} */ (Object.fromEntries(pairs));
+}
+
+/** Whether a person has asked for less motion. */
+export function isStill() {
+  return matchMedia("(prefers-reduced-motion: reduce)").matches;
+}

@@ -1,0 +1,81 @@
+// @ts-check
+/**
+ * The screen of the device: the whole of it for the page, and awake while somebody drives.
+ */
+import { t } from "urc/kit";
+
+/** The button that gives the page the whole screen; it is not shown where a browser cannot. */
+export class FullScreen {
+  /**
+   * @param {HTMLElement | null} button
+   * @param {(text: string) => void} tell
+   */
+  constructor(button, tell) {
+    if (!button || !document.fullscreenEnabled) return;
+    button.hidden = false;
+    button.addEventListener("click", async () => {
+      try {
+        if (document.fullscreenElement) await document.exitFullscreen();
+        else await document.documentElement.requestFullscreen({ navigationUI: "hide" });
+      } catch {
+        tell(t("This browser did not give the page the whole screen."));
+      }
+    });
+    document.addEventListener("fullscreenchange", () => {
+      button.setAttribute("aria-pressed", String(document.fullscreenElement !== null));
+    });
+  }
+}
+
+/**
+ * Keeps the screen on while this page has the controls. A browser takes that back whenever the page
+ * is hidden, so it is asked again when the page returns.
+ */
+export class WakeLock {
+  /** @param {(text: string) => void} tell told once when the screen may go dark */
+  constructor(tell) {
+    this.tell = tell;
+    this.isWanted = false;
+    this.isAsking = false;
+    this.wasTold = false;
+    /** @type {WakeLockSentinel | null} */
+    this.lock = null;
+    document.addEventListener("visibilitychange", () => {
+      if (!document.hidden) void this.ask();
+    });
+  }
+
+  /** @param {boolean} isWanted */
+  want(isWanted) {
+    if (isWanted === this.isWanted) return;
+    this.isWanted = isWanted;
+    if (isWanted) void this.ask();
+    else void this.drop();
+  }
+
+  async ask() {
+    if (!this.isWanted || this.isAsking || document.hidden || (this.lock && !this.lock.released)) return;
+    this.isAsking = true;
+    try {
+      if (!("wakeLock" in navigator)) throw new Error("no wake lock");
+      this.lock = await navigator.wakeLock.request("screen");
+    } catch {
+      // Without HTTPS there is none, and a weak battery refuses too. Driving goes on either way.
+      if (!this.wasTold) this.tell(t("The screen may go dark while you drive: this browser does not keep it on."));
+      this.wasTold = true;
+    } finally {
+      this.isAsking = false;
+    }
+    if (!this.isWanted) await this.drop();
+  }
+
+  async drop() {
+    const lock = this.lock;
+    this.lock = null;
+    try {
+      await lock?.release();
+    } catch {
+      // It was released already.
+    }
+  }
+}

@@ -1,0 +1,37 @@
+// @ts-check
+/**
+ * Style sheets of third-party modules: found by the module's name in the import map, loaded once.
+ */
+
+/** @type {Map<string, Promise<void>>} */
+const loaded = new Map();
+
+/**
+ * Load the style sheet of a module, below the widgets' own so that those can change it.
+ *
+ * @param {string} module as it is imported
+ * @returns {Promise<void>}
+ */
+export function loadStyle(module) {
+  const known = loaded.get(module);
+  if (known) return known;
+  const loading = load(module);
+  loaded.set(module, loading);
+  loading.catch(() => loaded.delete(module));
+  return loading;
+}
+
+/** @param {string} module */
+async function load(module) {
+  const url = import.meta.resolve(`${module}/style.css`); // throws when the map has none
+  const el = document.createElement("style");
+  // A sheet that is linked would stand above every layer, and so above the widgets.
+  const script = document.querySelector("script[nonce]");
+  el.nonce = script instanceof HTMLScriptElement ? script.nonce : "";
+  el.textContent = `@import url(${JSON.stringify(url)}) layer(widgets.vendor);`;
+  await new Promise((resolve, reject) => {
+    el.addEventListener("load", resolve);
+    el.addEventListener("error", () => reject(new Error(`the style sheet of ${module} did not load`)));
+    document.head.append(el);
+  });
+}

@@ -1,0 +1,76 @@
+// @ts-check
+/**
+ * The service worker: keeps what was shown last, for when the server cannot be reached.
+ *
+ * The server always comes first, so an old page never meets a new one while it answers. Whatever
+ * moves a robot or tells of one (`/api`, `/ws`, anything but GET) does not pass here. It has no
+ * timer and gives no command.
+ */
+
+/**
+ * @typedef {Event & {waitUntil: (work: Promise<unknown>) => void}} LifeEvent
+ * @typedef {LifeEvent & {request: Request, respondWith: (answer: Promise<Response>) => void}} AskEvent
+ */
+
+/** The page's types know no workers. @type {{addEventListener: (name: string, listener: (event: any) => void) => void}} */
+const worker = self;
+
+const CACHE = "urc-1";
+/** What is kept beside what was opened. */
+const FIRST = ["/", "/static/tokens.css", "/static/app.css", "/static/theme.js", "/static/favicon.svg"];
+const KEPT = /^\/(static|vendor|widgets|words)\/|^\/$|^\/robots\/[^/]+\/$|^\/app\.webmanifest$/;
+/** Asked again and again by who writes a widget; without the server nothing changes. */
+const NEVER = /\/stamp$/;
+const MOST = 400;
+
+worker.addEventListener("install", (/** @type {LifeEvent} */ event) => {
+  event.waitUntil(caches.open(CACHE).then((cache) => cache.addAll(FIRST)));
+});
+
+worker.addEventListener("activate", (/** @type {LifeEvent} */ event) => {
+  event.waitUntil(
+    caches
+      .keys()
+      .then((names) => Promise.all(names.filter((name) => name !== CACHE).map((name) => caches.delete(name)))),
+  );
+});
+
+worker.addEventListener("fetch", (/** @type {AskEvent} */ event) => {
+  const { request } = event;
+  const url = new URL(request.url);
+  if (request.method !== "GET" || url.origin !== location.origin) return;
+  if (!KEPT.test(url.pathname) || NEVER.test(url.pathname)) return;
+  event.respondWith(answer(event, request));
+});
+
+/**
+ * @param {AskEvent} event
+ * @param {Request} request
+ */
+async function answer(event, request) {
+  try {
+    const found = await fetch(request);
+    // What another address answered is not what stands at this one, and no page opens from it.
+    if (found.status === 200 && !found.redirected) event.waitUntil(keep(request, found.clone()));
+    return found;
+  } catch (error) {
+    const old = await caches.match(request, { cacheName: CACHE });
+    if (old) return old;
+    if (request.mode === "navigate") {
+      const menu = await caches.match("/", { cacheName: CACHE });
+      if (menu) return menu;
+    }
+    throw error;
+  }
+}
+
+/**
+ * @param {Request} request
+ * @param {Response} response
+ */
+async function keep(request, response) {
+  const cache = await caches.open(CACHE);
+  await cache.put(request, response);
+  const names = await cache.keys(); // oldest first
+  await Promise.all(names.slice(0, Math.max(0, names.length - MOST)).map((name) => cache.delete(name)));
+}

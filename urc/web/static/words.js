@@ -1,0 +1,90 @@
+// @ts-check
+/**
+ * What the page says, in the reader's language. English is the key; what nobody translated stays it.
+ *
+ * The import map leads `urc/words` to the table of the language that the server chose.
+ */
+import table from "urc/words";
+
+/** @type {Readonly<Record<string, string>>} */
+const words = table;
+
+/**
+ * @param {string} text
+ * @param {Readonly<Record<string, string | number>>} [names] what stands for each `{name}`
+ * @returns {string}
+ */
+export function t(text, names = {}) {
+  const said = Object.hasOwn(words, text) ? (words[text] ?? text) : text;
+  return said.replace(/\{([a-z_]+)\}/g, (hole, name) =>
+    Object.hasOwn(names, name) ? String(names[name]) : hole,
+  );
+}
+
+/**
+ * What the server says of the controls. It says it in English, to all pages alike, so what has a fixed
+ * form is put into the reader's language here.
+ */
+const SENTENCES = [
+  mark("stopped by {name}: reset it first"),
+  mark("{name} has the controls"),
+  mark("{name} asks for the controls already"),
+  mark("nobody asks you for the controls"),
+  mark("viewers cannot drive"),
+  mark("viewers can stop the robot, and cannot reset it"),
+  mark("taking the controls by force needs an engineer"),
+  mark("nothing is stopped"),
+  mark("nobody has the controls: take them first"),
+  mark("the controls were taken anew meanwhile"),
+  mark("it was stopped: let go, then begin anew"),
+  mark("it was stopped: take the controls anew"),
+  mark("the robot is not connected"),
+  mark("this page only watches"),
+  mark("no answer within {n} s"),
+  mark("nobody waited for the answer"),
+  mark("the robot's session ended"),
+  mark("too many clients watch this robot"),
+  mark("the server was held up"),
+  mark("the layout was changed"),
+  mark("screen {n}"),
+  mark("screen {n} at {place}"),
+  mark("somebody else"),
+];
+/** @type {Set<string>} */
+const PLAIN = new Set(SENTENCES.filter((text) => !text.includes("{")));
+/** @type {[string, RegExp][]} */
+const FORMS = SENTENCES.filter((text) => text.includes("{")).map((text) => [text, form(text)]);
+
+/** @param {string} text @returns {RegExp} */
+function form(text) {
+  const plain = text.replace(/[.*+?^$()|[\]\\]/g, "\\$&");
+  const holes = plain.replace(/\{([a-z]+)\}/g, (_, name) => `(?<${name}>${name === "n" ? "[0-9.]+" : ".+"})`);
+  return new RegExp(`^${holes}$`, "su");
+}
+
+/**
+ * Return a sentence of the server in the reader's language; as it came when it has no fixed form.
+ *
+ * @param {string} sentence
+ * @returns {string}
+ */
+export function said(sentence) {
+  if (PLAIN.has(sentence)) return t(sentence);
+  for (const [text, pattern] of FORMS) {
+    const { name, ...others } = pattern.exec(sentence)?.groups ?? {};
+    if (name !== undefined) return t(text, { ...others, name: said(name) });
+    if (Object.keys(others).length > 0) return t(text, others);
+  }
+  return sentence;
+}
+
+/**
+ * Marks a text that is said elsewhere, by `t`, so that the catalogues have it.
+ *
+ * @template {string} Text
+ * @param {Text} text
+ * @returns {Text}
+ */
+export function mark(text) {
+  return text;
+}
