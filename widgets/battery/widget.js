@@ -2,189 +2,184 @@
 /** @typedef {import("../../urc/web/static/types.js").Reading} Reading */
 /** @typedef {import("../../urc/web/static/types.js").Context} Context */
 /** @typedef {import("../../urc/web/static/types.js").Instance} Instance */
-
-/**
- * A rectangle in the units of a drawing.
- *
- * @typedef {{x: number, y: number, w: number, h: number}} Box
- */
-
-/** The inside of each drawing's shell, as in the template. @type {Record<string, Box>} */
-const INSIDE = {
-  lying: { x: 12, y: 12, w: 168, h: 88 },
-  standing: { x: 12, y: 28, w: 88, h: 168 },
-};
-
-/** How far from the inside the tip of a limit's mark is, its height, and half its width. */
-const TIP = 12;
-const HIGH = 8;
-const HALF = 5;
+/** @typedef {Readonly<Record<string, Reading>>} Readings */
+import { attribute, drawing, format, many, noteOf, number, numbers, part, style, worst, write } from "urc/kit";
+import { share } from "urc/scale";
+import { Mean, cellScale, clock, spread, timeLeft } from "./charge.js";
+import { INSIDE, filled, mark } from "./drawing.js";
 
 /** Of a unit's character against a digit's. */
 const UNIT_WIDTH = 0.86;
-
-const ALARMS = {
-  "": "",
-  lolo: "▲ Very low",
-  low: "◆ Low",
-  high: "◆ High",
-  hihi: "▲ Very high",
-};
+const MEAN_S = 30;
 
 export default {
   /**
    * @param {Context} ctx
    * @returns {Instance}
    */
-  mount({ el }) {
-    const root = find(el, ".battery");
-    const meter = find(el, ".battery-meter");
-    const note = find(el, ".battery-note");
-    const digits = [...el.querySelectorAll(".battery-digits")];
-    const units = [...el.querySelectorAll(".battery-unit")];
-    const pictures = Object.entries(INSIDE).map(([name, inside]) => ({
-      inside,
-      isLying: name === "lying",
-      full: find(el, `.battery-${name} .battery-full`),
-      limits: find(el, `.battery-${name} .battery-limits`),
-    }));
-    const put = writer();
+  mount(ctx) {
+    const { el, options, t } = ctx;
+    const root = part(el, ".battery");
+    const note = part(el, ".battery-note");
+    const shell = el.querySelector(".battery-meter") ? new Shell(ctx) : null;
+    const cells = el.querySelector(".battery-cells") ? new Cells(ctx) : null;
+    const current = new Mean(MEAN_S);
 
     return {
-      update({ level }) {
-        if (!level) return;
-        const { signal } = level;
-        const least = signal.min ?? 0;
-        const most = signal.max ?? 100;
-        const known = typeof level.value === "number" ? level.value : null;
-        const share = known === null ? 0 : clamp((known - least) / (most - least));
-        const symbol = known === null ? "" : (signal.unit ?? "%");
-        const marks = Object.values(signal.limits ?? {})
-          .map((limit) => (limit - least) / (most - least))
-          .filter((place) => place > 0 && place < 1);
-
-        put(root, "data-state", level.state);
-        put(root, "data-alarm", level.alarm);
-        if (root instanceof HTMLElement) {
-          const characters = level.text.length + UNIT_WIDTH * symbol.length;
-          root.style.setProperty("--battery-characters", String(characters));
+      update(readings) {
+        const { level, status } = readings;
+        if (level) shell?.update(level);
+        const imbalance = cells?.update(readings) ?? "";
+        for (const name of ["voltage", "current", "temperature"]) {
+          const place = el.querySelector(`.battery-${name}`);
+          const reading = readings[name];
+          if (place && reading) fact(place, reading);
         }
-        for (const text of digits) put(text, "", level.text);
-        for (const text of units) put(text, "", symbol);
-        put(note, "", noteOf(level));
-        for (const { inside, isLying, full, limits } of pictures) {
-          putBox(put, full, filled(inside, share, isLying));
-          put(limits, "d", marks.map((place) => mark(inside, place, isLying)).join(""));
+        const left = el.querySelector(".battery-time");
+        if (left) {
+          const flow = current.add(number(readings["current"]), readings["current"]?.time ?? 0);
+          const given = number(readings["time_left"]);
+          const rest = readings["time_left"] ? given : timeLeft(number(level), flow, options["capacity"]);
+          write(left, t("{time} left", { time: timeText(rest, ctx) }));
         }
 
-        put(meter, "aria-valuemin", String(least));
-        put(meter, "aria-valuemax", String(most));
-        put(meter, "aria-valuenow", known === null ? null : String(known));
-        put(meter, "aria-valuetext", spoken(level, symbol));
+        const lead = level ?? worst([readings["cells"], ...many(readings["modules"]), readings["voltage"]]);
+        attribute(root, "data-state", lead.state);
+        attribute(root, "data-alarm", lead.alarm || (imbalance ? "low" : ""));
+        const said = [noteOf(lead, t), imbalance, status?.value ? status.text : ""];
+        write(note, said.filter(Boolean).join(" · "));
       },
     };
   },
 };
 
-/**
- * The part of the inside that is full: a lying battery fills from the left, a standing one from
- * below.
- *
- * @param {Box} inside
- * @param {number} share 0..1
- * @param {boolean} isLying
- * @returns {Box}
- */
-function filled({ x, y, w, h }, share, isLying) {
-  if (isLying) return { x, y, w: share * w, h };
-  return { x, y: y + (1 - share) * h, w, h: share * h };
-}
-
-/**
- * Two triangles that point at the shell from outside, where a limit is.
- *
- * @param {Box} inside
- * @param {number} place 0..1
- * @param {boolean} isLying
- */
-function mark({ x, y, w, h }, place, isLying) {
-  if (isLying) {
-    const at = (x + place * w).toFixed(1);
-    const [above, below] = [y - TIP, y + h + TIP];
-    return (
-      `M${at} ${above}l-${HALF}-${HIGH}h${2 * HALF}z` +
-      `M${at} ${below}l-${HALF} ${HIGH}h${2 * HALF}z`
-    );
+/** The drawing that is more or less full. */
+class Shell {
+  /** @param {Context} ctx */
+  constructor({ el, t }) {
+    this.t = t;
+    this.root = part(el, ".battery");
+    this.meter = part(el, ".battery-meter");
+    this.digits = [...el.querySelectorAll(".battery-digits")];
+    this.units = [...el.querySelectorAll(".battery-unit")];
+    this.pictures = Object.entries(INSIDE).map(([name, inside]) => ({
+      inside,
+      isLying: name === "lying",
+      full: drawing(el, `.battery-${name} .battery-full`),
+      limits: drawing(el, `.battery-${name} .battery-limits`),
+    }));
   }
-  const at = (y + (1 - place) * h).toFixed(1);
-  const [left, right] = [x - TIP, x + w + TIP];
-  return (
-    `M${left} ${at}l-${HIGH}-${HALF}v${2 * HALF}z` + `M${right} ${at}l${HIGH}-${HALF}v${2 * HALF}z`
-  );
+
+  /** @param {Reading} level */
+  update(level) {
+    const { signal } = level;
+    const [least, most] = [signal.min ?? 0, signal.max ?? 100];
+    const known = number(level);
+    const full = known === null ? 0 : share(known, least, most);
+    const symbol = known === null ? "" : (signal.unit ?? "%");
+    const text = known === null ? "—" : level.text;
+    const marks = Object.values(signal.limits ?? {})
+      .filter((limit) => typeof limit === "number")
+      .map((limit) => (limit - least) / (most - least))
+      .filter((place) => place > 0 && place < 1);
+    style(this.root, "--battery-characters", String(text.length + UNIT_WIDTH * symbol.length));
+    for (const digits of this.digits) write(digits, text);
+    for (const unit of this.units) write(unit, symbol);
+    for (const { inside, isLying, full: rect, limits } of this.pictures) {
+      const { x, y, w, h } = filled(inside, full, isLying);
+      attribute(rect, "x", x.toFixed(1));
+      attribute(rect, "y", y.toFixed(1));
+      attribute(rect, "width", w.toFixed(1));
+      attribute(rect, "height", h.toFixed(1));
+      attribute(limits, "d", marks.map((place) => mark(inside, place, isLying)).join(""));
+    }
+    attribute(this.meter, "aria-valuemin", String(least));
+    attribute(this.meter, "aria-valuemax", String(most));
+    attribute(this.meter, "aria-valuenow", String(known ?? least));
+    const said = noteOf(level, this.t).replace(/[▲◆] /, "");
+    const spoken = known === null ? this.t("unknown") : `${text} ${symbol}${said ? `, ${said}` : ""}`;
+    attribute(this.meter, "aria-valuetext", spoken);
+  }
 }
 
-/** @param {Reading} level */
-function noteOf(level) {
-  if (level.state === "none") return "no value yet";
-  if (level.state === "gone") return `last seen ${level.age} ago`;
-  const old = level.state === "stale" ? `${level.age} old` : "";
-  return [ALARMS[level.alarm], old].filter(Boolean).join(" · ");
+/** One bar a cell or module, the lowest and the highest marked. */
+class Cells {
+  /** @param {Context} ctx */
+  constructor({ el, options, t }) {
+    this.options = options;
+    this.t = t;
+    this.list = part(el, ".battery-cells");
+    /** @type {HTMLElement[]} */
+    this.items = [];
+  }
+
+  /**
+   * @param {Readings} readings
+   * @returns {string} what is wrong; "" when nothing is
+   */
+  update({ cells, modules }) {
+    const each = many(modules);
+    const values = [...(numbers(cells) ?? []), ...each.map(number)];
+    const signal = cells?.signal ?? each[0]?.signal;
+    if (!signal) return "";
+    this.grow(values.length);
+    const [least, most] = cellScale(signal, this.options);
+    const known = values.filter((value) => value !== null);
+    const [lowest, highest] = [Math.min(...known), Math.max(...known)];
+    const old = [...(cells ? Array(values.length - each.length).fill(cells.state) : []), ...each.map(({ state }) => state)];
+    values.forEach((value, place) => {
+      const item = this.items[place];
+      if (!item) return;
+      const text = format(value, signal.precision ?? (signal.unit === "V" ? 2 : undefined));
+      write(part(item, ".battery-figure"), text);
+      style(item, "--battery-share", value === null ? "0" : share(value, least, most).toFixed(3));
+      const end = value === lowest ? "low" : value === highest ? "high" : "";
+      attribute(item, "data-end", known.length > 1 && lowest !== highest ? end : "");
+      attribute(item, "data-state", value === null ? "none" : (old[place] ?? "live"));
+    });
+    const apart = spread(values);
+    const most_apart = this.options["imbalance"];
+    if (apart === null || typeof most_apart !== "number" || apart <= most_apart) return "";
+    const unit = signal.unit ?? "";
+    return this.t("◆ Cells differ by {value}", { value: `${format(apart, signal.precision)} ${unit}`.trim() });
+  }
+
+  /** @param {number} count */
+  grow(count) {
+    if (this.items.length === count && count > 0) return;
+    this.items = Array.from({ length: count }, (_, place) => {
+      const item = document.createElement("li");
+      item.className = "battery-cell";
+      for (const name of ["place", "bar", "figure"]) {
+        const made = document.createElement("span");
+        made.className = `battery-${name}`;
+        made.textContent = name === "place" ? String(place + 1) : "";
+        item.append(made);
+      }
+      return item;
+    });
+    if (count > 0) this.list.replaceChildren(...this.items);
+  }
 }
 
 /**
- * @param {Reading} level
- * @param {string} symbol
+ * @param {Element} place
+ * @param {Reading} reading
  */
-function spoken(level, symbol) {
-  if (level.value === null) return "unknown";
-  const note = noteOf(level).replace(/[▲◆] /, "");
-  return `${level.text} ${symbol}${note ? `, ${note}` : ""}`;
-}
-
-/** @param {number} share */
-function clamp(share) {
-  return Math.min(1, Math.max(0, share));
+function fact(place, reading) {
+  const isKnown = number(reading) !== null;
+  write(place, isKnown ? `${reading.text} ${reading.unit}`.trim() : "—");
+  attribute(place, "data-state", reading.state);
+  attribute(place, "data-alarm", reading.alarm);
 }
 
 /**
- * @param {Element} root
- * @param {string} selector
+ * @param {number | null} seconds
+ * @param {Context} ctx
  */
-function find(root, selector) {
-  const found = root.querySelector(selector);
-  if (!found) throw new Error(`the template has no ${selector}`);
-  return found;
-}
-
-/** @typedef {(el: Element, name: string, value: string | null) => void} Put */
-
-/**
- * Return a function that writes an attribute (or the text, for the name "") only when it changes.
- *
- * @returns {Put}
- */
-function writer() {
-  /** @type {Map<Element, Map<string, string | null>>} */
-  const written = new Map();
-  return (el, name, value) => {
-    const known = written.get(el) ?? new Map();
-    written.set(el, known);
-    if (known.get(name) === value) return;
-    known.set(name, value);
-    if (name === "") el.textContent = value;
-    else if (value === null) el.removeAttribute(name);
-    else el.setAttribute(name, value);
-  };
-}
-
-/**
- * @param {Put} put
- * @param {Element} rect
- * @param {Box} box
- */
-function putBox(put, rect, box) {
-  put(rect, "x", box.x.toFixed(1));
-  put(rect, "y", box.y.toFixed(1));
-  put(rect, "width", box.w.toFixed(1));
-  put(rect, "height", box.h.toFixed(1));
+function timeText(seconds, { t }) {
+  if (seconds === null) return "—";
+  const { hours, minutes } = clock(seconds);
+  if (hours > 0) return t("{hours} h {minutes} min", { hours, minutes: String(minutes).padStart(2, "0") });
+  return minutes > 0 ? t("{minutes} min", { minutes }) : t("under 1 min");
 }

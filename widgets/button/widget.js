@@ -2,13 +2,12 @@
 /** @typedef {import("../../urc/web/static/types.js").Reading} Reading */
 /** @typedef {import("../../urc/web/static/types.js").Context} Context */
 /** @typedef {import("../../urc/web/static/types.js").Instance} Instance */
-/** @typedef {import("../../urc/web/static/types.js").Outlet} Outlet */
+import { Giver, slide } from "urc/giving";
+import { attribute, noteOf, part, style, write } from "urc/kit";
+import { listen } from "./gesture.js";
 
-/** @typedef {"" | "asking" | "pending" | "done" | "failed"} Phase */
-
-/** How long a question stands, and how long what was done is told. */
+/** How long a question stands. */
 const ASK_MS = 5000;
-const TELL_MS = 4000;
 /** A second tap of the same finger is no answer to a question that it has not seen. */
 const READ_MS = 400;
 
@@ -17,27 +16,13 @@ export default {
    * @param {Context} ctx
    * @returns {Instance}
    */
-  mount({ el, send, signal }) {
-    if (!el.querySelector(".button-main")) return {}; // no command is bound: there is nothing to do
-    const button = new Button(el, () => send("press"));
-    const on = (/** @type {string} */ selector, /** @type {() => void} */ listener) => {
-      el.querySelector(selector)?.addEventListener("click", listener, { signal });
-    };
-    on(".button-main", () => button.press());
-    on(".button-yes", () => button.answer(true));
-    on(".button-no", () => button.answer(false));
-    const key = (/** @type {KeyboardEvent} */ event) => {
-      if (event.key === "Escape" && button.phase === "asking") {
-        event.preventDefault(); // it means no, and not STOP
-        button.answer(false);
-      }
-      // A key that is held down repeats its clicks: that is one tap.
-      if (event.repeat && event.key === "Enter") event.preventDefault();
-    };
-    el.addEventListener("keydown", key, { signal });
+  mount(ctx) {
+    if (!ctx.el.querySelector(".button-main")) return {}; // no command is bound: nothing to do
+    const button = new Button(ctx);
     return {
       update({ state }, { press }) {
-        button.update(state, press);
+        button.update(state);
+        button.giver.take(press);
       },
       destroy() {
         button.end();
@@ -48,56 +33,80 @@ export default {
 
 /** One command: asked for, under way, done or failed. Nothing is ever given twice. */
 class Button {
-  /**
-   * @param {HTMLElement} el
-   * @param {() => Promise<unknown>} give
-   */
-  constructor(el, give) {
-    this.give = give;
-    this.root = find(el, ".button");
-    this.main = find(el, ".button-main");
-    this.note = find(el, ".button-note");
+  /** @param {Context} ctx */
+  constructor(ctx) {
+    const { el, options, signal, send, t } = ctx;
+    this.t = t;
+    this.root = part(el, ".button");
+    this.main = part(el, ".button-main");
+    this.note = part(el, ".button-note");
     this.value = el.querySelector(".button-value");
     this.question = el.querySelector(".button-question");
     this.yes = el.querySelector(".button-yes");
-    /** @type {Phase} */
-    this.phase = "";
-    this.outcome = "";
-    this.reason = "not ready yet";
-    this.isAnswered = false;
+    this.cooldownMs = 1000 * Number(options["cooldown"] ?? 0);
+    this.isAsking = false;
+    this.coldMs = -Infinity;
     /** What is known of the state: its age, or the limit it has passed. */
     this.stateNote = "";
     /** @type {number | undefined} */
-    this.timer = undefined;
+    this.asking = undefined;
     /** @type {number | undefined} */
     this.reading = undefined;
+    /** @type {number | undefined} */
+    this.cooling = undefined;
+    this.giver = new Giver({ give: () => send("press"), show: () => this.show(), t, signal });
+    const gesture = options["gesture"];
+    const isReady = () => this.isFree;
+    if (gesture === "slide") {
+      const label = part(el, ".button-label").textContent;
+      slide(this.main, { label, isReady, done: () => this.press(), signal });
+    } else if (gesture === "tap" || gesture === "double" || gesture === "hold" || gesture === "repeat") {
+      const fill = part(el, ".button-fill");
+      listen(this.main, {
+        gesture,
+        repeatMs: Number(options["repeat_ms"] ?? 250),
+        isReady: gesture === "repeat" ? () => this.giver.isReady && !this.isCold : isReady,
+        done: () => this.press(),
+        progress: (share) => style(fill, "--button-share", share.toFixed(2)),
+        signal,
+      });
+    }
+    el.querySelector(".button-yes")?.addEventListener("click", () => this.answer(true), { signal });
+    el.querySelector(".button-no")?.addEventListener("click", () => this.answer(false), { signal });
+    el.addEventListener("keydown", (event) => {
+      if (event.key !== "Escape" || !this.isAsking) return;
+      event.preventDefault(); // it means no, and not STOP
+      this.answer(false);
+    }, { signal });
   }
 
-  /**
-   * @param {Reading | undefined} state
-   * @param {Outlet | undefined} press
-   */
-  update(state, press) {
-    this.reason = press?.reason ?? "no command is bound to this button";
-    this.isAnswered = press?.isAnswered ?? false;
-    if (state) {
-      this.stateNote = noteOf(state);
-      attribute(this.root, "data-state", state.state);
-      attribute(this.root, "data-alarm", state.alarm);
-      if (this.value) write(this.value, textOf(state));
-    }
-    if (this.reason && this.phase === "asking") this.answer(false);
-    this.show();
+  get isCold() {
+    return performance.now() < this.coldMs;
+  }
+
+  get isFree() {
+    return this.giver.isReady && !this.giver.isPending && !this.isAsking && !this.isCold;
+  }
+
+  /** @param {Reading | undefined} state */
+  update(state) {
+    if (!state) return;
+    this.stateNote = noteOf(state, this.t);
+    attribute(this.root, "data-state", state.state);
+    attribute(this.root, "data-alarm", state.alarm);
+    if (this.value) write(this.value, textOf(state, this.t));
   }
 
   press() {
-    if (this.reason || this.phase === "asking" || this.phase === "pending") return;
+    if (!this.isFree) return;
     if (this.question) this.ask();
     else void this.run();
   }
 
   ask() {
-    this.become("asking", "", ASK_MS);
+    this.isAsking = true;
+    this.giver.become("");
+    this.asking = window.setTimeout(() => this.answer(false), ASK_MS);
     if (this.yes instanceof HTMLButtonElement) {
       const yes = this.yes;
       yes.disabled = true;
@@ -108,108 +117,57 @@ class Button {
 
   /** @param {boolean} isYes */
   answer(isYes) {
-    if (this.phase !== "asking") return;
+    if (!this.isAsking) return;
     const hadFocus = this.question?.contains(document.activeElement) ?? false;
-    this.become("");
+    this.isAsking = false;
+    clearTimeout(this.asking);
+    clearTimeout(this.reading);
+    this.show();
     if (hadFocus) focus(this.main);
-    if (isYes && !this.reason) void this.run();
+    if (isYes) void this.run();
   }
 
   async run() {
-    this.become("pending", this.isAnswered ? "… waiting for the robot" : "… sending");
-    try {
-      await this.give();
-      this.become("done", this.isAnswered ? "✓ done" : "✓ sent", TELL_MS);
-    } catch (error) {
-      this.become("failed", `▲ ${error instanceof Error ? error.message : error}`);
+    if (this.cooldownMs > 0) {
+      this.coldMs = performance.now() + this.cooldownMs;
+      clearInterval(this.cooling);
+      this.cooling = window.setInterval(() => this.show(), 250);
     }
-  }
-
-  /**
-   * @param {Phase} phase
-   * @param {string} outcome
-   * @param {number} forMs 0: until something happens
-   */
-  become(phase, outcome = "", forMs = 0) {
-    this.end();
-    this.phase = phase;
-    this.outcome = outcome;
-    if (forMs > 0) {
-      this.timer = window.setTimeout(() => {
-        if (this.phase === "asking") this.answer(false);
-        else this.become("");
-      }, forMs);
-    }
-    this.show();
+    await this.giver.once();
   }
 
   show() {
-    const isAsking = this.phase === "asking";
-    const isLocked = this.reason !== "" || this.phase === "pending";
-    attribute(this.root, "data-phase", this.phase);
-    attribute(this.main, "aria-disabled", String(isLocked));
-    attribute(this.main, "aria-busy", String(this.phase === "pending"));
-    if (this.main instanceof HTMLElement) this.main.hidden = isAsking;
-    if (this.question instanceof HTMLElement) this.question.hidden = !isAsking;
-    const hindrance = this.reason ? `◆ ${this.reason}` : "";
-    write(this.note, [this.outcome, hindrance, this.stateNote].filter(Boolean).join(" · "));
+    const { giver } = this;
+    if (giver.reason && this.isAsking) return this.answer(false);
+    const isCold = this.isCold;
+    if (!isCold) clearInterval(this.cooling);
+    const leftS = Math.ceil((this.coldMs - performance.now()) / 1000);
+    const wait = isCold && !giver.isPending ? this.t("ready in {seconds} s", { seconds: leftS }) : "";
+    attribute(this.root, "data-phase", this.isAsking ? "asking" : giver.phase);
+    attribute(this.main, "aria-disabled", String(!giver.isReady || giver.isPending || isCold));
+    attribute(this.main, "aria-busy", String(giver.isPending));
+    this.main.hidden = this.isAsking;
+    if (this.question instanceof HTMLElement) this.question.hidden = !this.isAsking;
+    write(this.note, giver.note(wait, this.stateNote));
   }
 
   end() {
-    clearTimeout(this.timer);
+    clearTimeout(this.asking);
     clearTimeout(this.reading);
+    clearInterval(this.cooling);
   }
 }
 
-const ALARMS = {
-  "": "",
-  lolo: "▲ Very low",
-  low: "◆ Low",
-  high: "◆ High",
-  hihi: "▲ Very high",
-};
-
-/** @param {Reading} state */
-function noteOf(state) {
-  if (state.state === "none") return "no value yet";
-  if (state.state === "gone") return `last seen ${state.age} ago`;
-  const old = state.state === "stale" ? `${state.age} old` : "";
-  return [ALARMS[state.alarm], old].filter(Boolean).join(" · ");
-}
-
-/** @param {Reading} state */
-function textOf({ value, text }) {
-  return typeof value === "boolean" && text === String(value) ? (value ? "on" : "off") : text;
+/**
+ * @param {Reading} state
+ * @param {Context["t"]} t
+ */
+function textOf({ value, text }, t) {
+  if (typeof value !== "boolean" || text !== String(value)) return text;
+  return value ? t("on") : t("off");
 }
 
 /** @param {Element | null | undefined} el */
 function focus(el) {
   if (el instanceof HTMLElement) el.focus();
-}
-
-/**
- * @param {Element} root
- * @param {string} selector
- */
-function find(root, selector) {
-  const found = root.querySelector(selector);
-  if (!found) throw new Error(`the template has no ${selector}`);
-  return found;
-}
-
-/**
- * @param {Element} el
- * @param {string} text
- */
-function write(el, text) {
-  if (el.textContent !== text) el.textContent = text;
-}
-
-/**
- * @param {Element} el
- * @param {string} name
- * @param {string} value
- */
-function attribute(el, name, value) {
-  if (el.getAttribute(name) !== value) el.setAttribute(name, value);
 }

@@ -2,8 +2,9 @@
 /** @typedef {import("../../urc/web/static/types.js").Context} Context */
 /** @typedef {import("../../urc/web/static/types.js").HoldState} HoldState */
 /** @typedef {import("../../urc/web/static/types.js").Instance} Instance */
+import { attribute, part, t, write } from "urc/kit";
 
-const WORDS = { idle: "hold", asking: "…", held: "moving", spent: "let go" };
+const WORDS = { idle: t("hold"), asking: "…", held: t("moving"), spent: t("let go") };
 
 export default {
   /**
@@ -11,13 +12,13 @@ export default {
    * @returns {Instance}
    */
   mount({ el, options, hold }) {
-    const main = el.querySelector(".hold-button-main");
-    if (!(main instanceof HTMLElement)) return {}; // no command is bound: there is nothing to do
-    const root = find(el, ".hold-button");
-    const word = find(el, ".hold-button-word");
-    const note = find(el, ".hold-button-note");
+    if (!el.querySelector(".hold-button-main")) return {}; // no command is bound: there is nothing to do
+    const root = part(el, ".hold-button");
+    const main = part(el, ".hold-button-main");
+    const word = part(el, ".hold-button-word");
+    const note = part(el, ".hold-button-note");
     const level = Number(options["level"] ?? 1);
-    let locked = "not ready yet";
+    let locked = t("not ready yet");
     /** @type {HoldState} */
     let state = { phase: "idle", reason: "", values: null };
 
@@ -42,36 +43,9 @@ export default {
     });
     return {
       update(_, { held }) {
-        locked = held?.reason ?? "no command is bound to this button";
+        locked = held?.reason ?? t("no command is bound to this button");
         draw();
       },
     };
   },
 };
-
-/**
- * @param {Element} root
- * @param {string} selector
- */
-function find(root, selector) {
-  const found = root.querySelector(selector);
-  if (!found) throw new Error(`the template has no ${selector}`);
-  return found;
-}
-
-/**
- * @param {Element} el
- * @param {string} text
- */
-function write(el, text) {
-  if (el.textContent !== text) el.textContent = text;
-}
-
-/**
- * @param {Element | null} el
- * @param {string} name
- * @param {string} value
- */
-function attribute(el, name, value) {
-  if (el && el.getAttribute(name) !== value) el.setAttribute(name, value);
-}

@@ -8,7 +8,7 @@ export default {
    * @param {Context} ctx
    * @returns {Instance}
    */
-  mount({ el, stop, onStop, signal }) {
+  mount({ el, stop, onStop, signal, t }) {
     const root = find(el, ".stop");
     const main = find(el, ".stop-main");
     const note = find(el, ".stop-note");
@@ -17,7 +17,7 @@ export default {
     function show(state) {
       const isCut = state.phase === "failed" || (state.fault !== "" && !state.isConfirmed);
       root.setAttribute("data-phase", isCut ? "fault" : state.phase);
-      note.textContent = words(state, isCut);
+      note.textContent = words(state, isCut, t);
     }
     // It acts when it is touched; a key has only the one moment, a screen reader only the click.
     main.addEventListener("pointerdown", (event) => {
@@ -36,14 +36,15 @@ export default {
 /**
  * @param {StopState} state
  * @param {boolean} isCut
+ * @param {Context["t"]} t
  */
-function words({ phase, isLatched, isConfirmed, fault }, isCut) {
-  if (phase === "failed") return "▲ NO LINK: stop it by hand";
-  if (isCut) return `▲ NO LINK: ${fault}`;
-  if (isConfirmed) return "✓ sent ✓ confirmed ✓ latched";
-  if (isLatched) return "✓ sent ✓ latched";
+function words({ phase, isLatched, isConfirmed, fault }, isCut, t) {
+  if (phase === "failed") return t("▲ NO LINK: stop it by hand");
+  if (isCut) return t("▲ NO LINK: {reason}", { reason: fault });
+  if (isConfirmed) return [t("✓ sent"), t("✓ confirmed"), t("✓ latched")].join(" ");
+  if (isLatched) return [t("✓ sent"), t("✓ latched")].join(" ");
   if (phase === "") return "—";
-  return phase === "sent" ? "✓ sent" : "… sending";
+  return phase === "sent" ? t("✓ sent") : t("… sending");
 }
 
 /**

@@ -2,19 +2,16 @@
 /** @typedef {import("../../urc/web/static/types.js").Reading} Reading */
 /** @typedef {import("../../urc/web/static/types.js").Context} Context */
 /** @typedef {import("../../urc/web/static/types.js").Instance} Instance */
+import { attribute, clamp, format, noteOf, number, part as find, style, write } from "urc/kit";
+import { spanOf } from "urc/scale";
+import { Trend } from "./trend.js";
 
-const ALARMS = {
-  "": "",
-  lolo: "▲ Very low",
-  low: "◆ Low",
-  high: "◆ High",
-  hihi: "▲ Very high",
-};
+const LIMITS = /** @type {const} */ (["lolo", "low", "high", "hihi"]);
 const POINTS = 600;
 const DRAW_EVERY_MS = 100;
 const MOVE_EVERY_MS = 1000;
-/** A limit further away than so many times the height of the line is not drawn. */
-const NEAR = 3;
+/** Over how much time a value has to rise or fall. */
+const TREND_S = 10;
 /** Room above and below, as a share of the height. */
 const RIM = 0.04;
 
@@ -23,7 +20,8 @@ export default {
    * @param {Context} ctx
    * @returns {Instance}
    */
-  mount({ el, options, signal }) {
+  mount(ctx) {
+    const { el, options, signal, t } = ctx;
     const root = find(el, ".value");
     const line = find(el, ".value-line");
     const text = find(el, ".value-text");
@@ -32,24 +30,87 @@ export default {
     const place = el.querySelector(".value-history");
     const windowS = seconds(options["history"]);
     const history = place && windowS ? new History(place, windowS) : null;
+    const facts = new Facts(ctx);
     signal.addEventListener("abort", () => history?.destroy());
 
     return {
       update({ value: reading }) {
         if (!reading) return;
-        const shown = textOf(reading, options["precision"]);
-        const symbol = reading.value === null ? "" : (reading.signal.unit ?? "");
+        const { symbol: known, factor } = ctx.unit("value");
+        const shown = textOf(reading, options["precision"], factor, t);
+        const symbol = reading.value === null ? "" : reading.unit || known;
         attribute(root, "data-state", reading.state);
         attribute(root, "data-alarm", reading.alarm);
         fitText(line, shown.length + symbol.length / 2);
         write(text, shown);
         write(unit, symbol);
-        write(note, noteOf(reading));
-        history?.add(reading);
+        write(note, noteOf(reading, t));
+        facts.update(reading, symbol, factor);
+        history?.add(reading, factor);
       },
     };
   },
 };
+
+/** What may stand beside the value: its trend, its limits and its age. */
+class Facts {
+  /** @param {Context} ctx */
+  constructor({ el, options, signal, t }) {
+    this.t = t;
+    this.precision = options["precision"];
+    this.trendText = el.querySelector(".value-trend");
+    this.limitsText = el.querySelector(".value-limits");
+    this.ageText = el.querySelector(".value-age");
+    this.trend = new Trend(TREND_S);
+    this.serial = -1;
+    this.time = NaN;
+    if (!this.ageText) return;
+    const timer = setInterval(() => this.tell(), MOVE_EVERY_MS);
+    signal.addEventListener("abort", () => clearInterval(timer));
+  }
+
+  /**
+   * @param {Reading} reading
+   * @param {string} symbol
+   * @param {(value: number) => number} factor
+   */
+  update(reading, symbol, factor) {
+    const value = number(reading);
+    if (this.trendText) this.point(reading, value);
+    if (this.limitsText) {
+      const { lolo, low, high, hihi } = reading.signal.limits ?? {};
+      const digits = typeof this.precision === "number" ? this.precision : reading.signal.precision;
+      const ends = [low ?? lolo, high ?? hihi].map((end) => (end === undefined ? "" : format(factor(end), digits)));
+      const said = ends.some(Boolean) ? `${ends.join(" … ").trim()} ${symbol}`.trim() : "";
+      write(this.limitsText, said ? this.t("limits {range}", { range: said }) : "");
+    }
+    this.time = reading.state === "none" ? NaN : reading.time;
+    this.tell();
+  }
+
+  /**
+   * @param {Reading} reading
+   * @param {number | null} value
+   */
+  point(reading, value) {
+    if (reading.state !== "live" || value === null) this.trend.clear();
+    else if (reading.serial !== this.serial) {
+      this.serial = reading.serial;
+      this.trend.add(reading.time, value);
+    }
+    const least = reading.signal.precision === undefined ? 0 : 10 ** -reading.signal.precision;
+    const direction = this.trend.direction(least);
+    const words = { up: this.t("↗ rising"), down: this.t("↘ falling"), flat: this.t("→ steady") };
+    const said = direction === null ? "" : words[direction > 0 ? "up" : direction < 0 ? "down" : "flat"];
+    if (this.trendText) write(this.trendText, said);
+  }
+
+  tell() {
+    if (!this.ageText) return;
+    const old = Math.max(0, performance.now() / 1000 - this.time);
+    write(this.ageText, Number.isFinite(old) ? this.t("{seconds} s ago", { seconds: Math.floor(old) }) : "");
+  }
+}
 
 /** The last minutes as a line, drawn by uPlot where the build has brought it. */
 class History {
@@ -71,6 +132,7 @@ class History {
     this.scale = [0, 1];
     /** @type {Reading["signal"]} */
     this.signal = { name: "", type: "number" };
+    this.factor = (/** @type {number} */ value) => value;
     this.serial = -1;
     this.drawnMs = 0;
     this.limitsShown = "";
@@ -112,11 +174,18 @@ class History {
     }
   }
 
-  /** @param {Reading} reading */
-  add({ value, state, signal, serial, time }) {
+  /**
+   * @param {Reading} reading
+   * @param {(value: number) => number} factor to the unit that is shown
+   */
+  add(reading, factor) {
+    const { state, signal, serial, time } = reading;
+    const known = number(reading);
+    const value = known === null ? null : factor(known);
     this.signal = signal;
+    this.factor = factor;
     const last = this.times.at(-1) ?? -Infinity;
-    if (state !== "live" || typeof value !== "number") {
+    if (state !== "live" || value === null) {
       if ((this.values.at(-1) ?? null) !== null) this.push(last + 1e-3, null);
       this.draw();
     } else if (serial !== this.serial) {
@@ -151,8 +220,11 @@ class History {
     while ((this.times[1] ?? Infinity) < startS) this.drop();
     if (this.times.length === 1 && (this.times[0] ?? 0) < startS) this.drop();
     const known = this.values.filter((value) => value !== null);
-    const limits = Object.entries(this.signal.limits ?? {});
-    const ends = scaleOf(known, limits.map(([, limit]) => limit));
+    const limits = LIMITS.flatMap((name) => {
+      const limit = this.signal.limits?.[name];
+      return limit === undefined ? [] : [/** @type {[string, number]} */ ([name, this.factor(limit)])];
+    });
+    const ends = spanOf(Math.min(...known), Math.max(...known), limits.map(([, limit]) => limit));
     const rim = (ends[1] - ends[0]) * RIM;
     this.scale = [ends[0] - rim, ends[1] + rim];
     write(this.least, known.length > 0 ? this.figure(ends[0]) : "");
@@ -192,28 +264,6 @@ class History {
   }
 }
 
-/**
- * What is drawn from bottom to top: all values, and the next limits where they are not so far off
- * that the line would become flat.
- *
- * @param {number[]} values
- * @param {number[]} limits
- * @returns {[number, number]}
- */
-function scaleOf(values, limits) {
-  if (values.length === 0) return [0, 1];
-  let least = Math.min(...values);
-  let most = Math.max(...values);
-  if (least === most) {
-    const room = Math.abs(most) / 10 || 1;
-    [least, most] = [least - room, most + room];
-  }
-  const near = NEAR * (most - least);
-  const above = Math.min(...limits.filter((limit) => limit > most && limit <= most + near));
-  const below = Math.max(...limits.filter((limit) => limit < least && limit >= least - near));
-  return [Number.isFinite(below) ? below : least, Number.isFinite(above) ? above : most];
-}
-
 /** @param {Element} place */
 function sizeOf(place) {
   return { width: Math.max(1, place.clientWidth), height: Math.max(1, place.clientHeight) };
@@ -235,54 +285,18 @@ function seconds(text) {
  * @param {number} characters
  */
 function fitText(line, characters) {
-  const step = String(Math.min(40, Math.max(4, 2 * Math.ceil(characters / 2))));
-  if (!(line instanceof HTMLElement)) return;
-  if (line.style.getPropertyValue("--value-characters") === step) return;
-  line.style.setProperty("--value-characters", step);
+  style(line, "--value-characters", String(clamp(2 * Math.ceil(characters / 2), 4, 40)));
 }
 
 /**
  * @param {Reading} reading
  * @param {unknown} precision
+ * @param {(value: number) => number} factor
+ * @param {Context["t"]} t
  */
-function textOf(reading, precision) {
+function textOf(reading, precision, factor, t) {
   const { value } = reading;
-  if (typeof precision === "number" && typeof value === "number") return value.toFixed(precision);
-  if (typeof value === "boolean" && reading.text === String(value)) return value ? "yes" : "no";
+  if (typeof precision === "number" && typeof value === "number") return format(factor(value), precision);
+  if (typeof value === "boolean" && reading.text === String(value)) return value ? t("yes") : t("no");
   return reading.text;
-}
-
-/** @param {Reading} reading */
-function noteOf(reading) {
-  if (reading.state === "none") return "no value yet";
-  if (reading.state === "gone") return `last seen ${reading.age} ago`;
-  const old = reading.state === "stale" ? `${reading.age} old` : "";
-  return [ALARMS[reading.alarm], old].filter(Boolean).join(" · ");
-}
-
-/**
- * @param {Element} root
- * @param {string} selector
- */
-function find(root, selector) {
-  const found = root.querySelector(selector);
-  if (!found) throw new Error(`the template has no ${selector}`);
-  return found;
-}
-
-/**
- * @param {Element} el
- * @param {string} text
- */
-function write(el, text) {
-  if (el.textContent !== text) el.textContent = text;
-}
-
-/**
- * @param {Element} el
- * @param {string} name
- * @param {string} value
- */
-function attribute(el, name, value) {
-  if (el.getAttribute(name) !== value) el.setAttribute(name, value);
 }

@@ -1,0 +1,59 @@
+// @ts-check
+/**
+ * A tape that runs past a mark. Pure.
+ *
+ * Its rungs are drawn for three times what is seen, and then it is only moved; it is drawn anew when
+ * the mark comes near an end.
+ */
+
+/** How high the picture of the tape is, in its own units. */
+export const HIGH = 200;
+
+/**
+ * Return the rungs around a value.
+ *
+ * @param {number} value
+ * @param {number} span how much is seen
+ * @returns {{base: number, step: number, rungs: {value: number, y: number, isMain: boolean}[]}}
+ *   `base` is the value at y 0; y grows downwards
+ */
+export function tape(value, span) {
+  const step = stepOf(span);
+  const base = Math.round(value / span) * span;
+  const rungs = [];
+  const [from, to] = [Math.ceil((base - 1.5 * span) / step), Math.floor((base + 1.5 * span) / step)];
+  for (let place = from; place <= to; place += 1) {
+    const at = Number((place * step).toPrecision(12)) + 0;
+    rungs.push({ value: at, y: (-(at - base) / span) * HIGH, isMain: place % 2 === 0 });
+  }
+  return { base, step, rungs };
+}
+
+/**
+ * Return whether a tape that was drawn around `base` still covers what is seen.
+ *
+ * @param {number} value
+ * @param {number} base
+ * @param {number} span
+ */
+export function covers(value, base, span) {
+  return Math.abs(value - base) <= span;
+}
+
+/**
+ * Return how far the tape has to be moved so that a value stands at the mark.
+ *
+ * @param {number} value
+ * @param {number} base
+ * @param {number} span
+ */
+export function offset(value, base, span) {
+  return ((value - base) / span) * HIGH;
+}
+
+/** @param {number} span */
+function stepOf(span) {
+  const rough = span / 8;
+  const decade = 10 ** Math.floor(Math.log10(rough));
+  return decade * ([1, 2, 5, 10].find((each) => each * decade >= rough * 0.999) ?? 10);
+}

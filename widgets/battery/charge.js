@@ -1,0 +1,82 @@
+// @ts-check
+/**
+ * What a battery's numbers mean. Pure.
+ */
+
+/**
+ * Return how long the charge lasts.
+ *
+ * @param {number | null} level percent
+ * @param {number | null} current amperes; negative while it is discharged, as in ROS
+ * @param {unknown} capacity ampere hours
+ * @returns {number | null} seconds; null when nobody can say, as while it is charged
+ */
+export function timeLeft(level, current, capacity) {
+  if (level === null || current === null || typeof capacity !== "number") return null;
+  // Next to nothing: the rest of the time would be longer than anybody believes.
+  if (current > -capacity / 1000) return null;
+  return (3600 * capacity * Math.max(0, level)) / 100 / -current;
+}
+
+/**
+ * Return a time as people read it: "2 h 05 min", "7 min", "under 1 min".
+ *
+ * @param {number} seconds
+ * @returns {{hours: number, minutes: number}}
+ */
+export function clock(seconds) {
+  const minutes = Math.max(0, Math.floor(seconds / 60));
+  return { hours: Math.floor(minutes / 60), minutes: minutes % 60 };
+}
+
+/**
+ * Return how much the cells differ: the highest less the lowest; null when fewer than two are known.
+ *
+ * @param {readonly (number | null)[]} cells
+ */
+export function spread(cells) {
+  const known = cells.filter((cell) => cell !== null);
+  return known.length < 2 ? null : Math.max(...known) - Math.min(...known);
+}
+
+/**
+ * Return between what a cell is empty and full.
+ *
+ * @param {{unit?: string | undefined, min?: number | undefined, max?: number | undefined}} signal
+ * @param {{cell_min?: unknown, cell_max?: unknown}} options
+ * @returns {[number, number]}
+ */
+export function cellScale({ unit, min, max }, options) {
+  // A lithium cell is the usual one; whoever has another says so.
+  const [empty, full] = unit === "V" ? [3, 4.2] : [0, 100];
+  const least = typeof options.cell_min === "number" ? options.cell_min : (min ?? empty);
+  const most = typeof options.cell_max === "number" ? options.cell_max : (max ?? full);
+  return most > least ? [least, most] : [least, least + 1];
+}
+
+/**
+ * A mean over about so many seconds, so that the time left does not jump with each start of a motor.
+ */
+export class Mean {
+  /** @param {number} seconds */
+  constructor(seconds) {
+    this.seconds = seconds;
+    /** @type {number | null} */
+    this.value = null;
+    this.time = 0;
+  }
+
+  /**
+   * @param {number | null} value null: begin anew with the next
+   * @param {number} time in seconds
+   */
+  add(value, time) {
+    if (value === null || this.value === null) this.value = value;
+    else {
+      const weight = 1 - Math.exp(-Math.max(0, time - this.time) / this.seconds);
+      this.value += weight * (value - this.value);
+    }
+    this.time = time;
+    return this.value;
+  }
+}

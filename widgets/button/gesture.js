@@ -1,0 +1,88 @@
+// @ts-check
+/**
+ * What a hand does on a button: two taps, a finger that rests, one that stays. A click without a
+ * finger, as a screen reader and a key make it, counts as the whole gesture where it cannot be told
+ * from it by time.
+ */
+
+/** So long a finger rests before it counts. */
+export const HOLD_MS = 800;
+/** Two taps that are further apart are two. */
+export const DOUBLE_MS = 500;
+const EVERY_MS = 40;
+
+/**
+ * @param {HTMLElement} el
+ * @param {object} spec
+ * @param {"tap" | "double" | "hold" | "repeat"} spec.gesture
+ * @param {number} spec.repeatMs
+ * @param {() => boolean} spec.isReady
+ * @param {() => void} spec.done
+ * @param {(share: number) => void} spec.progress how far the hold has got, 0 to 1
+ * @param {AbortSignal} spec.signal
+ */
+export function listen(el, { gesture, repeatMs, isReady, done, progress, signal }) {
+  let firstMs = -Infinity;
+  let downMs = -1;
+  /** @type {number | undefined} */
+  let timer;
+  if (gesture === "tap" || gesture === "double") {
+    el.addEventListener("click", () => {
+      const nowMs = performance.now();
+      const isSecond = nowMs - firstMs < DOUBLE_MS;
+      firstMs = isSecond ? -Infinity : nowMs;
+      if (gesture === "tap" || isSecond) done();
+    }, { signal });
+    el.addEventListener("keydown", (event) => {
+      // A key that is held down repeats its clicks: that is one tap.
+      if (event.repeat && event.key === "Enter") event.preventDefault();
+    }, { signal });
+    return;
+  }
+
+  function end() {
+    clearInterval(timer);
+    downMs = -1;
+    progress(0);
+  }
+  function begin() {
+    if (downMs >= 0 || !isReady()) return;
+    downMs = performance.now();
+    if (gesture === "repeat") {
+      done();
+      timer = window.setInterval(() => (isReady() ? done() : undefined), repeatMs);
+      progress(1);
+      return;
+    }
+    timer = window.setInterval(() => {
+      const share = (performance.now() - downMs) / HOLD_MS;
+      if (!isReady()) return end();
+      if (share < 1) return progress(share);
+      end();
+      done();
+    }, EVERY_MS);
+  }
+  el.addEventListener("pointerdown", (event) => {
+    if (event.button !== 0) return;
+    el.setPointerCapture(event.pointerId);
+    begin();
+  }, { signal });
+  for (const name of ["pointerup", "pointercancel", "lostpointercapture", "blur", "keyup"]) {
+    el.addEventListener(name, end, { signal });
+  }
+  el.addEventListener("pointermove", (event) => {
+    const box = el.getBoundingClientRect();
+    const isInside = event.clientX >= box.left && event.clientX <= box.right
+      && event.clientY >= box.top && event.clientY <= box.bottom;
+    if (downMs >= 0 && !isInside) end();
+  }, { signal });
+  el.addEventListener("keydown", (event) => {
+    if (event.key !== "Enter" && event.key !== " ") return;
+    event.preventDefault(); // no click besides
+    if (!event.repeat) begin();
+  }, { signal });
+  el.addEventListener("contextmenu", (event) => event.preventDefault(), { signal });
+  addEventListener("blur", end, { signal });
+  document.addEventListener("visibilitychange", end, { signal });
+  signal.addEventListener("abort", end);
+}

@@ -1,0 +1,101 @@
+// @ts-check
+/**
+ * How a picture lies in its box. Pure: no DOM.
+ *
+ * @typedef {"contain" | "cover" | "fill"} Fit
+ * @typedef {object} Size
+ * @property {number} width
+ * @property {number} height
+ *
+ * @typedef {object} Placement What a canvas does before it draws the picture around 0, 0.
+ * @property {number} x where the middle is
+ * @property {number} y
+ * @property {number} angle radians, clockwise
+ * @property {number} width of the picture as it is drawn, before it is turned
+ * @property {number} height
+ * @property {number} flip -1 when it is mirrored
+ */
+
+/**
+ * @param {Size} picture
+ * @param {Size} box
+ * @param {{fit: Fit, rotate: number, mirror: boolean}} look
+ * @returns {Placement}
+ */
+export function place(picture, box, { fit, rotate, mirror }) {
+  const turns = ((Math.round(rotate / 90) % 4) + 4) % 4;
+  const isLying = turns % 2 === 1;
+  const [across, down] = isLying ? [picture.height, picture.width] : [picture.width, picture.height];
+  const [wide, high] = [box.width / Math.max(1, across), box.height / Math.max(1, down)];
+  const scale = fit === "cover" ? Math.max(wide, high) : Math.min(wide, high);
+  const [scaleX, scaleY] = fit === "fill" ? [wide, high] : [scale, scale];
+  const [width, height] = isLying
+    ? [picture.width * scaleY, picture.height * scaleX]
+    : [picture.width * scaleX, picture.height * scaleY];
+  return {
+    x: box.width / 2,
+    y: box.height / 2,
+    angle: (turns * Math.PI) / 2,
+    width,
+    height,
+    flip: mirror ? -1 : 1,
+  };
+}
+
+/**
+ * Return how far a finger has dragged the view, as pan and tilt from -1 to 1: the picture follows the
+ * finger, so the camera turns the other way. Pan is positive to the left (REP 103), tilt upwards.
+ *
+ * @param {{x: number, y: number, startX: number, startY: number}} hand
+ * @param {Size} box
+ */
+export function lookOf(hand, box) {
+  const reach = Math.max(1, Math.min(box.width, box.height) / 2);
+  const share = (/** @type {number} */ way) => Math.round(Math.min(1, Math.max(-1, way / reach)) * 1000) / 1000 + 0;
+  return { pan: share(hand.x - hand.startX), tilt: share(hand.y - hand.startY) };
+}
+
+/**
+ * Return the age of a picture for people: tenths while they matter.
+ *
+ * @param {number} seconds
+ */
+export function ageText(seconds) {
+  if (seconds < 10) return `${Math.max(0, seconds).toFixed(1)} s`;
+  if (seconds < 60) return `${Math.floor(seconds)} s`;
+  return seconds < 3600 ? `${Math.floor(seconds / 60)} min` : `${Math.floor(seconds / 3600)} h`;
+}
+
+/**
+ * Return the name of a snapshot's file: only letters that every disk takes.
+ *
+ * @param {string} title
+ * @param {Date} when
+ */
+export function fileName(title, when) {
+  const plain = title.toLowerCase().replace(/[^a-z0-9]+/g, "-").replace(/^-+|-+$/g, "").slice(0, 40);
+  const stamp = when.toISOString().replace(/[:.]/g, "-").slice(0, 19);
+  return `${plain || "camera"}-${stamp}.png`;
+}
+
+/** Pictures in a second, over the last so many. */
+export class Rate {
+  constructor() {
+    /** @type {number[]} */
+    this.times = [];
+  }
+
+  /** @param {number} nowS */
+  add(nowS) {
+    this.times.push(nowS);
+    if (this.times.length > 30) this.times.shift();
+  }
+
+  /** @param {number} nowS */
+  perSecond(nowS) {
+    const recent = this.times.filter((time) => time > nowS - 3);
+    const first = recent[0];
+    if (first === undefined || recent.length < 2) return 0;
+    return (recent.length - 1) / Math.max(0.001, (recent.at(-1) ?? first) - first);
+  }
+}

@@ -1,0 +1,225 @@
+// @ts-check
+/** @typedef {import("../../urc/web/static/types.js").Context} Context */
+/** @typedef {import("../../urc/web/static/types.js").HoldState} HoldState */
+/** @typedef {import("../../urc/web/static/types.js").Instance} Instance */
+/** @typedef {import("../../urc/web/static/types.js").Outlet} Outlet */
+/** @typedef {import("../../urc/web/static/types.js").Reading} Reading */
+/** @typedef {import("./frame.js").Fit} Fit */
+import { DASH, attribute, board, many, noteOf, part, write } from "urc/kit";
+import { Rate, ageText, fileName, lookOf, place } from "./frame.js";
+import { Newest } from "./newest.js";
+
+const LOOK_AGAIN_MS = 200;
+const KEYS = ["ArrowUp", "ArrowDown", "ArrowLeft", "ArrowRight"];
+const KEY_LEVEL = 0.5;
+
+export default {
+  /**
+   * @param {Context} ctx
+   * @returns {Instance}
+   */
+  mount(ctx) {
+    const camera = new Camera(ctx);
+    return {
+      update: (readings, { look }) => camera.update(readings, look),
+      resize: () => camera.draw(),
+      destroy: () => camera.end(),
+    };
+  },
+};
+
+class Camera {
+  /** @param {Context} ctx */
+  constructor(ctx) {
+    const { el, options, t } = ctx;
+    this.t = t;
+    this.signal = ctx.signal;
+    this.root = part(el, ".camera");
+    this.face = part(el, ".camera-face");
+    this.age = part(el, ".camera-age");
+    this.note = part(el, ".camera-note");
+    this.tools = part(el, ".camera-tools");
+    this.title = part(el, ".camera-title").textContent ?? "";
+    const canvas = el.querySelector("canvas");
+    if (!canvas) throw new Error("the template has no canvas");
+    this.canvas = canvas;
+    this.look = {
+      fit: /** @type {Fit} */ (options["fit"] ?? "contain"),
+      rotate: Number(options["rotate"] ?? 0),
+      mirror: options["mirror"] === true,
+    };
+    this.freeze = Number(options["freeze"] ?? 1);
+    this.rate = options["rate"] === true ? new Rate() : null;
+    /** @type {Reading[]} */
+    this.sources = [];
+    this.chosen = 0;
+    this.fault = "";
+    /** What a hand that turns the camera is told. */
+    this.hand = "";
+    this.pictures = new Newest(
+      () => {
+        this.fault = "";
+        this.rate?.add(performance.now() / 1000);
+        this.draw();
+        this.tell();
+      },
+      () => {
+        this.fault = `▲ ${t("this picture cannot be shown")}`;
+        this.tell();
+      },
+    );
+    if (options["snapshot"] !== false) this.addSnapshot();
+    if (this.face.tabIndex === 0) this.addHold(ctx);
+    // The age grows also when nothing comes: that is when it matters.
+    this.timer = setInterval(() => this.tellAge(), LOOK_AGAIN_MS);
+  }
+
+  /**
+   * @param {string} sign
+   * @param {string} name
+   * @param {() => void} press
+   */
+  addButton(sign, name, press) {
+    const button = document.createElement("button");
+    button.type = "button";
+    button.className = "camera-button";
+    button.textContent = sign;
+    if (name) button.setAttribute("aria-label", name);
+    button.addEventListener("click", press, { signal: this.signal });
+    this.tools.append(button);
+    return button;
+  }
+
+  addSnapshot() {
+    this.shutter = this.addButton("⤓", this.t("Keep this picture"), () => void this.keep());
+    this.shutter.disabled = true;
+  }
+
+  /** @param {Context} ctx */
+  addHold({ hold, t }) {
+    hold("look", {
+      el: this.face,
+      keys: KEYS,
+      sample: (hand) => {
+        if (hand.kind === "pointer") return lookOf(hand, this.face.getBoundingClientRect());
+        const is = (/** @type {string} */ code) => Number(hand.keys.has(code));
+        return {
+          pan: KEY_LEVEL * (is("ArrowLeft") - is("ArrowRight")),
+          tilt: KEY_LEVEL * (is("ArrowUp") - is("ArrowDown")),
+        };
+      },
+      show: (/** @type {HoldState} */ { phase, reason }) => {
+        attribute(this.root, "data-phase", phase);
+        this.hand = phase === "asking" ? `… ${t("taking the controls")}` : phase === "spent" ? `◆ ${reason}` : "";
+        this.tell();
+      },
+    });
+  }
+
+  /**
+   * @param {Readonly<Record<string, Reading>>} readings
+   * @param {Outlet | undefined} look
+   */
+  update(readings, look) {
+    const one = readings["image"];
+    this.sources = [...(one ? [one] : []), ...many(readings["images"])];
+    if (this.sources.length > 1 && !this.switches) this.addSwitches();
+    const reading = this.sources[this.chosen];
+    attribute(this.root, "data-state", reading?.state ?? "none");
+    attribute(this.root, "data-locked", look?.reason ? "yes" : null);
+    this.locked = look?.reason ?? "";
+    if (reading?.image && reading.value !== null) this.pictures.take(reading.image);
+    if (this.shutter) this.shutter.disabled = !this.pictures.shown || !reading || reading.value === null;
+    this.tell();
+  }
+
+  addSwitches() {
+    this.switches = this.sources.map((source, index) => {
+      const name = source.signal.title || source.signal.name;
+      const button = this.addButton(name, "", () => this.choose(index));
+      attribute(button, "aria-pressed", String(index === this.chosen));
+      return button;
+    });
+  }
+
+  /** @param {number} index */
+  choose(index) {
+    if (index === this.chosen) return;
+    this.chosen = index;
+    this.pictures.leave();
+    this.fault = "";
+    this.switches?.forEach((button, place) => attribute(button, "aria-pressed", String(place === index)));
+    this.draw();
+    const reading = this.sources[index];
+    attribute(this.root, "data-state", reading?.state ?? "none");
+    if (reading?.image && reading.value !== null) this.pictures.take(reading.image);
+    this.tell();
+  }
+
+  draw() {
+    const size = { width: this.face.clientWidth, height: this.face.clientHeight };
+    if (size.width === 0 || size.height === 0) return;
+    const pen = board(this.canvas, size);
+    const bitmap = this.pictures.shown;
+    if (!bitmap) return;
+    if (this.shutter) this.shutter.disabled = false;
+    const lie = place(bitmap, size, this.look);
+    pen.translate(lie.x, lie.y);
+    pen.scale(lie.flip, 1);
+    pen.rotate(lie.angle);
+    pen.drawImage(bitmap, -lie.width / 2, -lie.height / 2, lie.width, lie.height);
+  }
+
+  tell() {
+    const reading = this.sources[this.chosen];
+    this.tellAge();
+    if (!reading) {
+      write(this.note, `◆ ${this.t("no camera is bound here")}`);
+      return;
+    }
+    const known = reading.state === "none" ? this.t("no picture yet") : reading.state === "gone" ? noteOf(reading, this.t) : "";
+    const locked = this.face.tabIndex === 0 && this.locked && !this.hand ? `◆ ${this.locked}` : "";
+    write(this.note, [this.fault, this.hand, locked, known].filter(Boolean).join(" · "));
+  }
+
+  tellAge() {
+    const reading = this.sources[this.chosen];
+    const isShown = reading !== undefined && reading.value !== null;
+    const nowS = performance.now() / 1000;
+    const ageS = isShown ? nowS - reading.time : 0;
+    const isFrozen = isShown && ageS >= this.freeze;
+    attribute(this.root, "data-frozen", isFrozen ? "yes" : null);
+    const rate = this.rate && !isFrozen ? `${this.rate.perSecond(nowS).toFixed(0)} /s` : "";
+    const old = isFrozen ? `❄ ${this.t("{age} old", { age: ageText(ageS) })}` : rate;
+    write(this.age, isShown ? old : DASH);
+  }
+
+  async keep() {
+    const bitmap = this.pictures.shown;
+    if (!bitmap) return;
+    const { rotate, mirror } = this.look;
+    const isLying = (rotate / 90) % 2 === 1;
+    const canvas = document.createElement("canvas");
+    [canvas.width, canvas.height] = isLying ? [bitmap.height, bitmap.width] : [bitmap.width, bitmap.height];
+    const pen = canvas.getContext("2d");
+    const lie = place(bitmap, canvas, { fit: "contain", rotate, mirror });
+    pen?.translate(lie.x, lie.y);
+    pen?.scale(lie.flip, 1);
+    pen?.rotate(lie.angle);
+    pen?.drawImage(bitmap, -lie.width / 2, -lie.height / 2, lie.width, lie.height);
+    const blob = await new Promise((/** @type {BlobCallback} */ done) => canvas.toBlob(done, "image/png"));
+    if (!blob || this.signal.aborted) return;
+    const link = document.createElement("a");
+    const url = URL.createObjectURL(blob);
+    link.href = url;
+    link.download = fileName(this.title, new Date());
+    link.click();
+    // The browser reads it after the click.
+    setTimeout(() => URL.revokeObjectURL(url), 10_000);
+  }
+
+  end() {
+    clearInterval(this.timer);
+    this.pictures.end();
+  }
+}

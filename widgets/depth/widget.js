@@ -1,0 +1,241 @@
+// @ts-check
+/** @typedef {import("../../urc/web/static/types.js").Context} Context */
+/** @typedef {import("../../urc/web/static/types.js").Instance} Instance */
+/** @typedef {import("../../urc/web/static/types.js").Outlet} Outlet */
+/** @typedef {import("../../urc/web/static/types.js").Reading} Reading */
+/** @typedef {import("./field.js").Field} Field */
+/** @typedef {import("./field.js").Form} Form */
+import { DASH, attribute, clamp, colours, format, noteOf, part, style, write } from "urc/kit";
+import { palette, pixel } from "urc/palette";
+import { arrayField, paint, pixelAt, probe, readField } from "./field.js";
+
+const STEP = 0.02;
+
+export default {
+  /**
+   * @param {Context} ctx
+   * @returns {Instance}
+   */
+  mount(ctx) {
+    const depth = new Depth(ctx);
+    ctx.follow("theme", () => depth.paint());
+    return {
+      update: ({ image }, { probe: outlet }) => depth.update(image, outlet),
+      resize: () => depth.mark(),
+      destroy: () => depth.end(),
+    };
+  },
+};
+
+class Depth {
+  /** @param {Context} ctx */
+  constructor({ el, options, t, send, signal }) {
+    this.t = t;
+    this.send = send;
+    this.options = options;
+    this.root = part(el, ".depth");
+    this.face = part(el, ".depth-face");
+    this.cross = part(el, ".depth-cross");
+    this.text = part(el, ".depth-text");
+    this.note = part(el, ".depth-note");
+    const [data, bar] = el.querySelectorAll("canvas");
+    const pen = data?.getContext("2d");
+    if (!data || !bar || !pen) throw new Error("this browser draws no canvas");
+    this.canvas = data;
+    this.pen = pen;
+    this.clip = { near: Number(options["near"] ?? 0.3), far: Number(options["far"] ?? 5) };
+    this.palette = palette(options["palette"] === "grey" ? "grey" : "cividis");
+    /** Where it is measured, in shares of the picture. */
+    this.point = { x: 0.5, y: 0.5 };
+    /** @type {Field | null} */
+    this.field = null;
+    /** @type {Reading | null} */
+    this.reading = null;
+    /** Came while another one was being read: the newest wins. @type {Reading | null} */
+    this.next = null;
+    this.isBusy = false;
+    this.isOver = false;
+    this.serial = -1;
+    this.fault = "";
+    this.outcome = "";
+    this.canSend = false;
+    this.legend(bar);
+    this.listen(signal);
+  }
+
+  /** @param {HTMLCanvasElement} bar */
+  legend(bar) {
+    const pen = bar.getContext("2d");
+    const image = new ImageData(256, 1);
+    new Uint32Array(image.data.buffer).set(this.palette.toReversed());
+    pen?.putImageData(image, 0, 0);
+    write(part(this.root, ".depth-near"), `≤ ${format(this.clip.near)} m`);
+    write(part(this.root, ".depth-far"), `≥ ${format(this.clip.far)} m`);
+  }
+
+  /** @param {AbortSignal} signal */
+  listen(signal) {
+    const point = (/** @type {PointerEvent} */ event) => {
+      const box = this.box();
+      this.move((event.clientX - box.left) / box.width, (event.clientY - box.top) / box.height);
+    };
+    const down = (/** @type {PointerEvent} */ event) => {
+      this.face.setPointerCapture(event.pointerId);
+      point(event);
+    };
+    const move = (/** @type {PointerEvent} */ event) => {
+      if (this.face.hasPointerCapture(event.pointerId)) point(event);
+    };
+    this.face.addEventListener("pointerdown", down, { signal });
+    this.face.addEventListener("pointermove", move, { signal });
+    this.face.addEventListener("pointerup", () => this.give(), { signal });
+    this.face.addEventListener("keydown", (event) => this.key(event), { signal });
+  }
+
+  /** @param {KeyboardEvent} event */
+  key(event) {
+    const ways = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
+    const way = Object.hasOwn(ways, event.key) ? Reflect.get(ways, event.key) : undefined;
+    if (event.key === "Enter" && !event.repeat) this.give();
+    if (!way) return;
+    event.preventDefault();
+    this.move(this.point.x + STEP * way[0], this.point.y + STEP * way[1]);
+  }
+
+  /** Where the picture lies in the page: its own shape, within or beyond the box of the canvas. */
+  box() {
+    const { left, top, width, height } = this.face.getBoundingClientRect();
+    const { width: columns, height: rows } = this.canvas;
+    const [across, down] = [width / columns, height / rows];
+    const scale = this.options["fit"] === "cover" ? Math.max(across, down) : Math.min(across, down);
+    const [wide, high] = [columns * scale || 1, rows * scale || 1];
+    return { left: left + (width - wide) / 2, top: top + (height - high) / 2, width: wide, height: high };
+  }
+
+  /**
+   * @param {number} x
+   * @param {number} y
+   */
+  move(x, y) {
+    this.point = { x: clamp(x, 0, 1), y: clamp(y, 0, 1) };
+    this.mark();
+    this.show();
+  }
+
+  mark() {
+    const [box, face] = [this.box(), this.face.getBoundingClientRect()];
+    style(this.cross, "left", `${(box.left - face.left + this.point.x * box.width).toFixed(1)}px`);
+    style(this.cross, "top", `${(box.top - face.top + this.point.y * box.height).toFixed(1)}px`);
+  }
+
+  /**
+   * @param {Reading | undefined} reading
+   * @param {Outlet | undefined} outlet
+   */
+  update(reading, outlet) {
+    this.canSend = outlet?.isReady ?? false;
+    if (!reading) return;
+    this.reading = reading;
+    attribute(this.root, "data-state", reading.state);
+    const serial = reading.image?.serial ?? reading.serial;
+    if (serial !== this.serial && reading.value !== null) {
+      this.serial = serial;
+      this.next = reading;
+      if (!this.isBusy) void this.work();
+    }
+    this.show();
+  }
+
+  async work() {
+    this.isBusy = true;
+    while (this.next && !this.isOver) {
+      const reading = this.next;
+      this.next = null;
+      try {
+        this.field = await this.read(reading);
+        this.fault = "";
+      } catch (error) {
+        this.field = null;
+        this.fault = error instanceof Error ? error.message : String(error);
+      }
+      if (!this.isOver) this.paint();
+    }
+    this.isBusy = false;
+  }
+
+  /**
+   * @param {Reading} reading
+   * @returns {Promise<Field | null>}
+   */
+  async read({ image, value }) {
+    const form = this.form();
+    if (Array.isArray(value)) return arrayField(value, { ...form, scale: this.scale(1) });
+    return image ? readField(new Uint8Array(await image.blob.arrayBuffer()), form) : null;
+  }
+
+  /** @returns {Form} */
+  form() {
+    const encoding = this.options["encoding"];
+    const isFloat = encoding === "32FC1";
+    return {
+      encoding: isFloat ? "32FC1" : encoding === "8UC1" ? "8UC1" : "16UC1",
+      width: Number(this.options["width"] ?? 0),
+      height: Number(this.options["height"] ?? 0),
+      bigEndian: this.options["big_endian"] === true,
+      scale: this.scale(isFloat ? 1 : 0.001),
+    };
+  }
+
+  /** @param {number} otherwise */
+  scale(otherwise) {
+    const given = this.options["scale"];
+    return typeof given === "number" ? given : otherwise;
+  }
+
+  paint() {
+    const { field, canvas } = this;
+    if (field) {
+      const isNew = canvas.width !== field.width || canvas.height !== field.height;
+      if (isNew) [canvas.width, canvas.height] = [field.width, field.height];
+      const image = new ImageData(field.width, field.height);
+      // What is not known looks like the box behind it, and is no colour of the scale.
+      const { surface } = colours(this.root, ["surface"]);
+      paint(field, this.clip, this.palette, pixel(surface), new Uint32Array(image.data.buffer));
+      this.pen.putImageData(image, 0, 0);
+      if (isNew) this.mark();
+    }
+    this.show();
+  }
+
+  show() {
+    const { field, reading, fault } = this;
+    const isShown = reading !== null && reading.value !== null && !fault;
+    const distance = field && isShown ? probe(field, this.point.x, this.point.y) : NaN;
+    const [column, row] = field ? pixelAt(field, this.point.x, this.point.y) : [0, 0];
+    const known = Number.isNaN(distance) ? DASH : `${format(distance, distance < 10 ? 2 : 1)} m`;
+    write(this.text, field && isShown ? `${known} · ${column}, ${row}` : DASH);
+    attribute(this.root, "data-fault", fault ? "yes" : null);
+    const note = reading ? noteOf(reading, this.t) : this.t("no value yet");
+    write(this.note, [fault ? `▲ ${fault}` : "", this.outcome, note].filter(Boolean).join(" · "));
+  }
+
+  async give() {
+    const { field } = this;
+    if (!field || !this.canSend) return;
+    const [x, y] = pixelAt(field, this.point.x, this.point.y);
+    const metres = probe(field, this.point.x, this.point.y);
+    if (Number.isNaN(metres)) return;
+    try {
+      await this.send("probe", { x, y, distance: Math.round(metres * 1000) / 1000 });
+      this.outcome = `✓ ${this.t("sent")}`;
+    } catch (error) {
+      this.outcome = `▲ ${error instanceof Error ? error.message : error}`;
+    }
+    this.show();
+  }
+
+  end() {
+    this.isOver = true;
+    this.next = null;
+  }
+}

@@ -1,0 +1,128 @@
+// @ts-check
+/**
+ * Where the sticks and buttons of a gamepad are: shown, and learnt by moving them.
+ *
+ * @typedef {import("../../urc/web/static/types.js").Context} Context
+ * @typedef {import("../../urc/web/static/types.js").PadView} PadView
+ * @typedef {import("../../urc/web/static/padmap.js").PadMap} PadMap
+ *
+ * @typedef {object} Part One thing that can be learnt.
+ * @property {string} text
+ * @property {string} how What a person has to do.
+ * @property {number} axis Which of the four axes; -1 for a button.
+ * @property {"left" | "right" | "slower" | "faster"} [button]
+ */
+import { STANDARD, movedAxis, withAxis, withButton } from "urc/padmap";
+import { part, t, write } from "urc/kit";
+
+/** @type {Part[]} */
+const PARTS = [
+  { text: t("Left stick, sideways"), how: t("push it to the right"), axis: 0 },
+  { text: t("Left stick, along"), how: t("pull it back"), axis: 1 },
+  { text: t("Right stick, sideways"), how: t("push it to the right"), axis: 2 },
+  { text: t("Right stick, along"), how: t("pull it back"), axis: 3 },
+  { text: t("Enables the left stick"), how: t("press a button"), axis: -1, button: "left" },
+  { text: t("Enables the right stick"), how: t("press a button"), axis: -1, button: "right" },
+  { text: t("Slower"), how: t("press a button"), axis: -1, button: "slower" },
+  { text: t("Faster"), how: t("press a button"), axis: -1, button: "faster" },
+];
+
+export class Mapping {
+  /** @param {Context} ctx */
+  constructor(ctx) {
+    this.ctx = ctx;
+    this.root = part(ctx.el, ".gamepad-map");
+    this.list = part(ctx.el, ".gamepad-parts");
+    /** @type {HTMLElement[]} */
+    this.places = [];
+    /** @type {HTMLButtonElement[]} */
+    this.buttons = [];
+    /** Which part is being learnt; null while none is. @type {Part | null} */
+    this.learnt = null;
+    /** How the gamepad was when that began. @type {PadView | null} */
+    this.before = null;
+    /** @type {PadView | null} */
+    this.view = null;
+    this.build();
+  }
+
+  build() {
+    const { signal } = this.ctx;
+    for (const one of PARTS) {
+      const row = document.createElement("p");
+      row.className = "gamepad-part";
+      const name = document.createElement("span");
+      name.textContent = `${one.text}: `;
+      const place = document.createElement("span");
+      const button = document.createElement("button");
+      button.type = "button";
+      button.className = "gamepad-learn";
+      button.setAttribute("aria-label", `${t("Change")}: ${one.text}`);
+      button.addEventListener("click", () => this.learn(one), { signal });
+      row.append(name, place, button);
+      this.list.append(row);
+      this.places.push(place);
+      this.buttons.push(button);
+    }
+    const reset = document.createElement("button");
+    reset.type = "button";
+    reset.className = "gamepad-learn";
+    reset.textContent = t("As the browser says");
+    reset.addEventListener("click", () => this.view && this.ctx.pads.setMap(this.view.id, null), { signal });
+    this.list.append(reset);
+  }
+
+  /** @param {Part} one */
+  learn(one) {
+    this.learnt = this.learnt === one ? null : one;
+    this.before = this.view;
+  }
+
+  /** @param {PadView | null} view */
+  draw(view) {
+    if (this.view?.id !== view?.id) this.learnt = null; // another gamepad teaches nothing about this one
+    this.view = view;
+    if (this.root.hidden !== !view) this.root.hidden = !view;
+    if (!view) return;
+    if (this.learnt && this.before) this.watch(view, this.learnt, this.before);
+    PARTS.forEach((one, index) => {
+      const place = this.places[index];
+      const button = this.buttons[index];
+      if (place) write(place, placed(one, view.map));
+      if (button) write(button, this.learnt === one ? `… ${one.how}` : t("Change"));
+    });
+  }
+
+  /**
+   * @param {PadView} view
+   * @param {Part} one
+   * @param {PadView} before
+   */
+  watch(view, one, before) {
+    const map = view.map ?? STANDARD;
+    const axis = one.axis >= 0 ? movedAxis(before.axes, view.axes) : null;
+    const button = one.button ? view.buttons.findIndex((isDown, place) => isDown && !before.buttons[place]) : -1;
+    if (axis) this.keep(withAxis(map, one.axis, axis.place, axis.isNegative), view);
+    else if (one.button && button >= 0) this.keep(withButton(map, one.button, button), view);
+  }
+
+  /**
+   * @param {PadMap} map
+   * @param {PadView} view
+   */
+  keep(map, view) {
+    this.learnt = null;
+    this.ctx.pads.setMap(view.id, map);
+  }
+}
+
+/**
+ * @param {Part} one
+ * @param {PadMap | null} map
+ */
+function placed({ axis, button }, map) {
+  if (!map) return "—";
+  if (button === undefined) return `${map.axes[axis] ?? "—"}${map.turned[axis] ? " ↔" : ""}`;
+  const places = map[button];
+  return Array.isArray(places) ? places.join(" / ") : String(places);
+}

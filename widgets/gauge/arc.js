@@ -1,0 +1,54 @@
+// @ts-check
+/**
+ * The geometry of a round scale: 270 degrees, open below. Pure.
+ */
+
+/** Degrees clockwise from straight up. */
+export const START = -135;
+export const SWEEP = 270;
+
+/**
+ * Return where a share of the scale points to, in degrees clockwise from straight up.
+ *
+ * @param {number} share 0 to 1
+ */
+export function angle(share) {
+  return START + SWEEP * share;
+}
+
+/**
+ * Return the point of a circle around the origin, as it is written into a path.
+ *
+ * @param {number} degrees clockwise from straight up
+ * @param {number} radius
+ */
+export function place(degrees, radius) {
+  const radians = (degrees * Math.PI) / 180;
+  const [x, y] = [radius * Math.sin(radians), -radius * Math.cos(radians)];
+  return `${x.toFixed(2)} ${y.toFixed(2)}`;
+}
+
+/**
+ * Return the path of an arc between two shares of the scale.
+ *
+ * @param {number} from 0 to 1
+ * @param {number} to not less than `from`
+ * @param {number} radius
+ */
+export function arc(from, to, radius) {
+  const isLarge = (to - from) * SWEEP > 180 ? 1 : 0;
+  return `M${place(angle(from), radius)}A${radius} ${radius} 0 ${isLarge} 1 ${place(angle(to), radius)}`;
+}
+
+/**
+ * Return the path of short lines across the rim.
+ *
+ * @param {readonly number[]} shares
+ * @param {number} inner
+ * @param {number} outer
+ */
+export function dashes(shares, inner, outer) {
+  return shares
+    .map((share) => `M${place(angle(share), inner)}L${place(angle(share), outer)}`)
+    .join("");
+}

@@ -1,0 +1,74 @@
+// @ts-check
+/** @typedef {import("../../urc/web/static/types.js").Context} Context */
+/** @typedef {import("../../urc/web/static/types.js").Instance} Instance */
+import { attribute, noteOf, part, write } from "urc/kit";
+import { pictureOf } from "./source.js";
+
+export default {
+  /**
+   * @param {Context} ctx
+   * @returns {Instance}
+   */
+  mount(ctx) {
+    const { el, options, t } = ctx;
+    const root = part(el, ".image");
+    const place = part(el, ".image-place");
+    const note = part(el, ".image-note");
+    const words = String(options["words"] || part(el, ".image-title").textContent);
+    const canvas = document.createElement("canvas");
+    canvas.className = "image-picture";
+    canvas.setAttribute("role", "img");
+    canvas.setAttribute("aria-label", words);
+    let fault = "";
+    const tell = (/** @type {string} */ said) => write(note, [fault, said].filter(Boolean).join(" · "));
+    if (options["file"] || options["source"]) {
+      still(ctx, root, place, words, (problem) => {
+        fault = problem;
+        tell("");
+      });
+    }
+
+    ctx.picture("picture", (bitmap) => {
+      // The style sheet fits it into the cell, so it keeps its own size.
+      if (canvas.width !== bitmap.width) canvas.width = bitmap.width;
+      if (canvas.height !== bitmap.height) canvas.height = bitmap.height;
+      canvas.getContext("2d")?.drawImage(bitmap, 0, 0);
+      if (canvas.parentElement !== place) place.replaceChildren(canvas);
+    });
+
+    return {
+      update({ picture }) {
+        if (!picture) return;
+        attribute(root, "data-state", picture.state);
+        const isNone = picture.state === "none";
+        tell(isNone ? t("no picture yet") : noteOf(picture, t));
+        // What is as old as that must not be taken for now.
+        canvas.hidden = picture.state === "gone";
+        attribute(root, "data-gone", canvas.hidden ? "yes" : null);
+      },
+    };
+  },
+};
+
+/**
+ * Show the picture of the profile.
+ *
+ * @param {Context} ctx
+ * @param {HTMLElement} root
+ * @param {HTMLElement} place
+ * @param {string} words
+ * @param {(fault: string) => void} fail
+ */
+function still({ options, t }, root, place, words, fail) {
+  const source = pictureOf(options);
+  const image = document.createElement("img");
+  image.className = "image-picture";
+  image.alt = words;
+  image.addEventListener("error", () => fail(t("◆ the picture cannot be read")));
+  image.addEventListener("load", () => {
+    place.replaceChildren(image);
+    if (root.dataset["state"] === "none") root.dataset["state"] = "live";
+  });
+  if (source) image.src = source;
+  else fail(t("◆ the options name no picture"));
+}

@@ -1,0 +1,216 @@
+// @ts-check
+/**
+ * Places on the earth, and on a floor. Pure: no DOM, no Leaflet.
+ *
+ * A place is `[first, second]`: latitude and longitude in degrees, or y and x in metres of the
+ * robot's own map, as Leaflet wants it: up comes first.
+ *
+ * @typedef {[number, number]} Place
+ */
+
+const EARTH_M = 6_371_008.8;
+const RAD = Math.PI / 180;
+
+/**
+ * Return the distance in metres.
+ *
+ * @param {Place} one
+ * @param {Place} other
+ * @param {boolean} isLocal
+ */
+export function distance(one, other, isLocal) {
+  if (isLocal) return Math.hypot(one[0] - other[0], one[1] - other[1]);
+  const north = (other[0] - one[0]) * RAD;
+  const east = (other[1] - one[1]) * RAD;
+  const half =
+    Math.sin(north / 2) ** 2 +
+    Math.cos(one[0] * RAD) * Math.cos(other[0] * RAD) * Math.sin(east / 2) ** 2;
+  return 2 * EARTH_M * Math.asin(Math.min(1, Math.sqrt(half)));
+}
+
+/**
+ * Return the length of a way in metres.
+ *
+ * @param {readonly Place[]} way
+ * @param {boolean} isLocal
+ */
+export function lengthOf(way, isLocal) {
+  return way.reduce((sum, place, index) => {
+    const before = way[index - 1];
+    return before ? sum + distance(before, place, isLocal) : sum;
+  }, 0);
+}
+
+/**
+ * Return how many degrees of latitude and longitude a metre is; 1 and 1 on a floor.
+ *
+ * @param {Place} origin
+ * @param {boolean} isLocal
+ * @returns {Place}
+ */
+export function perMetre(origin, isLocal) {
+  if (isLocal) return [1, 1];
+  const degree = 1 / (EARTH_M * RAD);
+  return [degree, degree / Math.max(0.01, Math.cos(origin[0] * RAD))];
+}
+
+/**
+ * Return whether a place lies within the fence. No fence holds nothing back.
+ *
+ * @param {Place} place
+ * @param {readonly Place[]} fence
+ */
+export function isInside(place, fence) {
+  if (fence.length < 3) return true;
+  let inside = false;
+  const [y, x] = place;
+  for (let index = 0, before = fence.length - 1; index < fence.length; before = index, index += 1) {
+    const [ay, ax] = fence[index] ?? [0, 0];
+    const [by, bx] = fence[before] ?? [0, 0];
+    if (ay > y !== by > y && x < ((bx - ax) * (y - ay)) / (by - ay) + ax) inside = !inside;
+  }
+  return inside;
+}
+
+/**
+ * Return a fence or way from an option: pairs of numbers; whatever is no pair is left out.
+ *
+ * @param {unknown} value
+ * @param {boolean} isLocal pairs are x, y there, and latitude, longitude on the earth
+ * @returns {Place[]}
+ */
+export function placesOf(value, isLocal) {
+  if (!Array.isArray(value)) return [];
+  return value.flatMap((pair) => {
+    const [first, second] = Array.isArray(pair) ? pair : [];
+    if (!Number.isFinite(first) || !Number.isFinite(second)) return [];
+    return [isLocal ? [second, first] : [first, second]];
+  });
+}
+
+/**
+ * Return whether two numbers can be a place.
+ *
+ * @param {number | null} first
+ * @param {number | null} second
+ * @param {boolean} isLocal
+ * @returns {Place | null}
+ */
+export function placeOf(first, second, isLocal) {
+  if (first === null || second === null) return null;
+  if (!isLocal && (Math.abs(first) > 90 || Math.abs(second) > 360)) return null;
+  return [first, second];
+}
+
+/**
+ * Return an angle in degrees, minutes and seconds with its side, as `46°31′10.9″ N`.
+ *
+ * @param {number} degrees
+ * @param {"NS" | "EW"} sides positive first
+ */
+export function sexagesimal(degrees, sides) {
+  // Rounded as a whole, so that 59.96 seconds never become 60.0.
+  const tenths = Math.round(Math.abs(degrees) * 36_000);
+  const seconds = ((tenths % 600) / 10).toFixed(1).padStart(4, "0");
+  const minutes = String(Math.floor(tenths / 600) % 60).padStart(2, "0");
+  const side = degrees < 0 ? sides[1] : sides[0];
+  return `${Math.floor(tenths / 36_000)}°${minutes}′${seconds}″ ${side}`;
+}
+
+/**
+ * Return a place for people.
+ *
+ * @param {Place} place
+ * @param {"decimal" | "dms"} form
+ * @param {boolean} isLocal
+ */
+export function placeText([first, second], form, isLocal) {
+  if (isLocal) return `x ${second.toFixed(2)} m, y ${first.toFixed(2)} m`;
+  if (form === "dms") return `${sexagesimal(first, "NS")}, ${sexagesimal(second, "EW")}`;
+  const side = (/** @type {number} */ value, /** @type {string} */ sides) =>
+    `${Math.abs(value).toFixed(6)}° ${value < 0 ? sides[1] : sides[0]}`;
+  return `${side(first, "NS")}, ${side(second, "EW")}`;
+}
+
+/**
+ * Return a distance for people.
+ *
+ * @param {number} metres
+ */
+export function distanceText(metres) {
+  if (metres < 10) return `${metres.toFixed(1)} m`;
+  return metres < 1000 ? `${Math.round(metres)} m` : `${(metres / 1000).toFixed(2)} km`;
+}
+
+/**
+ * Return the bearing in degrees, clockwise from up, of a yaw that grows counter-clockwise from the
+ * x axis, in radians (REP 103).
+ *
+ * @param {number} yaw
+ */
+export function bearingOf(yaw) {
+  return (((90 - yaw / RAD) % 360) + 360) % 360;
+}
+
+/**
+ * Return a round spacing for a grid: 1, 2 or 5 times a power of ten metres, at least `pixels` apart.
+ *
+ * @param {number} metresPerPixel
+ * @param {number} [pixels]
+ */
+export function gridStep(metresPerPixel, pixels = 64) {
+  const rough = metresPerPixel * pixels;
+  if (!(rough > 0) || !Number.isFinite(rough)) return 1;
+  const power = 10 ** Math.floor(Math.log10(rough));
+  return ([1, 2, 5, 10].find((each) => each * power >= rough * 0.999) ?? 10) * power;
+}
+
+/**
+ * Return what a message of a receiver says: latitude, longitude and accuracy, as in NavSatFix.
+ *
+ * @param {unknown} fix
+ * @returns {{place: Place | null, accuracy: number | null}}
+ */
+export function readFix(fix) {
+  if (typeof fix !== "object" || fix === null || Array.isArray(fix)) return { place: null, accuracy: null };
+  const { latitude, longitude, position_covariance: covariance, status } =
+    /** @type {Record<string, unknown>} */ (fix);
+  const state = typeof status === "object" && status !== null ? Reflect.get(status, "status") : status;
+  const has = typeof state !== "number" || state >= 0;
+  const place =
+    has && typeof latitude === "number" && typeof longitude === "number"
+      ? placeOf(latitude, longitude, false)
+      : null;
+  const list = Array.isArray(covariance) ? covariance : [];
+  const spread = Number(list[0]) + Number(list[4]);
+  // One number for both ways: the root of their mean variance.
+  return { place, accuracy: spread > 0 && Number.isFinite(spread) ? Math.sqrt(spread / 2) : null };
+}
+
+/** Where it has been: at most so many places, none of them close to the one before. */
+export class Trail {
+  /**
+   * @param {number} most
+   * @param {number} apart metres
+   * @param {boolean} isLocal
+   */
+  constructor(most, apart, isLocal) {
+    this.most = most;
+    this.apart = apart;
+    this.isLocal = isLocal;
+    /** @type {Place[]} */
+    this.places = [];
+  }
+
+  /**
+   * @param {Place} place
+   * @returns {boolean} whether it is a new place
+   */
+  add(place) {
+    const last = this.places.at(-1);
+    if (last && distance(last, place, this.isLocal) < this.apart) return false;
+    this.places.push(place);
+    if (this.places.length > this.most) this.places.shift();
+    return this.most > 0;
+  }
+}

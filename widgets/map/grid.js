@@ -1,0 +1,96 @@
+// @ts-check
+/** A grid in metres under the map: where there are no tiles, it tells what moves and how far. */
+/** @typedef {import("leaflet").Map} LeafletMap */
+/** @typedef {import("./geo.js").Place} Place */
+import { board, colours, write } from "urc/kit";
+import { distance, distanceText, gridStep, perMetre } from "./geo.js";
+
+/** More lines than fit on any screen at their least spacing. */
+const MOST_LINES = 200;
+
+export class Grid {
+  /**
+   * @param {LeafletMap} map
+   * @param {HTMLElement} scale takes what a square is
+   * @param {boolean} isLocal
+   */
+  constructor(map, scale, isLocal) {
+    this.map = map;
+    this.scale = scale;
+    this.isLocal = isLocal;
+    /** @type {Place} */
+    this.origin = [0, 0];
+    this.canvas = document.createElement("canvas");
+    this.canvas.className = "map-grid";
+    this.canvas.setAttribute("aria-hidden", "true");
+    map.getContainer().prepend(this.canvas);
+    this.isAsked = false;
+    this.theme();
+    map.on("move zoom resize viewreset", () => this.ask());
+    this.ask();
+  }
+
+  theme() {
+    this.ink = colours(this.map.getContainer(), ["faint", "line"]);
+    this.ask();
+  }
+
+  /** @param {Place} origin */
+  setOrigin(origin) {
+    this.origin = origin;
+    this.ask();
+  }
+
+  /** Once a frame, however often the map says that it moved. */
+  ask() {
+    if (this.isAsked) return;
+    this.isAsked = true;
+    requestAnimationFrame(() => {
+      this.isAsked = false;
+      if (this.canvas.isConnected) this.draw();
+    });
+  }
+
+  draw() {
+    const { map, isLocal } = this;
+    const { x: width, y: height } = map.getSize();
+    if (width === 0 || height === 0) return;
+    const pen = board(this.canvas, { width, height });
+    const [one, other] = [map.containerPointToLatLng([0, height / 2]), map.containerPointToLatLng([100, height / 2])];
+    const metres = distance([one.lat, one.lng], [other.lat, other.lng], isLocal) / 100;
+    const step = gridStep(metres);
+    write(this.scale, `▦ ${distanceText(step)}`);
+    const [up, across] = perMetre(this.origin, isLocal);
+    pen.strokeStyle = this.ink?.faint ?? "";
+    pen.lineWidth = 1;
+    const bounds = map.getBounds();
+    const [west, south, east, north] = [bounds.getWest(), bounds.getSouth(), bounds.getEast(), bounds.getNorth()];
+    this.lines(pen, this.origin[1], across * step, [west, east], (lng) => {
+      const { x } = map.latLngToContainerPoint([south, lng]);
+      pen.moveTo(x, 0);
+      pen.lineTo(x, height);
+    });
+    this.lines(pen, this.origin[0], up * step, [south, north], (lat) => {
+      const { y } = map.latLngToContainerPoint([lat, west]);
+      pen.moveTo(0, y);
+      pen.lineTo(width, y);
+    });
+  }
+
+  /**
+   * @param {CanvasRenderingContext2D} pen
+   * @param {number} from
+   * @param {number} step
+   * @param {[number, number]} ends
+   * @param {(place: number) => void} line
+   */
+  lines(pen, from, step, [least, most], line) {
+    if (!(step > 0) || (most - least) / step > MOST_LINES) return;
+    for (let index = Math.ceil((least - from) / step); from + index * step <= most; index += 1) {
+      pen.beginPath();
+      pen.strokeStyle = (index === 0 ? this.ink?.line : this.ink?.faint) ?? "";
+      line(from + index * step);
+      pen.stroke();
+    }
+  }
+}

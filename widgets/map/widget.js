@@ -1,0 +1,282 @@
+// @ts-check
+/** @typedef {import("../../urc/web/static/types.js").Context} Context */
+/** @typedef {import("../../urc/web/static/types.js").Instance} Instance */
+/** @typedef {import("../../urc/web/static/types.js").Outlet} Outlet */
+/** @typedef {import("../../urc/web/static/types.js").Reading} Reading */
+/** @typedef {import("./geo.js").Place} Place */
+/** @typedef {typeof import("leaflet")} Leaflet */
+import { DASH, attribute, colours, isStill, noteOf, number, part, style, svg, write } from "urc/kit";
+import { Choice } from "./choose.js";
+import { Trail, bearingOf, isInside, placeOf, placeText, placesOf, readFix } from "./geo.js";
+import { Grid } from "./grid.js";
+
+export default {
+  /**
+   * @param {Context} ctx
+   * @returns {Promise<Instance>}
+   */
+  async mount(ctx) {
+    const [leaflet] = await Promise.all([import("leaflet"), ctx.style("leaflet")]);
+    if (ctx.signal.aborted) return {};
+    const chart = new Chart(ctx, leaflet);
+    ctx.follow("theme", () => chart.theme());
+    return {
+      update: (readings, outputs) => chart.update(readings, outputs),
+      resize: () => chart.map.invalidateSize({ animate: false }),
+      destroy: () => chart.map.remove(),
+    };
+  },
+};
+
+class Chart {
+  /**
+   * @param {Context} ctx
+   * @param {Leaflet} leaflet
+   */
+  constructor(ctx, leaflet) {
+    const { el, options, t, signal } = ctx;
+    this.t = t;
+    this.leaflet = leaflet;
+    this.options = options;
+    this.root = part(el, ".map");
+    this.text = part(el, ".map-text");
+    this.note = part(el, ".map-note");
+    /** @type {"decimal" | "dms"} */
+    this.form = options["format"] === "dms" ? "dms" : "decimal";
+    /** Known with the first update: which inputs are bound. @type {boolean | null} */
+    this.isLocal = null;
+    this.signal = signal;
+    this.ctx = ctx;
+    this.isFollowing = true;
+    this.hasPlace = false;
+    this.trail = new Trail(Number(options["trail"] ?? 1000), Number(options["trail_step"] ?? 0.2), false);
+    /** @type {Place[]} */
+    this.fence = [];
+    this.map = this.makeMap(false);
+  }
+
+  /**
+   * @param {boolean} isLocal
+   */
+  makeMap(isLocal) {
+    const { leaflet, options } = this;
+    const tiles = typeof options["tiles"] === "string" && !isLocal ? options["tiles"] : "";
+    const map = new leaflet.Map(part(this.root, ".map-area"), {
+      crs: isLocal ? leaflet.CRS.Simple : leaflet.CRS.EPSG3857,
+      center: [0, 0],
+      zoom: Number(options["zoom"] ?? (isLocal ? 5 : 18)),
+      minZoom: isLocal ? -3 : 1,
+      maxZoom: isLocal ? 10 : 22,
+      // Its controls set markup from text, which the page's policy forbids.
+      zoomControl: false,
+      attributionControl: false,
+      preferCanvas: true,
+      zoomAnimation: !isStill(),
+      fadeAnimation: !isStill(),
+      markerZoomAnimation: !isStill(),
+      inertia: !isStill(),
+    });
+    if (tiles) new leaflet.TileLayer(tiles, { maxNativeZoom: Number(options["max_zoom"] ?? 19), maxZoom: 22 }).addTo(map);
+    return map;
+  }
+
+  /**
+   * Begin with what is bound: the earth, or the robot's own map.
+   *
+   * @param {Readonly<Record<string, Reading>>} readings
+   * @param {Readonly<Record<string, Outlet>>} outputs
+   */
+  begin(readings, outputs) {
+    const isLocal = readings["x"] !== undefined && readings["latitude"] === undefined && readings["fix"] === undefined;
+    this.isLocal = isLocal;
+    if (isLocal) {
+      this.map.remove();
+      this.map = this.makeMap(true);
+    }
+    this.trail.isLocal = isLocal;
+    this.fence = placesOf(this.options["fence"], isLocal);
+    const { fence, form } = this;
+    this.grid = new Grid(this.map, part(this.root, ".map-scale"), isLocal);
+    if (this.fence[0]) this.grid.setOrigin(this.fence[0]);
+    this.choice = new Choice(part(this.root, ".map-frame"), this.ctx, {
+      isLocal,
+      form,
+      fence,
+      changed: () => this.drawChoice(),
+    });
+    this.addButtons("waypoints" in outputs);
+    this.layers = this.makeLayers();
+    this.theme();
+    this.map.on("dragstart", () => this.follow(false));
+    if ("goto" in outputs || "waypoints" in outputs) this.listen();
+    if (fence.length > 2) this.map.fitBounds(new this.leaflet.LatLngBounds(fence), { animate: false });
+  }
+
+  listen() {
+    this.map.on("click", (event) => this.choice?.tap([event.latlng.lat, event.latlng.lng]));
+    const key = (/** @type {KeyboardEvent} */ event) => {
+      if (event.key === "Enter" && event.target === this.map.getContainer() && !event.repeat) {
+        const { lat, lng } = this.map.getCenter();
+        this.choice?.tap([lat, lng]);
+      }
+      if (event.key === "Escape" && this.choice && this.choice.mode !== "look") {
+        event.preventDefault(); // it means no, and not STOP
+        this.choice.clear();
+      }
+    };
+    this.root.addEventListener("keydown", key, { signal: this.signal });
+  }
+
+  /** @param {boolean} hasWay */
+  addButtons(hasWay) {
+    const row = document.createElement("div");
+    row.className = "map-tools";
+    const button = (/** @type {string} */ sign, /** @type {string} */ name, /** @type {() => void} */ press) => {
+      const made = document.createElement("button");
+      made.type = "button";
+      made.className = "map-button";
+      made.textContent = sign;
+      made.setAttribute("aria-label", name);
+      made.addEventListener("click", press, { signal: this.signal });
+      row.append(made);
+      return made;
+    };
+    button("+", this.t("Closer"), () => this.map.zoomIn());
+    button("−", this.t("Further away"), () => this.map.zoomOut());
+    this.follower = button("◎", this.t("Follow the robot"), () => this.follow(!this.isFollowing));
+    if (hasWay) this.wayButton = button("⤳", this.t("Draw a way"), () => this.toggleWay());
+    part(this.root, ".map-frame").append(row);
+    this.follow(true);
+  }
+
+  toggleWay() {
+    this.choice?.toggleWay();
+    this.drawChoice();
+  }
+
+  /** @param {boolean} isOn */
+  follow(isOn) {
+    this.isFollowing = isOn;
+    if (this.follower) attribute(this.follower, "aria-pressed", String(isOn));
+    const place = this.trail.places.at(-1);
+    if (isOn && place && this.hasPlace) this.map.panTo(place, { animate: !isStill() });
+  }
+
+  makeLayers() {
+    const { leaflet, map } = this;
+    const arrow = svg("svg", { class: "map-arrow", viewBox: "-20 -20 40 40", "aria-hidden": "true" });
+    arrow.append(svg("path", { class: "map-body", d: "M0 -16 11 12 0 6 -11 12Z" }), svg("circle", { class: "map-dot", r: 8 }));
+    const holder = document.createElement("div");
+    holder.className = "map-robot";
+    holder.append(arrow);
+    const icon = new leaflet.DivIcon({ html: holder, className: "map-pin", iconSize: [40, 40] });
+    const fence = this.fence.length > 2 ? new leaflet.Polygon(this.fence, { fill: false, interactive: false }).addTo(map) : null;
+    const line = (/** @type {object} */ given) => new leaflet.Polyline([], { interactive: false, ...given }).addTo(map);
+    return {
+      fence,
+      holder,
+      arrow,
+      trail: line({ weight: 3 }),
+      way: line({ weight: 3, dashArray: "8 6" }),
+      ring: new leaflet.Circle([0, 0], { radius: 0, weight: 1, interactive: false }),
+      robot: new leaflet.Marker([0, 0], { icon, interactive: false, keyboard: false }),
+      /** @type {import("leaflet").CircleMarker[]} */
+      marks: [],
+    };
+  }
+
+  theme() {
+    const ink = colours(this.root, ["text", "level", "line", "caution", "accent"]);
+    this.ink = ink;
+    this.grid?.theme();
+    this.layers?.trail.setStyle({ color: ink.level });
+    this.layers?.ring.setStyle({ color: ink.level, fillColor: ink.level, fillOpacity: 0.15 });
+    this.layers?.fence?.setStyle({ color: ink.caution, weight: 2, dashArray: "10 6" });
+    this.drawChoice();
+  }
+
+  /**
+   * @param {Readonly<Record<string, Reading>>} readings
+   * @param {Readonly<Record<string, Outlet>>} outputs
+   */
+  update(readings, outputs) {
+    if (this.isLocal === null) this.begin(readings, outputs);
+    const isLocal = this.isLocal ?? false;
+    const fix = readFix(readings["fix"]?.value);
+    const [first, second] = isLocal ? ["y", "x"] : ["latitude", "longitude"];
+    const place = fix.place ?? placeOf(number(readings[first ?? ""]), number(readings[second ?? ""]), isLocal);
+    const reading = readings["fix"] ?? worse(readings[first ?? ""], readings[second ?? ""]);
+    attribute(this.root, "data-state", reading?.state ?? "none");
+    const yaw = number(readings["yaw"]);
+    const heading = number(readings["heading"]) ?? (yaw === null ? null : bearingOf(yaw));
+    this.draw(place, heading, number(readings["accuracy"]) ?? fix.accuracy, reading?.state === "live");
+    write(this.text, place ? placeText(place, this.form, isLocal) : DASH);
+    const isOut = place !== null && !isInside(place, this.fence);
+    attribute(this.root, "data-fence", isOut ? "out" : null);
+    const unknown = reading?.state === "live" && !place ? this.t("no position") : "";
+    const note = reading ? noteOf(reading, this.t) : this.t("no position is bound to this map");
+    write(this.note, [isOut ? `▲ ${this.t("outside the fence")}` : "", unknown, note].filter(Boolean).join(" · "));
+    this.choice?.update(outputs["goto"], outputs["waypoints"], place);
+  }
+
+  /**
+   * @param {Place | null} place
+   * @param {number | null} heading
+   * @param {number | null} accuracy
+   * @param {boolean} isLive
+   */
+  draw(place, heading, accuracy, isLive) {
+    const { layers, map } = this;
+    if (!layers) return;
+    if (!place) {
+      layers.robot.remove();
+      layers.ring.remove();
+      this.hasPlace = false;
+      return;
+    }
+    if (isLive && this.trail.add(place)) layers.trail.setLatLngs(this.trail.places);
+    if (!this.hasPlace) layers.robot.addTo(map);
+    layers.robot.setLatLng(place);
+    layers.ring.setLatLng(place).setRadius(accuracy ?? 0);
+    if (accuracy !== null && accuracy > 0) layers.ring.addTo(map);
+    else layers.ring.remove();
+    attribute(layers.holder, "data-heading", heading === null ? "unknown" : "known");
+    style(layers.arrow, "transform", `rotate(${(heading ?? 0).toFixed(1)}deg)`);
+    const isFirst = !this.hasPlace && this.trail.places.length <= 1;
+    this.hasPlace = true;
+    if (isFirst && this.fence.length === 0) this.grid?.setOrigin(this.isLocal ? [0, 0] : place);
+    if (this.isFollowing) map.panTo(place, { animate: false });
+  }
+
+  drawChoice() {
+    const { layers, choice, leaflet, ink } = this;
+    if (!layers || !choice || !ink) return;
+    for (const mark of layers.marks) mark.remove();
+    layers.marks = choice.places.map((place) => {
+      const isIn = isInside(place, this.fence);
+      const look = { radius: 9, weight: 3, color: isIn ? ink.text : ink.caution, fillOpacity: 0, interactive: false };
+      return new leaflet.CircleMarker(place, look).addTo(this.map);
+    });
+    const from = this.trail.places.at(-1);
+    const way = from && this.hasPlace ? [from, ...choice.places] : choice.places;
+    layers.way.setLatLngs(choice.places.length > 0 ? way : []).setStyle({ color: ink.text });
+    attribute(this.root, "data-mode", choice.mode);
+    if (this.wayButton) {
+      const isWay = choice.mode === "way" || choice.mode === "sure";
+      attribute(this.wayButton, "aria-pressed", String(isWay));
+    }
+  }
+}
+
+const RANK = ["live", "stale", "gone", "none"];
+
+/**
+ * Of two readings that make one place, the one that is worse.
+ *
+ * @param {Reading | undefined} one
+ * @param {Reading | undefined} other
+ */
+function worse(one, other) {
+  if (!one || !other) return one ?? other;
+  return RANK.indexOf(other.state) > RANK.indexOf(one.state) ? other : one;
+}

@@ -1,0 +1,10 @@
+// @ts-check
+/** @typedef {import("../../urc/web/static/types.js").Instance} Instance */
+
+/** The server has rendered all of it: nothing changes here. */
+export default {
+  /** @returns {Instance} */
+  mount() {
+    return {};
+  },
+};

@@ -1,0 +1,110 @@
+// @ts-check
+/** @typedef {import("../../urc/web/static/types.js").Context} Context */
+/** @typedef {import("../../urc/web/static/types.js").Instance} Instance */
+import { Setpoint } from "urc/giving";
+import { attribute, part, write } from "urc/kit";
+import { numberOf } from "./typed.js";
+
+const KEYS = new Set(["ArrowUp", "ArrowDown", "PageUp", "PageDown"]);
+
+export default {
+  /**
+   * @param {Context} ctx
+   * @returns {Instance}
+   */
+  mount({ ...ctx }) {
+    const { el, signal, t } = ctx;
+    const root = part(el, ".number");
+    const text = part(el, ".number-text");
+    const note = part(el, ".number-note");
+    const field = el.querySelector(".number-field");
+    const argument = Object.values(ctx.command("change")?.arguments ?? {})[0];
+    const setpoint = new Setpoint(ctx, show);
+    setpoint.isLive = true; // a step is given at once
+    // What nobody has bounded may be any number.
+    const bounds = {
+      ...setpoint.bounds,
+      min: bound(ctx.options["min"], argument?.min, -Infinity, Math.max),
+      max: bound(ctx.options["max"], argument?.max, Infinity, Math.min),
+      isWhole: argument?.type === "integer",
+    };
+    setpoint.bounds = { ...bounds };
+    let fault = "";
+
+    function show() {
+      attribute(root, "data-state", setpoint.state?.state ?? "none");
+      attribute(root, "data-alarm", setpoint.state?.alarm ?? "");
+      attribute(root, "data-phase", setpoint.giver.phase);
+      attribute(root, "data-wish", setpoint.wishState);
+      write(text, setpoint.text(setpoint.shown));
+      write(note, [fault, setpoint.note()].filter(Boolean).join(" · "));
+      if (!field) return;
+      attribute(field, "aria-invalid", fault ? "true" : null);
+      const isLocked = String(!setpoint.giver.isReady);
+      for (const button of root.querySelectorAll("button")) attribute(button, "aria-disabled", isLocked);
+    }
+
+    /** @param {string} why */
+    function words(why) {
+      const limit = { low: bounds.min, high: bounds.max }[why];
+      const figure = limit === undefined ? "" : setpoint.text(limit);
+      if (why === "low") return t("◆ not below {limit}", { limit: figure });
+      if (why === "high") return t("◆ not above {limit}", { limit: figure });
+      if (why === "whole") return t("◆ a whole number is expected");
+      return why === "empty" ? t("◆ type a number") : t("◆ this is no number");
+    }
+
+    /** @param {string} key */
+    function step(key) {
+      fault = "";
+      if (!Number.isFinite(bounds.min) || !Number.isFinite(bounds.max)) {
+        const way = { ArrowUp: 1, ArrowDown: -1, PageUp: 10, PageDown: -10 }[key] ?? 0;
+        const next = setpoint.from + way * bounds.step;
+        setpoint.set(Number(Math.min(bounds.max, Math.max(bounds.min, next)).toFixed(10)));
+      } else {
+        setpoint.key(key);
+      }
+      show();
+    }
+
+    if (field instanceof HTMLInputElement) {
+      part(root, ".number-row").addEventListener("submit", (event) => {
+        event.preventDefault();
+        const typed = numberOf(field.value, bounds);
+        fault = "fault" in typed ? words(typed.fault) : "";
+        if ("value" in typed && setpoint.giver.isReady) {
+          setpoint.set(typed.value);
+          field.select();
+        }
+        show();
+      }, { signal });
+      field.addEventListener("input", () => {
+        fault = "";
+        show();
+      }, { signal });
+      field.addEventListener("keydown", (event) => {
+        if (!KEYS.has(event.key)) return;
+        event.preventDefault();
+        step(event.key);
+        field.value = setpoint.last === null ? "" : String(setpoint.last);
+      }, { signal });
+      part(root, ".number-less").addEventListener("click", () => step("ArrowDown"), { signal });
+      part(root, ".number-more").addEventListener("click", () => step("ArrowUp"), { signal });
+    }
+    return {
+      update({ state }, { change }) {
+        setpoint.take(state, change);
+      },
+    };
+  },
+};
+
+/**
+ * @param {unknown} own
+ * @param {number | null | undefined} theirs
+ * @param {number} none
+ * @param {(...values: number[]) => number} narrower
+ */
+function bound(own, theirs, none, narrower) {
+  return narrower(typeof own === "number" ? own : none, theirs ?? none);
+}

@@ -1,0 +1,127 @@
+// @ts-check
+/**
+ * Where somebody looks in a picture of all directions, and what its file says of them. Pure: no DOM.
+ *
+ * Yaw is degrees to the left of the picture's middle (REP 103), pitch degrees upwards.
+ *
+ * @typedef {object} View
+ * @property {number} yaw -180 to 180
+ * @property {number} pitch -90 to 90
+ * @property {number} fov degrees from top to bottom
+ *
+ * @typedef {object} Pose What the file says (Photo Sphere XMP).
+ * @property {number} heading degrees clockwise from north of the picture's middle; NaN: not told
+ * @property {number} pitch of the camera, degrees up
+ * @property {number} roll of the camera, degrees
+ * @property {number} startHeading where to look first, in the picture; NaN: not told
+ * @property {number} startPitch
+ */
+
+export const MOST_XMP = 256 * 1024;
+const PITCH = 89;
+
+/**
+ * @param {number} yaw
+ */
+export function wrapped(yaw) {
+  return ((((yaw + 180) % 360) + 360) % 360) - 180;
+}
+
+/**
+ * @param {View} view
+ * @param {{yaw?: number, pitch?: number, zoom?: number}} change degrees; zoom is a factor of the fov
+ * @returns {View}
+ */
+export function turned(view, { yaw = 0, pitch = 0, zoom = 1 }) {
+  return {
+    yaw: wrapped(view.yaw + yaw),
+    pitch: Math.min(PITCH, Math.max(-PITCH, view.pitch + pitch)),
+    fov: Math.min(110, Math.max(20, view.fov * zoom)),
+  };
+}
+
+/**
+ * Return the point one looks at, 1 away: x right, y up, z back, as three has it.
+ *
+ * @param {View} view
+ * @returns {[number, number, number]}
+ */
+export function target({ yaw, pitch }) {
+  const [across, up] = [(yaw * Math.PI) / 180, (pitch * Math.PI) / 180];
+  return [-Math.sin(across) * Math.cos(up), Math.sin(up), -Math.cos(across) * Math.cos(up)];
+}
+
+/**
+ * Return which part of the flat picture is seen, in shares of it; left may be below 0 or above 1.
+ *
+ * @param {View} view
+ * @param {number} aspect width by height of the box
+ */
+export function crop({ yaw, pitch, fov }, aspect) {
+  const height = Math.min(1, fov / 180);
+  const width = Math.min(1, (fov * aspect) / 360);
+  const middle = 0.5 - yaw / 360;
+  const top = Math.min(1 - height, Math.max(0, 0.5 - pitch / 180 - height / 2));
+  return { left: middle - width / 2, top, width, height };
+}
+
+/**
+ * Return where a device that is tilted looks, against where it was when that began.
+ *
+ * @param {{alpha: number, beta: number}} now degrees, as the device says them
+ * @param {{alpha: number, beta: number}} start
+ */
+export function tilted(now, start) {
+  return { yaw: wrapped(now.alpha - start.alpha), pitch: Math.max(-180, Math.min(180, now.beta - start.beta)) };
+}
+
+/**
+ * Return what the file says about its pose; null when it says nothing.
+ *
+ * @param {Uint8Array} bytes the beginning of a JPEG
+ * @returns {Pose | null}
+ */
+export function poseOf(bytes) {
+  const text = new TextDecoder("latin1").decode(bytes.subarray(0, MOST_XMP));
+  if (!text.includes("GPano:")) return null;
+  const number = (/** @type {string} */ name) => {
+    const pattern = new RegExp(`GPano:${name}(?:="|>)\\s*([-+]?\\d{1,6}(?:\\.\\d{1,9})?)\\s*["<]`);
+    const found = pattern.exec(text)?.[1];
+    return found === undefined ? NaN : Number(found);
+  };
+  return {
+    heading: number("PoseHeadingDegrees"),
+    pitch: number("PosePitchDegrees") || 0,
+    roll: number("PoseRollDegrees") || 0,
+    startHeading: number("InitialViewHeadingDegrees"),
+    startPitch: number("InitialViewPitchDegrees") || 0,
+  };
+}
+
+/**
+ * Return the view with which a picture begins: what the file says, else what the options do.
+ *
+ * @param {Pose | null} pose
+ * @param {View} otherwise
+ * @returns {View}
+ */
+export function firstView(pose, otherwise) {
+  if (!pose || Number.isNaN(pose.startHeading)) return otherwise;
+  // The file counts clockwise from north, and the picture's middle is at its own heading.
+  const middle = Number.isNaN(pose.heading) ? 0 : pose.heading;
+  return turned(
+    { ...otherwise, yaw: 0, pitch: 0 },
+    { yaw: middle - pose.startHeading, pitch: pose.startPitch },
+  );
+}
+
+/**
+ * Return where one looks as a compass says it; NaN when the file does not tell.
+ *
+ * @param {Pose | null} pose
+ * @param {View} view
+ */
+export function bearing(pose, view) {
+  if (!pose || Number.isNaN(pose.heading)) return NaN;
+  return (((pose.heading - view.yaw) % 360) + 360) % 360;
+}

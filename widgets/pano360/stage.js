@@ -1,0 +1,112 @@
+// @ts-check
+/**
+ * What draws the panorama: a sphere seen from within, or, without WebGL, a part of the flat picture.
+ *
+ * @typedef {import("./look.js").Pose} Pose
+ * @typedef {import("./look.js").View} View
+ *
+ * @typedef {object} Stage
+ * @property {HTMLCanvasElement} canvas
+ * @property {(bitmap: ImageBitmap, pose: Pose | null) => void} show
+ * @property {(view: View) => void} draw
+ * @property {(width: number, height: number) => void} resize CSS pixels
+ * @property {() => void} end
+ */
+import { board } from "urc/kit";
+import { crop, target } from "./look.js";
+
+/** More than this is not seen on a screen, and fills the memory of a phone. */
+const MOST_DENSITY = 1.5;
+
+/**
+ * @param {typeof import("three")} three
+ * @returns {Stage} throws where there is no WebGL
+ */
+export function sphere(three) {
+  const renderer = new three.WebGLRenderer({ antialias: false, powerPreference: "low-power" });
+  renderer.setPixelRatio(Math.min(MOST_DENSITY, globalThis.devicePixelRatio || 1));
+  const scene = new three.Scene();
+  const camera = new three.PerspectiveCamera(75, 1, 0.1, 10);
+  // Seen from within: mirrored, so that left stays left, and turned, so that its middle is ahead.
+  const geometry = new three.SphereGeometry(1, 48, 32).scale(-1, 1, 1).rotateY(-Math.PI / 2);
+  const material = new three.MeshBasicMaterial();
+  const ball = new three.Mesh(geometry, material);
+  ball.rotation.order = "ZXY";
+  scene.add(ball);
+  /** @type {import("three").Texture | null} */
+  let texture = null;
+  return {
+    canvas: renderer.domElement,
+    show(bitmap, pose) {
+      // A new one where the size differs: a texture's storage keeps its size.
+      const old = /** @type {ImageBitmap | undefined} */ (texture?.image);
+      if (!texture || old?.width !== bitmap.width || old.height !== bitmap.height) {
+        texture?.dispose();
+        texture = new three.Texture(bitmap);
+        texture.colorSpace = three.SRGBColorSpace;
+        texture.generateMipmaps = false;
+        texture.minFilter = three.LinearFilter;
+        // A bitmap's first row is its top, and WebGL does not turn bitmaps over.
+        texture.flipY = false;
+        texture.repeat.y = -1;
+        texture.offset.y = 1;
+        material.map = texture;
+        material.needsUpdate = true;
+      }
+      texture.image = bitmap;
+      texture.needsUpdate = true;
+      const radians = (/** @type {number} */ degrees) => (degrees * Math.PI) / 180;
+      ball.rotation.set(radians(pose?.pitch ?? 0), 0, -radians(pose?.roll ?? 0));
+    },
+    draw(view) {
+      if (!texture) return;
+      camera.fov = view.fov;
+      camera.updateProjectionMatrix();
+      camera.lookAt(...target(view));
+      renderer.render(scene, camera);
+    },
+    resize(width, height) {
+      renderer.setSize(width, height, false);
+      camera.aspect = width / Math.max(1, height);
+    },
+    end() {
+      texture?.dispose();
+      geometry.dispose();
+      material.dispose();
+      renderer.dispose();
+      renderer.forceContextLoss(); // a page may hold only some sixteen of them
+    },
+  };
+}
+
+/** @returns {Stage} */
+export function flat() {
+  const canvas = document.createElement("canvas");
+  /** @type {ImageBitmap | null} */
+  let shown = null;
+  let size = { width: 1, height: 1 };
+  return {
+    canvas,
+    show(bitmap) {
+      shown = bitmap;
+    },
+    draw(view) {
+      if (!shown || shown.width === 0) return;
+      const pen = board(canvas, size);
+      const part = crop(view, size.width / Math.max(1, size.height));
+      const scale = size.width / part.width;
+      // It goes on at its other side: left of the left edge is the right one.
+      const first = Math.floor(part.left);
+      for (let copy = first; copy < part.left + part.width; copy += 1) {
+        const x = (copy - part.left) * scale;
+        pen.drawImage(shown, 0, part.top * shown.height, shown.width, part.height * shown.height, x, 0, scale, size.height);
+      }
+    },
+    resize(width, height) {
+      size = { width, height };
+    },
+    end() {
+      shown = null;
+    },
+  };
+}

@@ -1,0 +1,143 @@
+// @ts-check
+/**
+ * What has been, standing still: uPlot with zoom and a cursor, loaded when somebody looks back.
+ *
+ * @typedef {{title: string, unit: string, colour: string, dash: number[], isShown: boolean}} Line
+ */
+
+/** uPlot has no types that this page could use. @typedef {any} Plot */
+
+export class History {
+  /**
+   * @param {HTMLElement} place
+   * @param {readonly Line[]} lines
+   * @param {{times: number[], columns: (number | null | undefined)[][]}} rows
+   * @param {{colour: string, grid: string, epoch: number, moved: (at: number | null) => void}} look
+   * @returns {Promise<History>}
+   */
+  static async open(place, lines, rows, look) {
+    const name = "uplot";
+    const { default: Chart } = await import(name);
+    return new History(place, new Chart(settings(place, lines, look), [rows.times, ...rows.columns], place));
+  }
+
+  /**
+   * @param {HTMLElement} place
+   * @param {Plot} plot
+   */
+  constructor(place, plot) {
+    this.plot = plot;
+    this.sizes = new ResizeObserver(() => plot.setSize(sizeOf(place)));
+    this.sizes.observe(place);
+  }
+
+  /** What is seen, in seconds. @returns {[number, number]} */
+  get span() {
+    const { min, max } = this.plot.scales.x;
+    return [min, max];
+  }
+
+  /**
+   * Show a shorter or longer time around the cursor, or the middle.
+   *
+   * @param {number} factor below 1: closer
+   */
+  zoom(factor) {
+    const times = this.plot.data[0];
+    const [from, to] = this.span;
+    const { left } = this.plot.cursor;
+    const middle = left > 0 ? this.plot.posToVal(left, "x") : (from + to) / 2;
+    const [first, last] = [times[0] ?? from, times[times.length - 1] ?? to];
+    const min = Math.max(first, middle - (middle - from) * factor);
+    const max = Math.min(last, middle + (to - middle) * factor);
+    if (max - min > 1e-3) this.plot.setScale("x", { min, max });
+  }
+
+  /** @param {number} step readings to move the cursor by */
+  move(step) {
+    const times = this.plot.data[0];
+    const [from, to] = this.span;
+    const now = this.plot.cursor.idx ?? times.findIndex((/** @type {number} */ time) => time >= from);
+    const next = Math.min(times.length - 1, Math.max(0, now + step));
+    const time = Math.min(to, Math.max(from, times[next] ?? from));
+    this.plot.setCursor({ left: this.plot.valToPos(time, "x"), top: 10 });
+  }
+
+  /**
+   * @param {number} index of the line
+   * @param {boolean} isShown
+   */
+  show(index, isShown) {
+    this.plot.setSeries(index + 1, { show: isShown });
+  }
+
+  /** What the lines have under the cursor. @returns {(number | null)[] | null} */
+  get values() {
+    const { idx } = this.plot.cursor;
+    if (typeof idx !== "number") return null;
+    return this.plot.data.slice(1).map((/** @type {(number | null)[]} */ column) => nearest(column, idx));
+  }
+
+  close() {
+    this.sizes.disconnect();
+    this.plot.destroy();
+  }
+}
+
+/**
+ * Signals rarely come at the same moment: return the value that stood at a row, or null in a gap.
+ *
+ * @param {readonly (number | null | undefined)[]} column
+ * @param {number} row
+ */
+function nearest(column, row) {
+  for (let place = row; place >= 0; place -= 1) {
+    const value = column[place];
+    if (value !== undefined) return value;
+  }
+  return null;
+}
+
+/**
+ * @param {HTMLElement} place
+ * @param {readonly Line[]} lines
+ * @param {{colour: string, grid: string, epoch: number, moved: (at: number | null) => void}} look
+ */
+function settings(place, lines, { colour, grid, epoch, moved }) {
+  const axis = { stroke: colour, grid: { stroke: grid, width: 1 }, ticks: { stroke: grid, width: 1 } };
+  const clock = new Intl.DateTimeFormat(undefined, { hour: "2-digit", minute: "2-digit", second: "2-digit", fractionalSecondDigits: 1 });
+  const when = (/** @type {number} */ time) => clock.format(epoch + time * 1000);
+  return {
+    ...sizeOf(place),
+    legend: { show: false },
+    cursor: { drag: { x: true, y: false }, focus: { prox: 24 } },
+    scales: { x: { time: false } },
+    axes: [
+      { ...axis, values: (/** @type {Plot} */ _, /** @type {number[]} */ splits) => splits.map(when), space: 96 },
+      axis,
+    ],
+    series: [
+      {},
+      ...lines.map((line) => ({
+        label: line.title,
+        stroke: line.colour,
+        dash: line.dash,
+        width: 2,
+        show: line.isShown,
+        points: { show: false },
+        spanGaps: false,
+      })),
+    ],
+    hooks: {
+      setCursor: [(/** @type {Plot} */ plot) => {
+        const { idx } = plot.cursor;
+        moved(typeof idx === "number" ? plot.data[0][idx] : null);
+      }],
+    },
+  };
+}
+
+/** @param {Element} place */
+function sizeOf(place) {
+  return { width: Math.max(60, place.clientWidth), height: Math.max(60, place.clientHeight) };
+}

@@ -1,0 +1,159 @@
+// @ts-check
+/**
+ * The last readings of several signals, and what a drawing of them goes from and to. Pure.
+ */
+
+/** Readings of one signal: the newest `size`, oldest first. A gap is a NaN. */
+export class Ring {
+  /** @param {number} size */
+  constructor(size) {
+    this.times = new Float64Array(size);
+    this.values = new Float64Array(size);
+    /** How many there have ever been; the newest is number `count - 1`. */
+    this.count = 0;
+  }
+
+  /** The number of the oldest that is kept. */
+  get first() {
+    return Math.max(0, this.count - this.times.length);
+  }
+
+  /** @param {number} number */
+  time(number) {
+    return this.times[number % this.times.length] ?? NaN;
+  }
+
+  /** @param {number} number */
+  value(number) {
+    return this.values[number % this.values.length] ?? NaN;
+  }
+
+  /**
+   * @param {number} time in seconds
+   * @param {number} value NaN: from here on nothing is known
+   */
+  push(time, value) {
+    const place = this.count % this.times.length;
+    this.times[place] = time;
+    this.values[place] = value;
+    this.count += 1;
+  }
+
+  /**
+   * Take a reading. It makes a gap where the ones between were missed; what is not newer is left out.
+   *
+   * @param {number} time in seconds
+   * @param {number} value
+   * @param {number} patience seconds after which two readings belong together no more; 0: never
+   */
+  add(time, value, patience) {
+    if (this.count > 0) {
+      const last = this.time(this.count - 1);
+      if (time <= last) return;
+      if (patience > 0 && time - last > patience) this.cut();
+    }
+    this.push(time, value);
+  }
+
+  /** From the last reading on, nothing is known. */
+  cut() {
+    if (this.count === 0 || Number.isNaN(this.value(this.count - 1))) return;
+    this.push(this.time(this.count - 1) + 1e-4, NaN);
+  }
+
+  /**
+   * Return the number of the first reading that is not older; the one before it is kept, since a line
+   * comes in from there.
+   *
+   * @param {number} time in seconds
+   */
+  since(time) {
+    let [low, high] = [this.first, this.count];
+    while (low < high) {
+      const middle = (low + high) >> 1;
+      if (this.time(middle) < time) low = middle + 1;
+      else high = middle;
+    }
+    return Math.max(this.first, low - 1);
+  }
+}
+
+/**
+ * Return the lowest and the highest value since a time; [Infinity, -Infinity] where there is none.
+ *
+ * @param {readonly Ring[]} rings
+ * @param {number} time in seconds
+ * @returns {[number, number]}
+ */
+export function extent(rings, time) {
+  let [least, most] = [Infinity, -Infinity];
+  for (const ring of rings) {
+    for (let number = ring.since(time); number < ring.count; number += 1) {
+      const value = ring.value(number);
+      if (value < least) least = value;
+      if (value > most) most = value;
+    }
+  }
+  return [least, most];
+}
+
+/**
+ * Return readings as rows of one table, one column a signal; null where a signal has none.
+ *
+ * @param {readonly Ring[]} rings
+ * @param {number} from in seconds
+ * @param {number} to in seconds
+ * @returns {{times: number[], columns: (number | null)[][]}}
+ */
+export function table(rings, from, to) {
+  const times = new Set();
+  for (const ring of rings) {
+    for (let number = ring.since(from); number < ring.count; number += 1) {
+      const time = ring.time(number);
+      if (time >= from && time <= to) times.add(time);
+    }
+  }
+  const rows = [...times].sort((one, other) => one - other);
+  const columns = rings.map((ring) => {
+    const known = new Map();
+    for (let number = ring.since(from); number < ring.count; number += 1) {
+      const value = ring.value(number);
+      known.set(ring.time(number), Number.isNaN(value) ? null : value);
+    }
+    return rows.map((time) => (known.has(time) ? known.get(time) : undefined));
+  });
+  return { times: rows, columns };
+}
+
+/**
+ * Return a table as CSV (RFC 4180), its times as ISO 8601.
+ *
+ * @param {readonly string[]} names of the columns
+ * @param {{times: number[], columns: (number | null | undefined)[][]}} rows
+ * @param {number} epoch milliseconds since 1970 at time 0
+ */
+export function csv(names, { times, columns }, epoch) {
+  const lines = [["time", ...names].map(quoted).join(",")];
+  times.forEach((time, row) => {
+    const cells = columns.map((column) => column[row] ?? "");
+    if (cells.every((cell) => cell === "")) return; // only a gap
+    lines.push([new Date(epoch + time * 1000).toISOString(), ...cells].join(","));
+  });
+  return `${lines.join("\r\n")}\r\n`;
+}
+
+/** @param {string} text */
+function quoted(text) {
+  // A spreadsheet would take it for a formula.
+  const safe = /^[=+\-@\t]/.test(text) ? `'${text}` : text;
+  return /[",\r\n]/.test(safe) ? `"${safe.replaceAll('"', '""')}"` : safe;
+}
+
+/**
+ * @param {unknown} text as "60s" or "5min"
+ * @returns {number} seconds
+ */
+export function seconds(text) {
+  const match = /^(\d+)(s|min)$/.exec(String(text));
+  return match ? Number(match[1]) * (match[2] === "min" ? 60 : 1) : 60;
+}

@@ -1,0 +1,387 @@
+// @ts-check
+/** @typedef {import("../../urc/web/static/types.js").Context} Context */
+/** @typedef {import("../../urc/web/static/types.js").Instance} Instance */
+/** @typedef {import("../../urc/web/static/types.js").Reading} Reading */
+/** @typedef {import("./live.js").Trace} Trace */
+import { ALARMS, attribute, colours, format, isStill, many, noteOf, number, part, style, write } from "urc/kit";
+import { digitsOf, spanOf, ticks } from "urc/scale";
+import { History } from "./history.js";
+import { Live } from "./live.js";
+import { epoch, legendItem, placed, saveText } from "./parts.js";
+import { Ring, csv, extent, seconds, table } from "./traces.js";
+
+const COLOURS = /** @type {const} */ (["series-1", "series-2", "series-3", "series-4", "series-5", "series-6"]);
+/** Lines beyond the colours differ by their dashes, and so they do where there is one colour. */
+const DASHES = [[], [8, 4], [2, 3], [10, 3, 2, 3]];
+const HERTZ = 60;
+const MOST_READINGS = 18_000;
+const LEGEND_EVERY_MS = 100;
+const FIT_EVERY_MS = 1000;
+/** Values may fill the scale from this share on before it becomes smaller. */
+const LOOSE = 0.4;
+/** Room above and below, as a share of the height. */
+const RIM = 0.05;
+
+class Plot {
+  /** @param {Context} ctx */
+  constructor(ctx) {
+    this.ctx = ctx;
+    const { el, options } = ctx;
+    this.root = part(el, ".plot");
+    this.board = part(el, ".plot-board");
+    this.note = part(el, ".plot-note");
+    this.legend = part(el, ".plot-legend");
+    this.pauseButton = part(el, ".plot-pause");
+    this.place = part(el, ".plot-history");
+    const canvas = part(el, ".plot-canvas");
+    if (!(canvas instanceof HTMLCanvasElement)) throw new Error("the template has no canvas");
+    this.windowS = seconds(options["window"]);
+    this.live = new Live(canvas, this.windowS);
+    /** @type {readonly Reading[]} */
+    this.readings = [];
+    /** @type {number[]} */
+    this.serials = [];
+    /** To the unit that is shown. @type {(value: number) => number} */
+    this.factor = (value) => value;
+    /** What the legend and the scale were made for. @type {Reading["signal"][]} */
+    this.signals = [];
+    this.symbol = "";
+    this.legendMs = 0;
+    /** Whether the legend says what was read last. */
+    this.isTold = true;
+    this.fitMs = 0;
+    /** @type {History | null} */
+    this.history = null;
+    this.pausing = 0;
+    this.isSeen = true;
+    this.timer = 0;
+    this.listen();
+  }
+
+  listen() {
+    const { ctx } = this;
+    const { signal } = ctx;
+    const click = (/** @type {string} */ selector, /** @type {() => void} */ what) =>
+      part(ctx.el, selector).addEventListener("click", what, { signal });
+    click(".plot-pause", () => void this.toggle());
+    click(".plot-closer", () => this.history?.zoom(0.5));
+    click(".plot-wider", () => this.history?.zoom(2));
+    click(".plot-save", () => this.save());
+    this.place.addEventListener("keydown", (event) => this.key(event), { signal });
+    ctx.follow("theme", () => this.paint());
+    const sizes = new ResizeObserver(([entry]) => {
+      if (entry) this.live.resize(entry.contentRect);
+      this.soon();
+    });
+    sizes.observe(this.board);
+    const sight = new IntersectionObserver((entries) => {
+      this.isSeen = entries.at(-1)?.isIntersecting ?? true;
+      this.live.spoil();
+      this.soon();
+    });
+    sight.observe(this.board);
+    // Time goes on when nothing comes. Who wants less motion gets a step a second.
+    const step = () => {
+      if (this.isSeen) this.frame(performance.now());
+      else if (!this.isTold) this.tell(); // those who hear the page are nowhere on it
+      this.timer = isStill() ? window.setTimeout(step, 1000) : requestAnimationFrame(step);
+    };
+    step();
+    signal.addEventListener("abort", () => {
+      cancelAnimationFrame(this.timer);
+      clearTimeout(this.timer);
+      sizes.disconnect();
+      sight.disconnect();
+      this.history?.close();
+    });
+  }
+
+  /** @param {readonly Reading[]} readings */
+  update(readings) {
+    this.readings = readings;
+    const { symbol, factor } = this.ctx.unit("series");
+    const isKnown = readings.every(({ signal }, place) => signal === this.signals[place]);
+    if (!isKnown || readings.length !== this.signals.length || symbol !== this.symbol) {
+      this.signals = readings.map(({ signal }) => signal);
+      this.symbol = symbol;
+      this.begin(factor);
+    }
+    readings.forEach((reading, place) => {
+      const ring = this.live.traces[place]?.ring;
+      if (!ring) return;
+      const value = number(reading);
+      if (reading.state !== "live" || value === null) ring.cut();
+      else if (reading.serial !== this.serials[place]) {
+        ring.add(reading.time, this.factor(value), reading.signal.stale_after_s ?? 0);
+        this.include(this.factor(value));
+      }
+      this.serials[place] = reading.serial;
+    });
+    this.isTold = false;
+  }
+
+  /** @param {(value: number) => number} factor to the unit that is shown */
+  begin(factor) {
+    const units = new Set(this.readings.map(({ signal }) => signal.unit ?? ""));
+    this.factor = units.size === 1 ? factor : (value) => value;
+    const size = Math.min(MOST_READINGS, Math.max(600, this.windowS * HERTZ));
+    const old = this.live.traces;
+    this.live.traces = this.readings.map((_, place) => ({
+      ring: old.length === this.readings.length ? (old[place]?.ring ?? new Ring(size)) : new Ring(size),
+      colour: "",
+      dash: [...(DASHES[Math.floor(place / COLOURS.length) % DASHES.length] ?? [])],
+      isShown: true,
+      drawn: 0,
+      way: 0,
+    }));
+    this.list();
+    this.paint();
+    this.fit(true);
+  }
+
+  /** Write the legend anew: one button a signal, which hides its line. */
+  list() {
+    const { signal: end, t } = this.ctx;
+    const items = this.readings.map(({ signal }, place) => {
+      const name = signal.title || signal.name;
+      const { item, button } = legendItem(name, t("Show or hide {name}", { name }));
+      button.addEventListener("click", () => this.show(place, button), { signal: end });
+      return item;
+    });
+    this.legend.replaceChildren(...items);
+  }
+
+  /**
+   * @param {number} place
+   * @param {HTMLElement} button
+   */
+  show(place, button) {
+    const trace = this.live.traces[place];
+    if (!trace) return;
+    trace.isShown = !trace.isShown;
+    attribute(button, "aria-pressed", String(trace.isShown));
+    this.history?.show(place, trace.isShown);
+    this.fit(true);
+  }
+
+  /** Take the colours of the theme. */
+  paint() {
+    const palette = colours(this.root, COLOURS);
+    const swatches = this.legend.querySelectorAll(".plot-swatch");
+    this.live.traces.forEach((trace, place) => {
+      trace.colour = palette[COLOURS[place % COLOURS.length] ?? "series-1"];
+      const swatch = swatches[place];
+      if (!swatch) return;
+      style(swatch, "--plot-colour", trace.colour);
+      attribute(swatch, "data-dash", String(Math.floor(place / COLOURS.length) % DASHES.length));
+    });
+    this.live.spoil();
+    this.soon();
+  }
+
+  /** Where the picture only moves once a second, what has to be seen at once does not wait for that. */
+  soon() {
+    if (isStill()) requestAnimationFrame(() => this.frame(performance.now()));
+  }
+
+  /**
+   * Let the scale grow at once when a value is past its end.
+   *
+   * @param {number} value
+   */
+  include(value) {
+    const [least, most] = this.live.scale;
+    if (value < least || value > most) this.fit(true);
+  }
+
+  /** @param {number} nowMs */
+  frame(nowMs) {
+    if (this.ctx.signal.aborted || this.history) return;
+    if (nowMs - this.fitMs > FIT_EVERY_MS) this.fit(false);
+    if (!this.isTold && nowMs - this.legendMs > LEGEND_EVERY_MS) this.tell();
+    this.live.frame(nowMs / 1000);
+  }
+
+  /** @param {boolean} isNeeded else the scale only changes when much of it is empty */
+  fit(isNeeded) {
+    const nowMs = performance.now();
+    this.fitMs = nowMs;
+    const shown = this.live.traces.filter((trace) => trace.isShown).map(({ ring }) => ring);
+    const [least, most] = extent(shown, nowMs / 1000 - this.windowS);
+    const [bottom, top] = spanOf(least, most, this.limits().map(([, limit]) => limit));
+    const rim = (top - bottom) * RIM;
+    const { min, max } = this.ctx.options;
+    const wanted = [
+      typeof min === "number" ? this.factor(min) : bottom - rim,
+      typeof max === "number" ? this.factor(max) : top + rim,
+    ];
+    const [start = 0, end = 1] = wanted;
+    const [was, till] = this.live.scale;
+    const isLoose = end - start < (till - was) * LOOSE;
+    if ((!isNeeded && !isLoose) || !(end > start) || (start === was && end === till)) return;
+    this.live.scale = [start, end];
+    this.live.spoil();
+    this.rule();
+  }
+
+  /** @returns {[string, number][]} */
+  limits() {
+    if (this.ctx.options["limits"] === false) return [];
+    const all = this.readings.flatMap(({ signal }) => Object.entries(signal.limits ?? {}));
+    const known = all.filter(([name]) => Object.hasOwn(ALARMS, name));
+    return known.map(([name, limit]) => [name, this.factor(limit)]);
+  }
+
+  /** Write the figures of the scale, and the lines of the limits. */
+  rule() {
+    const [least, most] = this.live.scale;
+    const top = (/** @type {number} */ value) => `${((100 * (most - value)) / (most - least)).toFixed(2)}%`;
+    const values = ticks(least, most, 4);
+    const digits = digitsOf(values);
+    const figures = values.map((value) => placed("plot-figure", top(value), format(value, digits)));
+    part(this.ctx.el, ".plot-scale").replaceChildren(...figures);
+    const lines = values.map((value) => placed("plot-line", top(value)));
+    for (const [name, limit] of this.limits()) {
+      if (limit <= least || limit >= most) continue;
+      const line = placed("plot-limit", top(limit));
+      line.dataset["limit"] = name;
+      lines.push(line);
+    }
+    part(this.ctx.el, ".plot-lines").replaceChildren(...lines);
+  }
+
+  /** Write the values beside the names, and what is wrong. */
+  tell() {
+    this.isTold = true;
+    this.legendMs = performance.now();
+    const order = /** @type {const} */ (["gone", "stale", "none", "live"]);
+    const worst = order.map((state) => this.readings.find((reading) => reading.state === state)).find(Boolean);
+    const alarm = ["hihi", "lolo", "high", "low"].find((name) => this.readings.some((each) => each.alarm === name));
+    const isAllOld = this.readings.every(({ state }) => state !== "live");
+    attribute(this.root, "data-state", isAllOld ? (worst?.state ?? "none") : "live");
+    attribute(this.root, "data-alarm", alarm ?? "");
+    if (this.history) return;
+    const { t } = this.ctx;
+    if (worst && worst.state !== "live") {
+      const said = noteOf(worst, t);
+      const name = worst.signal.title || worst.signal.name;
+      write(this.note, this.readings.length > 1 ? `${name}: ${said}` : said);
+    } else write(this.note, "");
+    const units = this.legend.querySelectorAll(".plot-value");
+    this.readings.forEach((reading, place) => {
+      const value = units[place];
+      if (!value) return;
+      write(value, reading.value === null ? reading.text : `${reading.text} ${reading.unit}`.trim());
+      attribute(value, "data-state", reading.state);
+    });
+  }
+
+  async toggle() {
+    this.pausing += 1;
+    const mine = this.pausing;
+    const { t } = this.ctx;
+    if (this.history || this.root.hasAttribute("data-paused")) {
+      this.history?.close();
+      this.history = null;
+      this.face(false);
+      this.live.spoil();
+      this.tell();
+      return;
+    }
+    this.face(true);
+    const rows = this.rows([-Infinity, Infinity]);
+    const lines = this.readings.map(({ signal }, place) => ({
+      title: signal.title || signal.name,
+      unit: signal.unit ?? "",
+      colour: this.live.traces[place]?.colour ?? "",
+      dash: this.live.traces[place]?.dash ?? [],
+      isShown: this.live.traces[place]?.isShown ?? true,
+    }));
+    const { muted, faint } = colours(this.root, ["muted", "faint"]);
+    const look = { colour: muted, grid: faint, epoch: epoch(), moved: (/** @type {number | null} */ at) => this.moved(at) };
+    try {
+      await this.ctx.style("uplot");
+      const opened = await History.open(this.place, lines, rows, look);
+      if (mine === this.pausing && !this.ctx.signal.aborted) this.history = opened;
+      else opened.close();
+    } catch (error) {
+      console.info("plot: no history:", error);
+      this.face(false);
+      write(this.note, t("this installation has no history to look at"));
+    }
+  }
+
+  /** @param {boolean} isPaused */
+  face(isPaused) {
+    const { el, t } = this.ctx;
+    this.root.toggleAttribute("data-paused", isPaused);
+    write(this.pauseButton, isPaused ? t("Resume") : t("Pause"));
+    attribute(this.pauseButton, "aria-pressed", String(isPaused));
+    for (const name of ["closer", "wider", "save"]) part(el, `.plot-${name}`).hidden = !isPaused;
+    this.place.hidden = !isPaused;
+    this.board.hidden = isPaused;
+    write(this.note, isPaused ? t("paused") : "");
+  }
+
+  /**
+   * The cursor stands elsewhere: write what was there.
+   *
+   * @param {number | null} time in seconds
+   */
+  moved(time) {
+    const values = time === null ? null : this.history?.values;
+    if (time === null || !values) return;
+    const clock = new Date(epoch() + time * 1000).toLocaleTimeString();
+    write(this.note, clock);
+    const places = this.legend.querySelectorAll(".plot-value");
+    this.readings.forEach((reading, place) => {
+      const value = values[place] ?? null;
+      const el = places[place];
+      if (el) write(el, `${format(value, reading.signal.precision)} ${value === null ? "" : reading.unit}`.trim());
+    });
+  }
+
+  /** @param {KeyboardEvent} event */
+  key(event) {
+    const { history } = this;
+    if (!history) return;
+    const step = event.shiftKey ? 10 : 1;
+    /** @type {Record<string, () => void>} */
+    const does = {
+      ArrowLeft: () => history.move(-step),
+      ArrowRight: () => history.move(step),
+      "+": () => history.zoom(0.5),
+      "-": () => history.zoom(2),
+    };
+    const what = does[event.key];
+    if (!what) return;
+    event.preventDefault();
+    what();
+  }
+
+  /** @param {[number, number]} span in seconds */
+  rows([from, to]) {
+    return table(this.live.traces.map(({ ring }) => ring), from, to);
+  }
+
+  /** Save what is seen as a file. */
+  save() {
+    const names = this.readings.map(({ signal, unit }) => (unit ? `${signal.name} (${unit})` : signal.name));
+    saveText(csv(names, this.rows(this.history?.span ?? [-Infinity, Infinity]), epoch()), "plot.csv");
+  }
+}
+
+export default {
+  /**
+   * @param {Context} ctx
+   * @returns {Instance}
+   */
+  mount(ctx) {
+    const plot = new Plot(ctx);
+    return {
+      update({ series }) {
+        if (series) plot.update(Array.isArray(series) ? many(series) : [series]);
+      },
+    };
+  },
+};

@@ -1,0 +1,162 @@
+// @ts-check
+/**
+ * What a distance means, and where it is drawn. Pure: no DOM.
+ *
+ * Angles are degrees from straight ahead, counter-clockwise as in REP 103; drawings have x to the
+ * right and y down, so that ahead is up.
+ *
+ * @typedef {"in" | "clear" | "close" | "unknown"} Kind
+ * @typedef {"" | "near" | "stop"} Zone
+ *
+ * @typedef {object} Bounds
+ * @property {number | null} min
+ * @property {number | null} max
+ * @property {number | null} near
+ * @property {number | null} stop
+ */
+
+/**
+ * REP 117: what is beyond the range is clear (+Inf), below it too close (-Inf), and what is no number
+ * is not known. Most lines cannot carry an infinity, so the ends of the range count as beyond them.
+ *
+ * @param {unknown} value
+ * @param {Bounds} bounds
+ * @returns {Kind}
+ */
+export function kindOf(value, { min, max }) {
+  if (typeof value !== "number" || Number.isNaN(value)) return "unknown";
+  if (value === Infinity || (max !== null && value >= max)) return "clear";
+  if (value === -Infinity || (min !== null && value <= min)) return "close";
+  return "in";
+}
+
+/**
+ * @param {unknown} value
+ * @param {Bounds} bounds
+ * @returns {Zone}
+ */
+export function zoneOf(value, bounds) {
+  const kind = kindOf(value, bounds);
+  if (kind === "close") return "stop";
+  if (kind !== "in" || typeof value !== "number") return "";
+  if (bounds.stop !== null && value <= bounds.stop) return "stop";
+  return bounds.near !== null && value <= bounds.near ? "near" : "";
+}
+
+/**
+ * Return how far out a distance is drawn, 0 to 1; what is clear at the rim, what is too close at 0.
+ *
+ * @param {unknown} value
+ * @param {Bounds} bounds
+ */
+export function shareOf(value, bounds) {
+  const kind = kindOf(value, bounds);
+  if (kind === "clear") return 1;
+  if (kind !== "in" || typeof value !== "number") return 0;
+  const most = bounds.max ?? Math.max(1, value);
+  return Math.min(1, Math.max(0, value / most));
+}
+
+/**
+ * Return the place on a circle around 0, 0.
+ *
+ * @param {number} bearing
+ * @param {number} radius
+ * @returns {[number, number]}
+ */
+export function at(bearing, radius) {
+  const angle = (bearing * Math.PI) / 180;
+  return [tidy(-Math.sin(angle) * radius), tidy(-Math.cos(angle) * radius)];
+}
+
+/**
+ * Return the outline of a sector between two radii as an SVG path.
+ *
+ * @param {number} bearing its middle
+ * @param {number} width its angle, at most 360
+ * @param {number} inner
+ * @param {number} outer
+ */
+export function sector(bearing, width, inner, outer) {
+  const half = Math.min(179.9, Math.max(0.5, width / 2));
+  const far = half > 90 ? 1 : 0;
+  const [ax, ay] = at(bearing + half, outer);
+  const [bx, by] = at(bearing - half, outer);
+  const [cx, cy] = at(bearing - half, inner);
+  const [dx, dy] = at(bearing + half, inner);
+  const back = inner > 0 ? `L${cx} ${cy}A${inner} ${inner} 0 ${far} 0 ${dx} ${dy}` : "L0 0";
+  return `M${ax} ${ay}A${outer} ${outer} 0 ${far} 1 ${bx} ${by}${back}Z`;
+}
+
+/**
+ * Return one direction for each of `count` sensors: those that are given, the rest spread evenly.
+ *
+ * @param {readonly unknown[]} given
+ * @param {number} count
+ */
+export function bearings(given, count) {
+  return Array.from({ length: count }, (_, index) => {
+    const one = given[index];
+    return typeof one === "number" && Number.isFinite(one) ? one : (360 * index) / Math.max(1, count);
+  });
+}
+
+/**
+ * Marks a text that is translated where it is said.
+ *
+ * @param {string} text
+ */
+const mark = (text) => text;
+const SIDES = [
+  mark("ahead"),
+  mark("ahead left"),
+  mark("left"),
+  mark("behind left"),
+  mark("behind"),
+  mark("behind right"),
+  mark("right"),
+  mark("ahead right"),
+];
+
+/**
+ * Return where a direction points to, in words.
+ *
+ * @param {number} bearing
+ */
+export function sideOf(bearing) {
+  const turn = (((bearing % 360) + 360) % 360) / 45;
+  return SIDES[Math.round(turn) % 8] ?? "ahead";
+}
+
+/** The last minutes of one distance, at most so many points. */
+export class Track {
+  /**
+   * @param {number} windowS
+   * @param {number} [most]
+   */
+  constructor(windowS, most = 600) {
+    this.windowS = windowS;
+    this.most = most;
+    /** Time in seconds and how far out it is drawn; null is a gap. @type {[number, number | null][]} */
+    this.points = [];
+  }
+
+  /**
+   * @param {number} timeS
+   * @param {number | null} share
+   */
+  add(timeS, share) {
+    const last = this.points.at(-1);
+    if (last && timeS <= last[0]) return;
+    if (last && share === null && last[1] === null) return;
+    this.points.push([timeS, share]);
+    while (this.points.length > this.most || (this.points[1]?.[0] ?? Infinity) < timeS - this.windowS) {
+      this.points.shift();
+    }
+  }
+}
+
+/** @param {number} value */
+function tidy(value) {
+  return Math.round(value * 100) / 100 + 0;
+}

@@ -1,0 +1,187 @@
+// @ts-check
+/**
+ * The geometry of a scan: rays to places, the nearest of them, zones. Pure: no DOM.
+ *
+ * Angles are radians from straight ahead, counter-clockwise (REP 103). A pixel's x is to the right
+ * and its y down, so ahead is up and left is left.
+ *
+ * @typedef {object} Fan Where the rays point.
+ * @property {number} count
+ * @property {number} start radians of the first ray
+ * @property {number} step radians between two; negative when they go clockwise
+ */
+
+const TURN = 2 * Math.PI;
+/** Two rays further apart than so many steps are not joined. */
+export const NO_RAY = 0xffff;
+
+/**
+ * Return the distances as they are drawn: NaN where nothing is known, `most` where it is clear, and
+ * 0 where something is too close (REP 117).
+ *
+ * @param {readonly unknown[]} ranges
+ * @param {number} least
+ * @param {number} most
+ * @param {Float32Array} into as long as `ranges`; written anew
+ */
+export function measured(ranges, least, most, into) {
+  for (let index = 0; index < into.length; index += 1) {
+    const value = ranges[index];
+    if (typeof value !== "number" || Number.isNaN(value)) into[index] = NaN;
+    else if (value >= most) into[index] = most;
+    else into[index] = value <= least ? 0 : value;
+  }
+  return into;
+}
+
+/**
+ * Return sine and cosine of each ray, in the sense of the drawing: multiply by a distance in pixels.
+ *
+ * @param {Fan} fan
+ */
+export function directions({ count, start, step }) {
+  const right = new Float32Array(count);
+  const down = new Float32Array(count);
+  for (let index = 0; index < count; index += 1) {
+    right[index] = -Math.sin(start + step * index);
+    down[index] = -Math.cos(start + step * index);
+  }
+  return { right, down };
+}
+
+/**
+ * Return the ray that looks into a direction, or NO_RAY when none does.
+ *
+ * @param {Fan} fan
+ * @param {number} angle radians, any turn
+ */
+export function rayAt({ count, start, step }, angle) {
+  if (count === 0 || step === 0) return NO_RAY;
+  const sense = Math.sign(step);
+  const along = ((((angle - start) * sense) % TURN) + TURN) % TURN;
+  const index = Math.round(along / Math.abs(step));
+  if (index < count) return index;
+  // Just before the first ray is still the first ray.
+  return TURN - along <= Math.abs(step) / 2 ? 0 : NO_RAY;
+}
+
+/**
+ * Return for each pixel of a square picture around the sensor which ray passes through it.
+ *
+ * @param {Fan} fan
+ * @param {number} size pixels
+ */
+export function rayOfPixels(fan, size) {
+  const rays = new Uint16Array(size * size);
+  const centre = (size - 1) / 2;
+  for (let y = 0; y < size; y += 1) {
+    for (let x = 0; x < size; x += 1) {
+      rays[y * size + x] = rayAt(fan, Math.atan2(centre - x, centre - y));
+    }
+  }
+  return rays;
+}
+
+/**
+ * Return the distance from the sensor of each pixel of a square picture, in pixels.
+ *
+ * @param {number} size
+ */
+export function reachOfPixels(size) {
+  const reach = new Float32Array(size * size);
+  const centre = (size - 1) / 2;
+  for (let y = 0; y < size; y += 1) {
+    for (let x = 0; x < size; x += 1) reach[y * size + x] = Math.hypot(x - centre, y - centre);
+  }
+  return reach;
+}
+
+/**
+ * Return the nearest thing and its direction; null when nothing is in reach. What is too close to be
+ * measured counts as 0.
+ *
+ * @param {Float32Array} distances
+ * @param {Fan} fan
+ * @param {number} most
+ * @returns {{distance: number, angle: number} | null}
+ */
+export function nearest(distances, fan, most) {
+  let found = -1;
+  let least = most;
+  for (let index = 0; index < distances.length; index += 1) {
+    const distance = distances[index] ?? NaN;
+    if (distance < least) {
+      least = distance;
+      found = index;
+    }
+  }
+  return found < 0 ? null : { distance: least, angle: fan.start + fan.step * found };
+}
+
+/**
+ * Return how much of the window a wall fills at a distance: all of it at `close`, little far away.
+ *
+ * @param {number} distance
+ * @param {number} close
+ */
+export function wallHeight(distance, close) {
+  return distance <= close ? 1 : Math.max(0.02, close / distance);
+}
+
+/**
+ * Return which ray each column of a picture from the robot's view shows: left is left.
+ *
+ * @param {Fan} fan
+ * @param {number} columns
+ */
+export function raysOfColumns({ count, step }, columns) {
+  const rays = new Uint16Array(columns);
+  for (let column = 0; column < columns; column += 1) {
+    const share = columns > 1 ? column / (columns - 1) : 0;
+    // Counter-clockwise rays go from right to left.
+    const along = step > 0 ? 1 - share : share;
+    rays[column] = count > 0 ? Math.min(count - 1, Math.round(along * (count - 1))) : NO_RAY;
+  }
+  return rays;
+}
+
+/**
+ * Return a round distance for rings: 1, 2 or 5 times a power of ten, at most `count` to the rim.
+ *
+ * @param {number} most
+ * @param {number} [count]
+ */
+export function ringStep(most, count = 5) {
+  if (!(most > 0)) return 1;
+  const rough = most / count;
+  const power = 10 ** Math.floor(Math.log10(rough));
+  const step = [1, 2, 5, 10].find((each) => each * power >= rough * 0.999) ?? 10;
+  return step * power;
+}
+
+/**
+ * Marks a text that is translated where it is said.
+ *
+ * @param {string} text
+ */
+const mark = (text) => text;
+const SIDES = [
+  mark("ahead"),
+  mark("ahead left"),
+  mark("left"),
+  mark("behind left"),
+  mark("behind"),
+  mark("behind right"),
+  mark("right"),
+  mark("ahead right"),
+];
+
+/**
+ * Return where a direction points to, in words.
+ *
+ * @param {number} angle radians
+ */
+export function sideOf(angle) {
+  const turn = (((angle % TURN) + TURN) % TURN) / (TURN / 8);
+  return SIDES[Math.round(turn) % 8] ?? "ahead";
+}

@@ -1,0 +1,245 @@
+// @ts-check
+/** @typedef {import("../../urc/web/static/types.js").Context} Context */
+/** @typedef {import("../../urc/web/static/types.js").Instance} Instance */
+/** @typedef {import("../../urc/web/static/types.js").Reading} Reading */
+/** @typedef {import("./rays.js").Fan} Fan */
+/** @typedef {import("./paint.js").Ink} Ink */
+import { DASH, attribute, colours, format, noteOf, number, part, write } from "urc/kit";
+import { palette, pixel } from "urc/palette";
+import { Overlay } from "./overlay.js";
+import { arc, band, chart, dots, graph, view } from "./paint.js";
+import { directions, measured, nearest, rayOfPixels, raysOfColumns, reachOfPixels, sideOf } from "./rays.js";
+
+/** Largest picture in pixels: a slow device fills no more in a frame. */
+const MOST_PIXELS = 420;
+const INK = /** @type {const} */ (["level", "caution", "alarm", "raised", "faint", "muted", "line", "text", "old"]);
+const VIEWS = /** @type {const} */ (["polar", "map", "graph", "depth", "arc"]);
+/**
+ * Marks a text that is translated where it is said.
+ *
+ * @param {string} text
+ */
+const mark = (text) => text;
+const NAMES = { polar: mark("Dots"), map: mark("Map"), graph: mark("Graph"), depth: mark("Depth"), arc: mark("Arc") };
+
+/** @typedef {typeof VIEWS[number]} ViewName */
+
+export default {
+  /**
+   * @param {Context} ctx
+   * @returns {Instance}
+   */
+  mount(ctx) {
+    const scan = new Scan(ctx);
+    ctx.follow("theme", () => scan.theme());
+    return {
+      update: (readings) => scan.update(readings),
+      resize: () => scan.resize(),
+    };
+  },
+};
+
+class Scan {
+  /** @param {Context} ctx */
+  constructor({ el, options, t, unit, signal }) {
+    this.t = t;
+    this.unit = unit;
+    this.options = options;
+    this.root = part(el, ".scan");
+    this.face = part(el, ".scan-face");
+    this.text = part(el, ".scan-text");
+    this.note = part(el, ".scan-note");
+    const [data, over] = el.querySelectorAll("canvas");
+    if (!data || !over) throw new Error("the template has no canvas");
+    this.canvas = data;
+    this.overlay = new Overlay(over);
+    const pen = data.getContext("2d");
+    if (!pen) throw new Error("this browser draws no canvas");
+    this.pen = pen;
+    this.view = VIEWS.find((each) => each === options["view"]) ?? "polar";
+    this.palette = palette();
+    /** @type {Reading | undefined} */
+    this.reading = undefined;
+    this.heading = NaN;
+    this.serial = -1;
+    this.most = 10;
+    this.distances = new Float32Array(0);
+    /** @type {Fan} */
+    this.fan = { count: 0, start: 0, step: 0 };
+    /** What was made for this fan and this size. */
+    this.tables = {
+      key: "",
+      ways: directions(this.fan),
+      rays: new Uint16Array(0),
+      reach: new Float32Array(0),
+      band: band(new Uint16Array(0), new Float32Array(0), 1),
+    };
+    this.image = new ImageData(1, 1);
+    this.pixels = new Uint32Array(this.image.data.buffer);
+    this.theme();
+    if (options["choose"] !== false) this.addButton(signal);
+  }
+
+  /** @param {AbortSignal} signal */
+  addButton(signal) {
+    const button = document.createElement("button");
+    button.type = "button";
+    button.className = "scan-view";
+    const label = () => {
+      write(button, this.t(NAMES[this.view]));
+      attribute(button, "aria-label", this.t("View: {name}. Change it.", { name: this.t(NAMES[this.view]) }));
+    };
+    label();
+    const next = () => {
+      this.view = VIEWS[(VIEWS.indexOf(this.view) + 1) % VIEWS.length] ?? "polar";
+      attribute(this.root, "data-view", this.view);
+      label();
+      this.resize();
+    };
+    button.addEventListener("click", next, { signal });
+    this.root.append(button);
+  }
+
+  theme() {
+    const ink = colours(this.root, INK);
+    this.css = ink;
+    /** @type {Ink} */
+    this.ink = {
+      wall: pixel(ink.text),
+      near: pixel(ink.caution),
+      stop: pixel(ink.alarm),
+      free: pixel(ink.faint),
+      unknown: pixel(ink.muted, 60),
+    };
+    this.resize();
+  }
+
+  resize() {
+    this.serial = -1;
+    this.draw();
+  }
+
+  /** @param {Readonly<Record<string, Reading>>} readings */
+  update(readings) {
+    const reading = readings["ranges"];
+    if (!reading) return;
+    this.reading = reading;
+    this.heading = number(readings["heading"]) ?? NaN;
+    const values = Array.isArray(reading.value) ? reading.value : [];
+    this.most = number(readings["range_max"]) ?? Number(this.options["range_max"] ?? 10);
+    this.setFan(values.length, readings);
+    attribute(this.root, "data-state", reading.state);
+    this.draw();
+    this.tell(reading, values.length);
+  }
+
+  /**
+   * @param {number} count
+   * @param {Readonly<Record<string, Reading>>} readings
+   */
+  setFan(count, readings) {
+    const option = (/** @type {string} */ name, /** @type {number} */ otherwise) => {
+      const given = number(readings[name]) ?? this.options[name];
+      return typeof given === "number" ? given : otherwise;
+    };
+    const start = option("angle_min", -Math.PI);
+    const step = option("angle_increment", count > 0 ? (2 * Math.PI) / count : 0);
+    if (this.fan.count === count && this.fan.start === start && this.fan.step === step) return;
+    this.fan = { count, start, step };
+    this.distances = new Float32Array(count);
+    this.serial = -1;
+  }
+
+  draw() {
+    const { reading } = this;
+    const [width, height] = [this.face.clientWidth, this.face.clientHeight];
+    if (!reading || width === 0 || height === 0) return;
+    const isFlat = this.view === "graph" || this.view === "depth";
+    this.overlay.draw({
+      width,
+      height,
+      view: this.view,
+      most: this.most,
+      near: Number(this.options["near"] ?? 0),
+      stop: Number(this.options["stop"] ?? 0),
+      vehicle: this.options["vehicle"],
+      heading: this.heading,
+      unit: this.unit("ranges"),
+      ink: this.css,
+    });
+    if (reading.serial === this.serial) return;
+    this.serial = reading.serial;
+    const scale = Math.min(1, MOST_PIXELS / Math.max(isFlat ? width : Math.min(width, height), 1));
+    const across = Math.max(16, Math.round((isFlat ? width : Math.min(width, height)) * scale));
+    this.size(across, isFlat ? Math.max(16, Math.round(height * scale)) : across);
+    this.makeTables(isFlat);
+    this.paint(Array.isArray(reading.value) ? reading.value : []);
+    this.pen.putImageData(this.image, 0, 0);
+  }
+
+  /**
+   * @param {number} width
+   * @param {number} height
+   */
+  size(width, height) {
+    if (this.image.width === width && this.image.height === height) return;
+    this.canvas.width = width;
+    this.canvas.height = height;
+    this.image = new ImageData(width, height);
+    this.pixels = new Uint32Array(this.image.data.buffer);
+  }
+
+  /** @param {boolean} isFlat */
+  makeTables(isFlat) {
+    const { width } = this.image;
+    const { count, start, step } = this.fan;
+    const key = `${this.view} ${width} ${count} ${start} ${step}`;
+    if (key === this.tables.key) return;
+    const isWhole = this.view === "map" || this.view === "arc";
+    const whole = isWhole ? rayOfPixels(this.fan, width) : new Uint16Array(0);
+    const reach = isWhole ? reachOfPixels(width) : new Float32Array(0);
+    this.tables = {
+      key,
+      ways: directions(this.fan),
+      rays: isFlat ? raysOfColumns(this.fan, width) : whole,
+      reach,
+      band: band(whole, this.view === "arc" ? reach : new Float32Array(0), width),
+    };
+  }
+
+  /** @param {readonly unknown[]} values */
+  paint(values) {
+    const { pixels, ink, tables, image, most } = this;
+    if (!ink) return;
+    const near = Number(this.options["near"] ?? 0);
+    const limits = { most, near, stop: Number(this.options["stop"] ?? 0) };
+    const all = measured(values, Number(this.options["range_min"] ?? 0), most, this.distances);
+    const { width, height } = image;
+    if (all.length === 0) pixels.fill(0);
+    else if (this.view === "polar") dots(pixels, width, all, tables.ways, limits, ink);
+    else if (this.view === "map") chart(pixels, tables.rays, tables.reach, width, all, limits, ink);
+    else if (this.view === "graph") graph(pixels, width, height, all, limits, ink);
+    else if (this.view === "depth") view(pixels, width, height, tables.rays, all, limits, this.palette, ink.unknown);
+    else arc(pixels, tables.band, all, limits, this.palette, ink.unknown);
+  }
+
+  /**
+   * @param {Reading} reading
+   * @param {number} count
+   */
+  tell(reading, count) {
+    const found = count > 0 ? nearest(this.distances, this.fan, this.most) : null;
+    const { symbol, factor } = this.unit("ranges");
+    const { near, stop } = { near: Number(this.options["near"] ?? 0), stop: Number(this.options["stop"] ?? 0) };
+    const zone = !found ? "" : found.distance <= stop || found.distance === 0 ? "stop" : found.distance <= near ? "near" : "";
+    attribute(this.root, "data-zone", zone);
+    const mark = zone === "stop" ? "▲ " : zone === "near" ? "◆ " : "";
+    const isBlind = count > 0 && !found && this.distances.every((each) => each !== each);
+    const words = found
+      ? `${mark}${found.distance === 0 ? this.t("too close") : `${format(factor(found.distance), 2)} ${symbol}`.trim()} · ${this.t(sideOf(found.angle))}`
+      : count === 0 || isBlind ? DASH : this.t("clear");
+    write(this.text, words);
+    const blind = isBlind && reading.state === "live" ? this.t("not known") : "";
+    write(this.note, [blind, noteOf(reading, this.t)].filter(Boolean).join(" · "));
+  }
+}

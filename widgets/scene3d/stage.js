@@ -1,0 +1,223 @@
+// @ts-check
+/**
+ * The scene: light, ground, the robot, its points, and from where they are seen. Draws only when it is
+ * asked to, and never more often than it may.
+ *
+ * @typedef {typeof import("three")} Three
+ * @typedef {import("three").Object3D} Object3D
+ * @typedef {import("./pose.js").Quaternion} Quaternion
+ * @typedef {import("./pose.js").Vector} Vector
+ */
+import { cameraAt } from "./pose.js";
+
+const MOST_DENSITY = 1.5;
+/** How far the ground goes to each side, in metres. */
+const REACH = 10;
+
+export class Stage {
+  /**
+   * @param {Three} three
+   * @param {typeof import("three/addons/controls/OrbitControls.js").OrbitControls} Controls
+   * @param {HTMLElement} face
+   * @param {{frames: number, view: "follow" | "top" | "orbit"}} given
+   */
+  constructor(three, Controls, face, { frames, view }) {
+    this.three = three;
+    this.everyMs = 1000 / frames;
+    this.renderer = new three.WebGLRenderer({ antialias: true, alpha: true, powerPreference: "low-power" });
+    this.renderer.setPixelRatio(Math.min(MOST_DENSITY, globalThis.devicePixelRatio || 1));
+    this.canvas = this.renderer.domElement;
+    this.scene = new three.Scene();
+    this.camera = new three.PerspectiveCamera(45, 1, 0.01, 1000);
+    this.camera.up.set(0, 0, 1);
+    this.scene.add(new three.HemisphereLight(0xffffff, 0x555555, 2.2));
+    const sun = new three.DirectionalLight(0xffffff, 1.4);
+    sun.position.set(2, 3, 5);
+    this.scene.add(sun);
+    this.robot = new three.Group();
+    this.scene.add(this.robot);
+    this.ground = this.makeGround(0x808890);
+    this.points = this.makePoints();
+    this.robot.add(this.points);
+    this.controls = new Controls(this.camera, this.canvas);
+    this.controls.enableDamping = false;
+    this.controls.addEventListener("change", () => this.ask());
+    this.size = 1;
+    this.view = view;
+    this.drawnMs = -Infinity;
+    this.isAsked = false;
+    this.isOver = false;
+    this.drawn = 0;
+    /** @type {ReturnType<typeof setTimeout> | undefined} */
+    this.timer = undefined;
+    this.look(view);
+  }
+
+  /** @param {number} colour */
+  makeGround(colour) {
+    // In pieces of a metre: a long line that begins behind the camera is lost in software.
+    const ends = [];
+    for (let line = -REACH; line <= REACH; line += 1) {
+      for (let piece = -REACH; piece < REACH; piece += 1) {
+        ends.push(line, piece, 0, line, piece + 1, 0, piece, line, 0, piece + 1, line, 0);
+      }
+    }
+    const geometry = new this.three.BufferGeometry();
+    geometry.setAttribute("position", new this.three.Float32BufferAttribute(ends, 3));
+    const material = new this.three.LineBasicMaterial({ color: colour, transparent: true, opacity: 0.5 });
+    const ground = new this.three.LineSegments(geometry, material);
+    this.scene.add(ground);
+    return ground;
+  }
+
+  makePoints() {
+    const { three } = this;
+    const material = new three.PointsMaterial({ size: 3, sizeAttenuation: false, color: 0xf0b23e });
+    const points = new three.Points(new three.BufferGeometry(), material);
+    points.frustumCulled = false;
+    return points;
+  }
+
+  /** @param {{line: string, caution: string}} ink */
+  theme({ line, caution }) {
+    this.ground.material.color.set(line);
+    this.points.material.color.set(caution);
+    this.ask();
+  }
+
+  /** @param {Object3D} object */
+  setModel(object) {
+    if (this.model) this.robot.remove(this.model);
+    this.model = object;
+    this.robot.add(object);
+    this.measure();
+  }
+
+  /** How large it is decides from how far it is seen. */
+  measure() {
+    if (!this.model) return;
+    const turn = this.robot.quaternion.clone();
+    this.robot.quaternion.identity();
+    this.robot.updateMatrixWorld(true);
+    const size = new this.three.Box3().setFromObject(this.model).getSize(new this.three.Vector3()).length();
+    this.robot.quaternion.copy(turn);
+    this.size = Number.isFinite(size) && size > 0 ? size : 1;
+    this.look(this.view);
+  }
+
+  /** @param {Float32Array} places */
+  setPoints(places) {
+    const { three } = this;
+    const old = this.points.geometry.getAttribute("position");
+    if (old && old.array.length >= places.length && places.length > 0) {
+      old.array.set(places);
+      old.needsUpdate = true;
+    } else {
+      this.points.geometry.dispose();
+      this.points.geometry = new three.BufferGeometry();
+      this.points.geometry.setAttribute("position", new three.BufferAttribute(places.slice(), 3));
+    }
+    this.points.geometry.setDrawRange(0, places.length / 3);
+    this.ask();
+  }
+
+  /**
+   * @param {Vector} place
+   * @param {Quaternion} turn
+   * @param {number} yaw
+   */
+  setPose(place, turn, yaw) {
+    const moved = new this.three.Vector3(...place).sub(this.robot.position);
+    this.robot.position.set(...place);
+    this.robot.quaternion.set(...turn);
+    // The ground goes along in whole squares, so that it never ends.
+    this.ground.position.set(Math.round(place[0]), Math.round(place[1]), 0);
+    if (this.view === "orbit") {
+      this.camera.position.add(moved);
+      this.controls.target.copy(this.robot.position);
+      this.controls.update();
+    } else this.stand(yaw);
+    this.ask();
+  }
+
+  /** @param {"follow" | "top" | "orbit"} view */
+  look(view) {
+    this.view = view;
+    this.controls.enabled = view === "orbit";
+    this.stand(0);
+    this.ask();
+  }
+
+  /** @param {number} yaw */
+  stand(yaw) {
+    const { position } = this.robot;
+    const [x, y, z] = cameraAt(this.view, yaw, this.size);
+    this.camera.up.set(this.view === "top" ? 1 : 0, 0, this.view === "top" ? 0 : 1);
+    this.camera.position.set(position.x + x, position.y + y, position.z + z);
+    this.camera.lookAt(position);
+    this.controls.target.copy(position);
+  }
+
+  /**
+   * Look from elsewhere, by keys.
+   *
+   * @param {number} across radians
+   * @param {number} up radians
+   * @param {number} zoom factor of the distance
+   */
+  orbit(across, up, zoom) {
+    const { three } = this;
+    const from = this.camera.position.clone().sub(this.controls.target);
+    const flat = Math.hypot(from.x, from.y);
+    const far = Math.min(500, Math.max(0.05, from.length() * zoom));
+    const turn = Math.atan2(from.y, from.x) + across;
+    const lift = Math.min(1.5, Math.max(-1.5, Math.atan2(from.z, flat) + up));
+    const place = new three.Vector3(Math.cos(turn) * Math.cos(lift), Math.sin(turn) * Math.cos(lift), Math.sin(lift));
+    this.camera.position.copy(place.multiplyScalar(far).add(this.controls.target));
+    this.camera.lookAt(this.controls.target);
+    this.ask();
+  }
+
+  /**
+   * @param {number} width
+   * @param {number} height
+   */
+  resize(width, height) {
+    this.renderer.setSize(width, height, false);
+    this.camera.aspect = width / Math.max(1, height);
+    this.camera.updateProjectionMatrix();
+    this.ask();
+  }
+
+  /** Draw in a frame to come, and not sooner than the budget allows. */
+  ask() {
+    if (this.isAsked || this.isOver) return;
+    this.isAsked = true;
+    const waitMs = this.drawnMs + this.everyMs - performance.now();
+    const draw = () => requestAnimationFrame(() => this.draw());
+    if (waitMs > 4) this.timer = setTimeout(draw, waitMs);
+    else draw();
+  }
+
+  draw() {
+    this.isAsked = false;
+    if (this.isOver) return;
+    this.drawnMs = performance.now();
+    this.drawn += 1;
+    this.renderer.render(this.scene, this.camera);
+    this.canvas.dataset["frames"] = String(this.drawn);
+  }
+
+  end() {
+    this.isOver = true;
+    clearTimeout(this.timer);
+    this.controls.dispose();
+    this.scene.traverse((object) => {
+      const { geometry, material } = /** @type {any} */ (object);
+      geometry?.dispose();
+      for (const each of [material].flat()) each?.dispose?.();
+    });
+    this.renderer.dispose();
+    this.renderer.forceContextLoss(); // a page may hold only some sixteen of them
+  }
+}

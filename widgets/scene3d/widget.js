@@ -1,0 +1,247 @@
+// @ts-check
+/** @typedef {import("../../urc/web/static/types.js").Context} Context */
+/** @typedef {import("../../urc/web/static/types.js").Instance} Instance */
+/** @typedef {import("../../urc/web/static/types.js").Reading} Reading */
+/** @typedef {import("./model.js").Model} Model */
+/** @typedef {import("./pose.js").Quaternion} Quaternion */
+import { DASH, attribute, colours, many, noteOf, number, part, write } from "urc/kit";
+import { box, urdf } from "./model.js";
+import { angles, cloud, fromAngles, fromOrientation, posture } from "./pose.js";
+import { Stage } from "./stage.js";
+
+const STEP = Math.PI / 24;
+const VIEWS = /** @type {const} */ (["follow", "top", "orbit"]);
+/**
+ * Marks a text that is translated where it is said.
+ *
+ * @param {string} text
+ */
+const mark = (text) => text;
+const NAMES = { follow: mark("Follow"), top: mark("From above"), orbit: mark("Around") };
+const KEYS = {
+  ArrowLeft: [-STEP, 0, 1],
+  ArrowRight: [STEP, 0, 1],
+  ArrowUp: [0, STEP, 1],
+  ArrowDown: [0, -STEP, 1],
+  "+": [0, 0, 0.9],
+  "-": [0, 0, 1.1],
+};
+
+export default {
+  /**
+   * @param {Context} ctx
+   * @returns {Promise<Instance>}
+   */
+  async mount(ctx) {
+    const [three, { OrbitControls }] = await Promise.all([
+      import("three"),
+      import("three/addons/controls/OrbitControls.js"),
+    ]);
+    if (ctx.signal.aborted) return {};
+    const scene = new Scene(ctx, three, OrbitControls);
+    ctx.follow("theme", () => scene.theme());
+    void scene.load();
+    return {
+      update: (readings) => scene.update(readings),
+      resize: () => scene.resize(),
+      destroy: () => scene.stage?.end(),
+    };
+  },
+};
+
+class Scene {
+  /**
+   * @param {Context} ctx
+   * @param {typeof import("three")} three
+   * @param {typeof import("three/addons/controls/OrbitControls.js").OrbitControls} Controls
+   */
+  constructor({ el, options, t, signal }, three, Controls) {
+    this.t = t;
+    this.three = three;
+    this.options = options;
+    this.signal = signal;
+    this.root = part(el, ".scene3d");
+    this.face = part(el, ".scene3d-face");
+    this.text = part(el, ".scene3d-text");
+    this.note = part(el, ".scene3d-note");
+    /** @type {import("./pose.js").Convention} */
+    this.convention = options["convention"] === "FRD" ? "FRD" : "FLU";
+    this.fault = "";
+    /** @type {Model | null} */
+    this.model = null;
+    /** @type {Readonly<Record<string, Reading>>} */
+    this.readings = {};
+    this.seen = "";
+    this.pointsSerial = -1;
+    const view = VIEWS.find((each) => each === options["view"]) ?? "orbit";
+    try {
+      this.stage = new Stage(three, Controls, this.face, { frames: Number(options["frames"] ?? 30), view });
+    } catch {
+      // The words below go on telling how it stands.
+      this.stage = null;
+      this.fault = t("this browser draws no WebGL");
+      return;
+    }
+    this.stage.canvas.className = "scene3d-picture";
+    this.stage.canvas.setAttribute("aria-hidden", "true");
+    this.face.append(this.stage.canvas);
+    this.addButton();
+    this.face.addEventListener("keydown", (event) => this.key(event), { signal });
+    this.theme();
+    this.resize();
+  }
+
+  addButton() {
+    const button = document.createElement("button");
+    button.type = "button";
+    button.className = "scene3d-view";
+    const label = () => {
+      const name = this.t(NAMES[this.stage?.view ?? "orbit"]);
+      write(button, name);
+      attribute(button, "aria-label", this.t("View: {name}. Change it.", { name }));
+    };
+    const press = () => {
+      const { stage } = this;
+      if (!stage) return;
+      stage.look(VIEWS[(VIEWS.indexOf(stage.view) + 1) % VIEWS.length] ?? "orbit");
+      attribute(this.root, "data-view", stage.view);
+      this.seen = "";
+      this.place();
+      label();
+    };
+    label();
+    button.addEventListener("click", press, { signal: this.signal });
+    this.root.append(button);
+  }
+
+  /** @param {KeyboardEvent} event */
+  key(event) {
+    const change = Object.hasOwn(KEYS, event.key) ? Reflect.get(KEYS, event.key) : undefined;
+    if (!change || this.stage?.view !== "orbit") return;
+    event.preventDefault();
+    this.stage.orbit(change[0], change[1], change[2]);
+  }
+
+  theme() {
+    this.stage?.theme(colours(this.root, ["line", "caution"]));
+  }
+
+  resize() {
+    const { clientWidth, clientHeight } = this.face;
+    if (clientWidth > 0 && clientHeight > 0) this.stage?.resize(clientWidth, clientHeight);
+  }
+
+  async load() {
+    const { options, stage, three } = this;
+    if (!stage) return;
+    const size = Array.isArray(options["box"]) ? options["box"] : [];
+    const file = options["urdf"];
+    let model = box(three, size);
+    if (typeof file === "string" && file) {
+      const meshes = Array.isArray(options["meshes"]) ? options["meshes"].map(String) : [];
+      const changed = () => {
+        if (this.signal.aborted) return;
+        stage.measure();
+        this.seen = "";
+        this.place();
+        this.tell();
+      };
+      try {
+        model = await urdf(three, file, meshes, changed);
+      } catch (error) {
+        this.fault = error instanceof Error ? error.message : String(error);
+      }
+    }
+    if (this.signal.aborted) return;
+    this.model = model;
+    stage.setModel(model.object);
+    attribute(this.root, "data-model", model.joints.length > 0 || model.missing.length > 0 ? "urdf" : "box");
+    this.seen = "";
+    this.place();
+    this.tell();
+  }
+
+  /** @param {Readonly<Record<string, Reading>>} readings */
+  update(readings) {
+    this.readings = readings;
+    const all = Object.values(readings).flatMap((each) => (Array.isArray(each) ? each : [each]));
+    // As old as the oldest of what is bound.
+    this.worst = all.reduce((/** @type {Reading | undefined} */ found, each) => worse(found, each), undefined);
+    attribute(this.root, "data-state", this.worst?.state ?? "none");
+    this.place();
+    this.setPoints();
+    this.tell();
+  }
+
+  /** Stand and bend as the readings say; what is not known stays as it was. */
+  place() {
+    const { readings, stage, model } = this;
+    if (!stage) return;
+    const values = this.jointValues();
+    const turn = this.turn();
+    const place = ["x", "y", "z"].map((name) => number(readings[name]) ?? 0);
+    const look = JSON.stringify([values, turn, place]);
+    if (look === this.seen) return;
+    this.seen = look;
+    const given = this.options["joint_names"];
+    const names = Array.isArray(given) ? given.map(String) : (model?.joints ?? []);
+    values.forEach((value, index) => {
+      const name = names[index];
+      if (model && name !== undefined && value !== null) model.set(name, value);
+    });
+    const [x = 0, y = 0, z = 0] = place;
+    stage.setPose([x, y, z], turn ?? [0, 0, 0, 1], turn ? angles(turn).yaw : 0);
+  }
+
+  /** @returns {(number | null)[]} */
+  jointValues() {
+    const list = this.readings["joints"]?.value;
+    const singles = many(this.readings["joint"]).map((each) => number(each));
+    const first = Array.isArray(list) ? list.map((each) => (typeof each === "number" ? each : null)) : [];
+    return [...first, ...singles];
+  }
+
+  /** @returns {Quaternion | null} */
+  turn() {
+    const { readings, convention } = this;
+    const whole = fromOrientation(readings["orientation"]?.value, convention);
+    if (whole) return whole;
+    const [roll, pitch, yaw] = ["roll", "pitch", "yaw"].map((name) => number(readings[name]));
+    if ((roll ?? pitch ?? yaw ?? null) === null) return null;
+    return fromAngles(roll ?? 0, pitch ?? 0, yaw ?? 0, convention);
+  }
+
+  setPoints() {
+    const reading = this.readings["points"];
+    if (!reading || !this.stage || reading.serial === this.pointsSerial) return;
+    this.pointsSerial = reading.serial;
+    const values = Array.isArray(reading.value) ? reading.value : [];
+    this.stage.setPoints(cloud(values, Number(this.options["budget"] ?? 20000), this.convention));
+  }
+
+  tell() {
+    const { worst, model, t } = this;
+    const turn = this.turn();
+    const words = turn ? posture(turn).map(({ text, degrees }) => t(text, { n: degrees })) : [];
+    const joints = this.jointValues().filter((each) => each !== null).length;
+    const isShown = worst !== undefined && (worst.state === "live" || worst.state === "stale");
+    const level = turn && words.length === 0 ? t("level") : "";
+    const bent = joints > 0 ? t("joints: {count}", { count: joints }) : "";
+    const said = [level, ...words, bent].filter(Boolean).join(" · ");
+    write(this.text, isShown && said ? said : DASH);
+    const count = model?.missing.length ?? 0;
+    const missing = count > 0 ? ["◆", t("shapes that are missing: {count}", { count })].join(" ") : "";
+    const note = worst ? noteOf(worst, t) : "";
+    write(this.note, [this.fault ? `▲ ${this.fault}` : "", missing, note].filter(Boolean).join(" · "));
+  }
+}
+
+const RANK = ["live", "stale", "gone", "none"];
+
+/**
+ * @param {Reading | undefined} one
+ * @param {Reading} other
+ */
+function worse(one, other) {
+  return !one || RANK.indexOf(other.state) > RANK.indexOf(one.state) ? other : one;
+}

@@ -1,0 +1,185 @@
+// @ts-check
+/** @typedef {import("../../urc/web/static/types.js").Context} Context */
+/** @typedef {import("../../urc/web/static/types.js").Instance} Instance */
+/** @typedef {import("../../urc/web/static/types.js").Outlet} Outlet */
+/** @typedef {import("../../urc/web/static/types.js").Reading} Reading */
+/** @typedef {import("../../urc/web/static/types.js").Value} Value */
+import { Giver, Wish } from "urc/giving";
+import { attribute, noteOf, part, write } from "urc/kit";
+
+/** @typedef {{value: Value, label: string}} Choice */
+
+export default {
+  /**
+   * @param {Context} ctx
+   * @returns {Instance}
+   */
+  mount(ctx) {
+    const control = new Select(ctx);
+    return {
+      update({ state }, { change }) {
+        control.update(state, change);
+      },
+    };
+  },
+};
+
+class Select {
+  /** @param {Context} ctx */
+  constructor(ctx) {
+    const { el, options, signal, send, t } = ctx;
+    this.ctx = ctx;
+    this.root = part(el, ".select");
+    this.now = part(el, ".select-now");
+    this.note = part(el, ".select-note");
+    this.place = el.querySelector(".select-choices");
+    this.isOptimistic = options["echo"] === "optimistic";
+    this.isList = options["look"] === "list";
+    /** @type {Reading | undefined} */
+    this.state = undefined;
+    /** @type {Choice[]} */
+    this.choices = [];
+    this.made = "";
+    /** @type {Value} */
+    this.chosen = null;
+    const show = () => this.show();
+    this.giver = new Giver({ give: () => send("change", { value: this.chosen }), show, t, signal });
+    this.wish = new Wish({ withinMs: 1000 * Number(options["echo_s"] ?? 3), show, signal });
+    this.place?.addEventListener("change", (event) => {
+      const at = event.target;
+      if (at instanceof HTMLSelectElement) void this.choose(this.choices[Number(at.value)]);
+      if (at instanceof HTMLInputElement) void this.choose(this.choices[Number(at.value)]);
+    }, { signal });
+  }
+
+  /**
+   * @param {Reading | undefined} state
+   * @param {Outlet | undefined} change
+   */
+  update(state, change) {
+    this.state = state;
+    this.wish.take(state);
+    this.choices = choicesOf(this.ctx, state);
+    const look = JSON.stringify(this.choices);
+    if (this.place && look !== this.made) {
+      this.made = look;
+      this.place.replaceChildren(...(this.isList ? [this.list()] : this.choices.map((_, place) => this.radio(place))));
+    }
+    this.giver.take(change);
+  }
+
+  /** @param {Choice | undefined} choice */
+  async choose(choice) {
+    if (!choice || !this.giver.isReady || this.giver.isPending) return this.show();
+    this.chosen = choice.value;
+    if (this.state) this.wish.make(choice.value, this.state);
+    this.show();
+    if (!(await this.giver.once())) {
+      this.wish.drop();
+      this.show();
+    }
+  }
+
+  show() {
+    const { giver, wish, state, ctx } = this;
+    const isHoped = this.isOptimistic && wish.isWaiting;
+    const said = state && state.value !== null ? String(state.value) : null;
+    const shown = isHoped ? String(wish.value) : said;
+    attribute(this.root, "data-state", state?.state ?? "none");
+    attribute(this.root, "data-alarm", state?.alarm ?? "");
+    attribute(this.root, "data-phase", giver.phase);
+    attribute(this.root, "data-wish", wish.isMissed ? "missed" : wish.isWaiting ? "waiting" : "");
+    const now = this.choices.find(({ value }) => String(value) === shown);
+    const sign = wish.isWaiting ? " …" : wish.isMissed ? " ≠" : "";
+    write(this.now, (state ? (now?.label ?? state.text) : "—") + sign);
+    this.mark(shown, !giver.isReady || giver.isPending);
+    const wished = this.choices.find(({ value }) => value === wish.value)?.label ?? "";
+    const missed = wish.isMissed ? ctx.t("≠ asked for {wish}, the robot says otherwise", { wish: wished }) : "";
+    write(this.note, giver.note(missed, state ? noteOf(state, ctx.t) : ""));
+  }
+
+  /**
+   * @param {string | null} shown
+   * @param {boolean} isLocked
+   */
+  mark(shown, isLocked) {
+    const place = this.choices.findIndex(({ value }) => String(value) === shown);
+    const list = this.place?.querySelector("select");
+    if (list) {
+      if (list.value !== String(place)) list.value = String(place);
+      if (list.disabled !== isLocked) list.disabled = isLocked;
+    }
+    for (const radio of this.place?.querySelectorAll("input") ?? []) {
+      const isOne = radio.value === String(place);
+      if (radio.checked !== isOne) radio.checked = isOne;
+      if (radio.disabled !== isLocked) radio.disabled = isLocked;
+      const isWished = this.wish.value !== null && this.choices[Number(radio.value)]?.value === this.wish.value;
+      attribute(radio.parentElement ?? radio, "data-wished", isWished ? "true" : null);
+    }
+  }
+
+  list() {
+    const list = document.createElement("select");
+    list.className = "select-list";
+    list.setAttribute("aria-labelledby", `${this.root.dataset["uid"]}-title`);
+    list.setAttribute("aria-describedby", `${this.root.dataset["uid"]}-note`);
+    const none = new Option("—", "-1");
+    none.disabled = true;
+    list.append(none, ...this.choices.map(({ label }, place) => new Option(label, String(place))));
+    return list;
+  }
+
+  /** @param {number} place */
+  radio(place) {
+    const label = document.createElement("label");
+    label.className = "select-choice";
+    const input = document.createElement("input");
+    input.className = "select-radio";
+    input.type = "radio";
+    input.name = `${this.root.dataset["uid"]}-choice`;
+    input.value = String(place);
+    const text = document.createElement("span");
+    text.textContent = this.choices[place]?.label ?? "";
+    label.append(input, text);
+    return label;
+  }
+}
+
+/**
+ * What can be chosen: what the slot says, else what the command takes, else what the signal knows.
+ *
+ * @param {Context} ctx
+ * @param {Reading | undefined} state
+ * @returns {Choice[]}
+ */
+function choicesOf({ command, options }, state) {
+  const argument = Object.values(command("change")?.arguments ?? {})[0];
+  const states = state?.signal.states ?? {};
+  const label = (/** @type {Value} */ value) =>
+    Object.hasOwn(states, String(value)) ? (states[String(value)] ?? "") : String(value);
+  const own = options["choices"];
+  /** @type {Choice[]} */
+  let found = (argument?.choices ?? []).map((value) => ({ value, label: label(value) }));
+  if (found.length === 0) found = Object.keys(states).map((value) => ({ value, label: label(value) }));
+  if (found.length === 0 && argument?.type === "boolean") {
+    found = [false, true].map((value) => ({ value, label: label(value) }));
+  }
+  if (Array.isArray(own)) {
+    found = own.map((text) => {
+      const [value, ...rest] = String(text).split("=");
+      return { value: value ?? "", label: rest.length > 0 ? rest.join("=") : label(value ?? "") };
+    });
+  }
+  return found.map((one) => ({ ...one, value: typed(one.value, argument?.type) }));
+}
+
+/**
+ * @param {Value} value
+ * @param {string | undefined} type
+ * @returns {Value}
+ */
+function typed(value, type) {
+  if (typeof value !== "string") return value;
+  if (type === "integer" || type === "number") return Number(value);
+  return type === "boolean" ? value === "true" : value;
+}

@@ -1,0 +1,81 @@
+// @ts-check
+/** @typedef {import("../../urc/web/static/types.js").Context} Context */
+/** @typedef {import("../../urc/web/static/types.js").Instance} Instance */
+/** @typedef {import("../../urc/web/static/types.js").Reading} Reading */
+import { attribute, clamp, noteOf, part, style, write } from "urc/kit";
+
+/** The same shapes as everywhere: triangle, diamond and square are alarm, caution and advice. */
+const SHAPES = {
+  unknown: "◌",
+  plain: "◎",
+  off: "○",
+  on: "●",
+  advice: "■",
+  caution: "◆",
+  alarm: "▲",
+  busy: "◐",
+};
+
+export default {
+  /**
+   * @param {Context} ctx
+   * @returns {Instance}
+   */
+  mount({ el, options, t }) {
+    const root = part(el, ".state");
+    const shape = part(el, ".state-shape");
+    const text = part(el, ".state-text");
+    const note = part(el, ".state-note");
+
+    return {
+      update({ value }) {
+        if (!value) return;
+        const meaning = meaningOf(value, options["meanings"]);
+        const word = wordOf(value, options["words"], t);
+        attribute(root, "data-state", value.state);
+        attribute(root, "data-alarm", value.alarm);
+        attribute(root, "data-meaning", meaning);
+        // In steps of two characters, so that a change of the word rarely changes the size.
+        style(root, "--state-characters", String(clamp(2 * Math.ceil(word.length / 2), 4, 40)));
+        write(shape, SHAPES[meaning]);
+        write(text, word);
+        write(note, noteOf(value, t));
+      },
+    };
+  },
+};
+
+/**
+ * @param {Reading} reading
+ * @param {unknown} meanings
+ * @returns {keyof typeof SHAPES}
+ */
+function meaningOf({ value }, meanings) {
+  if (value === null) return "unknown";
+  const said = entry(meanings, String(value));
+  if (said !== undefined && Object.hasOwn(SHAPES, said)) return /** @type {keyof typeof SHAPES} */ (said);
+  if (typeof value === "boolean") return value ? "on" : "off";
+  return "plain";
+}
+
+/**
+ * @param {Reading} reading
+ * @param {unknown} words
+ * @param {Context["t"]} t
+ */
+function wordOf({ value, text }, words, t) {
+  if (value === null) return text;
+  const said = entry(words, String(value));
+  if (said !== undefined) return said;
+  if (typeof value === "boolean" && text === String(value)) return value ? t("on") : t("off");
+  return text;
+}
+
+/**
+ * @param {unknown} table
+ * @param {string} key
+ */
+function entry(table, key) {
+  if (typeof table !== "object" || table === null || !Object.hasOwn(table, key)) return undefined;
+  return String(/** @type {Record<string, unknown>} */ (table)[key]);
+}

@@ -1,0 +1,146 @@
+// @ts-check
+/** @typedef {import("../../urc/web/static/types.js").Context} Context */
+/** @typedef {import("../../urc/web/static/types.js").Instance} Instance */
+/** @typedef {import("../../urc/web/static/types.js").Outlet} Outlet */
+/** @typedef {import("../../urc/web/static/types.js").Reading} Reading */
+/** @typedef {import("../../urc/web/static/types.js").Value} Value */
+import { Giver, Wish } from "urc/giving";
+import { attribute, noteOf, part, write } from "urc/kit";
+
+export default {
+  /**
+   * @param {Context} ctx
+   * @returns {Instance}
+   */
+  mount(ctx) {
+    const control = new Switch(ctx);
+    return {
+      update({ state }, outputs) {
+        control.update(state, outputs);
+      },
+    };
+  },
+};
+
+class Switch {
+  /** @param {Context} ctx */
+  constructor(ctx) {
+    const { el, options, signal, t } = ctx;
+    this.ctx = ctx;
+    this.root = part(el, ".switch");
+    this.note = part(el, ".switch-note");
+    this.word = part(el, ".switch-word");
+    this.main = el.querySelector(".switch-main");
+    this.pair = el.querySelector(".switch-pair");
+    this.isOptimistic = options["echo"] === "optimistic";
+    this.words = [String(options["off_word"] ?? "off"), String(options["on_word"] ?? "on")];
+    this.values = valuesOf(ctx);
+    /** @type {Reading | undefined} */
+    this.state = undefined;
+    const show = () => this.show();
+    this.giver = new Giver({ give: () => Promise.resolve(), show, t, signal });
+    this.wish = new Wish({
+      withinMs: 1000 * Number(options["echo_s"] ?? 3),
+      show,
+      signal,
+      isSame: (wished, said) => this.isOn(said) === wished,
+    });
+    const tap = (/** @type {Element | null} */ button, /** @type {() => boolean} */ wanted) => {
+      button?.addEventListener("click", () => void this.turn(wanted()), { signal });
+    };
+    tap(this.main, () => this.isOn(this.state?.value) !== true);
+    tap(el.querySelector(".switch-on"), () => true);
+    tap(el.querySelector(".switch-off"), () => false);
+  }
+
+  /**
+   * @param {Reading | undefined} state
+   * @param {Readonly<Record<string, Outlet>>} outputs
+   */
+  update(state, outputs) {
+    this.state = state;
+    this.wish.take(state);
+    if (outputs["change"]) return this.giver.take(outputs["change"]);
+    const [on, off] = [outputs["turn_on"], outputs["turn_off"]];
+    this.giver.take(on && off ? { ...on, reason: on.reason || off.reason } : undefined);
+  }
+
+  /**
+   * What the robot says; null when it is neither on nor off.
+   *
+   * @param {unknown} said
+   * @returns {boolean | null}
+   */
+  isOn(said) {
+    if (said === null || said === undefined) return null;
+    const [off, on] = this.values;
+    if (String(said) === String(on)) return true;
+    if (String(said) === String(off)) return false;
+    if (typeof said === "boolean") return said;
+    return typeof said === "number" && on === true ? said !== 0 : null;
+  }
+
+  /** @param {boolean} isOn */
+  async turn(isOn) {
+    if (!this.giver.isReady || this.giver.isPending) return;
+    const { ctx } = this;
+    const isOne = ctx.command("change") !== null;
+    this.giver.give = () =>
+      isOne ? ctx.send("change", { value: this.values[isOn ? 1 : 0] ?? isOn }) : ctx.send(isOn ? "turn_on" : "turn_off");
+    if (this.state) this.wish.make(isOn, this.state);
+    this.show();
+    if (!(await this.giver.once())) {
+      this.wish.drop();
+      this.show();
+    }
+  }
+
+  show() {
+    const { giver, wish, state, words } = this;
+    const said = this.isOn(state?.value);
+    const isKnown = said !== null;
+    const hoped = this.isOptimistic && wish.isWaiting ? wish.value === true : said;
+    const isLocked = !giver.isReady || giver.isPending;
+    attribute(this.root, "data-state", state?.state ?? "none");
+    attribute(this.root, "data-alarm", state?.alarm ?? "");
+    attribute(this.root, "data-phase", giver.phase);
+    attribute(this.root, "data-wish", wish.isMissed ? "missed" : wish.isWaiting ? "waiting" : "");
+    if (this.main instanceof HTMLElement && this.pair instanceof HTMLElement) {
+      const hadFocus = this.main.contains(document.activeElement) || this.pair.contains(document.activeElement);
+      const isMoved = this.main.hidden === isKnown;
+      this.main.hidden = !isKnown;
+      this.pair.hidden = isKnown;
+      if (hadFocus && isMoved) (isKnown ? this.main : this.pair.querySelector("button"))?.focus();
+      attribute(this.main, "aria-checked", String(hoped === true));
+      for (const button of [this.main, ...this.pair.children]) attribute(button, "aria-disabled", String(isLocked));
+    }
+    const sign = wish.isWaiting ? " …" : wish.isMissed ? " ≠" : "";
+    write(this.word, (isKnown ? words[hoped ? 1 : 0] ?? "" : state?.text ?? "—") + sign);
+    const wished = words[wish.value === true ? 1 : 0] ?? "";
+    const missed = wish.isMissed ? this.ctx.t("≠ asked for {wish}, the robot says otherwise", { wish: wished }) : "";
+    write(this.note, giver.note(missed, state ? noteOf(state, this.ctx.t) : ""));
+  }
+}
+
+/**
+ * What stands for off and on.
+ *
+ * @param {Context} ctx
+ * @returns {Value[]}
+ */
+function valuesOf({ command, options }) {
+  const argument = Object.values(command("change")?.arguments ?? {})[0];
+  const choices = argument?.choices ?? [];
+  /** @type {Value[]} */
+  let usual = [false, true];
+  if (argument?.type === "integer" || argument?.type === "number") usual = [0, 1];
+  if (argument?.type === "string") usual = ["off", "on"];
+  if (choices.length === 2) usual = [choices[0] ?? null, choices[1] ?? null];
+  const own = [options["off_value"], options["on_value"]];
+  const isNumber = argument?.type === "integer" || argument?.type === "number";
+  return usual.map((value, place) => {
+    const given = own[place];
+    if (typeof given !== "string") return value;
+    return isNumber ? Number(given) : argument?.type === "boolean" ? given === "true" : given;
+  });
+}

@@ -1,0 +1,129 @@
+// @ts-check
+/** Where lines are shown: a terminal where there is one, else a plain list. */
+
+/** @typedef {import("../../urc/web/static/types.js").Context} Context */
+/** @typedef {import("@xterm/xterm").Terminal} Terminal */
+
+import { attribute } from "urc/kit";
+
+const HIDE_CURSOR = "\x1b[?25l";
+
+export class Screen {
+  /**
+   * @param {Context} ctx
+   * @param {HTMLElement} place
+   */
+  constructor(ctx, place) {
+    this.ctx = ctx;
+    this.place = place;
+    this.most = Number(ctx.options["lines"] ?? 1000);
+    /** Lines that came before the terminal did; for it they are the text of the list. */
+    this.list = document.createElement("ol");
+    this.list.className = "terminal-list";
+    /** @type {Terminal | null} */
+    this.terminal = null;
+    /** @type {(() => void) | null} */
+    this.fit = null;
+    place.append(this.list);
+    this.isBlank = true;
+    attribute(place, "aria-busy", "true");
+    void this.load().finally(() => attribute(place, "aria-busy", null));
+  }
+
+  async load() {
+    const { ctx, place } = this;
+    try {
+      const [{ Terminal: Made }, { FitAddon }] = await Promise.all([
+        import("@xterm/xterm"),
+        import("@xterm/addon-fit"),
+        ctx.style("@xterm/xterm"),
+      ]);
+      if (ctx.signal.aborted) return;
+      const terminal = new Made({
+        disableStdin: true,
+        convertEol: true,
+        scrollback: this.most,
+        screenReaderMode: true,
+        fontSize: Number(ctx.options["font_size"] ?? 14),
+        fontFamily: "ui-monospace, 'Liberation Mono', monospace",
+      });
+      const fitting = new FitAddon();
+      terminal.loadAddon(fitting);
+      const box = document.createElement("div");
+      box.className = "terminal-box";
+      place.append(box);
+      withNonce(() => terminal.open(box));
+      // It is only read: Tab leaves it, Escape is STOP, and the screen around it is what has the focus.
+      terminal.attachCustomKeyEventHandler(({ key }) => key.startsWith("Page"));
+      for (const part of [terminal.element, terminal.textarea]) if (part) part.tabIndex = -1;
+      terminal.write(HIDE_CURSOR); // nobody types here
+      for (const line of this.list.children) this.print(terminal, line.textContent ?? "");
+      this.list.classList.add("urc-hidden"); // what a reader and a test find: the text of the lines
+      this.terminal = terminal;
+      this.fit = () => fitting.fit();
+      this.fit();
+      this.paint();
+      ctx.signal.addEventListener("abort", () => terminal.dispose());
+      ctx.follow("theme", () => this.paint());
+    } catch (error) {
+      // The list shows the same; the terminal is an extra that some installations don't have.
+      console.info("terminal: a plain list instead:", error);
+    }
+  }
+
+  paint() {
+    if (!this.terminal) return;
+    const look = getComputedStyle(this.list);
+    this.terminal.options.theme = {
+      background: look.backgroundColor,
+      foreground: look.color,
+      cursor: look.color,
+    };
+  }
+
+  /**
+   * Each line begins with its break: a terminal of one row would show the empty row after the last.
+   *
+   * @param {Terminal} terminal
+   * @param {string} line
+   */
+  print(terminal, line) {
+    terminal.write(this.isBlank ? line : `\n${line}`);
+    this.isBlank = false;
+  }
+
+  /** @param {string} line without control characters */
+  write(line) {
+    const item = document.createElement("li");
+    item.textContent = line;
+    const isAtEnd = this.place.scrollHeight - this.place.scrollTop - this.place.clientHeight < 24;
+    this.list.append(item);
+    while (this.list.childElementCount > Math.min(this.most, 500)) this.list.firstElementChild?.remove();
+    if (this.terminal) this.print(this.terminal, line);
+    else if (isAtEnd) this.place.scrollTop = this.place.scrollHeight;
+  }
+}
+
+/**
+ * Let style elements that are made meanwhile through the page's policy: the terminal makes its own,
+ * and has no option for this.
+ *
+ * @param {() => void} act must not wait
+ */
+function withNonce(act) {
+  const script = document.querySelector("script[nonce]");
+  const nonce = script instanceof HTMLScriptElement ? script.nonce : "";
+  const make = document.createElement.bind(document);
+  /** @param {string} name @param {ElementCreationOptions} [options] */
+  function made(name, options) {
+    const el = make(name, options);
+    if (el instanceof HTMLStyleElement) el.nonce = nonce;
+    return el;
+  }
+  Object.defineProperty(document, "createElement", { value: made, configurable: true });
+  try {
+    act();
+  } finally {
+    Reflect.deleteProperty(document, "createElement"); // its own again
+  }
+}
