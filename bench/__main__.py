@@ -4,6 +4,7 @@ import argparse
 import sys
 from importlib import import_module
 
+from bench.figures import PAGE, told, write_docs
 from bench.harness import report
 
 NAMES = (
@@ -21,8 +22,19 @@ NAMES = (
     "transport_websocket",
     "transport_rosbridge",
     "transport_mqtt",
+    "fanout",
+    "image_relay",
+    "browser_peers",
+    "browser_widgets",
+    "browser_plot_scan",
+    "browser_needle",
+    "wire_to_pixel",
     "motion_path",
     "motion_stop",
+    "motion_engine",
+    "motion_cuts",
+    "motion_flood",
+    "motion_loss",
 )
 
 
@@ -30,6 +42,9 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="./dev bench", description=__doc__)
     parser.add_argument("names", metavar="NAME", nargs="*", help=f"of {', '.join(NAMES)}")
     parser.add_argument("--full", action="store_true", help="more rounds")
+    parser.add_argument(
+        "--write-docs", action="store_true", help=f"put the figures of motion into {PAGE.name}"
+    )
     arguments = parser.parse_args()
     for name in arguments.names:
         if name not in NAMES:
@@ -37,6 +52,8 @@ def main() -> int:
     missed = 0
     for name in arguments.names or NAMES:
         missed |= report(import_module(f"bench.{name}").run(full=arguments.full))
+        if arguments.write_docs and told:
+            write_docs()
     return missed
 
 

@@ -1,0 +1,94 @@
+"""How old the values are that a page shows, for `browser_peers`, `wire_to_pixel` and the needle."""
+
+import asyncio
+import json
+from collections.abc import Sequence
+
+from bench.browser_page import Opened
+from bench.peers.robot import MODULUS, START
+
+__all__ = ["LEAST_SHARE", "TooFew", "ages"]
+
+LEAST_SHARE = 0.5
+"""Of what the robot told; below it nothing is said."""
+FIRST_S = 20.0
+MODULUS_MS = MODULUS / 10
+# By "frame", ages are taken after each frame was drawn: a message that is posted in the frame comes
+# behind it. By "write", at the end of the callback that wrote the value.
+WATCH = """
+async ([seconds, by]) => {
+  const isClock = (text) => /^[0-9]{10}$/.test(text);
+  const search = () => {
+    const walker = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
+    while (walker.nextNode()) {
+      const { data, parentElement } = walker.currentNode;
+      if (isClock(data.trim())) return parentElement;
+    }
+    return null;
+  };
+  const found = [];
+  let last = "", place = null, untilMs = Infinity;
+  const look = () => {
+    const now = performance.now();
+    if (!place?.isConnected) place = search();
+    const text = place?.textContent.trim() ?? "";
+    if (text === last || !isClock(text)) return;
+    if (!last) untilMs = now + seconds * 1000;
+    else found.push([now, Number(text)]);
+    last = text;
+  };
+  const startMs = performance.now();
+  const channel = new MessageChannel();
+  channel.port1.onmessage = look;
+  const observer = new MutationObserver(look);
+  const kinds = { subtree: true, childList: true, characterData: true };
+  if (by === "write") observer.observe(document.body, kinds);
+  await new Promise((done) => {
+    const frame = () => {
+      const now = performance.now();
+      if (by === "frame") channel.port2.postMessage(0);
+      if (now > untilMs || (!last && now - startMs > 20000)) done();
+      else requestAnimationFrame(frame);
+    };
+    requestAnimationFrame(frame);
+  });
+  observer.disconnect();
+  channel.port1.close();
+  return { found, said: document.body.innerText.slice(0, 200) };
+}
+"""
+
+
+class TooFew(Exception):
+    """A page did not show enough of what the robot told."""
+
+
+async def ages(one: Opened, seconds: float, rate_hz: float, *, by: str = "frame") -> list[float]:
+    """Return the ages of the values that a page shows in some seconds, in milliseconds.
+
+    Args:
+        one: the page.
+        seconds: for how long, from the first value on.
+        rate_hz: how often the robot tells its clock.
+        by: when a value counts as shown: "frame", once its frame was drawn, or "write".
+
+    Raises:
+        TooFew: fewer than `LEAST_SHARE` of them were shown.
+    """
+    try:
+        async with asyncio.timeout(FIRST_S + seconds * 4):
+            answer = await one.page.evaluate(WATCH, [seconds, by])
+    except TimeoutError as error:
+        raise TooFew("the page drew no frames any more") from error
+    found: Sequence[tuple[float, float]] = answer["found"]
+    if len(found) < LEAST_SHARE * seconds * rate_hz:
+        said = json.dumps(answer["said"])
+        raise TooFew(
+            f"{len(found)} of {seconds * rate_hz:.0f} values were shown; the page says: {said}"
+        )
+    return [_age_ms(one.origin_ms + now_ms, (clock - START) / 10) for now_ms, clock in found]
+
+
+def _age_ms(now_ms: float, told_ms: float) -> float:
+    """Return the difference of two times of which the second is known modulo the clock's turn."""
+    return (now_ms - told_ms + MODULUS_MS / 2) % MODULUS_MS - MODULUS_MS / 2

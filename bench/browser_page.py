@@ -1,0 +1,187 @@
+"""A page in a real Chromium, and what is measured of it: ages of values, frames, time spent.
+
+Ages are taken by one clock, the machine's monotonic one: robots tell it (``peers/robot.py``), and
+the browser says when its page began by it.
+"""
+
+import asyncio
+import statistics
+import sys
+from collections.abc import AsyncIterator, Iterator, Mapping, Sequence
+from contextlib import asynccontextmanager, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from playwright.async_api import Browser, CDPSession, Page
+
+from bench.harness import Result
+from tests.e2e.browser import running_browser
+from urc.testing.rig import Program, Server
+
+__all__ = [
+    "FRAME_MS",
+    "HERE",
+    "Cost",
+    "Opened",
+    "against",
+    "at_share",
+    "cost_of",
+    "kept",
+    "opened",
+    "peer",
+    "running_browser",
+    "served",
+]
+
+HERE = Path(__file__).resolve().parent
+FRAME_MS = 1000 / 60
+LEAST_FPS = 58
+SIZE = (1920, 1200)
+LOAD_MS = 30_000
+WARM_S = 1.0
+TRANSPORT = """\
+urc: 1
+kind: robot
+name: bench
+transports:
+  wire:
+    {{ type: tcp, host: 127.0.0.1, port: {port}, framing: {{ type: delimiter, tx: LF, rx: LF }} }}
+"""
+COUNT = """
+() => {
+  window.benchFrames = 0;
+  const frame = () => { window.benchFrames += 1; requestAnimationFrame(frame); };
+  requestAnimationFrame(frame);
+}
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class Opened:
+    """A page, and the browser's own word about it."""
+
+    page: Page
+    line: CDPSession
+    origin_ms: float
+    """When the page began, by the monotonic clock."""
+
+
+@dataclass(frozen=True, slots=True)
+class Cost:
+    """What the frames of a page cost."""
+
+    fps: float
+    frame_ms: float
+    """Time of the main thread for each frame."""
+
+
+@contextmanager
+def peer(script: str, *arguments: object) -> Iterator[int]:
+    """Run a program of ``peers/``; give the port that it tells."""
+    command = [sys.executable, "-P", str(HERE / "peers" / script), *map(str, arguments)]
+    with Program(command) as program:
+        yield int(program.wait_for("ready", 30.0)[1])
+
+
+@contextmanager
+def served(robot_port: int, document: str, work: Path) -> Iterator[str]:
+    """Run a real ``urc serve`` for a robot; give the address of its page.
+
+    Args:
+        robot_port: where the robot listens.
+        document: what the profile says beside its name and its transport.
+        work: a folder for it.
+    """
+    file = work / "bench.yaml"
+    file.write_text(TRANSPORT.format(port=robot_port) + document, "utf-8")
+    with Server([file], work / "data") as server:
+        yield f"http://127.0.0.1:{server.port}/robots/bench/"
+
+
+@asynccontextmanager
+async def opened(browser: Browser, address: str, *, script: str = "") -> AsyncIterator[Opened]:
+    """Open a page by itself; `script` runs before its own."""
+    context = await browser.new_context(
+        locale="en-GB", viewport={"width": SIZE[0], "height": SIZE[1]}
+    )
+    try:
+        if script:
+            await context.add_init_script(script)
+        page = await context.new_page()
+        page.set_default_timeout(LOAD_MS)
+        await page.goto(address)
+        line = await context.new_cdp_session(page)
+        await line.send("Performance.enable", {"timeDomain": "threadTicks"})
+        found = await _metrics(line)
+        yield Opened(page, line, found["NavigationStart"] * 1000)
+    finally:
+        await context.close()
+
+
+async def cost_of(one: Opened, seconds: float, *, slowed: int = 1) -> Cost:
+    """Let a page run for a while; its time is the processor's, so others on the machine count less.
+
+    Args:
+        one: the page; it draws already.
+        seconds: for how long.
+        slowed: how many times slower the page's processor is made.
+    """
+    page, line = one.page, one.line
+    await page.evaluate(COUNT)
+    await line.send("Emulation.setCPUThrottlingRate", {"rate": slowed})
+    await asyncio.sleep(WARM_S)
+    before = await _look(one)
+    await asyncio.sleep(seconds)
+    after = await _look(one)
+    await line.send("Emulation.setCPUThrottlingRate", {"rate": 1})
+    frames = max(1.0, after["frames"] - before["frames"])
+    spent_ms = (after["TaskDuration"] - before["TaskDuration"]) * 1000
+    passed_s = (after["now"] - before["now"]) / 1000
+    return Cost(frames / passed_s, spent_ms / frames)
+
+
+async def _look(one: Opened) -> dict[str, float]:
+    found = await _metrics(one.line)
+    frames, now = await one.page.evaluate("() => [window.benchFrames, performance.now()]")
+    return {**found, "frames": frames, "now": now}
+
+
+async def _metrics(line: CDPSession) -> dict[str, float]:
+    answer = await line.send("Performance.getMetrics")
+    return {each["name"]: float(each["value"]) for each in answer["metrics"]}
+
+
+def kept(name: str, costs: Sequence[Cost], *, of: Mapping[str, str] | None = None) -> Result:
+    """Return whether a page kept its frames: how long one took, against the longest allowed."""
+    periods = sorted(1000 / cost.fps for cost in costs)
+    most = 1000 / LEAST_FPS
+    middle = periods[len(periods) // 2]
+    return Result(
+        name=f"{name}: time between frames / {LEAST_FPS} a second",
+        ratio=round(middle / most, 3),
+        goal=1.0,
+        baseline_ms=round(most, 2),
+        subject_ms=round(middle, 2),
+        spread=round(periods[-1] / middle, 2),
+        rounds=len(periods),
+        versions=of or {},
+    )
+
+
+def at_share(ordered: Sequence[float], share: float) -> float:
+    """Return the value below which a share of all lies."""
+    return round(ordered[min(len(ordered) - 1, int(len(ordered) * share))], 3)
+
+
+def against(name: str, goal: float, pairs: Sequence[tuple[Cost, Cost]]) -> Result:
+    """Return what a frame costs beside another page: pairs of its cost and ours."""
+    bases = [base.frame_ms for base, _ in pairs]
+    return Result(
+        name=name,
+        ratio=round(statistics.median(ours.frame_ms / base.frame_ms for base, ours in pairs), 3),
+        goal=goal,
+        baseline_ms=round(statistics.median(bases), 3),
+        subject_ms=round(statistics.median(ours.frame_ms for _, ours in pairs), 3),
+        spread=round(max(bases) / statistics.median(bases), 2),
+        rounds=len(pairs),
+    )

@@ -1,0 +1,1 @@
+"""Other dashboards on the same job, for `bench.browser_peers`."""

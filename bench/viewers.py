@@ -1,0 +1,99 @@
+"""Plays pages that only look: opens WebSockets, says what it shows, counts what comes.
+
+``python -m bench.viewers PORT PATH CLIENTS [SHOWN…]`` prints ``ready``, and at the end of its input
+a JSON list: messages and bytes of each client. Frames are counted, never decoded: what is measured
+is the other side.
+"""
+
+import json
+import os
+import selectors
+import socket
+import sys
+
+HANDSHAKE = (
+    "GET {path} HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\nUpgrade: websocket\r\n"
+    "Origin: http://127.0.0.1:{port}\r\n"
+    "Connection: Upgrade\r\nSec-WebSocket-Version: 13\r\n"
+    "Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n\r\n"
+)
+CHUNK = 1 << 18
+OPEN_TIMEOUT_S = 10
+
+
+class Viewer:
+    """One page."""
+
+    def __init__(self, port: int, path: str, shown: list[str]) -> None:
+        self.line = socket.create_connection(("127.0.0.1", port), OPEN_TIMEOUT_S)
+        self.line.sendall(HANDSHAKE.format(path=path, port=port).encode())
+        head = b""
+        while b"\r\n\r\n" not in head:
+            head += self.line.recv(4096)
+        head, _, self.rest = head.partition(b"\r\n\r\n")
+        if b" 101 " not in head.split(b"\r\n", 1)[0]:
+            raise SystemExit(f"no WebSocket: {head[:80]!r}")
+        if shown:
+            data = json.dumps({"t": "show", "signals": shown}).encode()
+            # A mask of zeros is a mask.
+            self.line.sendall(bytes([0x81, 0x80 | len(data)]) + bytes(4) + data)
+        self.line.setblocking(False)
+        self.messages = 0
+        self.bytes = 0
+        self.skip = 0
+
+    def take(self) -> bool:
+        """Count what has come; return whether there can be more."""
+        data = self.line.recv(CHUNK)
+        if not data:
+            return False
+        self.bytes += len(data)
+        data = self.rest + data
+        while len(data) > self.skip:
+            data, self.skip = data[self.skip :], 0
+            size = head_and_body(data)
+            if size is None:
+                break
+            self.skip = size
+            self.messages += 1
+        else:
+            self.skip -= len(data)
+            data = b""
+        self.rest = data
+        return True
+
+
+def head_and_body(data: bytes) -> int | None:
+    """Return how long the frame is that begins here; None while its head is not whole."""
+    if len(data) < 2:
+        return None
+    size = data[1] & 0x7F
+    if size < 126:
+        return 2 + size
+    wide = 2 if size == 126 else 8
+    if len(data) < 2 + wide:
+        return None
+    return 2 + wide + int.from_bytes(data[2 : 2 + wide])
+
+
+def main() -> None:
+    """Look until the input ends."""
+    port, path, count, *shown = sys.argv[1:]
+    viewers = [Viewer(int(port), path, shown) for _ in range(int(count))]
+    ready = selectors.DefaultSelector()
+    for viewer in viewers:
+        ready.register(viewer.line, selectors.EVENT_READ, viewer)
+    ready.register(sys.stdin, selectors.EVENT_READ, None)
+    print("ready", flush=True)
+    while True:
+        for key, _ in ready.select():
+            if key.data is None:
+                os.read(key.fd, 1)
+                print(json.dumps([[viewer.messages, viewer.bytes] for viewer in viewers]))
+                return
+            if not key.data.take():
+                ready.unregister(key.fileobj)
+
+
+if __name__ == "__main__":
+    main()
