@@ -86,8 +86,12 @@ async def is_on_top(page: Page, selector: str) -> bool:
 
 
 async def turned(page: Page, size: tuple[int, int]) -> None:
-    """Give the page another screen."""
+    """Give the page another screen, and wait until it has been laid out for that."""
     await page.set_viewport_size({"width": size[0], "height": size[1]})
+    await page.wait_for_function("(width) => innerWidth === width", arg=size[0])
+    await page.evaluate(
+        "new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))"
+    )
 
 
 async def test_each_screen_has_its_own_picture(new_page: PageMaker) -> None:
@@ -235,7 +239,10 @@ async def test_the_background_fills_the_stage_and_controls_lie_above_it(
         await page.goto(f"{address}robots/puppet/")
         for size in (PHONE, PHONE_LYING, TABLET, DESKTOP):
             await turned(page, size)
-            stage, back = await box(page, "[data-stage]"), await box(page, ".urc-background")
+            stage, back = await page.evaluate(
+                "['[data-stage]', '.urc-background'].map((one) =>"
+                " document.querySelector(one).getBoundingClientRect().toJSON())"
+            )
             assert back == stage, size
             assert await is_on_top(page, "[data-cell='1']"), size
 
