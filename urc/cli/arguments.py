@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from urc.cli.output import complain
-from urc.cli.packages import installed_document
 from urc.problems import UrcError
 from urc.shipped import shipped
 
@@ -151,6 +150,8 @@ def profile_path(word: str) -> str:
     named = shipped("robots") / f"{word}.yaml"
     if len(path.parts) == 1 and os.path.isfile(named):
         return str(named)
+    from urc.cli.packages import installed_document  # every command starts here
+
     if installed := installed_document(word):
         return str(installed)
     if path.suffix or len(path.parts) > 1:

@@ -1,7 +1,5 @@
 """What is said when a verb ends in an error: one line for each fault, never a traceback."""
 
-from traceback import extract_tb
-
 from urc.cli.output import complain
 from urc.problems import ProblemsError, UrcError, to_text
 
@@ -33,6 +31,8 @@ def explain(error: Exception, program: str) -> int:
 
 def _mistake(bug: Exception) -> str:
     """Return what a maintainer needs to find a mistake of our own, on one line."""
+    from traceback import extract_tb  # slow to load, and only now needed
+
     frames = extract_tb(bug.__traceback__)
     place = f" at {frames[-1].filename}:{frames[-1].lineno}" if frames else ""
     return f"this is a mistake in URC, please report it: {type(bug).__name__}{place}: {bug}"
