@@ -7,6 +7,8 @@ from nicegui import app, ui
 
 robot_port, port = int(sys.argv[1]), int(sys.argv[2])
 labels: set[ui.label] = set()
+listening: list[asyncio.Task[None]] = []
+"""Kept here: a loop alone does not hold on to its tasks."""
 
 
 @ui.page("/")
@@ -24,5 +26,5 @@ async def listen() -> None:
             label.set_text(text)
 
 
-app.on_startup(lambda: asyncio.create_task(listen()))
+app.on_startup(lambda: listening.append(asyncio.create_task(listen())))
 ui.run(host="127.0.0.1", port=port, show=False, reload=False)
