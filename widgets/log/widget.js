@@ -2,7 +2,7 @@
 /** @typedef {import("../../urc/web/static/types.js").Context} Context */
 /** @typedef {import("../../urc/web/static/types.js").Instance} Instance */
 /** @typedef {import("../../urc/web/static/types.js").LogLine} LogLine */
-import { attribute, part, write } from "urc/kit";
+import { attribute, part, save, write } from "urc/kit";
 import { chosen, fileOf } from "./lines.js";
 
 const SIGNS = { info: "", warning: "◆", error: "▲" };
@@ -72,7 +72,7 @@ export default {
     }, { signal });
     part(el, ".log-save").addEventListener("click", () => {
       const wanted = chosen(held ?? lines, { level: level.value, words: filter.value, most: Infinity });
-      save(fileOf(wanted), "log.tsv");
+      save(fileOf(wanted), "log.tsv", "text/tab-separated-values");
     }, { signal });
     return {};
   },
@@ -97,16 +97,4 @@ function itemOf(line) {
   sign.textContent = SIGNS[level] ?? "";
   item.append(when, " ", sign, ` ${source}: ${text}`);
   return item;
-}
-
-/**
- * @param {string} text
- * @param {string} name
- */
-function save(text, name) {
-  const link = document.createElement("a");
-  link.href = URL.createObjectURL(new Blob([text], { type: "text/tab-separated-values" }));
-  link.download = name;
-  link.click();
-  setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
 }

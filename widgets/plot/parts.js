@@ -43,18 +43,3 @@ export function legendItem(name, hint) {
   item.append(button);
   return { item, button };
 }
-
-/**
- * Let the browser save a text as a file.
- *
- * @param {string} text
- * @param {string} name
- */
-export function saveText(text, name) {
-  const url = URL.createObjectURL(new Blob([text], { type: "text/csv" }));
-  const link = document.createElement("a");
-  link.href = url;
-  link.download = name;
-  link.click();
-  setTimeout(() => URL.revokeObjectURL(url), 10_000);
-}

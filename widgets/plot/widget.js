@@ -3,11 +3,11 @@
 /** @typedef {import("../../urc/web/static/types.js").Instance} Instance */
 /** @typedef {import("../../urc/web/static/types.js").Reading} Reading */
 /** @typedef {import("./live.js").Trace} Trace */
-import { ALARMS, attribute, colours, format, isStill, many, noteOf, number, part, style, write } from "urc/kit";
+import { ALARMS, attribute, colours, format, isStill, many, noteOf, number, part, save, style, write } from "urc/kit";
 import { digitsOf, spanOf, ticks } from "urc/scale";
 import { History } from "./history.js";
 import { Live } from "./live.js";
-import { epoch, legendItem, placed, saveText } from "./parts.js";
+import { epoch, legendItem, placed } from "./parts.js";
 import { Ring, csv, extent, seconds, table } from "./traces.js";
 
 const COLOURS = /** @type {const} */ (["series-1", "series-2", "series-3", "series-4", "series-5", "series-6"]);
@@ -367,7 +367,7 @@ class Plot {
   /** Save what is seen as a file. */
   save() {
     const names = this.readings.map(({ signal, unit }) => (unit ? `${signal.name} (${unit})` : signal.name));
-    saveText(csv(names, this.rows(this.history?.span ?? [-Infinity, Infinity]), epoch()), "plot.csv");
+    save(csv(names, this.rows(this.history?.span ?? [-Infinity, Infinity]), epoch()), "plot.csv", "text/csv");
   }
 }
 

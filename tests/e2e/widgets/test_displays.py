@@ -280,3 +280,29 @@ async def test_a_note_is_rendered_without_markup_of_its_own(new_page: PageMaker)
         assert await links.count() == 2  # the picture's address is one, too
         assert await links.last.get_attribute("rel") == "noopener noreferrer"
         assert await links.last.get_attribute("href") == "https://example.org"
+
+
+async def test_a_recording_is_saved_as_a_table(new_page: PageMaker, tmp_path: Path) -> None:
+    """From one press to the next, each value once; what was there before is not in it."""
+    bound = use("recorder", {})._replace(lists={"values": ("amps", "mode")})
+    async with shown(new_page, bound) as (robot, page):
+        robot.say("amps", 1.0)
+        await until_attribute(page, ".recorder", "data-state", "live")
+        assert await page.is_disabled(".recorder-save")
+        await page.click(".recorder-main")
+        for count, (name, value) in enumerate((("amps", 2.5), ("mode", "=go,1"), ("amps", 3.5)), 1):
+            robot.say(name, value)
+            await until_text(page, ".recorder-note", f"● recording: {count} rows")
+        await page.click(".recorder-main")
+        robot.say("amps", 4.5)
+        async with page.expect_download() as download:
+            await page.click(".recorder-save")
+        file = tmp_path / "recording.csv"
+        await (await download.value).save_as(file)
+        rows = list(csv.reader(file.read_text("utf-8").splitlines()))
+        assert rows[0] == ["time", "signal", "value"]
+        assert [row[1:] for row in rows[1:]] == [
+            ["amps", "2.5"],
+            ["mode", "'=go,1"],
+            ["amps", "3.5"],
+        ]

@@ -18,6 +18,9 @@ export const DASH = "—";
 
 const SVG = "http://www.w3.org/2000/svg";
 
+/** A browser that asks where to save a file reads it only after the answer. */
+const KEPT_MS = 10_000;
+
 /** How a limit that was passed is written: a shape and a word, since colour is never alone. */
 export const ALARMS = Object.freeze({
   "": "",
@@ -240,4 +243,19 @@ export function colours(el, names) {
 /** Whether a person has asked for less motion. */
 export function isStill() {
   return matchMedia("(prefers-reduced-motion: reduce)").matches;
+}
+
+/**
+ * Let the browser keep a text as a file on this device.
+ *
+ * @param {string} text
+ * @param {string} name
+ * @param {string} type its media type, as "text/csv"
+ */
+export function save(text, name, type) {
+  const link = document.createElement("a");
+  link.href = URL.createObjectURL(new Blob([text], { type }));
+  link.download = name;
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), KEPT_MS);
 }
