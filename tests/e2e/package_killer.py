@@ -1,7 +1,8 @@
 """Kills processes that change a store, and looks at what is left. Run as a program of its own.
 
 A process that forks must have no threads, which a test runner has:
-``python -m tests.e2e.package_killer FOLDER add|update|remove`` or ``… FOLDER random ROUNDS SEED``.
+``python -m tests.e2e.package_killer FOLDER add|update|back|remove|publish``, or
+``… FOLDER random ROUNDS SEED``.
 Nothing is forced to the disk here: what a process wrote outlives it.
 """
 
@@ -16,14 +17,23 @@ from typing import Any, NoReturn
 
 from tests.unit.packages.made import assert_whole, install, package
 from urc.packages import disk
+from urc.packages.changes import HEAD, read_change, read_head
+from urc.packages.index import INDEX, read_index
+from urc.packages.intake import take
+from urc.packages.keeper import make_index
 from urc.packages.names import PackageError, parse_wish
+from urc.packages.package import Package, sha256
+from urc.packages.signature import Signature, new_signer
+from urc.packages.sources import FileSource
 from urc.packages.store import Store
+from urc.packages.update import plan_update
 
 DIAL = package("widget", "dial", "1.0.0")
 DIAL_2 = package("widget", "dial", "2.0.0", big="x" * 200_000)
 BOT = package("driver", "bot", "1.0.0", {"widgets/dial": "^1"})
 BOT_2 = package("driver", "bot", "2.0.0", {"widgets/dial": "^2"})
 CAR = package("driver", "car", "1.0.0", {"widgets/dial": "*"})
+SIGNED: dict[str, Signature] = {}
 BOTS = {"drivers/bot 1.0.0", "drivers/bot 2.0.0"}
 
 
@@ -32,21 +42,45 @@ def add(store: Store) -> None:
 
 
 def update(store: Store) -> None:
-    """Put the newer version beside the older one, then take that away."""
-    install(store, BOT_2, DIAL, DIAL_2)
-    remove(store, "bot@1.0.0")
+    """Do as `urc update` does, where the older version is there."""
+    old = store.find(parse_wish("bot@1.0.0"))
+    if old is None:
+        return
+    source = FileSource("lab", [BOT_2, DIAL, DIAL_2], [BOT.manifest.key])
+    plan = plan_update(old, [source], store, fail)
+    assert plan is not None
+    with store.changing() as change:
+        change.stage(plan)
+        change.replace(old, plan)
 
 
-def remove(store: Store, word: str = "bot") -> None:
+def back(store: Store) -> None:
+    """Undo the last update, where there was one."""
+    for lock in store.installed():
+        if store.previous(lock) is not None:
+            with store.changing() as change:
+                change.back(lock)
+
+
+def remove(store: Store) -> None:
     with store.changing() as change:
         try:
-            change.remove(parse_wish(word))
+            change.remove(parse_wish("bot"))
         except PackageError as error:
             if "is not installed" not in str(error):
                 raise
 
 
-ACTS: dict[str, Callable[[Store], None]] = {"add": add, "update": update, "remove": remove}
+def fail(line: str) -> None:
+    raise AssertionError(line)
+
+
+ACTS: dict[str, Callable[[Store], None]] = {
+    "add": add,
+    "update": update,
+    "back": back,
+    "remove": remove,
+}
 
 
 class DeadlyOs:
@@ -101,11 +135,14 @@ def steps(folder: Path, act: str) -> None:
         install(store, CAR, DIAL)
         if act != "add":
             add(store)
+        if act == "back":
+            update(store)
         child = forked(lambda store=store, at=changes: die_at(store, act, at))
         status = os.waitpid(child, 0)[1]
         left = set(assert_whole(store))
         assert "drivers/car 1.0.0" in left, left
         assert left <= BOTS | {"drivers/car 1.0.0"}, left
+        assert act in ("add", "remove") or len(left) == 2, left  # one version or the other
         ACTS[act](store)  # what was interrupted can be done again
         assert "drivers/car 1.0.0" in assert_whole(store)
         if not os.WIFSIGNALED(status):
@@ -135,10 +172,69 @@ def at_random(folder: Path, rounds: int, seed: int) -> None:
     sys.stdout.write(f"random: whole after {rounds} deaths, in {len(seen)} states\n")
 
 
+def publish(folder: Path) -> None:
+    """Die at every single change of the disk that publishing a package makes."""
+    for changes in range(500):
+        lab = folder / f"publish-{changes}"
+        lab.mkdir()
+        make_index(lab, "Lab", sound)
+        assert whole(lab, put(lab, DIAL)) == ["widgets/dial 1.0.0"]
+        child = forked(lambda lab=lab, at=changes: put_and_die(lab, at))
+        status = os.waitpid(child, 0)[1]
+        assert whole(lab, True) in (["widgets/dial 1.0.0"], [*BOTH])
+        put(lab, DIAL_2)  # what was interrupted can be done again
+        assert whole(lab, True) == [*BOTH]
+        if not os.WIFSIGNALED(status):
+            assert os.waitstatus_to_exitcode(status) == 0
+            assert changes > 5
+            sys.stdout.write(f"publish: whole after each of {changes} deaths\n")
+            return
+    raise AssertionError("publishing never ended by itself")
+
+
+BOTH = ("widgets/dial 1.0.0", "widgets/dial 2.0.0")
+
+
+def put(lab: Path, made: Package) -> bool:
+    said = made.manifest
+    file = f"archives/{said.key}/{said.version}.zip"
+    return take(lab, file, made.data, SIGNED.get(made.digest), sound).is_new
+
+
+def put_and_die(lab: Path, changes: int) -> None:
+    deadly = DeadlyOs(changes)
+    disk.os = deadly  # type: ignore[attr-defined,assignment]
+    disk.mkdtemp = deadly.deadly(disk.mkdtemp)
+    put(lab, DIAL_2)
+
+
+def sound(document: Path) -> list[str]:
+    assert document.is_file()
+    return []
+
+
+def whole(lab: Path, is_new: bool) -> list[str]:
+    """Look at every byte that a client could ask for; return what is listed."""
+    assert is_new
+    index = read_index((lab / INDEX).read_bytes(), INDEX)
+    for entry in index.packages:
+        assert sha256((lab / entry.file).read_bytes()) == entry.sha256
+        if entry.signed is not None:
+            entry.signed.check(entry.key, entry.version, entry.sha256)
+    read_head((lab / HEAD).read_bytes(), HEAD)
+    for file in (lab / "index").glob("changes-*.json"):
+        read_change(file.read_bytes(), str(file))
+    return [str(entry) for entry in index.packages]
+
+
 if __name__ == "__main__":
     home, how, *more = sys.argv[1:]
     disk.os = DeadlyOs(-1)  # type: ignore[attr-defined,assignment]
-    if how == "random":
+    if how == "publish":
+        anna = new_signer("Anna", Path(home) / "anna.pem")
+        SIGNED[DIAL_2.digest] = anna.sign(DIAL_2.manifest.key, "2.0.0", DIAL_2.digest)
+        publish(Path(home))
+    elif how == "random":
         at_random(Path(home), int(more[0]), int(more[1]))
     else:
         steps(Path(home), how)

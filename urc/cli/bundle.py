@@ -2,44 +2,77 @@
 
 import argparse
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from urc.packages.plan import Plan
+    from urc.packages.signature import Signature
+    from urc.packages.store import Store
 
 EXAMPLE = "urc bundle drivers/puppet --to puppet.urcof"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add what goes into it, and where it is written."""
+    """Add what goes into it, who signs it, and where it is written."""
     parser.add_argument(
         "package", metavar="PACKAGE", help="what is installed, a name as for 'install', or a folder"
     )
     parser.add_argument(
         "--to", metavar="FILE", type=Path, help="file to write (default: NAME-VERSION.urcof)"
     )
+    parser.add_argument(
+        "--key",
+        metavar="FILE",
+        type=Path,
+        help="signs what comes from a folder (default: your own, if any)",
+    )
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Write the bundle; the same packages give the same bytes."""
     from urc.cli.failures import Misuse
-    from urc.cli.packages import is_path, open_store, planned
+    from urc.cli.packages import open_store
     from urc.packages.disk import put_file
-    from urc.packages.names import parse_wish
     from urc.packages.sources import make_bundle
 
-    word: str = arguments.package
     store = open_store()
-    # What is installed is at hand, and is what somebody has tried.
-    lock = None if is_path(word) else store.find(parse_wish(word))
-    fetched: dict[str, bytes] = {}
-    if lock is None:
-        plan = planned(word)
-        lock, fetched = plan.lock, plan.archives
+    plan = _planned(arguments.package, store)
+    lock = plan.lock
     file: Path = arguments.to or Path(f"{lock.key.name}-{lock.version}.urcof")
     if file.suffix != ".urcof":
         raise Misuse(f"{file}: the name of a bundle ends in .urcof")
     archives = {
-        pin.sha256: fetched.get(pin.sha256) or store.blob(pin.sha256)
+        pin.sha256: plan.archives.get(pin.sha256) or store.blob(pin.sha256)
         for pin in lock.packages.values()
     }
-    data = make_bundle(lock.key, archives, str(file))
+    data = make_bundle(lock.key, archives, _signatures(plan, arguments), str(file))
     put_file(file, data, file.resolve().parent)
     print(f"{file}  {len(data)} bytes, {len(archives)} packages")
     return 0
+
+
+def _planned(word: str, store: "Store") -> "Plan":
+    """Return what goes in: what is installed is at hand, and is what somebody has tried."""
+    from urc.cli.packages import is_path, planned
+    from urc.packages.names import parse_wish
+    from urc.packages.plan import Plan
+
+    lock = None if is_path(word) else store.find(parse_wish(word))
+    if lock is None:
+        return planned(word)
+    digests = [pin.sha256 for pin in lock.packages.values()]
+    found = {digest: store.signature(digest) for digest in digests}
+    return Plan(lock, {}, {}, {digest: one for digest, one in found.items() if one is not None})
+
+
+def _signatures(plan: "Plan", arguments: argparse.Namespace) -> "dict[str, Signature]":
+    """Return who signed what; what was written in one's own folder one signs oneself."""
+    from urc.cli.packages import signer
+    from urc.packages.names import parse_key
+
+    found = dict(plan.signatures)
+    key = signer(arguments.key) if plan.own else None
+    for name, pin in plan.lock.packages.items():
+        if key is not None and name in plan.own and pin.sha256 not in found:
+            found[pin.sha256] = key.sign(parse_key(name), pin.version, pin.sha256)
+    return found

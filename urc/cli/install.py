@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 from urc.cli.failures import Misuse
 
 if TYPE_CHECKING:
-    from urc.packages.install import Plan
     from urc.packages.lock import Lock
+    from urc.packages.plan import Plan
 
 EXAMPLE = "urc install drivers/puppet@^1.0"
 
@@ -22,6 +22,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--yes", action="store_true", help="install without asking")
     parser.add_argument(
+        "--signed-by",
+        metavar="SHA256:…",
+        help="refuse the package, unless the key of this fingerprint signed it",
+    )
+    parser.add_argument(
         "--lock",
         metavar="FILE",
         type=Path,
@@ -33,23 +38,37 @@ def run(arguments: argparse.Namespace) -> int:
     """Show what it may do, ask, install."""
     from urc.cli.packages import is_agreed, is_path, open_store, planned
     from urc.packages.disk import put_file
+    from urc.packages.install import origin_lines
 
     lock_file: Path | None = arguments.lock
     pinned = _pinned(lock_file)
     if pinned is not None and is_path(arguments.package):
         raise Misuse("a lock chooses among the versions of repositories; name a package")
     plan = planned(arguments.package, pinned)
-    with open_store().changing() as change:
-        folder = change.stage(plan.lock, plan.archives)
-        _show(plan, folder)
+    store = open_store()
+    with store.changing() as change:
+        folder = change.stage(plan)
+        if arguments.signed_by is not None:
+            _check_signer(plan, arguments.signed_by)
+        _show(plan, folder, origin_lines(plan, store))
         if not arguments.yes and not is_agreed("Install it?"):
             print("nothing is installed")
             return 1
-        change.commit(plan.lock)
+        change.commit(plan)
     if lock_file is not None and pinned is None:
         put_file(lock_file, plan.lock.to_bytes(), lock_file.resolve().parent)
     print(f"installed {plan.lock}")
     return 0
+
+
+def _check_signer(plan: "Plan", fingerprint: str) -> None:
+    """Raise `PackageError` unless a certain key signed what was asked for."""
+    from urc.packages.names import PackageError
+
+    signature = plan.signatures.get(plan.lock.packages[plan.lock.root].sha256)
+    if signature is None or signature.fingerprint != fingerprint.rstrip("="):
+        found = f"signed by {signature}" if signature else "not signed"
+        raise PackageError(f"{plan.lock} is {found}, and not by {fingerprint}")
 
 
 def _pinned(file: Path | None) -> "Lock | None":
@@ -61,7 +80,7 @@ def _pinned(file: Path | None) -> "Lock | None":
         return read_lock(opened.read(1 << 20), str(file))
 
 
-def _show(plan: "Plan", folder: Path) -> None:
+def _show(plan: "Plan", folder: Path, origins: list[str]) -> None:
     from urc.packages.store import kinds_in
     from urc.problems import printable
     from urc.runtime.permissions import permissions
@@ -70,9 +89,8 @@ def _show(plan: "Plan", folder: Path) -> None:
     document = folder / lock.root / f"{lock.key.kind}.yaml"
     widgets = [key.name for key in kinds_in(lock, "widget")]
     allowed = permissions(document, folder, widgets)
-    for key, pin in lock.packages.items():
-        kept = "" if pin.sha256 in plan.archives else ", kept from before"
-        print(printable(f"{key} {pin.version}  from {plan.origins[key]}{kept}"))
+    for line in origins:
+        print(printable(line))
     print(f"{lock} may do this:")
     for line in allowed:
         print(printable(f"  {line}"))

@@ -1,4 +1,4 @@
-"""`urc list`: what is installed."""
+"""`urc list`: what is installed, and what there is of newer versions."""
 
 import argparse
 
@@ -6,7 +6,10 @@ EXAMPLE = "urc list --json"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the form of the answer."""
+    """Add what is listed, and the form of the answer."""
+    parser.add_argument(
+        "--updates", action="store_true", help="only what the repositories have newer versions of"
+    )
     parser.add_argument("--json", action="store_true", help="one JSON line for each")
 
 
@@ -15,6 +18,8 @@ def run(arguments: argparse.Namespace) -> int:
     from urc.cli.output import json_text
     from urc.cli.packages import open_store
 
+    if arguments.updates:
+        return _updates(is_json=arguments.json)
     for lock in open_store().installed():
         needs = {key: pin.version for key, pin in lock.packages.items() if key != lock.root}
         if arguments.json:
@@ -23,4 +28,26 @@ def run(arguments: argparse.Namespace) -> int:
         else:
             rest = ", ".join(f"{key} {version}" for key, version in needs.items())
             print(f"{lock}  with {rest}" if rest else str(lock))
+    return 0
+
+
+def _updates(*, is_json: bool) -> int:
+    """Print the updates there are; 0 also where there is none: that is no failure."""
+    from urc.cli.failures import Misuse
+    from urc.cli.output import complain, json_text
+    from urc.cli.packages import open_store, repositories
+    from urc.packages.update import headline, newer
+    from urc.problems import printable
+
+    known = repositories().all()
+    if not known:
+        raise Misuse("no repository is known; 'urc repo add URL' adds one")
+    for update in newer(open_store(), known, complain):
+        old, new = update.old, update.new
+        if is_json:
+            said = {"package": old.root, "version": old.version, "newer": new.version}
+            print(json_text({**said, "changes": update.lines}))
+        else:
+            rest = ", ".join(line for line in update.lines if not line.startswith(f"{old} → "))
+            print(printable(f"{headline(old, new)}{f'  with {rest}' if rest else ''}"))
     return 0

@@ -1,6 +1,7 @@
 """What the verbs about packages share: the store, the repositories, a question, installed names."""
 
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -9,12 +10,22 @@ from urc.cli.failures import Misuse
 from urc.cli.output import complain
 
 if TYPE_CHECKING:
-    from urc.packages.install import Plan
     from urc.packages.lock import Lock
+    from urc.packages.plan import Plan
     from urc.packages.repositories import Repositories
+    from urc.packages.signature import Signer
     from urc.packages.store import Store
 
-__all__ = ["installed_document", "is_agreed", "is_path", "open_store", "planned", "repositories"]
+__all__ = [
+    "installed_document",
+    "is_agreed",
+    "is_path",
+    "open_store",
+    "planned",
+    "repositories",
+    "search_repositories",
+    "signer",
+]
 
 
 def open_store() -> "Store":
@@ -81,3 +92,38 @@ def is_agreed(question: str) -> bool:
         return input(f"{question} Type yes: ").strip().lower() == "yes"
     except EOFError:
         return False
+
+
+def signer(file: Path | None = None) -> "Signer | None":
+    """Return the key in a file that was named, or this user's own if there is one.
+
+    Raises:
+        Misuse: there is no file of that name.
+    """
+    from urc.packages.signature import PUBLISHER, read_signer
+
+    found = read_signer(file or data_folder() / PUBLISHER)
+    if found is None and file is not None:
+        raise Misuse(f"{file}: there is no such file; 'urc repo key new NAME' makes a key")
+    return found
+
+
+def search_repositories(words: Sequence[str], kind: str = "", *, is_json: bool = False) -> int:
+    """Print the newest version of each package that has all words; 1 when there is none."""
+    from urc.cli.output import json_text
+    from urc.packages.index import search
+    from urc.packages.sources import merged
+    from urc.problems import printable
+
+    known = repositories().all()
+    if not known:
+        raise Misuse("no repository is known; 'urc repo add URL' adds one")
+    found = merged(known, complain)
+    hits = search([entry for some in found.values() for entry, _ in some], words, kind)
+    for entry in hits:
+        if is_json:
+            said = {"package": str(entry.key), "version": entry.version, "summary": entry.summary}
+            print(json_text({**said, "signed": entry.signed and str(entry.signed)}))
+        else:
+            print(printable(f"{entry}  {entry.summary}".rstrip()))
+    return 0 if hits else 1

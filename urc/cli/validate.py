@@ -4,6 +4,7 @@ Imports as little as it can: people run it on every save.
 """
 
 import argparse
+import os
 from contextlib import suppress
 from typing import TYPE_CHECKING
 
@@ -11,6 +12,7 @@ from urc.cli.output import complain, json_text
 from urc.problems import Problem, has_errors, to_json, to_text
 
 if TYPE_CHECKING:
+    from urc.config.load import Shelf
     from urc.runtime.coverage import Coverage
 
 EXAMPLE = "urc validate robots/*.yaml"
@@ -104,7 +106,7 @@ def _examine(paths: list[str], *, with_tests: bool) -> _Report:
     report, catalog, shelf = _Report(), built_in_catalog(), Shelf(shipped("widgets"))
     for path in paths:
         report.files += 1
-        checked = check(path, catalog, shelf)
+        checked = check(path, catalog, _shelf_of_package(path) or shelf)
         report.add(list(checked.problems))
         report.looked_at |= dict.fromkeys(checked.files)
         if checked.profile is not None and with_tests:
@@ -114,6 +116,17 @@ def _examine(paths: list[str], *, with_tests: bool) -> _Report:
             report.add(outcome.problems)
             report.coverage.append(measure(path, checked.profile.driver, outcome.exercised))
     return report
+
+
+def _shelf_of_package(path: str) -> "Shelf | None":
+    """Return the widgets for a document that brings some, beside it or as a package. Else None."""
+    home = os.path.dirname(path)
+    is_package = os.path.isfile(os.path.join(home, "package.yaml"))
+    if not is_package and not os.path.isdir(os.path.join(home, "widgets")):
+        return None
+    from urc.runtime.shelves import shelf_of
+
+    return shelf_of(path)
 
 
 def _print(report: _Report, arguments: argparse.Namespace, indent: int | None = None) -> None:

@@ -39,7 +39,10 @@ def _check_name(sources: Sources, findings: Findings) -> None:
     """Warn of a robot that is started by one name and shown by another."""
     file = PurePath(sources.root.document.file)
     name = sources.root.text("name")
-    if sources.kind == "robot" and file.suffix in _ENDINGS and name != file.stem:
+    # In a package the folder has the robot's name, and the file is always called the same.
+    is_of_package = file.name == "robot.yaml" and file.parent.name == name
+    is_other = file.suffix in _ENDINGS and name != file.stem and not is_of_package
+    if sources.kind == "robot" and is_other:
         findings.warn(
             sources.root,
             "other-name",

@@ -8,9 +8,20 @@ import msgspec
 from urc.packages.archive import PACKAGE
 from urc.packages.names import KINDS, NAME, Key, PackageError, parse_key
 from urc.packages.package import Package
+from urc.packages.signature import Signature
 from urc.packages.versions import Version, parse_range, parse_version
 
-__all__ = ["INDEX", "INDEX_BYTES", "Entry", "Index", "entry_of", "read_index", "search"]
+__all__ = [
+    "INDEX",
+    "INDEX_BYTES",
+    "Entry",
+    "Index",
+    "check_entries",
+    "entry_of",
+    "in_order",
+    "read_index",
+    "search",
+]
 
 INDEX: Final = "index.json"
 INDEX_BYTES: Final = 64 << 20
@@ -31,6 +42,13 @@ class Entry(msgspec.Struct, frozen=True):
     authors: tuple[_Text, ...] = ()
     summary: _Text = ""
     needs: dict[str, _Text] = {}
+    signature: Signature | msgspec.UnsetType = msgspec.UNSET
+    """Who made it, if anybody says so."""
+
+    @property
+    def signed(self) -> Signature | None:
+        """Who made it, or None."""
+        return self.signature if isinstance(self.signature, Signature) else None
 
     @property
     def key(self) -> Key:
@@ -57,13 +75,15 @@ class Index(msgspec.Struct, frozen=True):
     format: Annotated[int, msgspec.Meta(ge=1, le=1)]
     name: _Text
     packages: tuple[Entry, ...]
+    number: Annotated[int, msgspec.Meta(ge=0, le=1 << 53)] = 0
+    """Grows with every change of a repository; 0 where nobody counts."""
 
     def to_bytes(self) -> bytes:
         """Return the file; the same packages give the same bytes."""
         return msgspec.json.format(msgspec.json.encode(self), indent=1) + b"\n"
 
 
-def entry_of(package: Package) -> Entry:
+def entry_of(package: Package, signature: Signature | None = None) -> Entry:
     """Return what an index says of a package."""
     said = package.manifest
     return Entry(
@@ -76,6 +96,7 @@ def entry_of(package: Package) -> Entry:
         authors=said.authors,
         summary=said.summary,
         needs=said.needs,
+        signature=signature or msgspec.UNSET,
     )
 
 
@@ -88,14 +109,29 @@ def read_index(data: bytes, where: str) -> Index:
         raise PackageError(f"{where}: an index has at most {INDEX_BYTES >> 20} MiB")
     try:
         index = msgspec.json.decode(data, type=Index)
-        for entry in index.packages:
-            parse_version(entry.version)
-            for needed, wanted in entry.needs.items():
-                parse_key(needed)
-                parse_range(wanted)
+        check_entries(index.packages)
     except (msgspec.DecodeError, PackageError, RecursionError, UnicodeDecodeError) as error:
         raise PackageError(f"{where}: this is no index of a repository: {error}") from None
     return index
+
+
+def in_order(entries: Iterable[Entry]) -> tuple[Entry, ...]:
+    """Return entries as they stand in an index."""
+    return tuple(sorted(entries, key=lambda entry: (entry.key, entry.number)))
+
+
+def check_entries(entries: Iterable[Entry]) -> None:
+    """Raise `PackageError` for a version or range that is none."""
+    versions: set[str] = set()
+    needs: set[tuple[str, str]] = set()
+    for entry in entries:  # thousands say the same: each is read once
+        versions.add(entry.version)
+        needs.update(entry.needs.items())
+    for version in versions:
+        parse_version(version)
+    for needed, wanted in needs:
+        parse_key(needed)
+        parse_range(wanted)
 
 
 def search(entries: Iterable[Entry], words: Sequence[str], kind: str = "") -> list[Entry]:

@@ -2,12 +2,14 @@
 
 DIR/drivers/puppet/package.yaml …     what the keeper writes, one folder for each package
 DIR/archives/drivers/puppet/1.0.0.zip every version that was ever listed
-DIR/index.json                        what there is
+DIR/archives/drivers/puppet/1.0.0.sig who signed it, if anybody did
+DIR/index.json, DIR/index/…           what there is, and what changed, see `changes`
 DIR/drivers/puppet/urcpm.json         the same in the thesis's form
 """
 
 import shutil
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Final, NamedTuple
 
@@ -15,15 +17,18 @@ import msgspec
 
 from urc.packages import disk
 from urc.packages.archive import PACKAGE
-from urc.packages.index import INDEX, Entry, Index, entry_of
+from urc.packages.changes import write_index
+from urc.packages.index import INDEX, INDEX_BYTES, Entry, Index, entry_of, read_index
 from urc.packages.manifest import MANIFEST, Manifest
 from urc.packages.names import FOLDERS, PackageError, parse_key
-from urc.packages.package import open_package, pack_folder
+from urc.packages.package import Package, open_package, pack_folder, sha256
+from urc.packages.signature import Signature, Signer
 
-__all__ = ["Listing", "make_index", "urcpm"]
+__all__ = ["Listing", "changing", "keep", "make_index", "read_signature", "urcpm"]
 
 _THESIS: Final = ("driver", "interface", "widget")
 _PACKAGES_MOST: Final = 20_000
+_SIGNED: Final = ".sig"
 
 
 class Listing(NamedTuple):
@@ -34,37 +39,70 @@ class Listing(NamedTuple):
     """One line for each package that is not listed."""
 
 
-def make_index(folder: Path, name: str, examine: Callable[[Path], list[str]]) -> Listing:
+def make_index(
+    folder: Path, name: str, examine: Callable[[Path], list[str]], signer: Signer | None = None
+) -> Listing:
     """Look at every package in a folder, list those that are sound, and write `index.json`.
 
     Args:
         folder: the repository.
         name: what it is called.
         examine: returns what is wrong with a package's document, one line each.
+        signer: signs what is new in the keeper's folders.
 
     Raises:
         PackageError: there is no such folder, or it cannot be written to.
     """
     if not folder.is_dir():
         raise PackageError(f"{folder}: there is no such folder")
-    work = folder / ".work"
-    faults: list[str] = []
     try:
-        for home in _homes(folder):
-            faults += _take(folder, home, work, examine)
-        entries = []
-        for file in _archives(folder):
-            try:
-                entries.append(_entry(folder, file))
-            except PackageError as error:
-                faults.append(str(error))
-        entries.sort(key=lambda entry: (entry.key, entry.number))
-        index = Index(1, name, tuple(entries))
-        disk.put_file(folder / INDEX, index.to_bytes(), work)
-        shutil.rmtree(work, ignore_errors=True)
+        with changing(folder) as work:
+            faults: list[str] = []
+            for home in _homes(folder):
+                faults += _take(folder, home, work, examine, signer)
+            entries = []
+            known = _known(folder)
+            for file in _archives(folder):
+                try:
+                    entries.append(_entry(folder, file, known))
+                except PackageError as error:
+                    faults.append(str(error))
+            index = write_index(folder, name, entries, work)
     except OSError as error:
         raise PackageError(f"{error.filename or folder}: {error.strerror or error}") from None
     return Listing(index, tuple(faults))
+
+
+@contextmanager
+def changing(folder: Path) -> Iterator[Path]:
+    """Keep other processes from changing a repository; yields a folder for what is not whole yet.
+
+    Raises:
+        PackageError: another one changes it for longer than ten seconds.
+    """
+    work = folder / ".work"
+    with disk.exclusive(folder / ".changing"):
+        shutil.rmtree(work, ignore_errors=True)
+        try:
+            yield work
+        finally:
+            shutil.rmtree(work, ignore_errors=True)
+
+
+def keep(folder: Path, package: Package, signature: Signature | None, work: Path) -> Entry:
+    """Put an archive into a repository; it is listed when the index is written next.
+
+    The signature goes first: an archive that is there is whole in every way.
+    """
+    entry = entry_of(package, signature)
+    archive = folder / entry.file
+    if signature is not None:
+        disk.put_file(archive.with_suffix(_SIGNED), msgspec.json.encode(signature) + b"\n", work)
+    elif not archive.is_file():
+        archive.with_suffix(_SIGNED).unlink(missing_ok=True)  # of another try, with other bytes
+    if not archive.is_file():
+        disk.put_file(archive, package.data, work)
+    return entry
 
 
 def _homes(folder: Path) -> list[Path]:
@@ -78,7 +116,13 @@ def _homes(folder: Path) -> list[Path]:
     )
 
 
-def _take(folder: Path, home: Path, work: Path, examine: Callable[[Path], list[str]]) -> list[str]:
+def _take(
+    folder: Path,
+    home: Path,
+    work: Path,
+    examine: Callable[[Path], list[str]],
+    signer: Signer | None,
+) -> list[str]:
     """Make the archive of a package that is new; return what is wrong with it."""
     try:
         package = pack_folder(home)
@@ -96,10 +140,21 @@ def _take(folder: Path, home: Path, work: Path, examine: Callable[[Path], list[s
     else:
         if faults := examine(home / said.main):
             return faults
-        disk.put_file(archive, package.data, work)
+        signature = signer.sign(said.key, said.version, package.digest) if signer else None
+        keep(folder, package, signature, work)
     if said.key.kind in _THESIS:
         disk.put_file(home / "urcpm.json", urcpm(said, package.files), work)
     return []
+
+
+def _known(folder: Path) -> dict[str, Entry]:
+    """Return what the last index says, by file: an archive of the same bytes is not read again."""
+    try:
+        with open(folder / INDEX, "rb") as file:
+            index = read_index(file.read(INDEX_BYTES + 1), INDEX)
+    except (OSError, PackageError):
+        return {}
+    return {entry.file: entry for entry in index.packages}
 
 
 def _archives(folder: Path) -> list[Path]:
@@ -109,13 +164,32 @@ def _archives(folder: Path) -> list[Path]:
     return found
 
 
-def _entry(folder: Path, file: Path) -> Entry:
+def _entry(folder: Path, file: Path, known: Mapping[str, Entry]) -> Entry:
     with open(file, "rb") as opened:
-        package = open_package(opened.read(PACKAGE.archive_bytes + 1), str(file))
-    entry = entry_of(package)
+        data = opened.read(PACKAGE.archive_bytes + 1)
+    signature = read_signature(file)
+    entry = known.get(file.relative_to(folder).as_posix())
+    is_known = entry is not None and entry.sha256 == sha256(data) and entry.signed == signature
+    if entry is None or not is_known:
+        package = open_package(data, str(file))
+        entry = entry_of(package, signature)
+        if signature is not None:
+            signature.check(entry.key, entry.version, entry.sha256)
     if folder / entry.file != file:
         raise PackageError(f"{file}: this is {entry}, which belongs into {folder / entry.file}")
     return entry
+
+
+def read_signature(archive: Path) -> Signature | None:
+    """Return the signature that stands beside an archive, or None; raise `PackageError`."""
+    file = archive.with_suffix(_SIGNED)
+    try:
+        with open(file, "rb") as opened:
+            return msgspec.json.decode(opened.read(4096), type=Signature)
+    except FileNotFoundError:
+        return None
+    except (msgspec.DecodeError, UnicodeDecodeError) as error:
+        raise PackageError(f"{file}: this is no signature: {error}") from None
 
 
 def urcpm(said: Manifest, files: Mapping[str, bytes]) -> bytes:

@@ -1,27 +1,33 @@
-"""A repository behind HTTP: any web server that gives out `index.json` and the archives."""
+"""A repository behind HTTP: any web server that gives out the index and the archives."""
 
 import asyncio
+import ssl
+from collections.abc import Container, Coroutine, Mapping
+from functools import cache
 from typing import Final, NamedTuple
 
 import httpx2
 
-from urc.packages.index import INDEX, INDEX_BYTES, Entry
+from urc.packages.index import Entry
 from urc.packages.names import PackageError
 from urc.packages.package import sha256
 
-__all__ = ["Answer", "ask", "fetch_archive", "fetch_index", "repository_url"]
+__all__ = ["Answer", "ask", "fetch_archive", "put", "repository_url"]
 
 _CONNECT_S: Final = 5.0
 _READ_S: Final = 10.0
 _TOTAL_S: Final = 120.0
 """For one file, however slowly it drips."""
+_ANSWER_BYTES: Final = 65536
+_CHECKED_S: Final = 90.0
+"""In which a repository must have checked what was sent to it."""
 
 
 class Answer(NamedTuple):
     """What a server gave."""
 
     status: int
-    """200, or 304: nothing has changed."""
+    """200; 304: nothing has changed; 404: there is none, where that may be."""
     etag: str
     body: bytes
 
@@ -37,11 +43,6 @@ def repository_url(text: str) -> str:
     return str(url.copy_with(fragment=None)).rstrip("/") + "/"
 
 
-def fetch_index(url: str, etag: str = "") -> Answer:
-    """Return a repository's index, or that it is still the one with `etag`."""
-    return ask(url + INDEX, INDEX_BYTES, etag)
-
-
 def fetch_archive(url: str, entry: Entry) -> bytes:
     """Return an archive with the bytes that the index promised; raise `PackageError`."""
     address = url + entry.file
@@ -54,47 +55,84 @@ def fetch_archive(url: str, entry: Entry) -> bytes:
     return data
 
 
-def ask(url: str, most: int, etag: str = "", total_s: float = _TOTAL_S) -> Answer:
+def ask(
+    url: str, most: int, etag: str = "", total_s: float = _TOTAL_S, *, may_lack: bool = False
+) -> Answer:
     """Return what a server has under an address, at most `most` bytes.
+
+    Args:
+        url: the address; redirects are not followed.
+        most: bytes that are taken.
+        etag: of what is here already.
+        total_s: for all of it.
+        may_lack: any other answer means that there is none: not every server says 404.
 
     Raises:
         PackageError: it does not answer, stalls, sends too much, or something else.
     """
-    return asyncio.run(_within(url, most, etag, total_s))
+    headers = {"if-none-match": etag} if etag else {}
+    accepted: Container[int] = {200, 304} if etag else {200}
+    if may_lack:
+        accepted = range(200, 600)
+    return asyncio.run(_within(url, _exchange("GET", url, headers, b"", most, accepted), total_s))
 
 
-async def _within(url: str, most: int, etag: str, total_s: float) -> Answer:
+def put(url: str, body: bytes, headers: Mapping[str, str], total_s: float = _TOTAL_S) -> Answer:
+    """Send something to an address, and return what is answered, whatever that is.
+
+    Raises:
+        PackageError: it does not answer, or stalls.
+    """
+    sent = _exchange("PUT", url, headers, body, _ANSWER_BYTES, range(200, 600))
+    return asyncio.run(_within(url, sent, total_s))
+
+
+async def _within(url: str, exchange: Coroutine[None, None, Answer], total_s: float) -> Answer:
     try:
         async with asyncio.timeout(total_s):
-            return await _ask(url, most, etag)
+            return await exchange
     except TimeoutError:
         raise PackageError(f"{url}: not all of it came within {total_s:g} s") from None
     except httpx2.ConnectTimeout:
         raise PackageError(f"{url}: no answer within {_CONNECT_S:g} s") from None
     except httpx2.TimeoutException:
-        raise PackageError(f"{url}: the server fell silent for {_READ_S:g} s") from None
+        raise PackageError(f"{url}: the server fell silent") from None
     except (httpx2.HTTPError, httpx2.InvalidURL, OSError) as error:
         reason = str(error) or type(error).__name__
         raise PackageError(f"{url}: {reason}") from None
 
 
-async def _ask(url: str, most: int, etag: str) -> Answer:
+@cache
+def _trust() -> ssl.SSLContext:
+    """Return who is believed to speak for a host: read once, for an index asks many times."""
+    return httpx2.create_ssl_context()
+
+
+async def _exchange(
+    method: str,
+    url: str,
+    headers: Mapping[str, str],
+    body: bytes,
+    most: int,
+    accepted: Container[int],
+) -> Answer:
     # Not compressed: what comes is then never more than what was sent.
-    headers = {"accept-encoding": "identity"} | ({"if-none-match": etag} if etag else {})
-    timeout = httpx2.Timeout(_READ_S, connect=_CONNECT_S)
+    asked = {"accept-encoding": "identity", **headers}
+    timeout = httpx2.Timeout(_CHECKED_S if body else _READ_S, connect=_CONNECT_S)
     async with (
-        httpx2.AsyncClient(timeout=timeout, follow_redirects=False) as client,
-        client.stream("GET", url, headers=headers) as response,
+        httpx2.AsyncClient(verify=_trust(), timeout=timeout, follow_redirects=False) as client,
+        client.stream(method, url, headers=asked, content=body or None) as response,
     ):
-        if etag and response.status_code == 304:
-            return Answer(304, etag, b"")
-        if response.status_code != 200:
-            raise PackageError(f"{url}: the server answers {response.status_code}, not 200")
+        status = response.status_code
+        if status not in accepted:
+            raise PackageError(f"{url}: the server answers {status}, not 200")
+        if method == "GET" and status != 200:
+            return Answer(status if status == 304 else 404, "", b"")
         if response.headers.get("content-encoding", "identity") != "identity":
             raise PackageError(f"{url}: the server compresses, which it was not asked to")
-        body = bytearray()
+        content = bytearray()
         async for piece in response.aiter_raw():
-            body += piece
-            if len(body) > most:
+            content += piece
+            if len(content) > most:
                 raise PackageError(f"{url}: more than the {most} bytes that are expected")
-        return Answer(200, response.headers.get("etag", ""), bytes(body))
+        return Answer(status, response.headers.get("etag", ""), bytes(content))

@@ -1,21 +1,32 @@
 """The repositories that this user knows, and what they said last."""
 
 import hashlib
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Annotated, Final
 
 import msgspec
 
 from urc.packages import disk
-from urc.packages.index import INDEX_BYTES, Entry, Index, read_index
+from urc.packages.changes import (
+    HEAD,
+    HEAD_BYTES,
+    IndexChange,
+    applied,
+    change_file,
+    read_change,
+    read_head,
+)
+from urc.packages.index import INDEX, INDEX_BYTES, Entry, Index, read_index
 from urc.packages.names import PackageError
 from urc.packages.package import sha256
-from urc.packages.remote import fetch_archive, fetch_index, repository_url
+from urc.packages.remote import ask, fetch_archive, repository_url
 
 __all__ = ["Repositories", "Repository"]
 
 _MOST: Final = 32
+_STEPS_MOST: Final = 64
+"""Changes that are asked for one by one; where more is new, the whole index is."""
 _LIST_BYTES: Final = 1 << 20
 
 
@@ -24,14 +35,19 @@ class _Known(msgspec.Struct, frozen=True):
     urls: tuple[str, ...]
 
 
-class _Tag(msgspec.Struct, frozen=True):
-    etag: str
+class _Tags(msgspec.Struct, frozen=True):
     sha256: str
-    """Of the index that it belongs to."""
+    """Of the index that they belong to."""
+    index: str = ""
+    """ETag of the whole index; "" when it was put together from changes."""
+    head: str = ""
 
 
 class Repository:
-    """One repository. What it said last is kept, and used where it cannot be reached."""
+    """One repository. What it said last is kept, and used where it cannot be reached.
+
+    Its number only ever grows: one that goes back is not believed, and what it said last is used.
+    """
 
     def __init__(self, url: str, folder: Path, complain: Callable[[str], None]) -> None:
         self.name = url
@@ -39,7 +55,7 @@ class Repository:
         self._folder = folder
         stem = hashlib.sha256(url.encode()).hexdigest()[:32]
         self._index = folder / f"{stem}.index.json"
-        self._tag = folder / f"{stem}.etag.json"
+        self._tags = folder / f"{stem}.tags.json"
 
     def entries(self) -> tuple[Entry, ...]:
         """Return what it has, or what it had when it was last reached."""
@@ -50,19 +66,59 @@ class Repository:
             if kept is None:
                 raise
             self._complain(f"{error}; what it said last is used")
-            return read_index(kept, str(self._index)).packages
+            return kept[0].packages
 
     def refresh(self) -> Index:
-        """Ask the repository; raise `PackageError` when it does not answer."""
+        """Ask the repository for what is new, and return all that it has.
+
+        Raises:
+            PackageError: it does not answer, sends something else, or goes back.
+        """
         kept = self._kept()
-        answer = fetch_index(self.name, self._etag(kept) if kept is not None else "")
+        if kept is None:
+            return self._whole(None, _Tags(""))
+        index, tags = kept
+        answer = ask(self.name + HEAD, HEAD_BYTES, tags.head, may_lack=True)
+        if answer.status == 304:
+            return index
+        try:
+            head = read_head(answer.body, self.name + HEAD)
+            if not index.number <= head.number <= index.number + _STEPS_MOST:
+                return self._whole(index, tags)
+            new = applied(index, self._changes(index.number, head.number))
+            if sha256(new.to_bytes()) != head.sha256:
+                return self._whole(index, tags)
+        except PackageError:  # there is no head, or a change is missing or damaged
+            return self._whole(index, tags)
+        etag = tags.index if head.number == index.number else ""
+        self._keep(new, new.to_bytes(), _Tags(head.sha256, etag, answer.etag))
+        return new
+
+    def _changes(self, first: int, last: int) -> Iterator[IndexChange]:
+        """Yield what is new, all of it together at most as large as an index may be."""
+        left = INDEX_BYTES
+        for number in range(first + 1, last + 1):
+            address = self.name + change_file(number)
+            body = ask(address, left).body
+            left -= len(body)
+            yield read_change(body, address)
+
+    def _whole(self, kept: Index | None, tags: _Tags) -> Index:
+        """Take the whole index; raise `PackageError` when it is older than what is known."""
+        address = self.name + INDEX
+        answer = ask(address, INDEX_BYTES, tags.index if kept else "")
         if answer.status == 304 and kept is not None:
-            return read_index(kept, self.name)
+            return kept
         index = read_index(answer.body, self.name)
-        work = self._folder / "work"
-        disk.put_file(self._index, answer.body, work)
-        tag = msgspec.json.encode(_Tag(answer.etag, sha256(answer.body)))
-        disk.put_file(self._tag, tag, work)
+        if kept is not None and (
+            index.number < kept.number or (index.number == kept.number > 0 and index != kept)
+        ):
+            raise PackageError(
+                f"{address}: it went back from number {kept.number} to {index.number}, or changed"
+                f" without a new one; if its keeper says that this is right,"
+                f" 'urc repo remove {self.name}' and add it again"
+            )
+        self._keep(index, answer.body, _Tags(sha256(answer.body), answer.etag))
         return index
 
     def fetch(self, entry: Entry) -> bytes:
@@ -72,18 +128,28 @@ class Repository:
     def forget(self) -> None:
         """Drop what it said last."""
         self._index.unlink(missing_ok=True)
-        self._tag.unlink(missing_ok=True)
+        self._tags.unlink(missing_ok=True)
 
-    def _kept(self) -> bytes | None:
-        return _content(self._index, INDEX_BYTES)
+    def _keep(self, index: Index, data: bytes, tags: _Tags) -> None:
+        work = self._folder / "work"
+        disk.put_file(self._index, data, work)
+        disk.put_file(self._tags, msgspec.json.encode(tags), work)
 
-    def _etag(self, kept: bytes) -> str:
-        """Return the tag of what is kept, or "" when it belongs to something else."""
+    def _kept(self) -> tuple[Index, _Tags] | None:
+        """Return what it said last, with the tags if they belong to it; None: it said nothing."""
+        data = _content(self._index, INDEX_BYTES)
+        if data is None:
+            return None
         try:
-            tag = msgspec.json.decode(_content(self._tag, 4096) or b"", type=_Tag)
-        except msgspec.DecodeError:
-            return ""
-        return tag.etag if tag.sha256 == sha256(kept) else ""
+            index = read_index(data, str(self._index))
+        except PackageError as error:
+            self._complain(f"{error}; it is asked for anew")
+            return None
+        try:
+            tags = msgspec.json.decode(_content(self._tags, 4096) or b"", type=_Tags)
+        except (msgspec.DecodeError, UnicodeDecodeError):
+            tags = _Tags("")
+        return index, tags if tags.sha256 == sha256(data) else _Tags("")
 
 
 class Repositories:

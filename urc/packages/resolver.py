@@ -5,6 +5,7 @@ which ones did. What a package is, and which version is best, is said here: the 
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from functools import lru_cache
 from typing import Any, Final, NamedTuple
 
 from resolvelib import AbstractProvider, BaseReporter, ResolutionImpossible, Resolver
@@ -13,7 +14,7 @@ from resolvelib.resolvers import ResolutionTooDeep
 from urc.packages.index import Entry
 from urc.packages.manifest import LANGUAGE
 from urc.packages.names import Key, PackageError, Wish, parse_key
-from urc.packages.versions import parse_range
+from urc.packages.versions import parse_range, parse_version
 
 __all__ = ["choose", "resolve"]
 
@@ -108,10 +109,16 @@ class _Provider(AbstractProvider[_Need, Entry, Key]):
         return sorted(found, key=lambda entry: entry.number, reverse=True)
 
     def is_satisfied_by(self, requirement: _Need, candidate: Entry) -> bool:
-        return parse_range(requirement.wanted).allows(candidate.number)
+        return _allows(requirement.wanted, candidate.version)
 
     def get_dependencies(self, candidate: Entry) -> list[_Need]:
         return [_Need(parse_key(key), wanted) for key, wanted in candidate.needs.items()]
+
+
+@lru_cache(maxsize=65536)
+def _allows(wanted: str, version: str) -> bool:
+    """Return whether a version is in a range; a search asks the same again and again."""
+    return parse_range(wanted).allows(parse_version(version))
 
 
 def _conflict(error: "ResolutionImpossible[_Need, Entry]", entries: Entries) -> str:

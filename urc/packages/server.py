@@ -7,7 +7,8 @@ package needs no restart.
 import asyncio
 import mimetypes
 import os
-from collections.abc import Mapping
+import re
+from collections.abc import Callable, Mapping
 from functools import lru_cache
 from pathlib import Path
 from typing import Final
@@ -19,11 +20,14 @@ from starlette.responses import Response
 from starlette.routing import Route
 
 from urc.packages.archive import PACKAGE
+from urc.packages.changes import HEAD, Head
+from urc.packages.door import Door
 from urc.packages.index import INDEX, INDEX_BYTES, Entry, Index, read_index, search
 from urc.packages.keeper import urcpm
 from urc.packages.manifest import MANIFEST, parse_manifest
 from urc.packages.names import FOLDERS, PackageError
 from urc.packages.package import open_package, sha256
+from urc.packages.tokens import Tokens
 
 __all__ = ["repository_app"]
 
@@ -34,12 +38,29 @@ _HEADERS: Final = {
     "cache-control": "no-cache",
 }
 _THESIS: Final = ("drivers", "widgets", "interfaces")
+_CHANGE: Final = re.compile(r"index/changes-[1-9][0-9]{0,15}\.json", re.ASCII)
+_LASTING: Final = "public, max-age=31536000, immutable"
+"""Of what never changes under its address: archives, and changes of the index."""
 
 
-def repository_app(folder: Path) -> Starlette:
-    """Return the application that gives out the repository in a folder."""
+def repository_app(
+    folder: Path,
+    tokens: Tokens | None = None,
+    examine: Callable[[Path], list[str]] | None = None,
+) -> Starlette:
+    """Return the application that gives out the repository in a folder.
+
+    Args:
+        folder: the repository.
+        tokens: who may publish into it; None: nobody.
+        examine: looks at what is published, see `urc.packages.intake.take`.
+    """
     shop = _Shop(folder)
-    return Starlette(routes=[Route("/{path:path}", shop.answer, methods=["GET", "HEAD"])])
+    routes = [Route("/{path:path}", shop.answer, methods=["GET", "HEAD"])]
+    if tokens is not None and examine is not None:
+        door = Door(folder, tokens, examine)
+        routes.append(Route("/{path:path}", door.answer, methods=["PUT"]))
+    return Starlette(routes=routes)
 
 
 class _Shop:
@@ -68,6 +89,8 @@ class _Shop:
             return self._lists[path], "json"
         if path in self._files:
             return self._archive(self._files[path]), "zip"
+        if _CHANGE.fullmatch(path):
+            return self._change(path), "json"
         folder, _, rest = path.partition("/")
         name, _, file = rest.partition("/")
         entry = self._newest.get(f"{folder}/{name}")
@@ -85,6 +108,17 @@ class _Shop:
             raise PackageError(f"{entry.file}: it has changed since it was listed")
         return data
 
+    def _change(self, path: str) -> bytes | None:
+        """Return what made a number of the index; what is not in the index yet is not given out."""
+        number = int(path.rpartition("-")[2].removesuffix(".json"))
+        if not 0 < number <= self._index.number:
+            return None
+        try:
+            with open(self._folder / path, "rb") as file:
+                return file.read(INDEX_BYTES + 1)
+        except FileNotFoundError:
+            return None
+
     def _refresh(self) -> None:
         """Read the index when its file is another one than before."""
         file = self._folder / INDEX
@@ -98,7 +132,8 @@ class _Shop:
         newest = {str(entry.key): entry for entry in search(index.packages, ())}
         self._index, self._newest = index, newest
         self._files = {entry.file: entry for entry in index.packages}
-        self._lists = {**_lists(index.name, newest), INDEX: data}
+        head = msgspec.json.encode(Head(1, index.number, sha256(data)))
+        self._lists = {**_lists(index.name, newest), INDEX: data, HEAD: head}
         self._seen = seen
 
 
@@ -120,7 +155,12 @@ def _files(archive: bytes, name: str) -> Mapping[str, bytes]:
 def _respond(request: Request, body: bytes, ending: str, status: int) -> Response:
     guessed = mimetypes.types_map.get(f".{ending}", "text/plain")
     media_type = "application/json" if ending == "json" else guessed
-    headers = _HEADERS | {"etag": f'"{sha256(body)[:32]}"'} if status == 200 else dict(_HEADERS)
+    headers = dict(_HEADERS)
+    if status == 200:
+        headers["etag"] = f'"{sha256(body)[:32]}"'
+        path = request.path_params["path"]
+        if path.startswith("archives/") or _CHANGE.fullmatch(path):
+            headers["cache-control"] = _LASTING
     known = request.headers.get("if-none-match", "")
     if status == 200 and headers["etag"] in [one.strip() for one in known.split(",")]:
         return Response(status_code=304, headers=headers)

@@ -5,10 +5,11 @@ from pathlib import Path
 from typing import Final, Protocol
 
 from urc.packages.archive import BUNDLE, read_archive, write_archive
-from urc.packages.index import INDEX, Entry, Index, entry_of, read_index
+from urc.packages.index import INDEX, Entry, Index, entry_of, in_order, read_index
 from urc.packages.manifest import MANIFEST
 from urc.packages.names import Key, PackageError, parse_key
 from urc.packages.package import Package, open_package, pack_folder, sha256
+from urc.packages.signature import Signature
 
 __all__ = ["FileSource", "Source", "make_bundle", "merged", "open_source"]
 
@@ -32,15 +33,35 @@ class Source(Protocol):
 class FileSource:
     """A bundle, a package's archive, or a package's folder."""
 
-    def __init__(self, name: str, packages: Iterable[Package], roots: Iterable[Key]) -> None:
+    def __init__(
+        self,
+        name: str,
+        packages: Iterable[Package],
+        roots: Iterable[Key],
+        signatures: Mapping[str, Signature] | None = None,
+        *,
+        is_folder: bool = False,
+    ) -> None:
         self.name = name
+        self.is_folder = is_folder
+        """Whether it is somebody's own folder, in which packages are still being written."""
+        self.signatures = dict(signatures or {})
+        """Digest → who signed it, of what is signed."""
         self.roots = tuple(roots)
         """What is installed when the whole source is asked for."""
         self._packages = {package.digest: package for package in packages}
 
     def entries(self) -> tuple[Entry, ...]:
         """Return what is in it."""
-        return tuple(map(entry_of, self._packages.values()))
+        return tuple(
+            entry_of(package, self.signatures.get(digest))
+            for digest, package in self._packages.items()
+        )
+
+    @property
+    def packages(self) -> tuple[Package, ...]:
+        """What is in it, what is installed first of all at the front."""
+        return tuple(self._packages.values())
 
     def fetch(self, entry: Entry) -> bytes:
         """Return an archive that is in it."""
@@ -51,7 +72,7 @@ def open_source(path: Path) -> FileSource:
     """Return what a path holds: a folder, an archive, or a bundle; raise `PackageError`."""
     if path.is_dir():
         packages = _pack_with_needs(path)
-        return FileSource(str(path), packages, [packages[0].manifest.key])
+        return FileSource(str(path), packages, [packages[0].manifest.key], is_folder=True)
     if path.suffix not in _ENDINGS:
         raise PackageError(f"{path}: a folder, or a file that ends in .urcof or .zip, is expected")
     try:
@@ -81,17 +102,22 @@ def _pack_with_needs(folder: Path) -> list[Package]:
     return packages
 
 
-def make_bundle(root: Key, archives: Mapping[str, bytes], name: str) -> bytes:
+def make_bundle(
+    root: Key, archives: Mapping[str, bytes], signatures: Mapping[str, Signature], name: str
+) -> bytes:
     """Return the bytes of a bundle: a small repository in one file.
 
     Args:
         root: what somebody wants who installs it.
         archives: digest → bytes of `root` and of all that it needs.
+        signatures: digest → who signed it, of what is signed.
         name: what it is called in errors.
     """
-    packages = [open_package(data, digest) for digest, data in archives.items()]
-    entries = sorted(map(entry_of, packages), key=lambda entry: (entry.key, entry.number))
-    files = {INDEX: Index(1, str(root), tuple(entries)).to_bytes()}
+    entries = in_order(
+        entry_of(open_package(data, digest), signatures.get(digest))
+        for digest, data in archives.items()
+    )
+    files = {INDEX: Index(1, str(root), entries).to_bytes()}
     for entry in entries:
         files[entry.file] = archives[entry.sha256]
     return write_archive(files, BUNDLE, name)
@@ -103,12 +129,15 @@ def _open_bundle(data: bytes, name: str) -> FileSource:
         raise PackageError(f"{name}: this is no bundle: there is no {INDEX} in it")
     index = read_index(files.pop(INDEX), f"{name}/{INDEX}")
     packages = []
+    signatures: dict[str, Signature] = {}
     for entry in index.packages:
         found = files.pop(entry.file, b"")
         if sha256(found) != entry.sha256:
             raise PackageError(f"{name}: {entry}: the archive is missing, or has other bytes")
         package = open_package(found, f"{name}/{entry.file}")
-        if entry_of(package) != entry:
+        if entry.signed is not None:
+            signatures[package.digest] = entry.signed
+        if entry_of(package, signatures.get(package.digest)) != entry:
             raise PackageError(f"{name}: {entry}: the index says something else than the package")
         packages.append(package)
     if files:
@@ -118,7 +147,7 @@ def _open_bundle(data: bytes, name: str) -> FileSource:
     ]
     if len(roots) != 1:
         raise PackageError(f"{name}: the bundle is for {index.name!r}, which is not in it once")
-    return FileSource(name, packages, roots)
+    return FileSource(name, packages, roots, signatures)
 
 
 def merged(

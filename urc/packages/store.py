@@ -1,8 +1,9 @@
 """The packages of this user on this machine, kept for ever after without any network.
 
     packages/
-      state.json              what is installed: one lock for each
+      state.json              what is installed: one lock for each; whose keys are known
       blobs/<sha256>.zip      the archives, each under the digest of its bytes
+      signatures/<sha256>.json  who signed them, of those that are signed
       ecosystems/<sha256>/    the files of one lock, made from its blobs
       work/                   what is not whole yet, or no longer wanted
 
@@ -14,25 +15,24 @@ import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Annotated, Final
+from typing import Final
 
 import msgspec
 
 from urc.packages import disk
 from urc.packages.archive import PACKAGE, read_archive
 from urc.packages.lock import LOCK, Lock
+from urc.packages.manifest import Manifest
 from urc.packages.names import Key, PackageError, Wish, parse_key
 from urc.packages.package import open_package, sha256
-from urc.packages.versions import parse_range
+from urc.packages.plan import Plan
+from urc.packages.signature import Signature
+from urc.packages.state import State
+from urc.packages.versions import parse_range, parse_version
 
 __all__ = ["Change", "Store", "ecosystem_of", "kinds_in"]
 
 _STATE_BYTES: Final = 16 << 20
-
-
-class _State(msgspec.Struct, frozen=True):
-    format: Annotated[int, msgspec.Meta(ge=1, le=1)]
-    installed: tuple[Lock, ...]
 
 
 class Store:
@@ -49,15 +49,23 @@ class Store:
         Raises:
             PackageError: the state cannot be read.
         """
+        return self.state().installed
+
+    def state(self) -> State:
+        """Return all that is known; raise `PackageError`."""
         try:
             with open(self._state, "rb") as file:
                 data = file.read(_STATE_BYTES)
         except FileNotFoundError:
-            return ()
+            return State(1, ())
         try:
-            return msgspec.json.decode(data, type=_State).installed
+            return msgspec.json.decode(data, type=State)
         except (msgspec.DecodeError, PackageError, UnicodeDecodeError) as error:
             raise PackageError(f"{self._state}: this file is damaged: {error}") from None
+
+    def previous(self, lock: Lock) -> Lock | None:
+        """Return what an update replaced by `lock`, or None."""
+        return self.state().before.get(lock.digest)
 
     def find(self, wish: Wish) -> Lock | None:
         """Return the newest installed version of what is named, or None.
@@ -76,8 +84,8 @@ class Store:
         """
         folder = self.place(lock)
         if not _holds(folder, self._files(lock)):
-            with self.changing() as change:
-                change.stage(lock, {})
+            with self.changing():
+                self.make(lock)
         return folder / lock.root / f"{lock.key.kind}.yaml"
 
     def place(self, lock: Lock) -> Path:
@@ -105,6 +113,36 @@ class Store:
         """Return where an archive is, or would be."""
         return self.folder / "blobs" / f"{digest}.zip"
 
+    def signature(self, digest: str) -> Signature | None:
+        """Return who signed an archive that is in the store, or None. It is checked when used."""
+        try:
+            with open(self._signature_file(digest), "rb") as file:
+                return msgspec.json.decode(file.read(4096), type=Signature)
+        except (FileNotFoundError, msgspec.DecodeError, UnicodeDecodeError):
+            return None
+
+    def keep_signature(self, digest: str, signature: Signature) -> None:
+        """Keep who signed an archive; only a `Change` may."""
+        if self.signature(digest) != signature:
+            data = msgspec.json.encode(signature) + b"\n"
+            disk.put_file(self._signature_file(digest), data, self.work)
+
+    def make(self, lock: Lock) -> Path:
+        """Return the folder of a lock's files, made anew where it is not whole.
+
+        Only while nobody else is `changing` the store.
+
+        Raises:
+            PackageError: an archive of it is missing or damaged.
+        """
+        files = self._files(lock)
+        if not _holds(self.place(lock), files):
+            disk.put_folder(self.place(lock), files, self.work)
+        return self.place(lock)
+
+    def _signature_file(self, digest: str) -> Path:
+        return self.folder / "signatures" / f"{digest}.json"
+
     @contextmanager
     def changing(self) -> Iterator["Change"]:
         """Keep other processes from changing the store; at the end rubbish is taken away."""
@@ -118,9 +156,8 @@ class Store:
                 with suppress(OSError, PackageError):
                     self._collect()
 
-    def write_state(self, installed: tuple[Lock, ...]) -> None:
+    def write_state(self, state: State) -> None:
         """Say what is installed; only a `Change` may."""
-        state = _State(1, tuple(sorted(installed, key=lambda lock: (lock.root, lock.number))))
         data = msgspec.json.format(msgspec.json.encode(state, order="sorted"), indent=1)
         disk.put_file(self._state, data + b"\n", self.work)
 
@@ -134,10 +171,14 @@ class Store:
 
     def _collect(self) -> None:
         """Take away what no lock names. What cannot go now goes at the next change."""
-        locks = self.installed()
-        places = {lock.digest for lock in locks}
-        blobs = {f"{pin.sha256}.zip" for lock in locks for pin in lock.packages.values()}
-        for folder, wanted in (("ecosystems", places), ("blobs", blobs)):
+        locks = self.state().kept
+        digests = {pin.sha256 for lock in locks for pin in lock.packages.values()}
+        for folder, wanted in (
+            # What an update replaced is kept whole: a dashboard may still be using it.
+            ("ecosystems", {lock.digest for lock in locks}),
+            ("blobs", {f"{digest}.zip" for digest in digests}),
+            ("signatures", {f"{digest}.json" for digest in digests}),
+        ):
             if (self.folder / folder).is_dir():
                 for entry in (self.folder / folder).iterdir():
                     if entry.name not in wanted:
@@ -151,21 +192,21 @@ class Change:
     def __init__(self, store: Store) -> None:
         self._store = store
 
-    def stage(self, lock: Lock, archives: Mapping[str, bytes]) -> Path:
-        """Make the files of a lock, to be looked at; they are not installed yet.
+    def stage(self, plan: Plan) -> Path:
+        """Make the files of a plan, to be looked at; they are not installed yet.
 
-        Args:
-            lock: what is to be installed.
-            archives: digest → bytes of those that the store has not.
+        Returns:
+            the folder with a folder for each kind: ``drivers/puppet/driver.yaml``.
 
         Raises:
-            PackageError: an archive is not what the lock says, or other bytes of a version are
-                installed already.
+            PackageError: an archive is not what the lock says, other bytes of a version are
+                installed already, or a signature is not the one that was expected.
         """
         store = self._store
-        self._check_known(lock)
-        for key, pin in lock.packages.items():
-            data = archives.get(pin.sha256)
+        store.state().check(plan)
+        opened = []
+        for key, pin in plan.lock.packages.items():
+            data = plan.archives.get(pin.sha256)
             if data is None:
                 data = store.blob(pin.sha256)
             elif sha256(data) != pin.sha256:
@@ -173,21 +214,30 @@ class Change:
             said = open_package(data, f"{key} {pin.version}").manifest
             if (str(said.key), said.version) != (key, pin.version):
                 raise PackageError(f"{key} {pin.version}: this is {said.key} {said.version}")
-            if pin.sha256 in archives:
+            opened.append(said)
+            if pin.sha256 in plan.archives:
                 disk.put_file(store.blob_file(pin.sha256), data, store.work)
-        files = store._files(lock)  # noqa: SLF001 (a change is the store's other half)
-        if not _holds(store.place(lock), files):
-            disk.put_folder(store.place(lock), files, store.work)
-        return store.place(lock)
+            if signature := plan.signatures.get(pin.sha256):
+                store.keep_signature(pin.sha256, signature)
+        for said in opened:
+            _check_needs(said, plan.lock)
+        return store.make(plan.lock)
 
-    def commit(self, lock: Lock) -> None:
+    def commit(self, plan: Plan) -> None:
         """Install what was staged. Another version of it stays beside it."""
-        others = [
-            one
-            for one in self._store.installed()
-            if (one.root, one.version) != (lock.root, lock.version)
-        ]
-        self._store.write_state((*others, lock))
+        self._store.write_state(self._store.state().with_installed(plan))
+
+    def replace(self, old: Lock, plan: Plan) -> None:
+        """Install what was staged in the place of `old`, which is kept for going back."""
+        self._store.write_state(self._store.state().with_update(old, plan))
+
+    def back(self, lock: Lock) -> Lock:
+        """Put back what an update replaced by `lock`, and return it; raise `PackageError`."""
+        state = self._store.state().with_back(lock)
+        old = self._store.state().before[lock.digest]
+        self._store.make(old)
+        self._store.write_state(state)
+        return old
 
     def remove(self, wish: Wish) -> tuple[list[Lock], list[str]]:
         """Remove what was installed, and what only it needed.
@@ -198,24 +248,29 @@ class Change:
         Raises:
             PackageError: it is not installed, or something else needs it.
         """
-        before = self._store.installed()
-        gone = _meant(wish, before)
+        state = self._store.state()
+        gone = _meant(wish, state.installed)
         if not gone:
-            raise PackageError(_not_installed(wish, before))
-        after = tuple(lock for lock in before if lock not in gone)
+            raise PackageError(_not_installed(wish, state.installed))
+        after = state.without(gone)
         self._store.write_state(after)
-        return gone, sorted(_all(before) - _all(after))
+        return gone, sorted(_all(state.installed) - _all(after.installed))
 
-    def _check_known(self, lock: Lock) -> None:
-        """Refuse other bytes under a version that is installed: nobody may change one silently."""
-        for other in self._store.installed():
-            for key, pin in other.packages.items():
-                new = lock.packages.get(key)
-                if new and new.version == pin.version and new.sha256 != pin.sha256:
-                    raise PackageError(
-                        f"{key} {pin.version} is installed with other bytes (by {other});"
-                        " a changed package needs a new version"
-                    )
+    def forget_key(self, key: Key) -> None:
+        """Take any signature of a package from now on; raise `PackageError`."""
+        self._store.write_state(self._store.state().without_key(key))
+
+
+def _check_needs(said: Manifest, lock: Lock) -> None:
+    """See to it that an index did not tell other needs than the package itself."""
+    for need, wanted in said.needs.items():
+        pin = lock.packages.get(need)
+        if pin is None or not parse_range(wanted).allows(parse_version(pin.version)):
+            found = f"comes with {pin.version}" if pin else "does not come with it"
+            raise PackageError(
+                f"{said.key} {said.version} needs {need} {wanted}, which {found}:"
+                " what lists it says something else than the package"
+            )
 
 
 def ecosystem_of(document: Path) -> Path | None:

@@ -1,10 +1,12 @@
-"""Which widgets a document may use: those of URC, and those that were installed with it."""
+"""Which widgets a document may use: those of URC, and those that came with it."""
 
 from os import PathLike
 from pathlib import Path
 
 from urc.config.load import Shelf
 from urc.model.widget import Widget
+from urc.packages.manifest import MANIFEST
+from urc.packages.names import FOLDERS
 from urc.packages.store import ecosystem_of
 from urc.shipped import shipped
 
@@ -12,10 +14,24 @@ __all__ = ["TwoShelves", "shelf_of"]
 
 
 def shelf_of(document: str | PathLike[str]) -> Shelf:
-    """Return the widgets for a document; an installed package sees its own ecosystem, no other."""
-    home = ecosystem_of(Path(document))
+    """Return the widgets for a document.
+
+    An installed package sees its own ecosystem, no other; one that is still being written sees the
+    packages that stand beside it; any other document sees the folder ``widgets`` beside it.
+    """
+    home = ecosystem_of(Path(document)) or _workshop_of(Path(document))
     ours = shipped("widgets")
-    return Shelf(ours) if home is None else TwoShelves(ours, home / "widgets")
+    brought = (home or Path(document).parent) / "widgets"
+    if home is None and (not brought.is_dir() or brought.resolve() == ours.resolve()):
+        return Shelf(ours)
+    return TwoShelves(ours, brought)
+
+
+def _workshop_of(document: Path) -> Path | None:
+    """Return the folder of packages that a package's own document stands in, or None."""
+    home = document.resolve().parent
+    is_package = home.parent.name in FOLDERS and (home / MANIFEST).is_file()
+    return home.parent.parent if is_package else None
 
 
 class TwoShelves(Shelf):

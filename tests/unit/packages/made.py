@@ -8,6 +8,7 @@ from urc.packages.index import Entry
 from urc.packages.install import plan_file
 from urc.packages.lock import Lock
 from urc.packages.package import Package, open_package, sha256
+from urc.packages.signature import Signature
 from urc.packages.sources import FileSource
 from urc.packages.store import Store
 
@@ -96,13 +97,19 @@ def entry(key: str, version: str, needs: Mapping[str, str] | None = None) -> Ent
     return Entry(folder[:-1], name, version, "0" * 64, 1, needs=dict(needs or {}))
 
 
-def install(store: Store, *packages: Package) -> Lock:
+def install(
+    store: Store,
+    *packages: Package,
+    signatures: Mapping[str, Signature] | None = None,
+    is_folder: bool = False,
+) -> Lock:
     """Install the first of some packages; the others are what it may need."""
-    source = FileSource("test", packages, [packages[0].manifest.key])
+    root = packages[0].manifest.key
+    source = FileSource("test", packages, [root], signatures, is_folder=is_folder)
     plan = plan_file(source, (), store, lambda line: None)
     with store.changing() as change:
-        change.stage(plan.lock, plan.archives)
-        change.commit(plan.lock)
+        change.stage(plan)
+        change.commit(plan)
     return plan.lock
 
 

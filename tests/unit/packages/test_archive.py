@@ -3,7 +3,9 @@
 import io
 import random
 import struct
+import tracemalloc
 import zipfile
+import zlib
 from collections.abc import Callable
 from pathlib import Path
 
@@ -43,6 +45,22 @@ def crowded(entries: int) -> bytes:
     return b"PK\3\4" + listing + end
 
 
+def bomb() -> bytes:
+    """Return an archive of 10 MB that says, truly, that a file in it has 10 GB of zeros."""
+    packer = zlib.compressobj(9, zlib.DEFLATED, -15)
+    piece = packer.compress(bytes(1 << 20)) + packer.flush(zlib.Z_FULL_FLUSH)
+    packed = piece * (10 << 10) + b"\3\0"
+    size = 10 << 30
+    extra = struct.pack("<HHQQ", 1, 16, size, len(packed))
+    name = b"a.txt"
+    head = (20, 0, 8, 0, 33, 0, 0xFFFFFFFF, 0xFFFFFFFF, len(name), len(extra))
+    local = struct.pack("<4s5H3L2H", b"PK\3\4", *head) + name + extra
+    central = struct.pack("<4s4B4HL2L5H2L", b"PK\1\2", 45, 3, 45, 0, *head[1:], 0, 0, 0, 0, 0)
+    central += name + extra
+    end = struct.pack("<4s4H2LH", b"PK\5\6", 0, 0, 1, 1, len(central), len(local) + len(packed), 0)
+    return local + packed + central + end
+
+
 HOSTILE: dict[str, tuple[Callable[[], bytes], str]] = {
     "absolute": (lambda: zipped(("/etc/passwd.txt", b"x")), "is an absolute path"),
     "drive": (lambda: zipped(("C:/a.txt", b"x")), "is an absolute path"),
@@ -76,6 +94,7 @@ HOSTILE: dict[str, tuple[Callable[[], bytes], str]] = {
         lambda: zipped(("a.txt", bytes(50 << 20)), compression=zipfile.ZIP_DEFLATED),
         "'a.txt' is compressed",
     ),
+    "10 GB of zeros": (bomb, "'a.txt' is compressed"),
     "large entry": (lambda: zipped(("a.txt", bytes((5 << 20) + 1))), "at most 5242880 are"),
     "large all": (
         lambda: zipped(*((f"{one}.txt", bytes(5 << 20)) for one in range(5))),
@@ -104,8 +123,14 @@ def _twice() -> bytes:
 def test_a_hostile_archive_is_refused_in_one_line(name: str) -> None:
     """Whatever it tries, nothing is written anywhere: it is read in memory, within bounds."""
     make, told = HOSTILE[name]
-    with pytest.raises(PackageError) as refused:
-        read_archive(make(), PACKAGE, "evil.zip")
+    data = make()
+    tracemalloc.start()
+    try:
+        with pytest.raises(PackageError) as refused:
+            read_archive(data, PACKAGE, "evil.zip")
+        assert tracemalloc.get_traced_memory()[1] < 32 << 20
+    finally:
+        tracemalloc.stop()
     assert told in str(refused.value)
     assert str(refused.value).startswith("evil.zip: ")
     assert "\n" not in str(refused.value)

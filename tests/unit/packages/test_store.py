@@ -13,7 +13,10 @@ from tests.unit.packages.made import assert_whole, install, package
 from urc.packages import disk
 from urc.packages.lock import LOCK, read_lock
 from urc.packages.names import PackageError, parse_wish
+from urc.packages.plan import Plan
+from urc.packages.sources import FileSource
 from urc.packages.store import Store, ecosystem_of
+from urc.packages.update import plan_update
 
 DIAL = package("widget", "dial", "1.0.0")
 DIAL_2 = package("widget", "dial", "2.0.0")
@@ -133,7 +136,7 @@ def test_bytes_that_are_not_those_of_the_lock_are_refused(store: Store) -> None:
         pytest.raises(PackageError, match="these are not the bytes that were named"),
         store.changing() as change,
     ):
-        change.stage(lock, {BOT.digest: BOT.data, DIAL.digest: DIAL_2.data})
+        change.stage(Plan(lock, {BOT.digest: BOT.data, DIAL.digest: DIAL_2.data}, {}, {}))
     assert store.installed() == ()
     assert files_below(store.folder) == ["changing"]
 
@@ -142,7 +145,8 @@ def test_what_was_staged_but_not_agreed_to_is_gone(store: Store) -> None:
     """Somebody looked at the permissions and said no."""
     lock = install(Store(store.folder.parent / "other"), BOT, DIAL)
     with store.changing() as change:
-        assert change.stage(lock, {BOT.digest: BOT.data, DIAL.digest: DIAL.data}).is_dir()
+        plan = Plan(lock, {BOT.digest: BOT.data, DIAL.digest: DIAL.data}, {}, {})
+        assert change.stage(plan).is_dir()
     assert files_below(store.folder) == ["changing"]
 
 
@@ -211,7 +215,32 @@ class _FullDisk:
         return change
 
 
-@pytest.mark.parametrize("act", ["install", "remove"])
+def update(store: Store) -> None:
+    old = store.find(parse_wish("bot"))
+    assert old is not None
+    plan = plan_update(old, [FileSource("lab", [BOT_2, DIAL_2], [old.key])], store, print)
+    assert plan is not None
+    with store.changing() as change:
+        change.stage(plan)
+        change.replace(old, plan)
+
+
+def back(store: Store) -> None:
+    new = store.find(parse_wish("bot"))
+    assert new is not None
+    with store.changing() as change:
+        change.back(new)
+
+
+ACTS: dict[str, Callable[[Store], object]] = {
+    "install": lambda store: install(store, BOT, DIAL),
+    "update": update,
+    "back": back,
+    "remove": lambda store: remove(store, "bot"),
+}
+
+
+@pytest.mark.parametrize("act", ["install", "update", "back", "remove"])
 def test_a_disk_that_gets_full_at_any_moment_changes_nothing(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, act: str
 ) -> None:
@@ -220,20 +249,24 @@ def test_a_disk_that_gets_full_at_any_moment_changes_nothing(
     for changes in range(200):
         store = Store(tmp_path / f"{act}-{changes}")
         install(store, CAR, DIAL)
-        if act == "remove":
+        if act != "install":
             install(store, BOT, DIAL)
+        if act == "back":
+            update(store)
         before = assert_whole(store)
         full = _FullDisk(changes)
         with monkeypatch.context() as patch:
             patch.setattr(disk, "os", full)
             patch.setattr(disk, "mkdtemp", full.limited(disk.mkdtemp))
             try:
-                install(store, BOT, DIAL) if act == "install" else remove(store, "bot")
+                ACTS[act](store)
                 outcomes.add("done")
             except OSError as error:
                 outcomes.add("refused" if error.errno == errno.ENOSPC else str(error))
         after = assert_whole(store)
-        assert after in (["drivers/car 1.0.0"], ["drivers/bot 1.0.0", "drivers/car 1.0.0"])
+        assert "drivers/car 1.0.0" in after
+        assert set(after) <= {"drivers/car 1.0.0", "drivers/bot 1.0.0", "drivers/bot 2.0.0"}
+        assert act not in ("update", "back") or len(after) == 2  # one version or the other
         if not full.was_full:
             assert after != before
             break

@@ -1,0 +1,21 @@
+"""`urc search`: packages in the repositories that were added."""
+
+import argparse
+
+EXAMPLE = "urc search battery --kind widget"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the words, and the form of the answer."""
+    parser.add_argument("words", metavar="WORD", nargs="*", help="all of them must be there")
+    parser.add_argument(
+        "--kind", choices=("driver", "interface", "widget", "robot"), default="", help="only these"
+    )
+    parser.add_argument("--json", action="store_true", help="one JSON line for each")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Print the newest version of each package that has all words; 1 when there is none."""
+    from urc.cli.packages import search_repositories
+
+    return search_repositories(arguments.words, arguments.kind, is_json=arguments.json)

@@ -1,0 +1,141 @@
+"""`urc update`: newer versions of what is installed, after showing what changes; and back."""
+
+import argparse
+from typing import TYPE_CHECKING
+
+from urc.cli.failures import Misuse
+from urc.cli.output import complain
+
+if TYPE_CHECKING:
+    from urc.packages.lock import Lock
+    from urc.packages.plan import Plan
+    from urc.packages.store import Store
+    from urc.packages.update import Difference
+
+EXAMPLE = "urc update drivers/puppet"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add what to update, and what is agreed to beforehand."""
+    parser.add_argument(
+        "packages", metavar="NAME", nargs="*", help="with @RANGE if one is wanted (default: all)"
+    )
+    parser.add_argument(
+        "--yes", action="store_true", help="agree beforehand, where nothing may do more than before"
+    )
+    parser.add_argument(
+        "--allow-more", action="store_true", help="with --yes: also where something may do more"
+    )
+    parser.add_argument(
+        "--back", action="store_true", help="put back what the last update of NAME replaced"
+    )
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Update, or go back; 1 when something could not be."""
+    if arguments.back:
+        return _back(arguments)
+    from urc.cli.packages import open_store, repositories
+
+    store, known = open_store(), repositories().all()
+    if not known:
+        raise Misuse("no repository is known; 'urc repo add URL' adds one")
+    code = 0
+    wishes = [_installed(store, word) for word in arguments.packages] or _all(store)
+    for lock, wanted in wishes:
+        from urc.packages.names import PackageError
+        from urc.packages.update import plan_update
+
+        try:
+            plan = plan_update(lock, known, store, complain, wanted)
+            if plan is None:
+                print(f"{lock} is up to date")
+            elif not _update(lock, plan, store, arguments):
+                code = 1
+        except PackageError as error:  # the others can still be updated
+            complain(f"urc update: {error}")
+            code = 1
+    return code
+
+
+def _installed(store: "Store", word: str) -> "tuple[Lock, str]":
+    """Return what is installed of a name, and the range that is wanted of it."""
+    from urc.packages.names import PackageError, parse_wish
+
+    wish = parse_wish(word)
+    lock = store.find(wish._replace(range="*"))
+    if lock is None:
+        raise PackageError(f"{wish} is not installed; 'urc install {word}' installs it")
+    return lock, wish.range
+
+
+def _all(store: "Store") -> "list[tuple[Lock, str]]":
+    """Return the newest version of everything that is installed."""
+    newest = {lock.root: lock for lock in store.installed()}  # they come by version
+    if not newest:
+        print("nothing is installed")
+    return [(lock, "*") for lock in newest.values()]
+
+
+def _update(old: "Lock", plan: "Plan", store: "Store", arguments: argparse.Namespace) -> bool:
+    """Show what changes, ask, and do it; return whether it was done."""
+    from urc.packages.install import origin_lines
+    from urc.packages.update import staged_difference
+    from urc.problems import printable
+    from urc.runtime.look import look
+
+    with store.changing() as change:
+        staged = change.stage(plan)
+        difference = staged_difference(old, plan, store, staged, look)
+        for line in _told(old, plan, difference, origin_lines(plan, store)):
+            print(printable(line))
+        if not _is_agreed(difference, arguments):
+            print(f"{old} stays")
+            return False
+        change.replace(old, plan)
+    print(f"updated {old.root} to {plan.lock.version}; 'urc update --back {old.root}' goes back")
+    return True
+
+
+def _told(old: "Lock", plan: "Plan", difference: "Difference", origins: list[str]) -> list[str]:
+    """Return what changes, for people."""
+    from urc.packages.update import headline
+
+    lines = [headline(old, plan.lock)]
+    lines += [f"  {line}" for line in difference.versions if not line.startswith(f"{old} → ")]
+    lines += [f"  {line}" for line in origins if "kept from before" not in line]
+    lines += [f"  may from now on: {line}" for line in difference.gained]
+    lines += [f"  may no longer: {line}" for line in difference.lost]
+    if not difference.gained:
+        lines.append("  it may do no more than before")
+    if difference.wire:
+        lines += ["  on the wire:", *(f"    {line}" for line in difference.wire)]
+    return lines
+
+
+def _is_agreed(difference: "Difference", arguments: argparse.Namespace) -> bool:
+    from urc.cli.packages import is_agreed
+
+    if not arguments.yes:
+        more = "It may do more than before. " if difference.gained else ""
+        return is_agreed(f"{more}Update it?")
+    if difference.gained and not arguments.allow_more:
+        complain(
+            "urc update: it may do more than before, which --yes alone does not agree to;"
+            " add --allow-more, or leave --yes out and be asked"
+        )
+        return False
+    return True
+
+
+def _back(arguments: argparse.Namespace) -> int:
+    if len(arguments.packages) != 1:
+        raise Misuse("--back takes the name of one package")
+    from urc.cli.packages import open_store
+
+    store = open_store()
+    lock, _ = _installed(store, arguments.packages[0])
+    with store.changing() as change:
+        old = change.back(lock)
+    print(f"{lock.root} is {old.version} again, as before the update to {lock.version}")
+    return 0

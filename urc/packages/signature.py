@@ -1,0 +1,172 @@
+"""Who made a package: Ed25519 signatures of `cryptography`, over a statement in plain words.
+
+A signature says that the holder of a key calls exactly these bytes that version of that package.
+Whose key it is nobody says: it is kept when a package is first installed, and a later version with
+another one is refused. That is what SSH does with host keys.
+"""
+
+import base64
+import binascii
+import hashlib
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Final
+
+import msgspec
+
+from urc.packages.names import Key, PackageError
+
+if TYPE_CHECKING:
+    from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
+
+__all__ = [
+    "PUBLISHER",
+    "SIGNATURE",
+    "Signature",
+    "Signer",
+    "fingerprint",
+    "new_signer",
+    "read_signer",
+]
+
+PUBLISHER: Final = "publisher.pem"
+"""File of the user's own key in the data folder."""
+SIGNATURE: Final = "urc-signature"
+"""Header of a request that brings a package: the signature as JSON, in base64."""
+_STATEMENT: Final = "URC package signature 1\n{package}\n{version}\n{sha256}\n{by}\n"
+_NAMED: Final = "Publisher: "
+_KEY_BYTES: Final = 16384
+_LONGEST: Final = 100
+
+
+class Signature(msgspec.Struct, frozen=True):
+    """A signature as an index carries it."""
+
+    by: Annotated[str, msgspec.Meta(min_length=1, max_length=_LONGEST)]
+    """The name that the publisher goes by; nobody vouches for it but the key."""
+    key: Annotated[str, msgspec.Meta(pattern=r"\A[A-Za-z0-9+/]{43}=\Z")]
+    """Ed25519 public key, 32 bytes in base64."""
+    value: Annotated[str, msgspec.Meta(pattern=r"\A[A-Za-z0-9+/]{86}==\Z")]
+    """64 bytes in base64."""
+
+    def __post_init__(self) -> None:
+        """Refuse what has a second way to be written, or would hide something when it is shown."""
+        for text in (self.key, self.value):
+            if base64.b64encode(base64.b64decode(text)).decode() != text:
+                raise ValueError("base64 with bits left over")
+        if not self.by.isprintable():
+            raise ValueError("a name on one line is expected")
+
+    @property
+    def fingerprint(self) -> str:
+        """What people compare: ``SHA256:…``, of the public key."""
+        return fingerprint(self.key)
+
+    def check(self, package: Key, version: str, sha256: str) -> None:
+        """Raise `PackageError` unless the key's holder signed exactly this."""
+        from cryptography.exceptions import InvalidSignature
+        from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PublicKey
+
+        said = _statement(package, version, sha256, self.by)
+        try:
+            key = Ed25519PublicKey.from_public_bytes(base64.b64decode(self.key))
+            key.verify(base64.b64decode(self.value), said)
+        except (InvalidSignature, ValueError):
+            raise PackageError(
+                f"{package} {version}: the signature is not of these bytes: {self} never signed"
+                " them, or somebody changed them"
+            ) from None
+
+    def __str__(self) -> str:
+        return f"{self.by} ({self.fingerprint})"
+
+
+class Signer:
+    """The holder of a private key."""
+
+    def __init__(self, by: str, private: "Ed25519PrivateKey") -> None:
+        self.by = by
+        self._private = private
+        self.key = base64.b64encode(private.public_key().public_bytes_raw()).decode()
+
+    @property
+    def fingerprint(self) -> str:
+        """What people compare."""
+        return fingerprint(self.key)
+
+    def sign(self, package: Key, version: str, sha256: str) -> Signature:
+        """Return the signature; the same package always gives the same one."""
+        value = self._private.sign(_statement(package, version, sha256, self.by))
+        return Signature(self.by, self.key, base64.b64encode(value).decode())
+
+    def __str__(self) -> str:
+        return f"{self.by} ({self.fingerprint})"
+
+
+def fingerprint(key: str) -> str:
+    """Return what people compare instead of a public key, as SSH writes it."""
+    digest = hashlib.sha256(base64.b64decode(key)).digest()
+    return "SHA256:" + base64.b64encode(digest).decode().rstrip("=")
+
+
+def new_signer(by: str, file: Path) -> Signer:
+    """Make a key and keep it in a new file that only its owner can read.
+
+    Raises:
+        PackageError: the name is none, or there is such a file already.
+        OSError: it cannot be written.
+    """
+    from cryptography.hazmat.primitives import serialization
+    from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
+
+    if not by.strip() or len(by) > _LONGEST or not by.isprintable():
+        raise PackageError(f"the name of a publisher is one line of 1 to {_LONGEST} characters")
+    private = Ed25519PrivateKey.generate()
+    text = private.private_bytes(
+        serialization.Encoding.PEM,
+        serialization.PrivateFormat.PKCS8,
+        serialization.NoEncryption(),
+    )
+    file.parent.mkdir(parents=True, exist_ok=True)
+    try:
+        number = os.open(file, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
+    except FileExistsError:
+        raise PackageError(
+            f"{file}: there is a key already; packages signed with it are known by it"
+        ) from None
+    with os.fdopen(number, "wb") as opened:
+        opened.write(f"{_NAMED}{by}\n".encode() + text)
+    return Signer(by, private)
+
+
+def read_signer(file: Path) -> Signer | None:
+    """Return the key in a file, or None when there is no such file; raise `PackageError`."""
+    from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
+    from cryptography.hazmat.primitives.serialization import load_pem_private_key
+
+    try:
+        with open(file, "rb") as opened:
+            data = opened.read(_KEY_BYTES)
+    except FileNotFoundError:
+        return None
+    except OSError as error:
+        raise PackageError(f"{file}: {error.strerror or error}") from None
+    named, _, text = data.partition(b"\n")
+    try:
+        by = named.decode()
+        private = load_pem_private_key(text, None)
+    except (ValueError, TypeError, binascii.Error):
+        raise PackageError(_no_key(file)) from None
+    is_named = by.startswith(_NAMED) and by.isprintable() and by != _NAMED
+    if not is_named or not isinstance(private, Ed25519PrivateKey):
+        raise PackageError(_no_key(file))
+    return Signer(by.removeprefix(_NAMED)[:_LONGEST], private)
+
+
+def _no_key(file: Path) -> str:
+    return f"{file}: this is no key of a publisher; 'urc repo key new NAME' makes one"
+
+
+def _statement(package: Key, version: str, sha256: str, by: str) -> bytes:
+    """Return what is signed. None of its parts can hold a line end, so no two read alike."""
+    return _STATEMENT.format(package=package, version=version, sha256=sha256, by=by).encode()

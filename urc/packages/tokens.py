@@ -1,0 +1,129 @@
+"""Who may publish into a repository: tokens, of which only the digests are kept."""
+
+import re
+import secrets
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated, Final
+
+import msgspec
+
+from urc.packages import disk
+from urc.packages.names import FOLDERS, Key, PackageError
+from urc.packages.package import sha256
+
+__all__ = ["Token", "Tokens", "new_token", "read_token"]
+
+_BYTES: Final = 1 << 20
+_MOST: Final = 1000
+_NAME: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}")
+_MAY: Final = re.compile(rf"(?:({'|'.join(FOLDERS)})/(?:[a-z][a-z0-9-]{{0,63}})?\*?|\*)")
+_TOKEN: Final = re.compile(r"urc_[A-Za-z0-9_-]{43}")
+
+
+class Token(msgspec.Struct, frozen=True):
+    """What is kept of a token."""
+
+    name: str
+    sha256: Annotated[str, msgspec.Meta(pattern=r"\A[0-9a-f]{64}\Z")]
+    """Of the token. A slow digest would add nothing: 256 random bits cannot be guessed."""
+    may: tuple[str, ...]
+    """``drivers/puppet``, ``drivers/puppet*``, ``widgets/*`` or ``*``."""
+
+    def allows(self, key: Key) -> bool:
+        """Return whether it may publish a package."""
+        text = str(key)
+        return any(
+            text.startswith(one[:-1]) if one.endswith("*") else text == one for one in self.may
+        )
+
+
+class _File(msgspec.Struct, frozen=True):
+    format: Annotated[int, msgspec.Meta(ge=1, le=1)]
+    tokens: tuple[Token, ...]
+
+
+class Tokens:
+    """A file of tokens; each question reads it, so what is removed counts no more at once."""
+
+    def __init__(self, file: Path) -> None:
+        self.file = file
+
+    def all(self) -> tuple[Token, ...]:
+        """Return what is kept; raise `PackageError` when it cannot be read."""
+        try:
+            with open(self.file, "rb") as opened:
+                return msgspec.json.decode(opened.read(_BYTES), type=_File).tokens
+        except FileNotFoundError:
+            return ()
+        except (msgspec.DecodeError, UnicodeDecodeError) as error:
+            raise PackageError(f"{self.file}: this is no file of tokens: {error}") from None
+        except OSError as error:
+            raise PackageError(f"{self.file}: {error.strerror or error}") from None
+
+    def find(self, text: str) -> Token | None:
+        """Return the token that somebody shows, or None; how long it takes tells nothing."""
+        digest = sha256(text.encode())
+        found = None
+        for token in self.all():
+            if secrets.compare_digest(token.sha256, digest):
+                found = token
+        return found
+
+    def add(self, name: str, may: tuple[str, ...]) -> str:
+        """Make a token and return it: it is never shown again.
+
+        Raises:
+            PackageError: the name is taken or none, or what it may do names no packages.
+        """
+        if not _NAME.fullmatch(name):
+            raise PackageError(f"{name!r}: a name of letters, digits, '-', '_' and '.' is expected")
+        for one in may:
+            if not _MAY.fullmatch(one):
+                raise PackageError(
+                    f"{one!r} names no packages; drivers/puppet, drivers/puppet*, widgets/* or *"
+                    " is expected"
+                )
+        text = new_token()
+        with self._changing() as known:
+            if any(token.name == name for token in known):
+                raise PackageError(f"{self.file}: there is a token {name!r} already")
+            if len(known) >= _MOST:
+                raise PackageError(f"{self.file}: at most {_MOST} tokens can be kept")
+            self._write((*known, Token(name, sha256(text.encode()), may)))
+        return text
+
+    def remove(self, name: str) -> None:
+        """Forget a token; raise `PackageError` when there is none of that name."""
+        with self._changing() as known:
+            if all(token.name != name for token in known):
+                names = ", ".join(token.name for token in known) or "none"
+                raise PackageError(f"{self.file}: there is no token {name!r}; there are: {names}")
+            self._write(tuple(token for token in known if token.name != name))
+
+    @contextmanager
+    def _changing(self) -> Iterator[tuple[Token, ...]]:
+        with disk.exclusive(self.file.with_name(f".{self.file.name}.changing")):
+            yield self.all()
+
+    def _write(self, tokens: tuple[Token, ...]) -> None:
+        data = msgspec.json.format(msgspec.json.encode(_File(1, tokens)), indent=1)
+        disk.put_file(self.file, data + b"\n", self.file.resolve().parent)
+
+
+def new_token() -> str:
+    """Return a token that nobody can guess: 256 random bits."""
+    return f"urc_{secrets.token_urlsafe(32)}"
+
+
+def read_token(file: Path) -> str:
+    """Return the token in a file; raise `PackageError`."""
+    try:
+        with open(file, "rb") as opened:
+            text = opened.read(1024).decode("utf-8", "replace").strip()
+    except OSError as error:
+        raise PackageError(f"{file}: {error.strerror or error}") from None
+    if not _TOKEN.fullmatch(text):
+        raise PackageError(f"{file}: one token is expected, as 'urc repo token add' printed it")
+    return text

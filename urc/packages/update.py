@@ -1,0 +1,216 @@
+"""Newer versions of what is installed: which there are, what they change, and the way back.
+
+The verb and the pages do the same: `newer` lists, `plan_update` fetches, `staged_difference` shows
+what would change once `Change.stage` has made the files, `Change.replace` installs, and
+`Change.back` undoes it.
+"""
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import NamedTuple, Protocol
+
+from urc.packages.install import Found, plan_root, settle
+from urc.packages.lock import Lock, lock_of
+from urc.packages.names import PackageError
+from urc.packages.plan import Plan
+from urc.packages.sources import Source, merged
+from urc.packages.store import Store, kinds_in
+from urc.packages.versions import parse_version
+
+__all__ = [
+    "Difference",
+    "Newer",
+    "Seen",
+    "differences",
+    "headline",
+    "newer",
+    "plan_update",
+    "staged_difference",
+    "version_lines",
+]
+
+
+class Newer(NamedTuple):
+    """An update that there is."""
+
+    old: Lock
+    new: Lock
+
+    @property
+    def lines(self) -> list[str]:
+        """What changes, for people: one line for each package."""
+        return version_lines(self.old, self.new)
+
+
+class Seen(Protocol):
+    """What can be said of a package by looking at its documents; `urc.runtime.look` does."""
+
+    @property
+    def permissions(self) -> Sequence[str]:
+        """What it may do, one line each."""
+
+    @property
+    def wire(self) -> Mapping[str, str]:
+        """Place in the document → what stands there, of all that decides what goes to the robot."""
+
+
+Look = Callable[[Path, Path, Sequence[str]], Seen]
+"""Document, folder with all that it needs, names of the widgets that come along → what is seen."""
+
+
+class Difference(NamedTuple):
+    """What an update changes."""
+
+    versions: list[str]
+    """``widgets/dial 1.0.0 → 1.1.0``."""
+    gained: list[str]
+    """What it may do that the old one may not."""
+    lost: list[str]
+    wire: list[str]
+    """``- commands.beep.send: "beep"`` and ``+ commands.beep.send: "BEEP"``."""
+
+
+def newer(store: Store, sources: Sequence[Source], complain: Callable[[str], None]) -> list[Newer]:
+    """Return the updates there are for what is installed; nothing is fetched but indexes.
+
+    Of several installed versions of a package the newest counts.
+
+    Args:
+        store: what is installed.
+        sources: the repositories, in the order in which they are asked.
+        complain: takes a line for each that does not answer, or whose packages do not fit.
+
+    Raises:
+        PackageError: the store cannot be read.
+    """
+    found = merged(sources, complain)
+    updates = []
+    for lock in _newest(store.installed()):
+        if lock.key not in found:
+            continue
+        try:
+            new = _lock(lock, "*", found)
+        except PackageError as error:
+            complain(str(error))
+            continue
+        if new is not None:
+            updates.append(Newer(lock, new))
+    return updates
+
+
+def plan_update(
+    old: Lock,
+    sources: Sequence[Source],
+    store: Store,
+    complain: Callable[[str], None],
+    wanted: str = "*",
+) -> Plan | None:
+    """Return what the newest version comes to, with its archives fetched; None: it is up to date.
+
+    Args:
+        old: what is installed.
+        sources: as for `newer`.
+        store: where it is installed.
+        complain: takes lines for people.
+        wanted: range of versions, of which the newest is taken.
+
+    Raises:
+        PackageError: no source has it, needs collide, or an archive is not what was promised.
+    """
+    found = merged(sources, complain)
+    if old.key not in found:
+        raise PackageError(f"no repository has {old.root}; what is installed stays")
+    new = _lock(old, wanted, found)
+    return None if new is None else plan_root(old.key, new.version, found, store)
+
+
+def staged_difference(old: Lock, plan: Plan, store: Store, staged: Path, look: Look) -> Difference:
+    """Return what an update changes, its files having been made.
+
+    Args:
+        old: what is installed.
+        plan: what would be.
+        store: where both are.
+        staged: what `Change.stage` returned for the plan.
+        look: tells what documents may do.
+
+    Raises:
+        UrcError: the new document is broken, or reaches out of its package.
+    """
+    before = _seen(old, store.make(old), look)
+    after = _seen(plan.lock, staged, look)
+    gained, lost = differences(before.permissions, after.permissions)
+    return Difference(
+        version_lines(old, plan.lock), gained, lost, _wire_lines(before.wire, after.wire)
+    )
+
+
+def differences(before: Iterable[str], after: Iterable[str]) -> tuple[list[str], list[str]]:
+    """Return what is only in the second, and what is only in the first, in their order."""
+    old, new = list(before), list(after)
+    return [one for one in new if one not in old], [one for one in old if one not in new]
+
+
+def headline(old: Lock, new: Lock) -> str:
+    """Return what becomes of a package, for people: ``drivers/puppet 1.0.0 → 1.1.0``."""
+    return str(old) if old.version == new.version else f"{old} → {new.version}"
+
+
+def version_lines(old: Lock, new: Lock) -> list[str]:
+    """Return which packages change, for people."""
+    lines = []
+    for name in sorted({*old.packages, *new.packages}):
+        before, after = old.packages.get(name), new.packages.get(name)
+        if before is None:
+            lines.append(f"{name} {after.version if after else ''}, new")
+        elif after is None:
+            lines.append(f"{name} {before.version}, no longer needed")
+        elif before.version != after.version:
+            older = parse_version(after.version) < parse_version(before.version)
+            lines.append(f"{name} {before.version} → {after.version}{', which is older' * older}")
+    return lines
+
+
+def _seen(lock: Lock, folder: Path, look: Look) -> Seen:
+    document = folder / lock.root / f"{lock.key.kind}.yaml"
+    return look(document, folder, [key.name for key in kinds_in(lock, "widget")])
+
+
+def _wire_lines(before: Mapping[str, str], after: Mapping[str, str]) -> list[str]:
+    lines = []
+    for place in dict.fromkeys((*before, *after)):
+        if before.get(place) != after.get(place):
+            lines += [f"- {place}: {before[place]}"] if place in before else []
+            lines += [f"+ {place}: {after[place]}"] if place in after else []
+    return lines
+
+
+def _newest(locks: Iterable[Lock]) -> list[Lock]:
+    found: dict[str, Lock] = {}
+    for lock in locks:
+        other = found.get(lock.root)
+        if other is None or other.number < lock.number:
+            found[lock.root] = lock
+    return list(found.values())
+
+
+def _lock(old: Lock, wanted: str, found: Found) -> Lock | None:
+    """Return the lock of the newest version, or None where that is no update of `old`."""
+    new = lock_of(old.key, settle(old.key, wanted, found))
+    if new == old or new.number < old.number:
+        return None
+    if new.number == old.number and not _is_step_up(old, new):
+        return None
+    return new
+
+
+def _is_step_up(old: Lock, new: Lock) -> bool:
+    """Return whether something that the same version needs got newer, and nothing older."""
+    pairs = [
+        (parse_version(pin.version), parse_version(new.packages[name].version))
+        for name, pin in old.packages.items()
+        if name in new.packages
+    ]
+    return all(before <= after for before, after in pairs) and any(
+        before < after for before, after in pairs
+    )

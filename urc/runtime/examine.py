@@ -1,0 +1,86 @@
+"""Whether a package's document may be listed in a repository: its errors, its tests included.
+
+``python -m urc.runtime.examine DOCUMENT`` prints the faults as a JSON list. It gives itself little
+memory and time: a stranger's document cannot hold up the repository that looks at it.
+"""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Final
+
+from urc.config.load import check
+from urc.problems import printable
+from urc.runtime.catalog import built_in_catalog
+from urc.runtime.selftest import exercise
+from urc.runtime.shelves import TwoShelves
+from urc.shipped import shipped
+
+__all__ = ["examine", "examine_apart"]
+
+_MEMORY_BYTES: Final = 2 << 30
+_PROCESSOR_S: Final = 60
+_TOTAL_S: Final = 60.0
+_FAULTS_MOST: Final = 20
+_FAULT_LONGEST: Final = 500
+
+
+def examine(document: Path) -> list[str]:
+    """Return the errors of a package's document, one line each.
+
+    Args:
+        document: ``TOP/drivers/puppet/driver.yaml``, beside the packages that it needs.
+    """
+    top = document.parent.parent.parent
+    checked = check(document, built_in_catalog(), TwoShelves(shipped("widgets"), top / "widgets"))
+    homes = (top.resolve(), shipped("widgets").resolve())
+    outside = [
+        f"{document}: it refers to {file}, which is not in this repository"
+        for file in checked.files
+        if not any(Path(file).resolve().is_relative_to(home) for home in homes)
+    ]
+    if outside:
+        return outside
+    problems = [*checked.problems]
+    if checked.profile is not None:
+        problems += exercise(checked.profile).problems
+    return [problem.headline for problem in problems if problem.severity == "error"]
+
+
+def examine_apart(document: Path, total_s: float = _TOTAL_S) -> list[str]:
+    """Return the same of a stranger's document: found by a process of its own, within bounds.
+
+    Args:
+        document: as for `examine`.
+        total_s: after which it is stopped.
+    """
+    command = [sys.executable, "-P", "-m", "urc.runtime.examine", str(document)]
+    try:
+        done = subprocess.run(  # noqa: S603 (our own program)
+            command, stdin=subprocess.DEVNULL, capture_output=True, timeout=total_s, check=False
+        )
+    except subprocess.TimeoutExpired:
+        return [f"{document}: checking it took longer than {total_s:g} s"]
+    try:
+        faults = [str(fault) for fault in json.loads(done.stdout)]
+    except ValueError:
+        return [f"{document}: it cannot be checked within the memory and time that there are"]
+    return [fault[:_FAULT_LONGEST] for fault in faults[:_FAULTS_MOST]]
+
+
+def _main(document: str) -> int:
+    try:
+        import resource
+    except ImportError:  # Windows: the time-out of the caller is all there is
+        pass
+    else:
+        resource.setrlimit(resource.RLIMIT_AS, (_MEMORY_BYTES, _MEMORY_BYTES))
+        resource.setrlimit(resource.RLIMIT_CPU, (_PROCESSOR_S, _PROCESSOR_S))
+        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    sys.stdout.write(json.dumps([printable(line) for line in examine(Path(document))]))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(_main(sys.argv[1]))
