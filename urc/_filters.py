@@ -8,7 +8,7 @@ turns small operands into a large result.
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
-from urc import _bytes, _cuts, _lists, _rotation
+from urc import _bytes, _cuts, _geometry, _lists, _rotation
 from urc._spelling import spelt
 
 __all__ = ["FILTERS", "SCOPE", "filter_names"]
@@ -236,6 +236,7 @@ FILTERS |= {
 FILTERS |= {name: Filter(one, (more, more)) for name, (one, more) in _bytes.TEXT_FILTERS.items()}
 
 FILTERS |= {name: Filter(*one) for name, one in _lists.LIST_FILTERS.items()}
+FILTERS |= {name: Filter(*one) for name, one in _geometry.GEOMETRY_FILTERS.items()}
 FILTERS |= {name: Filter(*one) for name, one in _cuts.CUT_FILTERS.items()}
 
 _OPERATORS = (_add, _sub, _mul, _div, _floordiv, _mod, _pow, _item, _join)

@@ -9,6 +9,7 @@ WARNING: the result is passed to eval. Everything put into it is a repr() of a c
 that `resolve` returns, or a name out of `urc._filters.SCOPE`; keep it so.
 """
 
+import math
 import re
 from collections.abc import Callable
 from typing import Final
@@ -30,6 +31,7 @@ _CONSTANTS = {
     "False": "False",
     "none": "None",
     "None": "None",
+    "pi": repr(math.pi),
 }
 _KEYWORDS = frozenset(("and", "or", "not", "in", "is", "if", "else"))
 _COMPARE = frozenset(("==", "!=", "<", "<=", ">", ">="))

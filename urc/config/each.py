@@ -26,6 +26,7 @@ _NODES_MOST: Final = 10_000
 _RESERVED: Final = ("params", "settings")
 _NAMED: Final = ("signals", "messages", "commands", "sequences", "widgets")
 _LISTED: Final = ("polls", "tests")
+_BY_NAME: Final = ("simulator", "rules")
 
 
 def expand(document: Document, findings: Findings) -> Document:
@@ -119,7 +120,10 @@ def _places(data: object) -> Iterator[Path]:
     for key, below in (("simulator", ()), ("interfaces", ("widgets",))):
         named = data.get(key)
         if isinstance(named, dict):
-            yield from ((key, name, *below) for name in named)
+            yield from ((key, name, *below) for name in named if (key, name) != _BY_NAME)
+            rules = named.get("rules") if key == "simulator" else None
+            if isinstance(rules, dict):
+                yield from ((*_BY_NAME, name) for name in rules)
 
 
 def _at(data: object, path: Path) -> object:

@@ -15,10 +15,12 @@ from urc.config.shape import check_shape, kind_of, read_schema
 from urc.problems import Problem, ProblemsError, has_errors
 from urc.source import Document
 
-__all__ = ["EMULATED", "Gathered", "Sources", "gather"]
+__all__ = ["RESERVED", "Gathered", "Sources", "gather"]
 
-EMULATED: Final = ("signals", "state")
-"""Keys of a simulator that are no transports: the values with which it begins."""
+_EMULATED: Final = ("signals", "state", "world")
+"""Keys of a simulator that are no transports: the values with which it begins, and its world."""
+RESERVED: Final = (*_EMULATED, "rules")
+"""Keys of a simulator that cannot be names of transports."""
 
 
 class Sources:
@@ -35,7 +37,9 @@ class Sources:
         self.interfaces: dict[str, Part] = {}
         self.tests: list[Part] = []
         self.simulator: dict[str, Part] = {}
-        """Rules by transport, and what is under the keys in `EMULATED`."""
+        """What an emulated robot is, but for its rules."""
+        self.rules: dict[str, Part] = {}
+        """Rules of the emulated robot by transport."""
 
     def add(self, part: Part) -> None:
         """Take what `part` says beside its wire; it goes before what was there."""
@@ -43,12 +47,34 @@ class Sources:
         for slot, use in part.named("widgets").items():
             self.slots.setdefault(slot, []).append(use)
         self.tests += part.listed("tests")
-        self.simulator |= part.named("simulator")
         simulator = part.get("simulator")
-        for key in EMULATED:
-            inner = simulator.get(key) if simulator else None
+        if simulator is None:
+            return
+        for key in _EMULATED:
+            inner = simulator.get(key)
             if inner is not None:
-                self.simulator[key] = inner
+                self.simulator[key] = _over(self.simulator.get(key), inner)
+        rules = {name: one for name, one in simulator.entries().items() if name not in RESERVED}
+        for name, inner in (rules | simulator.named("rules")).items():
+            self.rules[name] = _over(self.rules.get(name), inner)
+
+
+def _over(below: Part | None, part: Part) -> Part:
+    """Return a part of a simulator with what stands below it, in the driver's document."""
+    if below is None:
+        return part
+    merged = merge(_tree(below), _tree(part), part.path)
+    home, value, mark = merged.home, merged.value, merged.mark
+    for key in reversed(part.path):
+        value, mark = {key: value}, mark.copy({key: mark})
+    document = Document(home.file, home.text, home.lines, value, mark)
+    return Part(document, part.path, merged.value)
+
+
+def _tree(part: Part) -> Tree:
+    mark = part.document.at(part.path)
+    assert mark is not None, part.path  # noqa: S101  # what stands there has a mark
+    return Tree(part.data, mark, part.document.source_of(part.path))
 
 
 class Gathered(NamedTuple):

@@ -11,8 +11,9 @@ from urc.model.codec import ReadSpec
 from urc.model.driver import Driver
 from urc.model.profile import Reaction, SimulatorRule
 from urc.model.values import Reading, Signal, Value
+from urc.model.world import WorldSpec
 
-__all__ = ["link_rules", "link_values"]
+__all__ = ["link_rules", "link_values", "settable"]
 
 
 def link_values(
@@ -28,7 +29,7 @@ def link_values(
     values: dict[str, Reading] = {}
     if "state" in parts:
         for name, inner in parts["state"].entries().items():
-            if name in driver.signals or name in ("now", "settings"):
+            if name in driver.signals or name in ("now", "settings", "world"):
                 what = "a signal" if name in driver.signals else "something else"
                 text = f"{name!r} is {what} already"
                 hint = "give its first value under 'signals'" if what == "a signal" else ""
@@ -36,13 +37,14 @@ def link_values(
             values[name] = tuple(inner.data) if isinstance(inner.data, list) else inner.data
     if "signals" in parts:
         for name, inner in parts["signals"].entries().items():
-            signal = _settable(name, inner, driver, findings)
+            signal = settable(name, inner, driver, findings)
             if signal is not None:
                 values[name] = _value(inner, signal, findings)
     return values
 
 
-def _settable(name: str, part: Part, driver: Driver, findings: Findings) -> Signal | None:
+def settable(name: str, part: Part, driver: Driver, findings: Findings) -> Signal | None:
+    """Return the signal that is given a value at `part`; report it if it has none of its own."""
     signal = driver.signals.get(name)
     if signal is None:
         text = f"{name!r} is not a signal"
@@ -94,7 +96,11 @@ def _single(part: Part, signal: Signal, kind: str, findings: Findings) -> Value:
 
 
 def link_rules(
-    linker: Linker, part: Part, rules: Iterable[SimulatorRule], state: Iterable[str]
+    linker: Linker,
+    part: Part,
+    rules: Iterable[SimulatorRule],
+    state: Iterable[str],
+    world: WorldSpec | None = None,
 ) -> None:
     """Check the rules of one transport.
 
@@ -103,8 +109,10 @@ def link_rules(
         part: the list of rules.
         rules: what was made of them.
         state: names of the robot's own state.
+        world: of the robot.
     """
-    always = {"now", *state, *linker.driver.signals}
+    always = {"now", *state, *linker.driver.signals} | ({"world"} if world is not None else set())
+    told = frozenset[str]() if world is None else frozenset(world.senses)
     for inner, rule in zip(part.items(), rules, strict=True):
         known = always | _given(linker, inner, rule)
         if rule.when is not None:
@@ -112,6 +120,7 @@ def link_rules(
         places = (inner, *inner.listed("then"))
         for place, reaction in zip(places, rule.reactions, strict=True):
             _link_reaction(linker, place, reaction, known, set(state))
+            _check_told(linker, place, told)
         _check_answers(linker, places, rule)
 
 
@@ -184,7 +193,7 @@ def _link_reaction(
             hint = did_you_mean(name, names, "names") or "declare it under simulator.state"
             linker.findings.error(inner, "unknown-signal", text, key=True, hint=hint)
         elif name not in state:
-            signal = _settable(name, inner, linker.driver, linker.findings)
+            signal = settable(name, inner, linker.driver, linker.findings)
             if signal is not None and not isinstance(inner.data, str):
                 _value(inner, signal, linker.findings)
         value = reaction.sets.get(name)
@@ -198,6 +207,15 @@ def _link_reaction(
         text = f"there is no message {reaction.message!r}"
         hint = did_you_mean(reaction.message, linker.driver.messages, "messages")
         linker.findings.error(part, "unknown-message", text, at="message", hint=hint)
+
+
+def _check_told(linker: Linker, part: Part, told: frozenset[str]) -> None:
+    """Report values for signals that the world tells."""
+    for name, inner in part.named("set").items():
+        if name in told:
+            text = f"signal {name!r} is told by the world"
+            hint = "take it away here, or from world.signals"
+            linker.findings.error(inner, "two-sources", text, key=True, hint=hint)
 
 
 def _check_word(linker: Linker, part: Part, value: Template) -> None:

@@ -12,13 +12,15 @@ from urc.config.link_options import check_option
 from urc.config.link_signals import link_signals
 from urc.config.link_steps import link_sequences
 from urc.config.parse_line import option_templates
+from urc.config.parse_simulator import Simulated
 from urc.config.part import Findings, Part
 from urc.config.suggest import did_you_mean
 from urc.expressions import COUNTERS, Template
 from urc.model.codec import ReadSpec, WriteSpec
 from urc.model.driver import Driver
-from urc.model.profile import Setting, SimulatorRule
+from urc.model.profile import Setting
 from urc.model.values import NOTHING, Reading
+from urc.model.world import WorldSpec
 
 __all__ = ["Uses", "link_driver", "link_simulator"]
 
@@ -139,6 +141,10 @@ class _Linker:
                 f"{name!r} means nothing here",
                 hint,
             )
+        if "world" in template.names and "world" not in self.driver.signals:
+            from urc.config.link_world import check_readings
+
+            check_readings(self.findings, part, template)
         self.uses.settings |= template.settings
         for name in sorted(template.settings - self.settings.keys()):
             self._unknown(
@@ -251,27 +257,32 @@ def _check_arguments_used(part: Part, send: WriteSpec, findings: Findings) -> No
 def link_simulator(
     sources: Sources,
     driver: Driver,
-    rules: Mapping[str, list[SimulatorRule]],
+    simulated: Simulated,
     settings: Mapping[str, Setting],
     findings: Findings,
-) -> Mapping[str, Reading]:
-    """Check every name in the rules of the emulated robot; return the values it begins with."""
-    if not sources.simulator:
-        return NOTHING
+) -> tuple[Mapping[str, Reading], WorldSpec | None]:
+    """Check every name in the emulated robot; return the values it begins with, and its world."""
+    if not sources.simulator and not sources.rules:
+        return NOTHING, None
     from urc.config.link_rules import link_rules, link_values
 
     linker = _Linker(driver, settings, findings)
-    parts = sources.simulator
-    for name, found in rules.items():
+    parts, world = sources.simulator, simulated.world
+    state = parts["state"].data if "state" in parts else ()
+    if world is not None:
+        from urc.config.link_world import link_world
+
+        world = link_world(linker, parts["world"], world, state, parts)
+    for name, found in simulated.rules.items():
+        part = sources.rules[name]
         if name not in driver.transports:
             findings.error(
-                parts[name],
+                part,
                 "unknown-transport",
                 f"there is no transport {name!r}",
                 key=True,
                 hint=did_you_mean(name, driver.transports, "transports"),
             )
             continue
-        state = parts["state"].data if "state" in parts else ()
-        link_rules(linker, parts[name], found, state)
-    return link_values(parts, driver, findings)
+        link_rules(linker, part, found, state, world)
+    return link_values(parts, driver, findings), world

@@ -17,14 +17,14 @@ from urc.config.link_wire import link_driver, link_simulator
 from urc.config.parse_driver import parse_driver, spoken_name
 from urc.config.parse_interface import check_names, parse_interface
 from urc.config.parse_profile import parse_setting
-from urc.config.parse_simulator import parse_simulator
+from urc.config.parse_simulator import Simulated, parse_simulator
 from urc.config.parse_test import parse_test
 from urc.config.parse_widget import Shelf, parse_widget
 from urc.config.part import Findings
 from urc.config.rules import check_profile
 from urc.model.driver import Driver
 from urc.model.interface import Interface
-from urc.model.profile import DocumentTest, Profile, Setting, SimulatorRule
+from urc.model.profile import DocumentTest, Profile, Setting
 from urc.problems import Problem, ProblemsError, has_errors
 from urc.registry import Catalog
 from urc.shipped import shipped
@@ -124,7 +124,7 @@ class _Parsed(NamedTuple):
     settings: dict[str, Setting]
     interfaces: dict[str, Interface]
     tests: list[DocumentTest]
-    rules: dict[str, list[SimulatorRule]]
+    simulated: Simulated
 
 
 def _profile(
@@ -140,7 +140,11 @@ def _profile(
             name: parse_interface(part, name, findings) for name, part in sources.interfaces.items()
         },
         tests=[parse_test(part, findings) for part in sources.tests],
-        rules=parse_simulator(sources, driver, catalog, findings) if sources.simulator else {},
+        simulated=(
+            parse_simulator(sources, driver, catalog, findings)
+            if sources.simulator or sources.rules
+            else Simulated()
+        ),
     )
     if has_errors(findings):
         return None
@@ -150,7 +154,8 @@ def _profile(
 def _link(sources: Sources, parsed: _Parsed, shelf: Shelf, findings: Findings) -> Profile | None:
     driver = parsed.driver
     uses = link_driver(sources.driver, driver, parsed.settings, findings)
-    emulated = link_simulator(sources, driver, parsed.rules, parsed.settings, findings)
+    simulated = parsed.simulated
+    emulated, world = link_simulator(sources, driver, simulated, parsed.settings, findings)
     tests = [
         link_test(part, test, driver, parsed.settings, findings)
         for part, test in zip(sources.tests, parsed.tests, strict=True)
@@ -183,8 +188,9 @@ def _link(sources: Sources, parsed: _Parsed, shelf: Shelf, findings: Findings) -
         interfaces=interfaces,
         widgets={one: widget for one, widget in widgets.items() if widget is not None},
         tests=tuple(tests),
-        simulator=tuple(rule for rules in parsed.rules.values() for rule in rules),
+        simulator=tuple(rule for rules in simulated.rules.values() for rule in rules),
         emulated=emulated,
+        world=world,
         licence=root.text("licence"),
         author=root.text("author"),
     )

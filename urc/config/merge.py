@@ -1,6 +1,7 @@
 """Two trees of data with their marks → one: what stands above goes before what it stands on.
 
-Mappings are merged key by key, lists of named things name by name; anything else is replaced. A
+Mappings are merged key by key, lists of named things name by name; anything else is replaced. Of
+the rules of a simulator those with names are changed, and the others stay. A
 ``null`` takes a key away, ``remove: true`` an item of such a list. No finding loses its place: each
 mark of the result says in which document it stands.
 """
@@ -94,8 +95,11 @@ def merge(base: Tree, over: Tree, path: Path = (), clash: _Clash | None = None) 
         return _mappings(base, over, path, clash)
     if isinstance(base.value, list) and isinstance(over.value, list):
         old, new = _by_name(base), _by_name(over)
-        if old is not None and new is not None:
+        is_rules = path[:1] == ("simulator",)
+        if old is not None and new is not None and not is_rules:
             return _lists(old, new, over, path, clash)
+        if new and is_rules:
+            return _rules(base, new, over, path, clash)
     if clash is not None and base.value != over.value:
         clash(path, base, over)
     return over
@@ -154,6 +158,20 @@ def _lists(
         else:
             result[name] = inner
     items = list(result.values())
+    return _built([tree.value for tree in items], dict(enumerate(items)), over)
+
+
+def _rules(base: Tree, new: dict[str, Tree], over: Tree, path: Path, clash: _Clash | None) -> Tree:
+    """Return rules of which some are changed by their names; new ones go before all others."""
+    left, items = dict(new), []
+    for inner in children(base).values():
+        name = item_name(inner.value)
+        changed = None if name is None else left.pop(name, None)
+        if changed is None:
+            items.append(inner)
+        elif not (isinstance(changed.value, dict) and changed.value.get("remove") is True):
+            items.append(merge(inner, changed, (*path, str(name)), clash))
+    items = [*left.values(), *items]
     return _built([tree.value for tree in items], dict(enumerate(items)), over)
 
 

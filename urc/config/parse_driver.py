@@ -174,13 +174,14 @@ def _argument(part: Part, findings: Findings) -> Argument:
     kind = part.text("type", "number")
     of = element_of(part, kind, findings)
     low, high = check_range(part, of, findings)
-    if part.name == "settings":
+    if part.name in ("settings", "pi"):
+        what = "the settings" if part.name == "settings" else "the number"
         findings.error(
             part,
             "bad-name",
-            "an argument cannot be called 'settings'",
+            f"an argument cannot be called {part.name!r}",
             key=True,
-            hint="templates find the settings under that name",
+            hint=f"templates find {what} under that name",
         )
     choices = [_fitting(inner, of, findings) for inner in part.listed("choices")]
     default_part = part.get("default")

@@ -24,6 +24,9 @@ def parse_signal(part: Part, title: str, findings: Findings) -> Signal:
     element = part.text("of", "number") if kind == "array" else kind
     _check_vector(part, kind, findings)
     low, high = check_range(part, element, findings)
+    if part.name == "pi":
+        text, hint = "a signal cannot be called 'pi'", "expressions find the number under that name"
+        findings.error(part, "bad-name", text, key=True, hint=hint)
     precision = part.integer("precision")
     if precision is not None and element != "number":
         findings.error(

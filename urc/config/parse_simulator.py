@@ -1,10 +1,10 @@
 """The emulated robot of a document: its first values, and the rules of each transport."""
 
 from collections.abc import Mapping
-from typing import Final
+from typing import Final, NamedTuple
 
 from urc.config.forms import FormContext, parse_read, parse_write
-from urc.config.gather import EMULATED, Sources
+from urc.config.gather import Sources
 from urc.config.parse_framing import parse_framing
 from urc.config.part import Findings, Part
 from urc.expressions import Template
@@ -12,27 +12,31 @@ from urc.model.codec import ReadSpec
 from urc.model.driver import Driver
 from urc.model.flow import MAX_STEP_S
 from urc.model.profile import Reaction, SimulatorRule
-from urc.model.values import Reading
+from urc.model.values import NOTHING, Reading
+from urc.model.world import WorldSpec
 from urc.patterns import Pattern
 from urc.registry import Catalog
 
-__all__ = ["parse_simulator", "rules_of"]
+__all__ = ["Simulated", "parse_simulator"]
 
 _TRIGGERS: Final = ("match", "command", "poll", "every")
 
 
-def rules_of(sources: Sources) -> dict[str, Part]:
-    """Return the rules by the transport that they are for."""
-    return {name: part for name, part in sources.simulator.items() if name not in EMULATED}
+class Simulated(NamedTuple):
+    """What a document says about its emulated robot, before any name is looked up."""
+
+    rules: Mapping[str, list[SimulatorRule]] = NOTHING
+    """By transport."""
+    world: WorldSpec | None = None
 
 
 def parse_simulator(
     sources: Sources, driver: Driver, catalog: Catalog, findings: Findings
-) -> dict[str, list[SimulatorRule]]:
-    """Return the rules of each transport; their names are looked up later."""
+) -> Simulated:
+    """Return the rules of each transport, and the world; their names are looked up later."""
     found: dict[str, list[SimulatorRule]] = {}
     context = FormContext(catalog=catalog)
-    if any(_needs_types(part.data) for part in rules_of(sources).values()):
+    if any(_needs_types(part.data) for part in sources.rules.values()):
         from urc.config.parse_types import parse_types
         from urc.config.struct_numbers import parse_enums
 
@@ -40,12 +44,28 @@ def parse_simulator(
         enums = parse_enums(sources.driver, quiet)
         types = parse_types(sources.driver, enums, quiet)
         context = context._replace(types=types, enums=enums)
-    for name, part in rules_of(sources).items():
+    for name, part in sources.rules.items():
         spec = driver.transports.get(name)
         if spec is not None:
             context = context._replace(encoding=spec.encoding, framing=spec.framing)
         found[name] = [_rule(inner, name, findings, context) for inner in part.items()]
-    return found
+        _check_names(part, found[name], findings)
+    world = sources.simulator.get("world")
+    if world is None:
+        return Simulated(found)
+    from urc.config.parse_world import parse_world
+
+    return Simulated(found, parse_world(world, findings))
+
+
+def _check_names(part: Part, rules: list[SimulatorRule], findings: Findings) -> None:
+    """Report two rules of one name: whoever builds on them could not tell which one is meant."""
+    seen: set[str] = set()
+    for inner, rule in zip(part.items(), rules, strict=True):
+        if rule.name and rule.name in seen:
+            text = f"two rules of {rule.transport!r} are called {rule.name!r}"
+            findings.error(inner, "duplicate-name", text, at="name", hint="rename one of them")
+        seen.add(rule.name)
 
 
 def _needs_types(data: object) -> bool:
@@ -72,6 +92,7 @@ def _rule(part: Part, transport: str, findings: Findings, context: FormContext) 
         findings.error(part, "misplaced-key", text, at="after", key=True)
     return SimulatorRule(
         transport=transport,
+        name=part.text("name"),
         match=None if match is None else _match(match, findings, context),
         request=request,
         every_s=(

@@ -9,7 +9,7 @@ import re
 from collections.abc import Iterator, Mapping
 from typing import Final, NamedTuple
 
-from urc.config.gather import Sources, gather
+from urc.config.gather import RESERVED, Sources, gather
 from urc.config.made_look import made_look
 from urc.config.merge import Tree, merge
 from urc.config.parse_widget import Shelf
@@ -84,8 +84,11 @@ def _sections(sources: Sources, shelf: Shelf) -> Iterator[tuple[str, object]]:
         yield "interfaces", {name: _layout(part) for name, part in sources.interfaces.items()}
     if sources.tests:
         yield "tests", sources.tests
-    if sources.simulator:
-        yield "simulator", sources.simulator
+    if sources.simulator or sources.rules:
+        plain = {name: part for name, part in sources.rules.items() if name not in RESERVED}
+        inner: dict[str, object] = {**sources.simulator, **plain}
+        rest = {name: part for name, part in sources.rules.items() if name in RESERVED}
+        yield "simulator", inner | ({"rules": rest} if rest else {})
 
 
 def _layout(part: Part) -> Mapping[str, Part]:

@@ -9,6 +9,7 @@ from urc.model.driver import Driver, FramingSpec
 from urc.model.interface import Interface, WidgetUse
 from urc.model.values import NOTHING, Alarm, Reading, Value
 from urc.model.widget import Widget
+from urc.model.world import WorldSpec
 from urc.patterns import Pattern
 
 __all__ = [
@@ -167,6 +168,8 @@ class SimulatorRule(NamedTuple):
     when: Template | None = None
     """The rule is passed over where it does not hold."""
     reactions: tuple[Reaction, ...] = (Reaction(),)
+    name: str = ""
+    """By which other documents change it; "" for none."""
 
 
 class Profile(NamedTuple):
@@ -188,6 +191,8 @@ class Profile(NamedTuple):
     simulator: tuple[SimulatorRule, ...] = ()
     emulated: Mapping[str, Reading] = NOTHING
     """Values with which the emulated robot begins: signals, and names of its own state."""
+    world: WorldSpec | None = None
+    """Body and surroundings of the emulated robot; None: it has none."""
     licence: str = ""
     """SPDX identifier, as the document says."""
     author: str = ""

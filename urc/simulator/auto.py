@@ -5,7 +5,7 @@ line; the answer is made by the same declaration that would read it, out of plau
 command sets is remembered, where an argument and a signal share a name.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from functools import partial
 from typing import Final, NamedTuple
 
@@ -28,7 +28,15 @@ from urc.protocol.forms import (
 )
 from urc.protocol.framing import Framing, FramingError, build_framing
 from urc.simulator.backwards import computed_fields
-from urc.simulator.echo import correlated, own_fields, rule_for, typed_arguments
+from urc.simulator.echo import (
+    correlated,
+    guesses,
+    is_alike,
+    own_fields,
+    rule_for,
+    typed_arguments,
+)
+from urc.simulator.fields import Fields
 from urc.simulator.in_lines import in_lines
 from urc.simulator.values import Values
 
@@ -111,7 +119,7 @@ class AutoRobot:
             raise BadValue(name)
         return self._raw[name](self.values.of(name, now_s))
 
-    def fields(self, spec: ReadSpec, known: Mapping[str, object], now_s: float) -> "_Fields":
+    def fields(self, spec: ReadSpec, known: Mapping[str, object], now_s: float) -> Fields:
         """Return raw fields for a frame: what was set, else something plausible."""
         numbers: dict[str, object] = {}
         others: dict[str, object] = {}
@@ -128,34 +136,17 @@ class AutoRobot:
                 raw = round(raw)
             is_number = isinstance(raw, (int, float, tuple, list)) or is_set
             (numbers if is_number else others)[name] = raw
-        own = own_fields(spec, known)
-        own = computed_fields(spec, partial(self._raw_of, now_s=now_s)) | own
+        # A field of the document's own, `_kind`, is what the robot's state says of `kind`.
+        state = self.values.state
+        own: dict[str, object] = {
+            name: state[name[1:]]
+            for name in spec.fields
+            if name.startswith("_") and name[1:] in state
+        }
+        own |= computed_fields(spec, partial(self._raw_of, now_s=now_s))
+        own |= own_fields(spec, known)
         unknown = [name for name in spec.fields if name.startswith("_") and name not in own]
-        return _Fields(numbers, others, own, tuple(unknown))
-
-
-class _Fields(NamedTuple):
-    numbers: dict[str, object]
-    others: dict[str, object]
-    own: dict[str, object]
-    """Those of the document: constants of ``when``, and what correlates with the request."""
-    unknown: tuple[str, ...] = ()
-    """Those of the document that nothing says anything about."""
-
-    def attempts(self, fits: Callable[[dict[str, object]], bool]) -> Iterator[dict[str, object]]:
-        """Yield fields to write, from all to the least; the frame decides what it can carry."""
-        whole = {name: _rounded(raw) for name, raw in self.numbers.items()}
-        yield self.numbers | self.others | self.own
-        yield whole | self.others | self.own
-        # Some exclude each other: one by one, as long as there is a frame with all of them.
-        most = dict(self.own)
-        for name, raw in (self.numbers | self.others).items():
-            for value in (raw, whole.get(name, raw)):
-                if name not in most and fits(most | {name: value}):
-                    most[name] = value
-        yield most
-        yield self.own
-        yield {**dict.fromkeys(self.unknown, 1), **most}
+        return Fields(numbers, others, own, tuple(unknown))
 
 
 class AutoLine:
@@ -225,7 +216,9 @@ class AutoLine:
         """Return the frames of one answer or message; raise `Unanswered`."""
         if answer.prompt is not None:
             return [example(answer.prompt, {}).encode(self._spec.encoding, "replace")]
-        if answer.reader is None:
+        if answer.reader is None or self._robot.values.faults.drops(
+            (*answer.spec.fields, *answer.spec.sets)
+        ):
             return []
         if answer.match is not None:
             known = {**known, **correlated(answer.match, known)}
@@ -250,32 +243,65 @@ class AutoLine:
             label: a command or poll that is meant where several give the same frame; "" for any.
         """
         near: Asked | None = None
-        exact: list[Asked] = []
+        best: Asked | None = None
+        for one in self._readings(frame):
+            near = near or one
+            if not self._gives(one):
+                continue
+            best = best or one
+            if label in ("", best.request.label):
+                return best
+            # Of a poll and a command that send the same bytes, either may be meant.
+            if one.request.label == label and not (one.request.names or best.request.names):
+                return one
+        best = best or near
+        return best if best is not None and label in ("", best.request.label) else None
+
+    def asked_too(self, frame: Frame, label: str) -> Asked | None:
+        """Return what a frame asks as the command `label`, where what gives it first says nothing.
+
+        What stops a robot is often both what a command sends when it is released and a text of its
+        own: a good-bye, or a command without an answer.
+        """
+        best = self.asked(frame)
+        if best is None or best.request.names or best.request.answers:
+            return None
+        for one in self._readings(frame):
+            if one.request.label == label and self._gives(one):
+                return one
+        return None
+
+    def labels(self, frame: Frame) -> set[str]:
+        """Return every command, poll and script that sends this very frame, else the nearest."""
+        found = list(self._readings(frame))
+        exact = {one.request.label for one in found if self._gives(one)}
+        return exact or {one.request.label for one in found[:1]}
+
+    def _readings(self, frame: Frame) -> Iterator[Asked]:
+        """Yield all requests that a frame may be, the constant ones first."""
         for request in self._requests:
             found = request.writer.read(frame)
             arguments = None if found is None else typed_arguments(found, request.arguments)
             if arguments is None:
                 continue
-            near = near or Asked(request, arguments, frame)
-            if not request.names or self._gives(request, arguments, frame):
-                exact.append(Asked(request, arguments, frame))
-                if not label:
-                    break
-        best = exact[0] if exact else near
-        if best is None or label in ("", best.request.label):
-            return best
-        # Of a poll and a command that send the same bytes, either may be meant.
-        same = (one for one in exact if not (one.request.names or best.request.names))
-        return next((one for one in same if one.request.label == label), None)
+            for guess in guesses(request.arguments, arguments):
+                asked = Asked(request, guess, frame)
+                if self._gives(asked):
+                    yield asked
+            yield Asked(request, arguments, frame)
 
-    def _gives(self, request: _Request, arguments: Mapping[str, object], frame: Frame) -> bool:
+    def _gives(self, asked: Asked) -> bool:
+        """Return whether a request gives this very frame with the arguments in it."""
+        request, arguments, frame = asked
+        if not request.names:
+            return True
         namespace = {
             "settings": self._robot.settings,
             COUNTERS: lambda name, low, high: arguments.get(f"seq.{name}", low),
             **arguments,
         }
         try:
-            return request.writer.write(namespace) == frame.payload
+            return is_alike(request.writer.write(namespace), frame.payload)
         except (ExpressionError, NotWritable):
             return False
 
@@ -369,11 +395,3 @@ def numbered(data: Payload, request: Frame) -> Payload:
         return data
     number = asked.attributes.get("id")
     return Envelope("response", {"id": number, "ok": True, "status": 200}, data)
-
-
-def _rounded(raw: object) -> object:
-    if isinstance(raw, float):
-        return round(raw)
-    if isinstance(raw, (list, tuple)):
-        return [_rounded(one) for one in raw]
-    return raw

@@ -8,7 +8,7 @@ import re
 from collections.abc import Iterator, Mapping
 
 from urc.expressions import Template
-from urc.model.codec import ReadSpec
+from urc.model.codec import Envelope, Payload, ReadSpec
 from urc.model.driver import Argument, Driver
 from urc.patterns import compile_pattern, example
 from urc.protocol.vectors import elements_of
@@ -120,6 +120,32 @@ def typed_arguments(
         except ValueError:
             return None
     return typed
+
+
+def guesses(
+    arguments: Mapping[str, Argument], found: Mapping[str, object]
+) -> Iterator[dict[str, object]]:
+    """Yield arguments with each value of the one that no frame says plainly, as ``on`` for true.
+
+    Only where it is one, and there are few values that it can have.
+    """
+    left = [one for name, one in arguments.items() if name not in found]
+    if len(left) == 1:
+        choices = (True, False) if left[0].type == "boolean" else left[0].choices
+        for value in choices:
+            yield {**found, left[0].name: value}
+
+
+def is_alike(made: Payload, came: Payload) -> bool:
+    """Return whether a frame is the one that is made; an envelope may say more of its way."""
+    if not isinstance(made, Envelope) or not isinstance(came, Envelope):
+        return made == came
+    said = came.attributes
+    return (
+        made.verb == came.verb
+        and all(said.get(name) == value for name, value in made.attributes.items())
+        and (made.body or None) == (came.body or None)
+    )
 
 
 def _value(argument: Argument, raw: object) -> object:

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 from urc.expressions import COUNTERS, ExpressionError, Template
-from urc.model.codec import Payload, ReadSpec
+from urc.model.codec import Envelope, Payload, ReadSpec, traffic_of
 from urc.model.driver import TransportSpec
 from urc.model.profile import Reaction, SimulatorRule
 from urc.model.values import NOTHING
@@ -28,7 +28,7 @@ from urc.protocol.topics import frame_of
 from urc.simulator.auto import Answer, Asked, AutoLine, Unanswered, numbered
 from urc.simulator.values import Names, Unsettable, Values
 
-__all__ = ["Course", "Ruled", "Rules"]
+__all__ = ["Course", "Ruled", "Rules", "not_taken"]
 
 
 class Deed(NamedTuple):
@@ -136,15 +136,35 @@ class Rules:
                 names = None if asked is None else asked.arguments
             else:
                 names = _names_in(rule, frame)
-            for name, value in (names or NOTHING).items():
-                if isinstance(value, Unusable):
-                    raise Unanswered(f"{name}: {value.why}")
-            if names is None or not self.holds(rule.what.when, now_s, names):
-                continue
-            if asked is not None:
-                self._values.remember(asked.arguments)
-            return Course(rule.deeds, names, asked, frame)
+            course = self._course(rule, names, asked, frame, now_s)
+            if course is not None:
+                return course
+        # Nothing is written for the first that sends these bytes; for another that does, maybe.
+        for rule in self.asked:
+            asked = self._auto.asked_too(frame, rule.what.request) if rule.what.request else None
+            names = None if asked is None else asked.arguments
+            course = self._course(rule, names, asked, frame, now_s)
+            if course is not None:
+                return course
         return None
+
+    def _course(
+        self,
+        rule: Ruled,
+        names: Mapping[str, object] | None,
+        asked: Asked | None,
+        frame: Frame,
+        now_s: float,
+    ) -> Course | None:
+        """Return what a rule does with a frame that says `names`, None when it is passed over."""
+        for name, value in (names or NOTHING).items():
+            if isinstance(value, Unusable):
+                raise Unanswered(f"{name}: {value.why}")
+        if names is None or not self.holds(rule.what.when, now_s, names):
+            return None
+        if asked is not None:
+            self._values.remember(asked.arguments)
+        return Course(rule.deeds, names, asked, frame)
 
     def holds(
         self, condition: Template | None, now_s: float, names: Mapping[str, object] = NOTHING
@@ -160,10 +180,10 @@ class Rules:
     def do(self, deed: Deed, course: Course, now_s: float) -> list[Payload]:
         """Do one thing and return what is said; raise `Unanswered` for what cannot be done."""
         what = deed.what
+        said: list[Payload] = []
         try:
             if course.sets:
                 self._set(what, course, now_s)
-            said: list[Payload] = []
             if what.answers:
                 asked = course.asked
                 if asked is None and course.frame is not None:
@@ -173,11 +193,27 @@ class Rules:
                 said += self._auto.answers(asked, now_s)
             if deed.message is not None:
                 said += self._auto.say(deed.message, now_s)
-            if deed.writer is not None:
+            if deed.writer is not None and not self._is_dropped(what):
                 said.append(self._written(deed, deed.writer, course, now_s))
         except (ExpressionError, FramingError, NotWritable, Unsettable) as problem:
+            if self._wants_dropped(what):
+                return said
             raise Unanswered(str(problem)) from None
         return said
+
+    def _is_dropped(self, what: Reaction) -> bool:
+        """Return whether something that is said tells what has dropped out."""
+        return what.send is not None and self._values.faults.drops(what.send.names)
+
+    def _wants_dropped(self, what: Reaction) -> bool:
+        """Return whether a reaction may have failed because a sensor of the world has."""
+        body = self._values.body
+        names = {
+            name for one in what.sets.values() if isinstance(one, Template) for name in one.names
+        }
+        if what.send is not None:
+            names |= what.send.names
+        return body is not None and bool(body.world.dropped) and "world" in names
 
     def _set(self, what: Reaction, course: Course, now_s: float) -> None:
         names = Names(self._values, now_s, course.names)
@@ -194,6 +230,8 @@ class Rules:
         payload = writer.write(names)
         self._counters.count(draw)
         said = deed.framing.encode(payload) if isinstance(payload, bytes) else payload
+        if isinstance(said, Envelope) and said.verb == "publish":  # a message to who listens
+            said = Envelope("message", {"topic": said.attributes.get("topic")}, said.body)
         return said if course.frame is None else numbered(said, course.frame)
 
 
@@ -207,3 +245,15 @@ def _names_in(rule: Ruled, came: Frame) -> Mapping[str, object] | None:
         return None if match is None or isinstance(match, ReadSpec) else match.search(frame.text)
     except BadText:
         return None
+
+
+def not_taken(frame: Frame) -> str:
+    """Return what to tell about a frame that nothing takes, for people."""
+    if not isinstance(frame.payload, bytes):
+        shown = traffic_of(frame.payload).decode("utf-8", "replace")[:60]
+        return f"no rule takes {shown!r}, and the driver never sends it"
+    try:
+        shown = repr(frame.text[:60])
+    except BadText:
+        return f"a frame is not {frame.encoding} text"
+    return f"no rule takes {shown}, and the driver never sends it"

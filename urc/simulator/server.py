@@ -3,6 +3,7 @@
 How a client gets in is the matter of a door (`urc.simulator.doors`), one a kind of transport.
 """
 
+import asyncio
 import time
 from collections.abc import AsyncIterator, Callable, Mapping
 from contextlib import asynccontextmanager
@@ -15,7 +16,7 @@ from urc.model.values import Value
 from urc.problems import UrcError
 from urc.protocol.json_text_form import filled
 from urc.protocol.topics import listened
-from urc.simulator.doors.base import DOORS, Door, Listening, Place, shown_place
+from urc.simulator.doors.base import DOORS, Caller, Door, Listening, Place, shown_place
 from urc.simulator.twin import Twin
 
 __all__ = ["serve"]
@@ -33,6 +34,7 @@ async def serve(
     *,
     now: Callable[[], float] = time.time,
     is_anywhere: bool = False,
+    twin: Twin | None = None,
 ) -> AsyncIterator[Mapping[str, Listening]]:
     """Emulate the robot of `profile` until the context ends.
 
@@ -42,6 +44,7 @@ async def serve(
         host: address to listen on; the default can be reached from this machine only.
         now: seconds since the epoch, the templates' ``now``.
         is_anywhere: listen where it is free, whatever the profile says about ports and paths.
+        twin: the emulated robot, for who wants to look at it; made from the profile by default.
 
     Returns:
         Transport → where it listens.
@@ -49,11 +52,13 @@ async def serve(
     Raises:
         UrcError: a transport that cannot be emulated, or a place that cannot be had.
     """
-    twin = Twin(profile, settings)
+    robot = twin or Twin(profile, settings)
     transports = profile.driver.transports
     inside: dict[str, dict[tuple[str, int], Listening]] = {name: {} for name in transports}
+    caller = Caller()
     doors: list[Door] = []
     listening: dict[str, Listening] = {}
+    ready = asyncio.create_task(asyncio.to_thread(robot.prepare))
     try:
         for name in sorted(transports, key=lambda name: -_depth(transports, name)):
             spec = transports[name]
@@ -63,10 +68,12 @@ async def serve(
                 options=_options_of(spec, settings),
                 # What is reached through another line is known inside the robot alone.
                 host=_LOOPBACK if spec.via else host,
-                line=lambda name=name: twin.line(name),  # type: ignore[misc] # of this turn
+                line=lambda name=name: robot.line(name),  # type: ignore[misc] # of this turn
                 now=now,
                 topics=listened(profile.driver, name, settings),
                 is_anywhere=is_anywhere or bool(spec.via),
+                picture=lambda topics, name=name: robot.picture(name, topics, now()),  # type: ignore[misc] # of this turn
+                caller=caller,
                 carried=inside[name],
             )
             door = _door(place)
@@ -78,6 +85,7 @@ async def serve(
     finally:
         for door in reversed(doors):
             await door.close()
+        await asyncio.gather(ready, return_exceptions=True)
 
 
 def _door(place: Place) -> Door:

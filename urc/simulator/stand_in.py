@@ -9,18 +9,26 @@ from contextlib import asynccontextmanager
 from urc.model.profile import Profile
 from urc.model.values import Value
 from urc.simulator.server import serve
+from urc.simulator.twin import Twin
 
 __all__ = ["stand_in"]
 
 
 @asynccontextmanager
-async def stand_in(profile: Profile, settings: Mapping[str, Value]) -> AsyncIterator[Profile]:
+async def stand_in(
+    profile: Profile, settings: Mapping[str, Value], twin: Twin | None = None
+) -> AsyncIterator[Profile]:
     """Emulate `profile` for as long as the context lasts; give the profile that leads there.
+
+    Args:
+        profile: of the robot.
+        settings: for its templates.
+        twin: the emulated robot, for who wants to look at it; made from the profile by default.
 
     Raises:
         UrcError: a transport that cannot be emulated.
     """
-    async with serve(profile, settings, is_anywhere=True) as listening:
+    async with serve(profile, settings, is_anywhere=True, twin=twin) as listening:
         places = {name: place.options for name, place in listening.items()}
         yield _redirected(profile, places)
 

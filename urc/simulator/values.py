@@ -6,16 +6,21 @@ Pure. All connections of one robot share it.
 from collections.abc import Iterator, Mapping
 from typing import Final
 
-from urc.expressions import ExpressionError
+from urc.expressions import ExpressionError, Template
 from urc.model.driver import Driver
 from urc.model.values import NOTHING, Reading, Signal, Value
+from urc.model.world import WorldSpec
 from urc.problems import UrcError
 from urc.protocol.convert import BadValue
 from urc.protocol.decode import build_converter
+from urc.simulator.embodied import Embodied
+from urc.simulator.faults import Faults
 from urc.simulator.plausible import plausible
 
 __all__ = ["Names", "Unsettable", "Values"]
 
+_DIGITS: Final = 7
+"""Of what the world tells: a centimetre on the earth."""
 _DEEPEST: Final = 16
 """Signals that are computed from each other, one upon the other."""
 
@@ -32,22 +37,33 @@ class Values:
         driver: Driver,
         settings: Mapping[str, Value],
         initial: Mapping[str, Reading] = NOTHING,
+        world: WorldSpec | None = None,
     ) -> None:
-        """Begin with `initial` values, of signals and of the robot's own state."""
+        """Begin with `initial` values, of signals and of its own state; maybe in a world."""
         self.driver = driver
         self.settings: Mapping[str, Value] = dict(settings)
         self.state: dict[str, Reading] = {}
         """What is no signal."""
         self.chosen: dict[str, Reading] = {}
         """Signals that were set."""
+        self.body: Embodied | None = None
+        """What moves and senses; None where the document gives it no world."""
+        self.senses: Mapping[str, object] = NOTHING
+        """Signals that the world tells."""
+        self.faults = Faults()
+        """What is wrong with the robot on demand."""
         for name, value in initial.items():
             self.put(name, value)
+        if world is not None:
+            self.body, self.senses = Embodied(world, driver, self.evaluate, self.put), world.senses
 
     def remember(self, arguments: Mapping[str, object]) -> None:
         """Keep what a command sets, where an argument and a signal share a name."""
         for name, value in arguments.items():
             signal = self.driver.signals.get(name)
-            if signal is not None and signal.formula is None and value is not None:
+            if signal is None or name in self.senses:
+                continue
+            if signal.formula is None and value is not None:
                 try:
                     self.chosen[name] = _kept(signal, value)
                 except BadValue:
@@ -70,7 +86,11 @@ class Values:
 
     def of(self, name: str, now_s: float, depth: int = 0) -> Reading:
         """Return the value of a signal: as set, as computed, else something plausible."""
+        if name in self.faults.stuck:
+            return self.faults.stuck[name]
         signal = self.driver.signals[name]
+        if self.body is not None and name in self.senses:
+            return _sensed(self.body, signal, now_s)
         if name in self.chosen:
             return self.chosen[name]
         if signal.formula is not None and depth < _DEEPEST:
@@ -81,6 +101,10 @@ class Values:
             except (ExpressionError, BadValue):
                 return None
         return plausible(signal, now_s)
+
+    def evaluate(self, template: Template, now_s: float) -> object:
+        """Return the value of a template over all that the robot knows; raise `ExpressionError`."""
+        return template.evaluate(Names(self, now_s))
 
 
 class Names(Mapping[str, object]):
@@ -108,6 +132,8 @@ class Names(Mapping[str, object]):
             return self._now_s
         if name == "settings":
             return self._values.settings
+        if name == "world" and self._values.body is not None:
+            return self._values.body.view(self._now_s)
         if name in self._values.state:
             return self._values.state[name]
         if name in self._values.driver.signals:
@@ -121,6 +147,19 @@ class Names(Mapping[str, object]):
 
     def __len__(self) -> int:
         return sum(1 for _ in self)
+
+
+def _sensed(body: Embodied, signal: Signal, now_s: float) -> Reading:
+    """Return what the world says of a signal; None where that is no value of it."""
+    try:
+        value = body.sense(signal.name, now_s)
+        if isinstance(value, bytes):
+            return value
+        if isinstance(value, float):
+            value = round(value, _DIGITS)
+        return None if value is None else _kept(signal, _within(signal, value))
+    except (ExpressionError, BadValue):
+        return None
 
 
 def _kept(signal: Signal, value: object) -> Reading:

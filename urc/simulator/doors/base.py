@@ -28,6 +28,7 @@ __all__ = [
     "MAX_CLIENTS",
     "READ_BYTES",
     "TAKEN_WITHIN_S",
+    "Caller",
     "Crowd",
     "Door",
     "Guest",
@@ -64,6 +65,14 @@ class Listening(NamedTuple):
     """A file of the file system, for lines that are one."""
 
 
+class Caller:
+    """The machine that a robot was spoken to from last, whichever of its doors it came to."""
+
+    def __init__(self) -> None:
+        self.host = ""
+        """Its address; "" before anybody spoke."""
+
+
 class Place(NamedTuple):
     """Where a door is put, and what is behind it."""
 
@@ -82,6 +91,10 @@ class Place(NamedTuple):
     """What the driver listens to, on a transport that carries messages: topic → how."""
     is_anywhere: bool = False
     """Listen where it is free, whatever the options say; else exactly where they say."""
+    picture: Callable[[Sequence[str]], bytes | None] = lambda _: None
+    """Names of a topic → the picture that the robot's world gives there now, None without one."""
+    caller: Caller | None = None
+    """Who speaks to the robot, which all its doors share; None: nobody keeps it."""
     carried: Mapping[tuple[str, int], Listening] = MappingProxyType({})
     """What a client that comes through this door can reach from inside: host and port as the
     driver says them → where the emulated robot really listens for them."""
@@ -213,7 +226,7 @@ async def converse(
                 raise  # the system has given the client up
         if not said_by_client and not wait.expired():
             return
-        now_s = clock()
+        now_s, was_late = clock(), line.has_late
         said: list[Payload] = list(line.step(now_s - before_s, place.now()))
         before_s = now_s
         answers: list[Payload] = []
@@ -223,7 +236,8 @@ async def converse(
         if said or answers:
             async with asyncio.timeout(TAKEN_WITHIN_S):
                 await put(said + answers)
-        if line.is_over or (answers and limit is not None):
+        is_answered = limit is not None and bool(answers or (was_late and said))
+        if (line.is_over or is_answered) and not line.has_late:
             return
         await asyncio.sleep(0)  # reading what is there already does not wait by itself
 

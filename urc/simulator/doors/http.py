@@ -1,7 +1,8 @@
 """The emulated robot behind a web server: requests, and streams of pictures, events and lines.
 
 Requests go to the robot's rules as envelopes. What the driver listens to is served as a stream by
-its path: what the robot says on that topic or, for a camera, a picture of one wandering colour.
+its path: what the robot says on that topic or, for a camera, what it sees in its world; without a
+world, one colour that wanders.
 """
 
 import asyncio
@@ -197,21 +198,34 @@ class _Talk:
             await self._answer(401, [("WWW-Authenticate", challenge)], b"who are you?\n", asked)
             return
         kind = self._kind(asked)
+        await self._suffer(guest.line)
         if kind == "stills":
-            taken = picture(self._place.now())
+            taken = self._picture(asked)
+            if not taken:
+                await self._answer(503, [], b"the camera gives no picture\n", asked)
+                return
             await self._answer(200, [("Content-Type", "image/jpeg")], taken, asked)
         elif kind:
             await self._stream(guest, asked, kind)
         else:
             await self._answer(*_written(self._asks(guest.line, asked)), asked)
 
+    async def _suffer(self, line: TwinLine) -> None:
+        """Be late, or lost: what is wrong with the robot on demand."""
+        if line.loses:
+            raise ConnectionResetError("lost on demand")
+        if line.delay_s:
+            await asyncio.sleep(line.delay_s)
+
     def _asks(self, line: TwinLine, asked: Asked) -> Envelope:
         """Return the robot's answer; one that it takes without a word is answered as well."""
         for envelope in asked.ways:
             before = line.faults
-            for one in line.receive(envelope, self._place.now()):
+            for one in line.ask(envelope, self._place.now()):
                 if isinstance(one, Envelope) and one.verb == "response":
                     return one
+            if line.faults == before and line.is_incomplete:
+                return Envelope("response", {"ok": False, "status": 503, "reason": "no value"})
             if line.faults == before:
                 return Envelope("response", {"ok": True, "status": 200})
         reason = f"{line.last_fault}\n"
@@ -226,6 +240,12 @@ class _Talk:
         names = (asked.path, target)
         kinds = [how.get("stream") for topic, how in ways if topic.partition("#")[0] in names]
         return str(kinds[0]) if kinds else ""
+
+    def _picture(self, asked: Asked) -> bytes:
+        """Return what the robot sees in its world, else one of a wandering colour."""
+        place, target = self._place, asked.target.removeprefix(self._base)
+        seen = place.picture((asked.path, target))
+        return picture(place.now()) if seen is None else seen
 
     async def _answer(
         self, status: int, headers: Sequence[tuple[str, str]], body: bytes, asked: Asked
@@ -249,7 +269,7 @@ class _Talk:
         headers = [("Content-Type", _TYPES[kind]), ("Cache-Control", "no-store")]
         await self._say(h11.Response(status_code=200, headers=headers))
         if kind == "mjpeg":
-            await self._pictures()
+            await self._pictures(asked)
             return
         path = asked.path
 
@@ -262,11 +282,14 @@ class _Talk:
 
         await converse(self._place, guest, self._gone, put)
 
-    async def _pictures(self) -> None:
+    async def _pictures(self, asked: Asked) -> None:
         gone = asyncio.ensure_future(self._gone())
         try:
             while not gone.done():
-                taken = picture(self._place.now())
+                taken = self._picture(asked)
+                if not taken:
+                    await asyncio.wait([gone], timeout=PICTURE_EVERY_S)
+                    continue
                 head = f"--{_BOUNDARY}\r\nContent-Type: image/jpeg\r\nContent-Length: {len(taken)}"
                 await self._say(h11.Data(data=f"{head}\r\n\r\n".encode() + taken + b"\r\n"))
                 await asyncio.wait([gone], timeout=PICTURE_EVERY_S)

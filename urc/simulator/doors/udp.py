@@ -1,7 +1,8 @@
 """The emulated robot behind a UDP port.
 
 A client is an address that datagrams come from. Where the driver has a port of its own
-(``listen``), the robot talks there from the beginning, to this machine until it hears from another.
+(``listen``), the robot talks there from the beginning, to this machine until one of its UDP ports
+hears from another.
 """
 
 import asyncio
@@ -81,6 +82,8 @@ class UdpDoor(asyncio.DatagramProtocol):
         address = str(addr[0]), int(addr[1])
         if not data:
             return
+        if self._place.caller is not None:
+            self._place.caller.host = address[0]
         if address not in self._inboxes:
             self._meet(address)
         with suppress(asyncio.QueueFull):
@@ -104,9 +107,16 @@ class UdpDoor(asyncio.DatagramProtocol):
                 raise TimeoutError
             for datagram in said:
                 if self._line is not None and isinstance(datagram, bytes):
-                    self._line.sendto(datagram, address)
+                    self._line.sendto(datagram, self._now_at(address))
 
         await converse(self._place, guest, inbox.get, put)
+
+    def _now_at(self, address: _Address) -> _Address:
+        """Return where somebody is: whom the robot talks to unasked is who spoke to it last."""
+        caller = self._place.caller
+        if address != self._told or caller is None or not caller.host:
+            return address
+        return caller.host, address[1]
 
 
 def _reachable(host: str) -> str:

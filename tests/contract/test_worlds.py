@@ -1,0 +1,134 @@
+"""The robots that ship move in their worlds as they are told, and stop as the real ones do."""
+
+import math
+from collections.abc import Mapping
+from pathlib import Path
+
+import pytest
+
+from tests.contract.test_protocols import Conversation
+from urc.config.load import load_profile
+from urc.model.profile import Profile
+from urc.protocol.events import Request
+from urc.runtime.catalog import built_in_catalog
+from urc.simulator.embodied import Embodied
+from urc.simulator.world.world import World
+
+FOLDER = Path(__file__).parents[2] / "robots"
+
+BEFORE: Mapping[str, list[tuple[str, Mapping[str, object]]]] = {
+    "amphibot-ii": [("start", {}), ("steer", {"turn": 0.5})],
+    "amphibot-iii": [("start", {}), ("steer", {"turn": 0.5})],
+    "salamandra-i": [("start", {}), ("steer", {"turn": 0.5})],
+    "salamandra-ii": [("start", {}), ("steer", {"turn": 0.5})],
+    "ardupilot-rover": [("arm", {"armed": True})],
+    "tello": [("takeoff", {})],
+}
+"""What must come before it moves."""
+DRIVES: Mapping[str, tuple[str, Mapping[str, object]]] = {
+    "absolem": ("drive", {"speed": 0.3, "turn": 0.3}),
+    "amphibot-ii": ("swim", {"drive": 1.0}),
+    "amphibot-iii": ("swim", {"drive": 1.0}),
+    "ardupilot-rover": ("sticks", {"forward": 0.5, "turn": -0.5}),
+    "create-2": ("wheels", {"forward": 200, "turn": 60}),
+    "generic-ros1": ("drive", {"speed": 0.3, "turn": 0.3}),
+    "generic-ros2": ("drive", {"speed": 0.3, "turn": 0.3}),
+    "roveo-mini": ("drive", {"forward": 60, "left": 30}),
+    "salamandra-i": ("swim", {"drive": 1.0}),
+    "salamandra-ii": ("swim", {"drive": 1.0}),
+    "tello": ("fly", {"forward": 50, "clockwise": -40}),
+    "turtlebot3": ("drive", {"speed": 0.2, "turn": 0.3}),
+    "turtlebot4": ("drive", {"speed": 0.2, "turn": 0.3}),
+}
+"""Ahead, and to the left."""
+STOPS_AFTER_S = {"absolem": 1.0, "turtlebot4": 0.5, "ardupilot-rover": 3.0, "tello": 15.0}
+"""What the robots themselves do when commands stop, as their pages say; all others go on."""
+
+
+def profile_of(name: str) -> Profile:
+    """Return the profile of a robot that ships."""
+    return load_profile(FOLDER / f"{name}.yaml", built_in_catalog())
+
+
+def command(talk: Conversation, name: str, arguments: Mapping[str, object]) -> None:
+    """Run a command, which must not be refused."""
+    before = len(talk.faults)
+    request = Request(1, name, {**arguments})  # type: ignore[dict-item]  # values of documents
+    talk.perform(talk.engine.command(request, talk.now))
+    assert talk.faults[before:] == []
+
+
+def body_of(talk: Conversation) -> Embodied:
+    """Return what moves."""
+    body = talk.twin.body
+    assert body is not None
+    return body
+
+
+def pose(world: World) -> tuple[float, float, float]:
+    """Return where it is, and its direction."""
+    return world.motion.x, world.motion.y, world.motion.yaw
+
+
+@pytest.mark.parametrize("name", sorted(DRIVES))
+def test_it_goes_ahead_and_to_the_left_and_stops_when_it_is_let_go(name: str) -> None:
+    """By the bytes of its own driver, over the framing of its own line."""
+    profile = profile_of(name)
+    talk = Conversation(profile)
+    talk.begin()
+    talk.wait(3.0)
+    for action, arguments in BEFORE.get(name, []):
+        command(talk, action, arguments)
+        talk.wait(2.5)
+    world = body_of(talk).world
+    start = pose(world)
+    action, arguments = DRIVES[name]
+    for _ in range(10):
+        command(talk, action, arguments)
+        talk.wait(0.2)
+    x, y, yaw = pose(world)
+    ahead = (x - start[0]) * math.cos(start[2]) + (y - start[1]) * math.sin(start[2])
+    assert ahead > 0.1, "it did not go ahead"
+    assert math.remainder(yaw - start[2], 2 * math.pi) > 0.02, "it did not turn to the left"
+    hold = profile.driver.commands[action].hold
+    assert hold is not None
+    command(talk, action, hold.release)
+    talk.wait(3.0)
+    there = pose(world)
+    talk.wait(1.0)
+    assert pose(world) == pytest.approx(there, abs=1e-3), "it did not stop"
+
+
+@pytest.mark.parametrize("name", sorted(DRIVES))
+def test_when_commands_stop_it_does_what_the_real_one_does(name: str) -> None:
+    """Its fail-safe, or nothing at all: then it goes on until something is in its way."""
+    profile = profile_of(name)
+    talk = Conversation(profile)
+    talk.begin()
+    talk.wait(3.0)
+    for action, arguments in BEFORE.get(name, []):
+        command(talk, action, arguments)
+        talk.wait(2.5)
+    command(talk, *DRIVES[name])
+    body = body_of(talk)
+    now_s = talk.now
+    expected = STOPS_AFTER_S.get(name)
+    assert (body.failsafe and body.failsafe.after_s) == expected
+    body.world.advance(now_s + 0.4)
+    assert abs(body.world.motion.forward) > 0.05
+    if expected is None:
+        body.world.advance(now_s + 20)
+        assert body.world.motion.told_forward != 0
+        return
+    body.world.advance(now_s + expected + 3.0)
+    assert abs(body.world.motion.forward) < 1e-6
+    if name == "tello":
+        assert body.world.motion.z == 0.0  # it has landed
+
+
+def test_every_robot_that_moves_or_senses_has_a_world() -> None:
+    """All but the arm and the toy of the tutorial."""
+    names = {file.stem for file in FOLDER.glob("*.yaml")}
+    without = {name for name in names if profile_of(name).world is None}
+    assert without == {"puppet", "ur-e-series"}
+    assert {*DRIVES} == names - without - {"esp32-cam", "gpsd", "nmea-gps"}

@@ -1,0 +1,114 @@
+"""Faults on demand over real sockets: given at the start, changed by typed lines, and over HTTP."""
+
+import asyncio
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import httpx2
+import pytest
+
+from urc.config.load import load_profile
+from urc.runtime.catalog import built_in_catalog
+from urc.runtime.selftest import sample_settings
+from urc.simulator.server import serve
+from urc.simulator.twin import Twin
+
+ROOT = Path(__file__).parents[2]
+PUPPET = str(ROOT / "robots" / "puppet.yaml")
+WAIT_S = 20.0
+URC = (sys.executable, "-m", "urc.cli.main")
+QUESTION = b"Give me the battery %\n"
+
+
+async def asked(port: int) -> tuple[bytes, float]:
+    """Return the answer of the puppet to one question, and how long it took in seconds."""
+    reader, writer = await asyncio.open_connection("127.0.0.1", port)
+    begin = time.monotonic()
+    writer.write(QUESTION)
+    async with asyncio.timeout(WAIT_S):
+        answer = await reader.readline()
+    writer.close()
+    return answer, time.monotonic() - begin
+
+
+@pytest.mark.anyio
+async def test_faults_are_given_at_the_start_and_changed_by_typed_lines() -> None:
+    """The answer is late as told; after `mend` nothing is wrong; nonsense is told in one line."""
+    process = await asyncio.create_subprocess_exec(
+        *URC,
+        *("simulate", PUPPET, "--set", "port=0", "--fault", "delay=400ms"),
+        cwd=ROOT,
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+    )
+    assert process.stdin is not None
+    assert process.stdout is not None
+    assert process.stderr is not None
+    try:
+        async with asyncio.timeout(WAIT_S):
+            port = int((await process.stdout.readline()).split(b":")[-1])
+            answer, took_s = await asked(port)
+            assert answer.strip().isdigit()
+            assert took_s >= 0.35
+            process.stdin.write(b"fault nosie=2x\nmend\n")
+            error = await process.stderr.readline()
+            assert error.startswith(b"there is no fault 'nosie'; there are delay=200ms, loss=5%")
+            assert await process.stdout.readline() == b"faults: none\n"
+            assert (await asked(port))[0].strip().isdigit()
+            process.stdin.write(b"fault silent\n")
+            assert await process.stdout.readline() == b"faults: silent\n"
+    finally:
+        process.terminate()
+        await process.wait()
+
+
+def test_an_unknown_fault_is_wrong_use() -> None:
+    """One line, before anything listens."""
+    done = subprocess.run(
+        [*URC, "simulate", PUPPET, "--fault", "noise=2x"],
+        cwd=ROOT,
+        capture_output=True,
+        stdin=subprocess.DEVNULL,
+        timeout=WAIT_S,
+        text=True,
+        check=False,
+    )
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr.startswith("urc simulate: --fault: fault noise: this robot has no world")
+    assert done.stderr.count("\n") == 1
+
+
+@pytest.mark.anyio
+async def test_a_camera_shows_the_world_and_fails_on_demand() -> None:
+    """Two pictures of its stream differ, for the board turns; then there is none, and 503."""
+    profile = load_profile(ROOT / "robots" / "esp32-cam.yaml", built_in_catalog())
+    settings = sample_settings(profile.settings)
+    twin = Twin(profile, settings)
+    async with (
+        serve(profile, settings, is_anywhere=True, twin=twin) as places,
+        httpx2.AsyncClient(timeout=WAIT_S) as client,
+    ):
+        pictures: list[bytes] = []
+        stream = f"{places['video'].options['url']}stream"
+        async with client.stream("GET", stream) as response:
+            data = b""
+            async for piece in response.aiter_raw():
+                data += piece
+                while b"\r\n--picture" in data:
+                    whole, _, data = data.partition(b"\r\n--picture")
+                    pictures.append(whole.partition(b"\r\n\r\n")[2])
+                if len(pictures) > 4:
+                    break
+        assert pictures[0][:2] == b"\xff\xd8"
+        assert pictures[0] != pictures[4]
+        status = f"{places['web'].options['url']}status"
+        assert (await client.get(status)).json()["framesize"] == 8
+        twin.inject("dropout=frame_size", time.time())
+        assert (await client.get(status)).status_code == 503
+        twin.mend()
+        twin.inject("loss=100%", time.time())
+        with pytest.raises(httpx2.TransportError):
+            await client.get(status)

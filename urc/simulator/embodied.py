@@ -1,0 +1,129 @@
+"""An emulated robot that has a body: its state drives the body, and the body gives its signals.
+
+Pure: no socket, no clock. What the robot does when commands stop is done here, whether anybody is
+connected or not: that of the document (`failsafe`), else that of its held commands (`watchdog`).
+"""
+
+import logging
+import math
+import re
+from collections.abc import Callable, Iterable, Mapping
+
+from urc.expressions import ExpressionError, Template
+from urc.model.driver import Driver
+from urc.model.values import Reading
+from urc.model.world import Failsafe, WorldSpec
+from urc.simulator.world.world import View, World
+
+__all__ = ["Embodied", "failsafe_of"]
+
+log = logging.getLogger("urc.simulator.twin")
+_KEPT = ("flies", "cut")
+"""Inputs that are no motion: a robot that hears nothing more stays in the air."""
+
+_LOOKS = re.compile(r"_item\(ns\['world'\], '(laser|picture|panorama)'\)")
+"""What needs numpy."""
+
+Evaluate = Callable[[Template, float], object]
+"""A template and the time → its value over the robot's signals and state."""
+
+
+class Embodied:
+    """The body of one emulated robot, and what it has heard.
+
+    Args:
+        spec: as declared.
+        driver: of the robot.
+        evaluate: gives the value of a template.
+        put: sets something of the robot's state.
+    """
+
+    def __init__(
+        self,
+        spec: WorldSpec,
+        driver: Driver,
+        evaluate: Evaluate,
+        put: Callable[[str, object], None],
+    ) -> None:
+        self.spec = spec
+        self.world = World(spec, self._inputs, self._holds)
+        self.failsafe = spec.failsafe or failsafe_of(driver)
+        self._evaluate = evaluate
+        self._put = put
+        self._heard_s = -math.inf
+        """When a command of those that keep it going last came."""
+        self._is_safe = True
+        """Whether the fail-safe has done its work since."""
+        self._last_fault = ""
+
+    def hear(self, labels: Iterable[str], now_s: float) -> None:
+        """Take note of the commands in a frame."""
+        if self.failsafe is not None and not {*labels}.isdisjoint(self.failsafe.without):
+            self._heard_s, self._is_safe = now_s, False
+
+    def prepare(self) -> None:
+        """Load what lasers and cameras need, where a signal is told by one; may block."""
+        if any(_LOOKS.search(one.python) for one in self.spec.senses.values()):
+            import urc.simulator.world.laser
+            import urc.simulator.world.picture  # noqa: F401  # loaded is all that is wanted
+
+    def view(self, now_s: float) -> View:
+        """Return what can be read of the world at `now_s`."""
+        return self.world.view(now_s)
+
+    def sense(self, name: str, now_s: float) -> object:
+        """Return what a signal is now by the world; raise `ExpressionError` if it has no value."""
+        self.world.advance(now_s)
+        return self._evaluate(self.spec.senses[name], now_s)
+
+    def picture(self, name: str, now_s: float) -> bytes | None:
+        """Return the picture that is the value of a signal, None when it is none."""
+        value = self.sense(name, now_s)
+        return value if isinstance(value, bytes) else None
+
+    def _inputs(self, time_s: float) -> Mapping[str, float]:
+        failsafe = self.failsafe
+        is_lost = failsafe is not None and time_s - self._heard_s > failsafe.after_s
+        if is_lost and failsafe is not None and failsafe.sets and not self._is_safe:
+            self._is_safe = True
+            for name, value in failsafe.sets.items():
+                self._put(name, self._value(value, time_s))
+        stands = is_lost and failsafe is not None and not failsafe.sets
+        return {
+            name: self._number(name, value, time_s)
+            for name, value in self.spec.drive.items()
+            if not stands or name in _KEPT
+        }
+
+    def _holds(self, value: Template | bool) -> bool:
+        return bool(self._value(value, self.world.time_s or 0.0))
+
+    def _value(self, value: Template | Reading, time_s: float) -> object:
+        if not isinstance(value, Template):
+            return value
+        try:
+            return self._evaluate(value, time_s)
+        except ExpressionError as error:
+            self._tell(str(error))
+            return None
+
+    def _number(self, name: str, value: Template | float, time_s: float) -> float:
+        found = self._value(value, time_s)
+        if isinstance(found, (int, float)) and math.isfinite(found):
+            return float(found)
+        self._tell(f"world.drive.{name}: a number is expected, found {found!r}")
+        return 0.0
+
+    def _tell(self, text: str) -> None:
+        if text != self._last_fault:
+            self._last_fault = text
+            log.info("%s", text)
+
+
+def failsafe_of(driver: Driver) -> Failsafe | None:
+    """Return what the `watchdog` of the held commands says; None when one of them never stops."""
+    held = {name: one.hold for name, one in driver.commands.items() if one.hold is not None}
+    times = [hold.watchdog_s for hold in held.values()]
+    if not times or any(one is None or not math.isfinite(one) for one in times):
+        return None
+    return Failsafe(max(one for one in times if one is not None), tuple(held))

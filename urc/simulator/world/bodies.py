@@ -1,0 +1,236 @@
+"""How bodies move: one step of each kind, from what it is told.
+
+Pure. Metres, seconds, radians; x ahead, y to the left, z up, as REP 103 says. Wheels follow the arc
+of the step exactly, so that the length of a step does not matter while nothing changes.
+"""
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Final
+
+from urc.model.world import BodySpec
+
+__all__ = ["GRAVITY", "Motion", "joints_of", "legs_of", "move"]
+
+GRAVITY: Final = 9.80665
+_LANDS_AT: Final = 0.4
+"""Speed with which a quadrotor goes down to land, in m/s."""
+_LEAN: Final = 0.02
+"""Radians that a body on springs leans for each m/s²."""
+
+Inputs = Mapping[str, float]
+
+
+@dataclass(slots=True)
+class Motion:
+    """Where a body is, and how it moves."""
+
+    x: float = 0.0
+    y: float = 0.0
+    z: float = 0.0
+    yaw: float = 0.0
+    roll: float = 0.0
+    """Right side down is positive."""
+    pitch: float = 0.0
+    """Nose down is positive."""
+    forward: float = 0.0
+    """Speed along its own x; so `sideways` and `climb`."""
+    sideways: float = 0.0
+    climb: float = 0.0
+    turn: float = 0.0
+    """To the left, in rad/s."""
+    steer: float = 0.0
+    """Of the front wheels."""
+    phase: float = 0.0
+    """Of the wave along a body, in turns."""
+    drive: float = 0.0
+    """How strong the wave is, 0 to 1."""
+    bend: float = 0.0
+    """-1 to 1, to the left."""
+    is_up: bool = False
+    """It flies and has reached its height once."""
+    accelerations: list[float] = field(default_factory=lambda: [0.0, 0.0, 0.0])
+    """Along its own axes, without gravity."""
+    rates: list[float] = field(default_factory=lambda: [0.0, 0.0])
+    """Of roll and pitch."""
+    told_forward: float = 0.0
+    """What its wheels or tracks do, whatever comes of it; so `told_turn`."""
+    told_turn: float = 0.0
+    effort: float = 0.0
+    """Share of its strength that is in use, 0 to 1."""
+
+
+def move(body: BodySpec, motion: Motion, inputs: Inputs, dt_s: float) -> None:
+    """Move for `dt_s` seconds as `inputs` say; walls are the world's matter."""
+    before = motion.forward, motion.sideways, motion.climb, motion.roll, motion.pitch
+    _MOVES[body.type](body, motion, inputs, dt_s)
+    turn = motion.turn
+    motion.accelerations[0] = (motion.forward - before[0]) / dt_s - turn * motion.sideways
+    motion.accelerations[1] = (motion.sideways - before[1]) / dt_s + turn * motion.forward
+    motion.accelerations[2] = (motion.climb - before[2]) / dt_s
+    if body.type != "quadrotor":
+        _lean(body, motion)
+    motion.rates[0] = (motion.roll - before[3]) / dt_s
+    motion.rates[1] = (motion.pitch - before[4]) / dt_s
+
+
+def joints_of(body: BodySpec, motion: Motion) -> tuple[float, ...]:
+    """Return the angle of each joint from the head on: a wave that runs down, about a bend."""
+    return tuple(
+        motion.drive * body.amplitude * math.sin(2 * math.pi * (motion.phase - place / body.joints))
+        + motion.bend * body.amplitude / 3
+        for place in range(body.joints)
+    )
+
+
+def legs_of(body: BodySpec, motion: Motion) -> tuple[float, ...]:
+    """Return the angle of each leg, -pi to pi: neighbours are half a turn apart, as in a trot."""
+    turns = (motion.phase + (place % 3 != 0) / 2 for place in range(body.legs))
+    return tuple(2 * math.pi * ((one + 0.5) % 1.0 - 0.5) for one in turns)
+
+
+def _lean(body: BodySpec, motion: Motion) -> None:
+    """Lean against accelerations, and rock with the ground."""
+    along, across, _ = motion.accelerations
+    motion.pitch += (-_LEAN * along - motion.pitch) * 0.2
+    motion.roll += (_LEAN * across - motion.roll) * 0.2
+    if body.type in ("tracks", "ackermann"):
+        motion.pitch += 0.2 * body.roughness * math.sin(9 * motion.x + 5 * motion.y)
+        motion.roll += 0.2 * body.roughness * math.sin(7 * motion.y - 4 * motion.x)
+    if body.type == "swimmer":
+        motion.roll = 0.08 * motion.drive * math.sin(2 * math.pi * motion.phase)
+
+
+def _toward(value: float, target: float, most: float) -> float:
+    return min(target, value + most) if target > value else max(target, value - most)
+
+
+def _within(value: float, most: float) -> float:
+    return min(most, max(-most, value))
+
+
+def _arc(motion: Motion, dt_s: float) -> None:
+    """Go along the arc of the present speeds."""
+    angle = motion.turn * dt_s
+    if abs(angle) < 1e-9:
+        sine, cosine = dt_s, angle * dt_s / 2
+    else:
+        sine, cosine = math.sin(angle) / motion.turn, (1 - math.cos(angle)) / motion.turn
+    ahead = motion.forward * sine - motion.sideways * cosine
+    left = motion.forward * cosine + motion.sideways * sine
+    east, north = math.cos(motion.yaw), math.sin(motion.yaw)
+    motion.x += ahead * east - left * north
+    motion.y += ahead * north + left * east
+    motion.yaw = math.remainder(motion.yaw + angle, 2 * math.pi)
+
+
+def _ramped(body: BodySpec, motion: Motion, inputs: Inputs, dt_s: float) -> tuple[float, float]:
+    """Return the wheels' new speed and turn."""
+    forward = _within(inputs.get("forward", 0.0), body.speed)
+    turn = _within(inputs.get("turn", 0.0), body.turn)
+    motion.told_forward = _toward(motion.told_forward, forward, body.acceleration * dt_s)
+    motion.told_turn = _toward(motion.told_turn, turn, body.turn_acceleration * dt_s)
+    share = abs(motion.told_forward) / body.speed + 0.5 * abs(motion.told_turn) / body.turn
+    motion.effort = min(1.0, share)
+    return motion.told_forward, motion.told_turn
+
+
+def _wheels(body: BodySpec, motion: Motion, inputs: Inputs, dt_s: float) -> None:
+    motion.forward, motion.turn = _ramped(body, motion, inputs, dt_s)
+    motion.sideways = 0.0
+    _arc(motion, dt_s)
+
+
+def _tracks(body: BodySpec, motion: Motion, inputs: Inputs, dt_s: float) -> None:
+    forward, turn = _ramped(body, motion, inputs, dt_s)
+    motion.turn = turn * (1 - body.slip)
+    motion.forward = forward * (1 - body.slip * abs(turn) / body.turn / 2)
+    motion.sideways = 0.0
+    _arc(motion, dt_s)
+
+
+def _holonomic(body: BodySpec, motion: Motion, inputs: Inputs, dt_s: float) -> None:
+    motion.forward, motion.turn = _ramped(body, motion, inputs, dt_s)
+    sideways = _within(inputs.get("sideways", 0.0), body.speed)
+    motion.sideways = _toward(motion.sideways, sideways, body.acceleration * dt_s)
+    motion.effort = min(1.0, motion.effort + abs(motion.sideways) / body.speed)
+    _arc(motion, dt_s)
+
+
+def _ackermann(body: BodySpec, motion: Motion, inputs: Inputs, dt_s: float) -> None:
+    forward = _within(inputs.get("forward", 0.0), body.speed)
+    steer = _within(inputs.get("steer", 0.0), body.steer)
+    motion.steer = _toward(motion.steer, steer, body.turn_acceleration * dt_s)
+    motion.forward = _toward(motion.told_forward, forward, body.acceleration * dt_s)
+    motion.turn = motion.forward * math.tan(motion.steer) / body.wheelbase
+    motion.told_forward, motion.told_turn = motion.forward, motion.turn
+    motion.effort = abs(motion.forward) / body.speed
+    _arc(motion, dt_s)
+
+
+def _swimmer(body: BodySpec, motion: Motion, inputs: Inputs, dt_s: float) -> None:
+    motion.drive = _toward(motion.drive, min(1.0, max(0.0, inputs.get("forward", 0.0))), dt_s)
+    motion.bend = _toward(motion.bend, _within(inputs.get("turn", 0.0), 1.0), 2 * dt_s)
+    motion.phase = (motion.phase + body.frequency * motion.drive * dt_s) % 1.0
+    target = body.speed * motion.drive * (1 - 0.4 * abs(motion.bend))
+    motion.forward = _toward(motion.forward, target, body.acceleration * dt_s)
+    # Only a wave that runs turns a bent body.
+    motion.turn = body.turn * motion.bend * motion.drive
+    motion.told_forward, motion.told_turn = motion.forward, motion.turn
+    motion.effort = motion.drive
+    _arc(motion, dt_s)
+
+
+def _quadrotor(body: BodySpec, motion: Motion, inputs: Inputs, dt_s: float) -> None:
+    flies, cut = inputs.get("flies", 0.0) > 0, inputs.get("cut", 0.0) > 0
+    forward = sideways = turn = 0.0
+    if flies and motion.is_up and not cut:
+        forward = _within(inputs.get("forward", 0.0), body.speed)
+        sideways = _within(inputs.get("sideways", 0.0), body.speed)
+        turn = _within(inputs.get("turn", 0.0), body.turn)
+    most = body.acceleration * dt_s
+    before = motion.forward, motion.sideways
+    motion.forward = _toward(motion.forward, forward, most)
+    motion.sideways = _toward(motion.sideways, sideways, most)
+    motion.turn = _toward(motion.turn, turn, body.turn_acceleration * dt_s)
+    motion.climb = _climb(body, motion, inputs, flies, cut, dt_s)
+    motion.z = max(0.0, motion.z + motion.climb * dt_s)
+    if motion.z == 0.0 and motion.climb <= 0:
+        motion.climb, motion.forward, motion.sideways, motion.turn = 0.0, 0.0, 0.0, 0.0
+        motion.is_up = False
+    # It leans into what accelerates it, and a little against the air.
+    along = (motion.forward - before[0]) / dt_s + 0.4 * motion.forward
+    across = (motion.sideways - before[1]) / dt_s + 0.4 * motion.sideways
+    motion.pitch += (math.atan(along / GRAVITY) - motion.pitch) * 0.2
+    motion.roll += (math.atan(-across / GRAVITY) - motion.roll) * 0.2
+    motion.told_forward, motion.told_turn = motion.forward, motion.turn
+    motion.effort = 0.6 + 0.4 * abs(motion.forward) / body.speed if motion.z > 0 else 0.0
+    _arc(motion, dt_s)
+
+
+def _climb(
+    body: BodySpec, motion: Motion, inputs: Inputs, flies: bool, cut: bool, dt_s: float
+) -> float:
+    """Return the new speed upwards: it rises to its height by itself, lands, or falls."""
+    if cut:
+        return motion.climb - GRAVITY * dt_s
+    if not flies:
+        target = -_LANDS_AT
+    elif not motion.is_up:
+        left = body.hover - motion.z
+        motion.is_up = left <= 0.02
+        target = min(body.climb, 2 * left)
+    else:
+        target = _within(inputs.get("climb", 0.0), body.climb)
+    return _toward(motion.climb, target, 4 * dt_s)
+
+
+_MOVES: Final[Mapping[str, Callable[[BodySpec, Motion, Inputs, float], None]]] = {
+    "differential": _wheels,
+    "tracks": _tracks,
+    "holonomic": _holonomic,
+    "ackermann": _ackermann,
+    "swimmer": _swimmer,
+    "quadrotor": _quadrotor,
+}

@@ -1,0 +1,39 @@
+"""A laser scanner: rays from the middle of the robot, with noise.
+
+Pure. Imports numpy, so it is imported only where it is read.
+"""
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+
+from urc.simulator.world.rays import Faces, first_hits
+from urc.simulator.world.sensors import Moment
+
+__all__ = ["sweep"]
+
+_HEIGHT_M = 0.15
+"""Of the scanner above the robot's foot."""
+
+
+def sweep(faces: Faces, moment: Moment) -> Mapping[str, object]:
+    """Return ``world.laser``; a ray that meets nothing within reach has None."""
+    spec, motion = moment.spec.laser, moment.motion
+    step = (spec.last - spec.first) / spec.rays
+    angles = motion.yaw + spec.first + step * np.arange(spec.rays, dtype=np.float64)
+    far = first_hits(faces, motion.x, motion.y, motion.z + _HEIGHT_M, angles)
+    noise = np.random.default_rng((moment.spec.seed, moment.tick)).standard_normal(spec.rays)
+    told = far + noise * spec.noise * moment.noise
+    ranges = tuple(
+        round(max(0.0, one), 3) if real <= spec.max and math.isfinite(real) else None
+        for one, real in zip(told.tolist(), far.tolist(), strict=True)
+    )
+    ahead = round(-spec.first / step) % spec.rays if step else 0
+    return {
+        "ranges": ranges,
+        "first": spec.first,
+        "step": step,
+        "nearest": min((one for one in ranges if one is not None), default=None),
+        "ahead": ranges[ahead],
+    }

@@ -1,0 +1,175 @@
+"""What a camera of the emulated robot sees, as JPEG: walls, ground and sky, drawn by rays.
+
+Pure. Imports numpy and Pillow, so it is imported only where somebody looks. Each column of the
+picture is one direction on the ground; what stands there is drawn from the farthest to the nearest.
+"""
+
+import io
+import math
+from functools import lru_cache
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from urc.simulator.world.plan import Plan
+from urc.simulator.world.rays import Faces, cast
+
+__all__ = ["Eye", "camera_picture", "jpeg", "panorama_picture"]
+
+Array = NDArray[np.float32]
+_BINS: Final = 1440
+"""Directions on the ground, all round."""
+_LAYERS: Final = 4
+"""Edges behind each other that are looked at: a low box hides only the foot of the wall."""
+_SKY: Final = ((150, 184, 222), (226, 233, 240))
+"""Above, and at the horizon."""
+_GROUNDS: Final = {
+    "floor": ((150, 146, 138), (128, 124, 118)),
+    "grass": ((104, 138, 84), (92, 126, 74)),
+    "water": ((70, 122, 150), (62, 112, 142)),
+}
+_FAR_M: Final = 25.0
+"""Here half of a colour has become that of the horizon."""
+_QUALITY: Final = 80
+
+
+class Eye(NamedTuple):
+    """Where the camera is and how it is held; metres and radians."""
+
+    x: float
+    y: float
+    z: float
+    yaw: float
+    pitch: float = 0.0
+    """Nose down is positive."""
+    roll: float = 0.0
+    """Right side down is positive."""
+
+
+def camera_picture(
+    plan: Plan, faces: Faces, eye: Eye, size: tuple[int, int], view: float
+) -> NDArray[np.uint8]:
+    """Return what is seen ahead, rows by columns by red, green and blue.
+
+    Args:
+        plan: where the camera is.
+        faces: of that plan.
+        eye: of the camera.
+        size: columns and rows.
+        view: angle from the left to the right edge, below pi.
+    """
+    ahead = _straight(*size, view)
+    rotated = ahead @ _rotation(eye.pitch, eye.roll).T
+    azimuth = np.arctan2(rotated[..., 1], rotated[..., 0])
+    slope = rotated[..., 2] / np.hypot(rotated[..., 0], rotated[..., 1])
+    return _seen(plan, faces, eye, azimuth, slope)
+
+
+def panorama_picture(
+    plan: Plan, faces: Faces, eye: Eye, size: tuple[int, int]
+) -> NDArray[np.uint8]:
+    """Return all that is seen: a column a direction, ahead in the middle, a row a height."""
+    columns, rows = size
+    azimuth = np.linspace(math.pi, -math.pi, columns, endpoint=False, dtype=np.float32)
+    height = np.linspace(math.pi / 2 - 0.01, -math.pi / 2 + 0.01, rows, dtype=np.float32)
+    grid = (
+        np.broadcast_to(azimuth, (rows, columns)),
+        np.broadcast_to(height[:, None], (rows, columns)),
+    )
+    if abs(eye.pitch) > 1e-4 or abs(eye.roll) > 1e-4:
+        around = np.cos(grid[1])
+        ray = np.stack((around * np.cos(grid[0]), around * np.sin(grid[0]), np.sin(grid[1])), -1)
+        ray = ray @ _rotation(eye.pitch, eye.roll).T
+        flat = np.maximum(np.hypot(ray[..., 0], ray[..., 1]), 1e-4)
+        return _seen(plan, faces, eye, np.arctan2(ray[..., 1], ray[..., 0]), ray[..., 2] / flat)
+    return _seen(plan, faces, eye, grid[0], np.tan(grid[1]))
+
+
+def jpeg(picture: NDArray[np.uint8], *, flip: bool = False, mirror: bool = False) -> bytes:
+    """Return a picture as JPEG, turned upside down or mirrored if need be."""
+    if flip:
+        picture = picture[::-1]
+    if mirror:
+        picture = picture[:, ::-1]
+    out = io.BytesIO()
+    Image.fromarray(np.ascontiguousarray(picture)).save(out, "JPEG", quality=_QUALITY)
+    return out.getvalue()
+
+
+@lru_cache(maxsize=8)
+def _straight(columns: int, rows: int, view: float) -> Array:
+    """Return the direction of each point for a camera that is held level: ahead, left, up."""
+    focus = columns / 2 / math.tan(view / 2)
+    left = (columns / 2 - 0.5 - np.arange(columns, dtype=np.float32)) / focus
+    up = (rows / 2 - 0.5 - np.arange(rows, dtype=np.float32)) / focus
+    shape = rows, columns
+    parts = (np.ones(shape), np.broadcast_to(left, shape), np.broadcast_to(up[:, None], shape))
+    return np.stack(parts, axis=-1).astype(np.float32)
+
+
+def _rotation(pitch: float, roll: float) -> Array:
+    """Return what turns a direction of the camera into one of the level world, but for yaw."""
+    sp, cp, sr, cr = math.sin(pitch), math.cos(pitch), math.sin(roll), math.cos(roll)
+    rows = ((cp, sp * sr, sp * cr), (0.0, cr, -sr), (-sp, cp * sr, cp * cr))
+    return np.array(rows, dtype=np.float32)
+
+
+def _seen(plan: Plan, faces: Faces, eye: Eye, azimuth: Array, slope: Array) -> NDArray[np.uint8]:
+    """Return the colours in given directions: `azimuth` from ahead to the left, `slope` upwards."""
+    direction = azimuth + np.float32(eye.yaw)
+    picture = _open_country(plan, eye, direction, slope)
+    if len(faces.height):
+        bins = np.floor(direction * np.float32(_BINS / (2 * math.pi))).astype(np.int32) % _BINS
+        _paint_edges(picture, faces, eye, bins, slope)
+    return np.clip(picture, 0, 255).astype(np.uint8)
+
+
+def _open_country(plan: Plan, eye: Eye, direction: Array, slope: Array) -> Array:
+    """Return sky and ground."""
+    above, horizon = (np.array(one, dtype=np.float32) for one in _SKY)
+    share = np.clip(slope * 1.5, 0, 1)[..., None]
+    picture: Array = horizon + (above - horizon) * share
+    below = slope < -1e-3
+    far = np.float32(max(eye.z, 0.02)) / -slope[below]
+    x = np.float32(eye.x) + far * np.cos(direction[below])
+    y = np.float32(eye.y) + far * np.sin(direction[below])
+    first, second = (np.array(one, dtype=np.float32) for one in _GROUNDS[plan.spec.ground])
+    is_odd = ((np.floor(x).astype(np.int32) + np.floor(y).astype(np.int32)) & 1).astype(bool)
+    ground = np.where(is_odd[:, None], first, second)
+    for hole in plan.spec.holes:
+        inside = (np.abs(x - hole.x) <= hole.width / 2) & (np.abs(y - hole.y) <= hole.depth / 2)
+        ground[inside] = (40, 38, 36)
+    haze = (far / (far + np.float32(_FAR_M)))[:, None]
+    picture[below] = ground + (horizon - ground) * haze
+    return picture
+
+
+def _paint_edges(
+    picture: Array, faces: Faces, eye: Eye, bins: NDArray[np.int32], slope: Array
+) -> None:
+    """Draw what stands there, from the farthest to the nearest."""
+    horizon = np.array(_SKY[1], dtype=np.float32)
+    angles = (np.arange(_BINS, dtype=np.float64) + 0.5) * (2 * math.pi / _BINS)
+    distance, share = cast(faces, eye.x, eye.y, angles)
+    order = np.argsort(distance, axis=1)[:, :_LAYERS]
+    rows = np.arange(_BINS)
+    for layer in reversed(range(order.shape[1])):
+        which = order[:, layer]
+        far = distance[rows, which]
+        if not np.isfinite(far).any():
+            continue
+        # Faces along x are a little darker than those along y; stripes show how fast one goes by.
+        shade = 0.82 + 0.18 * np.abs(faces.along[which, 0]) / np.maximum(faces.length[which], 1e-6)
+        stripe = np.floor(share[rows, which] * faces.length[which] * 2).astype(np.int64) & 1
+        colour = faces.colour[which] * (shade * (1 - 0.08 * stripe))[:, None]
+        far = np.where(np.isfinite(far), far, 1e9).astype(np.float32)
+        haze = (far / (far + _FAR_M))[:, None]
+        colour = (colour + (horizon - colour) * haze).astype(np.float32)
+        top = ((faces.height[which] - eye.z) / far).astype(np.float32)
+        foot = (-eye.z / far).astype(np.float32)
+        seen = (slope <= top[bins]) & (slope >= foot[bins]) & (far[bins] < 1e8)
+        place = bins[seen]
+        skirting = slope[seen] < foot[place] + np.float32(0.08) / far[place]
+        picture[seen] = colour[place] * np.where(skirting, 0.7, 1.0).astype(np.float32)[:, None]

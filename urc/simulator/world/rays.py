@@ -1,0 +1,67 @@
+"""Rays against the edges of a plan, all at once.
+
+Pure. Imports numpy, so it is imported only where something is looked at.
+"""
+
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from urc.simulator.world.plan import Edge, Plan
+
+__all__ = ["Faces", "cast", "first_hits"]
+
+Numbers = NDArray[np.floating]
+_NEAREST: Final = 1e-6
+
+
+class Faces:
+    """The edges of a plan as columns of numbers."""
+
+    def __init__(self, plan: Plan) -> None:
+        """Take the edges as they are."""
+        edges: tuple[Edge, ...] = plan.edges
+        self.start: Numbers = np.array([(one.x1, one.y1) for one in edges]).reshape(-1, 2)
+        end: Numbers = np.array([(one.x2, one.y2) for one in edges]).reshape(-1, 2)
+        self.along: Numbers = end - self.start
+        self.length: Numbers = np.hypot(self.along[:, 0], self.along[:, 1])
+        self.height: Numbers = np.array([one.height for one in edges])
+        self.colour: Numbers = np.array([_rgb(one.colour) for one in edges]).reshape(-1, 3)
+
+
+def cast(faces: Faces, x: float, y: float, angles: Numbers) -> tuple[Numbers, Numbers]:
+    """Return how far each ray goes to each edge, and where along the edge it meets it.
+
+    Args:
+        faces: what is there.
+        x: where the rays begin.
+        y: where the rays begin.
+        angles: of the rays, in radians from the x axis to the left.
+
+    Returns:
+        Two arrays of rays by edges: metres, ``inf`` where they do not meet; and 0 to 1.
+    """
+    cosine, sine = np.cos(angles)[:, None], np.sin(angles)[:, None]
+    ax, ay = faces.start[:, 0] - x, faces.start[:, 1] - y
+    dx, dy = faces.along[:, 0], faces.along[:, 1]
+    cross = cosine * dy - sine * dx
+    with np.errstate(divide="ignore", invalid="ignore"):
+        distance = (ax * dy - ay * dx) / cross
+        share = (ax * sine - ay * cosine) / cross
+    meets = (distance > _NEAREST) & (share >= 0) & (share <= 1) & np.isfinite(distance)
+    return np.where(meets, distance, np.inf), share
+
+
+def first_hits(faces: Faces, x: float, y: float, z: float, angles: Numbers) -> Numbers:
+    """Return how far each ray at the height `z` goes, ``inf`` where it meets nothing."""
+    if not len(faces.height):
+        return np.full(len(angles), np.inf)
+    distance, _ = cast(faces, x, y, angles)
+    nearest: Numbers = np.where(faces.height > z, distance, np.inf).min(axis=1)
+    return nearest
+
+
+def _rgb(colour: str) -> tuple[int, int, int]:
+    number = int(colour.removeprefix("#"), 16)
+    return number >> 16, number >> 8 & 255, number & 255

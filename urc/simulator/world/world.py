@@ -1,0 +1,291 @@
+"""One emulated robot in its world: a body that is told what to do, and sensors that tell of it.
+
+Pure: no clock, no socket. Time is passed in; the world goes on in steps of `STEP_S`, however often
+it is looked at, so that the same commands at the same times give the same world.
+"""
+
+import math
+from collections import deque
+from collections.abc import Callable, Iterator, Mapping
+from typing import TYPE_CHECKING, Final
+
+from urc.expressions import Template
+from urc.model.world import READINGS, WorldSpec
+from urc.simulator.world.bodies import Motion, joints_of, legs_of, move
+from urc.simulator.world.plan import ROOM, Plan, Touch
+from urc.simulator.world.sensors import (
+    Battery,
+    Moment,
+    Odometry,
+    contact,
+    gps,
+    imu,
+    odometry,
+)
+
+if TYPE_CHECKING:
+    from urc.simulator.world.picture import Eye
+    from urc.simulator.world.rays import Faces
+
+__all__ = ["FARTHEST_S", "STEP_S", "View", "World"]
+
+STEP_S: Final = 0.02
+"""Length of a step."""
+FARTHEST_S: Final = 60.0
+"""Most that is made up for: a world that nobody looks at for longer stands still for the rest."""
+_ASKED_EVERY_S: Final = 0.1
+"""How often inputs that depend on the time are asked for while much is made up for."""
+_TRAIL_EVERY_M: Final = 0.05
+_TRAIL_MOST: Final = 400
+_LOW: Final = 12.0
+"""Per cent of the battery that are left by the fault of that name."""
+_PANORAMA: Final = (512, 256)
+"""Columns and rows of a still that shows all around."""
+
+Inputs = Callable[[float], Mapping[str, float]]
+"""Time → what the body is told."""
+
+
+class World:
+    """One robot's world.
+
+    Args:
+        spec: as declared.
+        inputs: gives the inputs of the body for a time; it may look at the world, which then
+            tells of the present step.
+        holds: whether something of the camera holds now, where a document has a template for it.
+    """
+
+    def __init__(
+        self,
+        spec: WorldSpec,
+        inputs: Inputs,
+        holds: Callable[[Template | bool], bool] = bool,
+    ) -> None:
+        self.spec = spec
+        self.plan = Plan(ROOM if spec.plan is None else spec.plan)
+        x, y, yaw = spec.start
+        self.motion = Motion(x=x, y=y, yaw=yaw)
+        self.odometry = Odometry(spec)
+        self.battery = Battery(spec)
+        self.touch: Touch | None = None
+        self.tick = 0
+        """Steps since the beginning."""
+        self.time_s: float | None = None
+        """When the last step ended, in seconds since the epoch; None before the first look."""
+        self.noise = 1.0
+        self.dropped: set[str] = set()
+        """Names of `READINGS` that have failed: nothing reads them."""
+        self._inputs = inputs
+        self._holds = holds
+        self._is_busy = False
+        self._trail: deque[tuple[float, float]] = deque([(x, y)], _TRAIL_MOST)
+        self._kept: dict[object, tuple[float, bytes]] = {}
+        """Picture → when it was made, and itself."""
+        self._faces: Faces | None = None
+
+    def advance(self, now_s: float) -> None:
+        """Go on to `now_s`, in whole steps; what is left waits for the next time."""
+        if self.time_s is None or now_s < self.time_s - FARTHEST_S:
+            self.time_s = now_s  # the first look, or the clock was put back
+        if self._is_busy:
+            return
+        self.time_s = max(self.time_s, now_s - FARTHEST_S)
+        self._is_busy = True
+        try:
+            while (steps := int((now_s - self.time_s) / STEP_S + 1e-6)) > 0:
+                inputs = self._inputs(self.time_s)
+                for _ in range(min(steps, round(_ASKED_EVERY_S / STEP_S))):
+                    self._step(inputs)
+        finally:
+            self._is_busy = False
+
+    def low_battery(self) -> None:
+        """Let the battery be nearly empty from now on."""
+        self.battery.drain(_LOW)
+
+    def view(self, now_s: float) -> "View":
+        """Return what can be read at `now_s`."""
+        self.advance(now_s)
+        return View(self)
+
+    def top_view(self, width: int, height: int) -> bytes:
+        """Return the world from above as JPEG, at most five new ones a second.
+
+        Args:
+            width: points, 16 to 2000.
+            height: points, 16 to 2000.
+        """
+        size = min(2000, max(16, width)), min(2000, max(16, height))
+
+        def draw() -> bytes:
+            from urc.simulator.world.top import top_picture
+
+            trail = [*self._trail, (self.motion.x, self.motion.y)]
+            return top_picture(self.plan, self.spec.body, self.motion, trail, size)
+
+        return self._once(("top", size), 0.2, draw)
+
+    def picture(self) -> bytes:
+        """Return what the robot's camera sees, as JPEG, at most ten new ones a second."""
+        flip, mirror = self._holds(self.spec.camera.flip), self._holds(self.spec.camera.mirror)
+
+        def draw() -> bytes:
+            from urc.simulator.world.picture import camera_picture, jpeg
+
+            spec = self.spec.camera
+            seen = camera_picture(
+                self.plan, self.faces(), self._eye(), (spec.width, spec.height), spec.view
+            )
+            return jpeg(seen, flip=flip, mirror=mirror)
+
+        return self._once(("camera", flip, mirror), 0.1, draw)
+
+    def panorama(self) -> bytes:
+        """Return all around as JPEG: left is behind, the middle ahead, a row a height."""
+
+        def draw() -> bytes:
+            from urc.simulator.world.picture import jpeg, panorama_picture
+
+            return jpeg(panorama_picture(self.plan, self.faces(), self._eye(), _PANORAMA))
+
+        return self._once("panorama", 0.5, draw)
+
+    def faces(self) -> "Faces":
+        """Return the edges of the plan, for rays."""
+        if self._faces is None:
+            from urc.simulator.world.rays import Faces
+
+            self._faces = Faces(self.plan)
+        return self._faces
+
+    def _eye(self) -> "Eye":
+        from urc.simulator.world.picture import Eye
+
+        motion, camera = self.motion, self.spec.camera
+        return Eye(
+            motion.x,
+            motion.y,
+            motion.z + camera.up,
+            motion.yaw,
+            motion.pitch - camera.tilt,
+            motion.roll,
+        )
+
+    def _once(self, name: object, every_s: float, draw: Callable[[], bytes]) -> bytes:
+        now_s = self.time_s or 0.0
+        kept = self._kept.get(name)
+        if kept is not None and 0 <= now_s - kept[0] < every_s:
+            return kept[1]
+        while len(self._kept) >= 8:
+            del self._kept[next(iter(self._kept))]
+        picture = draw()
+        self._kept[name] = now_s, picture
+        return picture
+
+    def _step(self, inputs: Mapping[str, float]) -> None:
+        motion = self.motion
+        if self.battery.charge <= 0:
+            inputs = {}
+        move(self.spec.body, motion, inputs, STEP_S)
+        self.odometry.step(motion, STEP_S, self.noise)
+        self.battery.step(motion.effort, STEP_S)
+        self._collide()
+        self.tick += 1
+        self.time_s = (self.time_s or 0.0) + STEP_S
+        last = self._trail[-1]
+        if math.hypot(motion.x - last[0], motion.y - last[1]) > _TRAIL_EVERY_M:
+            self._trail.append((motion.x, motion.y))
+
+    def _collide(self) -> None:
+        """Put a body that went into something back to its edge."""
+        motion, self.touch = self.motion, None
+        for _ in range(3):  # a corner has two edges
+            touch = self.plan.touch(motion.x, motion.y, motion.z, self.spec.body.radius)
+            if touch is None or touch.depth < 1e-9:
+                return
+            self.touch = touch
+            dx, dy = motion.x - touch.x, motion.y - touch.y
+            far = math.hypot(dx, dy)
+            if far < 1e-9:
+                dx, dy, far = -math.cos(motion.yaw), -math.sin(motion.yaw), 1.0
+            motion.x += dx / far * touch.depth
+            motion.y += dy / far * touch.depth
+
+
+class View(Mapping[str, object]):
+    """What can be read of a world now: the names of `READINGS`, made when they are asked for."""
+
+    __slots__ = ("_world",)
+
+    def __init__(self, world: World) -> None:
+        """Look at `world`, which does not go on meanwhile."""
+        self._world = world
+
+    def __getitem__(self, name: str) -> object:
+        world, motion = self._world, self._world.motion
+        if name in world.dropped:
+            raise KeyError(name)
+        if name in _PLAIN:
+            return getattr(motion, _PLAIN[name])
+        if name == "heading":
+            return math.degrees(math.pi / 2 - motion.yaw) % 360
+        if name in ("joints", "legs"):
+            return (joints_of if name == "joints" else legs_of)(world.spec.body, motion)
+        if name in _SENSORS:
+            return _SENSORS[name](world)
+        if name == "picture":
+            return world.picture()
+        if name == "panorama":
+            return world.panorama()
+        if name == "top":
+            return world.top_view(320, 240)
+        raise KeyError(name)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(READINGS)
+
+    def __len__(self) -> int:
+        return len(READINGS)
+
+
+_PLAIN: Final = {
+    "x": "x",
+    "y": "y",
+    "z": "z",
+    "roll": "roll",
+    "pitch": "pitch",
+    "yaw": "yaw",
+    "speed": "forward",
+    "sideways": "sideways",
+    "climb": "climb",
+    "turn": "turn",
+}
+
+
+def _moment(world: World) -> Moment:
+    return Moment(
+        world.spec,
+        world.plan,
+        world.motion,
+        world.touch,
+        world.tick,
+        world.time_s or 0.0,
+        world.noise,
+    )
+
+
+def _laser(world: World) -> Mapping[str, object]:
+    from urc.simulator.world.laser import sweep
+
+    return sweep(world.faces(), _moment(world))
+
+
+_SENSORS: Final[Mapping[str, Callable[[World], Mapping[str, object]]]] = {
+    "odometry": lambda world: odometry(_moment(world), world.odometry),
+    "imu": lambda world: imu(_moment(world)),
+    "gps": lambda world: gps(_moment(world)),
+    "contact": lambda world: contact(_moment(world)),
+    "battery": lambda world: world.battery.readings(),
+    "laser": _laser,
+}
