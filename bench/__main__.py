@@ -23,7 +23,10 @@ NAMES = (
     "transport_rosbridge",
     "transport_mqtt",
     "fanout",
+    "fanout_stall",
     "image_relay",
+    "packages_index",
+    "gallery",
     "browser_peers",
     "browser_widgets",
     "browser_plot_scan",
@@ -32,8 +35,11 @@ NAMES = (
     "motion_path",
     "motion_stop",
     "motion_engine",
+    "motion_guard",
     "motion_cuts",
     "motion_flood",
+    "motion_idle",
+    "motion_input",
     "motion_loss",
 )
 

@@ -1,13 +1,16 @@
 """How often a link that loses packets stops a robot that nobody let go of.
 
 Pages drive over a relay with 100 ms there and back, and with random loss in both directions; each
-that is stopped begins a new gesture. Needs root and /dev/net/tun; otherwise left out, and told.
+that is stopped begins a new gesture. Once with one line alone, to compare, and once as URC's own
+page does it over such a link: with a second line. Needs root and /dev/net/tun; otherwise left out,
+and told.
 """
 
 import json
 import tempfile
 import time
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 
 from bench.figures import tell
@@ -20,6 +23,7 @@ __all__ = ["run"]
 LANES = 20
 DELAY_MS = 50
 LOOK_S = 0.25
+CALM_S = 20.0
 LATE_MS, LATE_WITHIN_NS = 50.0, 600_000_000
 """A machine that was so late within this time before a stop may have brought it about."""
 MOST = {0: None, 1: 0.1, 3: 4.0}
@@ -41,25 +45,38 @@ def run(*, full: bool) -> Sequence[Result]:
     ):
         rig.bout("close")
         for loss, most in MOST.items():
-            rig.weather(f"delay {DELAY_MS}", f"loss {loss}")
-            minutes, stops, excused = _drive(rig, lasts_s[loss])
-            rig.weather("delay 0", "loss 0")
-            rate = stops / minutes
-            figures = {"loss_percent": loss, "minutes": round(minutes, 1), "stops": stops}
-            figures["excused"] = excused
-            tell({"figure": "motion_loss", **figures, "stops_a_minute": round(rate, 3)})
-            if most is not None:
-                results.append(_result(loss, rate, most, stops))
+            for lines in (1, 2):
+                rig.weather(f"delay {DELAY_MS}", f"loss {loss}")
+                minutes, stops, excused = _drive(rig, lasts_s[loss], has_spare=lines == 2)
+                rig.weather("delay 0", "loss 0")
+                _calm(rig)
+                rate = stops / minutes
+                figures = {"loss_percent": loss, "lines": lines, "minutes": round(minutes, 1)}
+                counts = {"stops": stops, "excused": excused, "stops_a_minute": round(rate, 3)}
+                tell({"figure": "motion_loss", **figures, **counts})
+                if most is not None and lines == 2:
+                    results.append(_result(loss, rate, most, stops))
     return results
 
 
-def _drive(rig: Rig, seconds: float) -> tuple[float, int, int]:
+def _calm(rig: Rig) -> None:
+    """Wait until the last pages are forgotten: their stops are not the next ones' stops."""
+    for lane in rig.lanes:
+        rig.robots.wait_until(partial(_is_still, rig, lane), CALM_S, "a robot at rest")
+    time.sleep(LOOK_S)
+
+
+def _is_still(rig: Rig, lane: int) -> bool:
+    return rig.robots.heard[lane][-1].text == "M 0"
+
+
+def _drive(rig: Rig, seconds: float, *, has_spare: bool) -> tuple[float, int, int]:
     """Let every lane be driven for so long; return the minutes of motion, and the stops.
 
     Those before which the machine itself was late are the third number.
     """
     until_s = time.monotonic() + seconds
-    pages = {lane: rig.drive(lane) for lane in rig.lanes}
+    pages = {lane: rig.drive(lane, has_spare=has_spare) for lane in rig.lanes}
     began_ns = {lane: time.monotonic_ns() for lane in pages}
     moved_ns = stops = excused = 0
     while time.monotonic() < until_s:
@@ -73,7 +90,7 @@ def _drive(rig: Rig, seconds: float) -> tuple[float, int, int]:
                 moved_ns += heard[-1].time_ns - heard[0].time_ns
                 rig.operators.kill(number)
                 began_ns[lane] = time.monotonic_ns()
-                pages[lane] = rig.drive(lane)
+                pages[lane] = rig.drive(lane, has_spare=has_spare)
     for lane, number in pages.items():
         heard = rig.robots.since(lane, began_ns[lane])
         moved_ns += heard[-1].time_ns - heard[0].time_ns if heard else 0

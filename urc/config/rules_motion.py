@@ -39,6 +39,7 @@ def check_motion(part: Part, driver: Driver, findings: Findings) -> None:
         on_line = [one for one in held if one[1].transport == name]
         if on_line:
             _check_baud(on_line, spec, findings)
+            _check_will(on_line, spec, findings)
     if held and not any(_notices(spec, driver) for spec in driver.transports.values()):
         findings.warn(
             held[0][0],
@@ -110,6 +111,23 @@ def _check_baud(
         "line-too-slow",
         f"{what} {bits_per_s:.0f} bit/s at the least, and the line carries {baud:g}",
         hint=f"repeat less often: every {_bearable_ms(bits_per_s / baud, held)}ms and slower",
+    )
+
+
+def _check_will(
+    held: list[tuple[Part, Command, Hold]], spec: TransportSpec, findings: Findings
+) -> None:
+    """Warn of motion by way of a broker that nobody tells to stop the robot when URC is gone."""
+    if spec.type != "mqtt" or spec.options.get("will") is not None:
+        return
+    part, command, _ = held[0]
+    findings.warn(
+        part,
+        "motion-without-will",
+        f"when the way to the broker is cut, nobody stops what {command.name!r} moves",
+        key=True,
+        hint=f"write will: with the topic and the payload of its stop beside {spec.name!r}: the"
+        " broker publishes it then",
     )
 
 

@@ -2,6 +2,7 @@
 
 Theory of operation. The guard is a process of its own. It says ten times a second that it is alive;
 when it is silent for half a second, or gone, it is killed for good and another is started at once.
+Only a machine that gives it no time to run is no fault of its own: another one would have none.
 That one knows nothing: it is told the lines, the terms of everything armed, and what was moving,
 of which it opens the lines and writes the stop before anything else. Nothing moves on by itself.
 """
@@ -13,12 +14,14 @@ import socket
 import subprocess
 from collections.abc import Sequence
 from contextlib import suppress
+from time import monotonic
 from typing import Final
 
 from urc.guard import wire
 from urc.guard.pipe import Pipe
-from urc.guard.process import CAN_INHERIT, Door, launch, reap
+from urc.guard.process import CAN_INHERIT, Door, Standing, launch, processors, reap, standing
 from urc.guard.side import Client, LineSpec, LocalGuard
+from urc.model.codec import Payload
 
 __all__ = ["CAN_GUARD", "Client", "Guard", "LineSpec", "LocalGuard"]
 
@@ -26,6 +29,8 @@ CAN_GUARD: Final = CAN_INHERIT or os.name == "nt"
 """Whether this system can run the guard as a process of its own."""
 _LOOK_S: Final = 0.1
 _SILENT_LOOKS: Final = 5
+_MOST_KEPT_LOOKS: Final = 15
+"""Silence that is put down to a busy machine, at most."""
 _START_LOOKS: Final = 100
 """A machine that is busy may take long until Python runs."""
 _STEADY_S: Final = 0.5
@@ -34,6 +39,7 @@ _AT_ONCE: Final = 3
 _AGAIN_S: Final = 1.0
 """Guards that end at once are started anew so often right away, and then at this pace."""
 _FINISH_S: Final = 3.0
+_HAS_TWO: Final = processors() > 1
 _DIED: Final = "the guard of this line ended; it is started anew"
 
 log = logging.getLogger(__name__)
@@ -62,7 +68,8 @@ class Guard(Client):
         self._gone = asyncio.Event()
         self._look: asyncio.TimerHandle | None = None
         self._look_s = 0.0
-        self._silent_looks = 0
+        self._silent_looks = self._kept_looks = 0
+        self._standing = Standing()
         self._was_heard = self._has_served = False
         self._started_s = 0.0
         self._short_lives = 0
@@ -85,7 +92,7 @@ class Guard(Client):
             self._look = loop.call_later(_AGAIN_S, self.start)
             return
         self._was_heard = self._has_served = False
-        self._silent_looks = 0
+        self._silent_looks = self._kept_looks = 0
         if isinstance(line, Door):
             self._is_up.clear()
             self._door = line
@@ -161,7 +168,7 @@ class Guard(Client):
                 self._post(wire.Arm(held.line, control, held.terms))
 
     def _hear(self, said: wire.FromGuard) -> None:
-        self._silent_looks = 0
+        self._silent_looks = self._kept_looks = 0
         self._was_heard = True
         self._has_served |= isinstance(said, wire.Opened)
         self._take(said, 0 if self._pipe is None else self._pipe.taken_bytes)
@@ -169,7 +176,7 @@ class Guard(Client):
     def _watch(self) -> None:
         """Look whether the guard is alive."""
         loop = asyncio.get_running_loop()
-        if loop.time() - self._look_s < _LOOK_S:  # else it was we who slept
+        if loop.time() - self._look_s < _LOOK_S and not self._is_kept():  # else it was we who slept
             self._silent_looks += 1
         limit = _SILENT_LOOKS if self._was_heard else _START_LOOKS
         if self._silent_looks > limit and self._pipe is not None:
@@ -179,6 +186,17 @@ class Guard(Client):
             return
         self._look_s = loop.time() + _LOOK_S
         self._look = loop.call_at(self._look_s, self._watch)
+
+    def _is_kept(self) -> bool:
+        """Return whether a guard that is silent would run, and the system has not let it."""
+        if not self._silent_looks or self._kept_looks >= _MOST_KEPT_LOOKS:
+            return False
+        before, self._standing = self._standing, standing(self.pid)
+        is_kept = self._standing.wants_to_run and (
+            self._standing.ran_s - before.ran_s < _LOOK_S / 2
+        )
+        self._kept_looks += is_kept
+        return is_kept
 
     def _died(self) -> None:
         """Start another one, unless it was to end."""
@@ -212,9 +230,19 @@ class Guard(Client):
         if self._pipe is not None:
             self._pipe.post(said)
 
-    def _pass_tick(self, said: wire.Tick) -> None:
-        if self._pipe is not None:
-            self._pipe.post(said, slot=said.control)
+    def hint(self) -> None:
+        """Wake the guard for a tick that is about to come, where it has a processor of its own."""
+        if _HAS_TWO and self._pipe is not None:
+            self._pipe.nudge()
+
+    def tick(self, control: str, data: Payload) -> None:
+        """Renew the lease of `control`; `data` is its newest frame. Never waits."""
+        held, pipe = self._held.get(control), self._pipe
+        if held is not None:
+            held.number += 1
+            held.may_move = True
+            if pipe is not None:
+                pipe.post(wire.Tick(control, held.number, data, monotonic()), slot=control)
 
     def _pass_renewed(self, said: wire.Renew) -> None:
         if self._pipe is not None:

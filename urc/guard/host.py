@@ -29,7 +29,6 @@ class Host:
         self._stirred: set[Line] = set()
         self._is_finishing = False
         self._handlers: dict[type, Callable[[Any], None]] = {
-            wire.Tick: self._tick,
             wire.Send: self._send,
             wire.Credit: lambda said: self._lines[said.line].credit(said.turn, said.amount),
             wire.Release: self._release,
@@ -44,7 +43,12 @@ class Host:
 
     def take(self, said: wire.ToGuard) -> None:
         """Do what the engine's side says; `settle` follows."""
-        if not self._is_finishing:
+        if type(said) is wire.Tick and not self._is_finishing:
+            line = self._controls.get(said.control)
+            if line is not None:
+                line.reins.tick(said.control, said.number, said.data, said.at_s)
+                self._stirred.add(line)
+        elif not self._is_finishing:
             self._handlers[type(said)](said)
 
     def settle(self) -> None:
@@ -76,12 +80,6 @@ class Host:
         line = self._lines[said.line]
         line.send(said.turn, said.number, said.data)
         self._stirred.add(line)
-
-    def _tick(self, said: wire.Tick) -> None:
-        line = self._controls.get(said.control)
-        if line is not None:
-            line.reins.tick(said.control, said.number, said.data, said.at_s)
-            self._stirred.add(line)
 
     def _release(self, said: wire.Release) -> None:
         line = self._controls.get(said.control)

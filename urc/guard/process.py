@@ -7,9 +7,10 @@ import secrets
 import socket
 import subprocess
 import sys
-from typing import Any, Final
+from pathlib import Path
+from typing import Any, Final, NamedTuple
 
-__all__ = ["CAN_INHERIT", "DOOR", "Door", "launch", "reap"]
+__all__ = ["CAN_INHERIT", "DOOR", "Door", "launch", "processors", "reap", "standing"]
 
 CAN_INHERIT: Final = os.name == "posix"
 """Whether this system can hand an open pipe to another process."""
@@ -116,6 +117,32 @@ def _started(place: str, **more: Any) -> "subprocess.Popen[bytes]":
     # -P: nothing is imported from the folder we happen to be in.
     command = [sys.executable, "-P", "-m", "urc.guard", place]
     return subprocess.Popen(command, **more)  # noqa: S603 - our own interpreter and module
+
+
+def processors() -> int:
+    """Return how many processors this process may use."""
+    allowed = getattr(os, "sched_getaffinity", None)  # not everywhere
+    return len(allowed(0)) if allowed is not None else os.cpu_count() or 1
+
+
+class Standing(NamedTuple):
+    """How a process stands with the system."""
+
+    wants_to_run: bool = False
+    """It has a processor, or waits for one or for a disk; it does not sleep, and is not stopped."""
+    ran_s: float = 0.0
+    """How much of a processor's time its first thread has had."""
+
+
+def standing(process: int, proc: Path = Path("/proc")) -> Standing:
+    """Return how a process stands, in files of Linux; elsewhere nothing is known of it."""
+    try:
+        # The name before the state may hold anything, brackets and spaces too.
+        state = (proc / str(process) / "stat").read_text("latin-1").rpartition(")")[2].split()[0]
+        ran_ns = (proc / str(process) / "schedstat").read_text("ascii").split()[0]
+        return Standing(state in "RD", int(ran_ns) / 1e9)
+    except (OSError, ValueError, IndexError):
+        return Standing()
 
 
 async def reap(process: "subprocess.Popen[bytes]") -> None:

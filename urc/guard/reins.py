@@ -171,24 +171,20 @@ class Reins:
         if not self._is_open:
             return
         now = self._clock.now()
-        is_moving = False
+        waiting: list[tuple[str, Mover]] = []
         for control, mover in self._movers.items():
             if mover.must_stop(now):
                 data = mover.due(now, is_clear=False)
                 if data is not None:
                     self._write(control, data, now, is_stop=True)
             elif mover.is_waiting:
-                is_moving = True
-        if is_moving:
-            self._move(now)
-        self._set_alarm(now)
-
-    def _move(self, now: float) -> None:
-        for control, mover in self._movers.items():
-            if mover.is_waiting and self._is_clear(now):
+                waiting.append((control, mover))
+        for control, mover in waiting:
+            if self._is_clear(now):
                 data = mover.due(now, is_clear=True)
                 if data is not None:
                     self._write(control, data, now, is_stop=False)
+        self._set_alarm(now)
 
     def _is_clear(self, now: float) -> bool:
         if not self.lane.is_idle:

@@ -83,7 +83,10 @@ class Client:
         if held is not None:
             held.number += 1
             held.may_move = True
-            self._pass_tick(wire.Tick(control, held.number, data, self._now()))
+            self._post(wire.Tick(control, held.number, data, self._now()))
+
+    def hint(self) -> None:
+        """Take note that a tick is about to come, where that saves time."""
 
     def renew(self, control: str, stop: Payload) -> None:
         """Let `stop` be what stops `control` from now on; it arms nothing."""
@@ -147,9 +150,6 @@ class Client:
 
     def _post(self, said: wire.ToGuard) -> None:
         raise NotImplementedError
-
-    def _pass_tick(self, said: wire.Tick) -> None:
-        self._post(said)
 
     def _pass_renewed(self, said: wire.Renew) -> None:
         self._post(said)

@@ -8,7 +8,7 @@ recorded and played back, or belongs to an earlier lease is refused, however the
 from collections import deque
 from typing import Final, NamedTuple
 
-__all__ = ["OLDEST_S", "Freshness", "Input"]
+__all__ = ["OLDEST_S", "FirstOfTwo", "Freshness", "Input"]
 
 OLDEST_S: Final = 0.4
 """An input that echoes an older tick is refused."""
@@ -68,3 +68,22 @@ class Freshness:
             return f"it is {(now - issued_at) * 1000:.0f} ms old"
         self._newest[of] = given.number
         return ""
+
+
+class FirstOfTwo:
+    """What a page says twice, on two lines that lose packets independently: the first counts.
+
+    Its numbers only grow, and each line keeps their order. So what has a number that is not above
+    the newest was said on the other line already, or was overtaken there by something newer: a tick
+    that was held up must not move what the other line has let go of since.
+    """
+
+    def __init__(self) -> None:
+        self._newest: dict[str, int] = {}
+
+    def take(self, about: str, number: int) -> bool:
+        """Return whether `number` is above all that came about the same, and remember it."""
+        if number <= self._newest.get(about, 0):
+            return False
+        self._newest[about] = number
+        return True

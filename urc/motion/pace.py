@@ -31,7 +31,8 @@ class Pace:
 
     def take(self, now: float) -> bool:
         """Count one that goes now, if it may."""
-        if now < self.free_at - _ROUNDING_S:
+        due, period_s = self._due, self._period_s
+        if now < due - period_s - _ROUNDING_S:
             return False
-        self._due = max(now, self._due) + self._period_s
+        self._due = (now if now > due else due) + period_s
         return True

@@ -19,9 +19,11 @@ from urc.protocol.exchange import Ask, Asked, Exchange
 from urc.protocol.generate import WARM_AFTER
 from urc.protocol.line import Line
 
-__all__ = ["Brief", "briefs"]
+__all__ = ["Brief", "Write", "briefs", "made_for"]
 
 Check = Callable[[Mapping[str, object]], dict[str, Reading]]
+Write = Callable[[Mapping[str, object]], Payload | None]
+"""Arguments → bytes, framing included, or None for what the check must look at."""
 
 new = tuple.__new__
 """Makes a named tuple without the detour through its class: this is done for every command."""
@@ -59,8 +61,7 @@ class Brief:
         self._command = command
         self._cold = WARM_AFTER
         """How often it has still to be used until it pays to make a function for it."""
-        self._write: Callable[[Mapping[str, object]], Payload | None] | None = None
-        """Arguments → bytes, or None for what the check must look at."""
+        self._write: Write | None = None
 
     def send(self, request: Request, now: float) -> list[Event] | None:
         """Send it if its line is idle, and return what is to be told.
@@ -91,10 +92,15 @@ class Brief:
 
     def _warm_up(self) -> None:
         self._cold -= 1
-        send, line = self._command.send, self._line
-        template = send.options.get("template")
-        if not self._cold and send.form == "text" and isinstance(template, Template):
-            from urc.protocol.fast_encode import build_fast_write
+        if not self._cold:
+            self._write = made_for(self._command, self._line)
 
-            arguments, encoding = self._command.arguments, line.spec.encoding
-            self._write = build_fast_write(template, arguments, line.framing, encoding)
+
+def made_for(command: Command, line: Line) -> Write | None:
+    """Return a function of `command` alone, which checks and writes; None where there is none."""
+    template = command.send.options.get("template")
+    if command.send.form != "text" or not isinstance(template, Template):
+        return None
+    from urc.protocol.fast_encode import build_fast_write
+
+    return build_fast_write(template, command.arguments, line.framing, line.spec.encoding)

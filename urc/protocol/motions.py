@@ -13,9 +13,11 @@ from urc.model.codec import Payload
 from urc.model.driver import Command
 from urc.model.values import Reading
 from urc.problems import UrcError
+from urc.protocol.brief import Write, made_for
 from urc.protocol.commands import is_guarded, why_refused
 from urc.protocol.encode import BadArgument, check_arguments
 from urc.protocol.exchange import Ask
+from urc.protocol.generate import WARM_AFTER
 from urc.protocol.known import Known
 from urc.protocol.line import Line
 
@@ -26,6 +28,27 @@ Check = Callable[[Mapping[str, object]], dict[str, Reading]]
 
 class NotNow(UrcError):
     """Motion that is not allowed now; the message says why."""
+
+
+class _Way:
+    """What a frame of one held command takes: looked up once, for there are many a second."""
+
+    __slots__ = ("_cold", "ask", "check", "command", "is_guarded", "line", "write")
+
+    def __init__(self, command: Command, check: Check, ask: Ask, line: Line) -> None:
+        self.command, self.check, self.ask, self.line = command, check, ask, line
+        self.is_guarded = is_guarded(command)
+        self.write: Write | None = None
+        """Where nothing but the arguments matters, once it pays to make it."""
+        is_plain = ask.is_local and not (ask.has_counters or self.is_guarded)
+        self._cold = WARM_AFTER if is_plain else 0
+
+    def warm_up(self) -> None:
+        """Take note that a frame was made in the usual way."""
+        if self._cold:
+            self._cold -= 1
+            if not self._cold:
+                self.write = made_for(self.command, self.line)
 
 
 class Motions:
@@ -41,8 +64,10 @@ class Motions:
     ) -> None:
         """Take what the engine has built of the commands; nothing is copied."""
         self._held = {name: one for name, one in commands.items() if one.hold is not None}
-        self._guarded = {name for name, one in self._held.items() if is_guarded(one)}
-        self._checks = checks
+        self._ways = {
+            name: _Way(one, checks[name], asks[name], lines[one.transport])
+            for name, one in self._held.items()
+        }
         self._asks = asks
         self._lines = lines
         self._known = known
@@ -107,17 +132,25 @@ class Motions:
             NotNow: the line is not ready, the robot silent, what it requires does not hold, or
                 nobody confirmed it.
         """
-        found = self._found(command)
-        values = self._checks[command](arguments)
-        line, ask = self._lines[found.transport], self._asks[command]
+        way = self._ways.get(command)
+        if way is None:
+            raise BadArgument(f"{command!r} is no command with a release")
+        line, ask = way.line, way.ask
+        if way.write is not None and line.state == "open" and line.is_ready:
+            is_heard = line.spec.stale_after_s is None or not line.is_silent
+            data = way.write(arguments) if is_heard else None
+            if data is not None:
+                return data
+        values = way.check(arguments)
         if not (line.is_open and line.is_ready):
             raise NotNow("the robot is not connected")
         if line.is_silent:
             raise NotNow(f"the robot has said nothing for {line.spec.stale_after_s:g} s")
-        if command in self._guarded:
-            refused = why_refused(found, self._known, values, confirmed_by, now)
+        if way.is_guarded:
+            refused = why_refused(way.command, self._known, values, confirmed_by, now)
             if refused is not None:
                 raise NotNow(refused.message)
+        way.warm_up()
         names = values if ask.is_local else {**self._known.names, **values}
         if not ask.has_counters:
             return ask.encode(names)

@@ -38,6 +38,7 @@ class GuardedMovers:
         """
         self._driver = driver
         self.client = client
+        self.hint, self.tick = client.hint, client.tick
         self._armed: dict[str, Terms] = {}
 
     @property
@@ -71,10 +72,6 @@ class GuardedMovers:
             raise UrcError(f"{command}: {fault}") from fault
         self._armed[command] = terms
         self.client.arm(self._driver.commands[command].transport, command, terms)
-
-    def tick(self, command: str, data: Payload) -> None:
-        """Renew the lease of `command`; `data` is its newest frame."""
-        self.client.tick(command, data)
 
     def renew(self, command: str, stop: Payload) -> None:
         """Let `stop` be what stops `command` from now on; it arms nothing."""

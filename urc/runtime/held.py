@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Literal, Protocol
 
 from urc.model.codec import Payload
 from urc.model.driver import Command, Driver
@@ -41,6 +41,9 @@ class Movers(Protocol):
     def arm(self, command: str, terms: Terms) -> None:
         """Take ticks of `command` from now on, under these terms."""
 
+    def hint(self) -> None:
+        """Take note that a tick is about to come, where that saves time."""
+
     def tick(self, command: str, data: Payload) -> None:
         """Renew the lease of `command`; `data` is its newest frame."""
 
@@ -76,6 +79,10 @@ class Control:
     is_greeted: bool
     """The line has start-up steps: what is said before them may not count."""
     is_armed: bool = False
+    is_lasting: bool = False
+    """What stops it is the same for as long as it is armed."""
+    course: Literal["rest", "moving", "ending"] = "rest"
+    """``ending``: it was let go, and nobody has said yet that its stop was written."""
     stop: Payload | None = None
     """What stops it, as the movers know it."""
     is_owed_again: bool = False
@@ -85,7 +92,7 @@ class Control:
     """Lease in which it stopped by itself: it goes on in a later one only."""
 
     def rest(self) -> None:
-        """Take note that it stands."""
+        """Take note that it is to stand."""
         if self.slew is not None:
             self.slew.begin()
 

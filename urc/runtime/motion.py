@@ -66,6 +66,8 @@ class MotionDesk:
         }
         self._controls = {name: control_of(driver, one) for name, one in self._holds.items()}
         self._is_making = False
+        self.hint: Callable[[], None] = _nothing
+        """To be called, if at all, when a tick is about to come that will most likely be taken."""
         self._screens: dict[str, _Screen] = {}
         self._unconfirmed: set[str] = set()
         self.on_change: Callable[[LeaseState], None] = _ignore
@@ -96,7 +98,7 @@ class MotionDesk:
 
     def attach(self, frames: Frames, movers: Movers) -> None:
         """Take a session's engine and movers; a stop that is still owed goes out."""
-        self._frames, self._movers = frames, movers
+        self._frames, self._movers, self.hint = frames, movers, movers.hint
         frames.on_count, frames.on_ready = self._renew, self._ready
         if self._unconfirmed:
             self._movers.stop(self._stop_frames(self._holds))
@@ -104,6 +106,7 @@ class MotionDesk:
     def detach(self) -> None:
         """Take note that the session is over: its movers stop what moves, and nothing is armed."""
         self._frames = self._movers = None
+        self.hint = _nothing
         for control in self._controls.values():
             control.is_owed_again = False
             if control.is_armed:
@@ -160,14 +163,22 @@ class MotionDesk:
     def halt(self) -> list[str]:
         """Stop what moves, and let it be driven again only by a new gesture in a new lease.
 
+        What the movers have stopped by themselves meanwhile hears no second stop.
+
         Returns:
             The commands that may have moved.
         """
-        self._stop_what_moves()
-        halted = [name for name, control in self._controls.items() if control.is_armed]
+        halted = self._moving()
         for name in halted:
-            self._close(self._controls[name])
+            control = self._controls[name]
+            self._let_go(name, control)
+            self._close(control)
         return halted
+
+    def _moving(self) -> list[str]:
+        """Return what was ticked since its stop was written, as far as anybody has said."""
+        controls = self._controls.items()
+        return [name for name, one in controls if one.is_armed and one.course != "rest"]
 
     def expire(self, now: float) -> None:
         """Do what time alone does."""
@@ -193,14 +204,15 @@ class MotionDesk:
         frames, movers = self._frames, self._movers
         if frames is None or movers is None:
             return _NO_ROBOT
-        arguments = control.limited(arguments, now)
+        if control.slew is not None:
+            arguments = control.limited(arguments, now)
         self._is_making = True  # its stop is made after it
         try:
             data = frames.motion_frame(command, arguments, now)
             if not control.is_armed:
                 movers.arm(command, self._terms(command, frames))
-                control.is_armed = True
-            elif not frames.is_lasting(command):
+                control.is_armed, control.is_lasting = True, frames.is_lasting(command)
+            elif not control.is_lasting:
                 self._renew_stops(control.line)
         except UrcError as error:
             if control.is_armed:
@@ -210,6 +222,7 @@ class MotionDesk:
         finally:
             self._is_making = False
         self.lease.touch(now)
+        control.course = "moving"
         movers.tick(command, data)
         self.on_moved(screen.client, epoch, command, arguments, data, now)
         return ""
@@ -221,6 +234,11 @@ class MotionDesk:
         if control is None or holder is None or holder.id != client:
             return
         control.needs_release = False
+        if control.course == "moving":
+            control.course = "ending"
+        self._let_go(command, control)
+
+    def _let_go(self, command: str, control: Control) -> None:
         control.rest()
         if control.is_armed and self._movers is not None:
             self._movers.release(command)
@@ -231,6 +249,8 @@ class MotionDesk:
         control = self._controls.get(command)
         if control is None:
             return
+        if control.course == "ending":  # else it moves again already
+            control.course = "rest"
         if reason not in ("released", "stopped"):
             self._close(control)
         if self._is_too_early(command, control):
@@ -287,6 +307,7 @@ class MotionDesk:
     def _close(self, control: Control) -> None:
         """Take no tick of a control until it was let go, and the lease was taken anew."""
         control.rest()
+        control.course = "rest"
         control.is_armed = False
         control.needs_release = True
         control.closed_epoch = self.lease.state.epoch
@@ -309,13 +330,14 @@ class MotionDesk:
                 self._stop_what_moves()
             for control in self._controls.values():
                 control.is_armed = control.needs_release = False
+                control.course = "rest"
                 control.rest()
         self.on_change(outcome.state)
 
     def _stop_what_moves(self) -> None:
-        armed = [name for name, control in self._controls.items() if control.is_armed]
-        if armed and self._movers is not None:
-            self._movers.stop(self._stop_frames(armed))
+        moving = self._moving()
+        if moving and self._movers is not None:
+            self._movers.stop(self._stop_frames(moving))
 
     def _stop_frames(self, commands: Sequence[str] | Mapping[str, object]) -> dict[str, Payload]:
         """Return the stop frames; one that cannot be made must not keep back the others."""
@@ -333,6 +355,10 @@ class MotionDesk:
 
 def _ignore(state: LeaseState) -> None:
     """Nobody wants to know."""
+
+
+def _nothing() -> None:
+    """There is nobody to be told."""
 
 
 def _unseen(

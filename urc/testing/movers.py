@@ -75,6 +75,7 @@ class FakeMovers:
         self.ticked_s = float("-inf")
         """When the newest tick was taken."""
         self.is_up = True
+        self.hints = 0
         self._clock = clock
         self._write = write
         self._movers: dict[str, Mover] = {}
@@ -92,6 +93,10 @@ class FakeMovers:
         if mover is None or mover.state == "idle":
             mover = self._movers[command] = Mover(terms)
         mover.arm()
+
+    def hint(self) -> None:
+        """Count that a tick was announced."""
+        self.hints += 1
 
     def tick(self, command: str, data: Payload) -> None:
         """Renew the lease."""

@@ -177,6 +177,17 @@ class CutRig:
                 continue
         return self._trial((lane,), seconds, f"cut {self.port(lane)}", share)[0]
 
+    def drive_once(self, lane: int, life_s: float) -> None:
+        """Let a page drive a robot and let go of it; it lives on, and keeps the controls."""
+        began_ns = time.monotonic_ns()
+        number = self._drive(lane, life_s)
+        self._await_motion(lane, began_ns)
+        self.operators.order(json.dumps({"let_go": number}))
+        robots = self.robots
+        robots.wait_until(
+            lambda: robots.heard[lane][-1].text == "M 0", READY_S, f"the stop of lane {lane}"
+        )
+
     def _share(self) -> float:
         return 0.1 + self._dice.random() * 0.8
 
@@ -206,7 +217,7 @@ class CutRig:
             self.operators.kill(number)
         return cuts
 
-    def _drive(self, lane: int) -> int:
+    def _drive(self, lane: int, life_s: float = 120.0) -> int:
         """Let a page drive a robot; return its number."""
         with self._lock:
             self._numbers += 1
@@ -218,6 +229,7 @@ class CutRig:
             "robot": f"lane-{lane}",
             "death": "outside",
             "drive_s": 0.0,
+            "life_s": life_s,
         }
         self.operators.start(plan)
         return number

@@ -173,12 +173,14 @@ class Rig:
         """Make the relay slow or lossy, by its orders."""
         self._link().do(*orders)
 
-    def drive(self, lane: int, death: str = "outside", drive_s: float = 0.0) -> int:
+    def drive(
+        self, lane: int, death: str = "outside", drive_s: float = 0.0, *, has_spare: bool = False
+    ) -> int:
         """Let a page drive a robot until it dies; return its number."""
         self._numbers += 1
         plan = Plan(
             self._numbers, self.host, self.server.port, f"lane-{lane}", death, drive_s,
-            life_s=LIFE_S,
+            life_s=LIFE_S, has_spare=has_spare,
         )  # fmt: skip
         self.operators.start(plan._asdict())
         return self._numbers

@@ -52,13 +52,18 @@ class Plan(NamedTuple):
     """How long it lives after that at most, where nobody ends it."""
     command: str = "go"
     argument: str = "t"
+    has_spare: bool = False
+    """Whether it says everything about held controls on a second line, too."""
 
 
 class Page:
     """A WebSocket client that does what the dashboard's own page does."""
 
-    def __init__(self, plan: Plan) -> None:
+    def __init__(self, plan: Plan, path: str = "/ws") -> None:
         self.plan = plan
+        self.path = path
+        self.key = ""
+        self.spare: Page | None = None
         self.epoch = -1
         self.beat = -1
         self.you = ""
@@ -81,7 +86,7 @@ class Page:
         place = f"{plan.host}:{plan.port}"
         key = base64.b64encode(os.urandom(16)).decode()
         head = (
-            f"GET /ws?robot={plan.robot} HTTP/1.1\r\nHost: {place}\r\nOrigin: http://{place}\r\n"
+            f"GET {self.path}?robot={plan.robot} HTTP/1.1\r\nHost: {place}\r\nOrigin: http://{place}\r\n"
             "Upgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\n"
             f"Sec-WebSocket-Key: {key}\r\n\r\n"
         )
@@ -126,9 +131,14 @@ class Page:
         """Take what comes until then."""
         while not self.is_closed:
             left_s = (until_ns - time.monotonic_ns()) / 1e9
-            if left_s <= 0 or not select.select([self.socket], [], [], left_s)[0]:
+            lines = [one for one in (self, self.spare) if one is not None and not one.is_closed]
+            ready = select.select([one.socket for one in lines], [], [], max(0.0, left_s))[0]
+            if left_s <= 0 or not ready:
                 return
-            self.hear()
+            for one in lines:
+                if one.socket in ready:
+                    one.hear()
+                    self.beat = max(self.beat, one.beat)
         time.sleep(max(0.0, (until_ns - time.monotonic_ns()) / 1e9))
 
     def hear(self) -> None:
@@ -161,6 +171,7 @@ class Page:
             holder = message.get("holder") or {}
             self.you, self.epoch = message["you"], message["epoch"]
             self.holder = holder.get("id", "")
+            self.key = message["spare"]
             self.is_mine = bool(self.you) and self.holder == self.you
             self.is_latched = bool(message.get("latched"))
         elif kind == "links":
@@ -174,7 +185,7 @@ class Page:
         """Send a sample of what is held, which is the time in microseconds; return it."""
         self.sent += 1
         value = time.monotonic_ns() // 1000
-        self.say(
+        self._say_twice(
             {
                 "t": "tick",
                 "command": self.plan.command,
@@ -186,10 +197,22 @@ class Page:
         )
         return value
 
+    def _say_twice(self, message: dict[str, Any]) -> None:
+        self.say(message)
+        if self.spare is not None:
+            self.spare.say(message)
+
+    def double(self) -> None:
+        """Make a second line."""
+        self.spare = Page(self.plan, "/ws/spare")
+        self.spare.say({"t": "spare", "key": self.key})
+
     def let_go(self) -> None:
         """Hold nothing any more."""
         self.has_let_go = True
-        self.say({"t": "release", "command": self.plan.command})
+        self.sent += 1
+        message = {"t": "release", "command": self.plan.command, "number": self.sent}
+        self._say_twice(message)
 
     def take_controls(self) -> None:
         """Have the lease, a beat and a robot; raise `TimeoutError` when that takes too long."""
@@ -235,6 +258,8 @@ def live(plan: Plan) -> None:
     signal.signal(signal.SIGUSR1, lambda *_: page.let_go())
     tell("port", plan.number, page.socket.getsockname()[1])
     page.take_controls()
+    if plan.has_spare:
+        page.double()
     began_ns = time.monotonic_ns()
     tell("driving", plan.number, began_ns)
     _drive(page, began_ns, began_ns + int(plan.drive_s * 1e9))

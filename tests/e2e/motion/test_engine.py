@@ -19,12 +19,12 @@ from urc.testing.rig_operator import Page, Plan
 
 LANES = 8
 EACH = 16
-IDLE_S = 600.0 if IS_THOROUGH else 20.0
+IDLE_S = 20.0
+"""Ten minutes, on every kind of line, are listened to by ``./dev bench --full motion_idle``."""
 RESTARTS = 5
 BATCHES = 10 if IS_THOROUGH else 1
 WAIT_S = 20.0
 ROOM_BYTES = 2_000_000
-MOST_HELD_UP = 3
 MOST_BOUTS = 4
 
 pytestmark = pytest.mark.skipif("sys.platform != 'linux'", reason="the rig is for Linux")
@@ -189,10 +189,8 @@ def test_latched_stop_holds_over_restarts(latched: tuple[Path, Robots], batch: i
 
 
 def test_robot_that_was_stopped_hears_nothing_more(idle: Idle) -> None:
-    """Not one motion, for as long as nobody begins a new gesture: zeros would fight autonomy."""
+    """Not one word, for as long as nobody begins a new gesture: zeros would fight autonomy."""
     left_s = IDLE_S - (time.monotonic_ns() - idle.stopped_ns) / 1e9
     time.sleep(max(0.0, left_s))
-    texts = [one.text for one in idle.robots.since(0, idle.stopped_ns)]
-    assert set(texts) <= {"M 0"}
-    # A server that was held up by a busy machine stops for certain what is armed, once each time.
-    assert len(texts) <= MOST_HELD_UP
+    # Nor from a server that was held up by a busy machine: it stops only what moves.
+    assert idle.robots.since(0, idle.stopped_ns) == []

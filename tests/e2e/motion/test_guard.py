@@ -38,6 +38,8 @@ END_S = 3.0
 """Required of the end of a session."""
 DEATHS = 10
 BATCHES = 20 if IS_THOROUGH else 2
+LOOK_NS = 25_000_000
+"""How much later it is known that a process was kept from running."""
 START = [sys.executable, "-P", "-c", "import urc.guard.__main__"]
 
 
@@ -54,15 +56,19 @@ class Rig:
                 lambda: "linked live" in self.engine.lines, WAIT_S, "a live line"
             )
         except BaseException:
-            self.close()
+            self.engine.close()
+            self.robots.close()
             raise
+        self._watcher = Robots([f"pid:{self.engine.pid}"])
+        """Says when the engine or a guard could run, and was not let."""
 
     def close(self) -> None:
-        """End both."""
+        """End all."""
         self.engine.signal(signal.SIGCONT)
         self.engine.close()
         self.robots.signal(signal.SIGCONT)
         self.robots.close()
+        self._watcher.close()
 
     @property
     def guard(self) -> int:
@@ -107,7 +113,8 @@ class Rig:
 
     def is_late(self, from_ns: int, until_ns: int) -> float:
         """Return by how many milliseconds the machine itself was late meanwhile."""
-        return self.robots.latest_ms(from_ns, until_ns)
+        waited_ms = self._watcher.waited_ms(from_ns, until_ns + LOOK_NS)
+        return self.robots.latest_ms(from_ns, until_ns) + waited_ms
 
 
 @pytest.fixture

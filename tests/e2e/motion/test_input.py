@@ -3,13 +3,12 @@
 import asyncio
 import os
 import signal
-from collections.abc import Awaitable, Callable
+from functools import partial
 from pathlib import Path
 
 import pytest
-from playwright.async_api import Page
 
-from tests.e2e.browser import LOCALE, PAGE_TIMEOUT_MS, running_browser
+from tests.e2e.browser import LOCALE, PAGE_TIMEOUT_MS, SIZES, running_browser
 from tests.e2e.conftest import PageMaker
 from tests.e2e.dashboards import until
 from tests.e2e.motion.driving import (
@@ -29,11 +28,14 @@ from tests.e2e.motion.driving import (
     push,
     text_of,
 )
+from tests.e2e.motion.ways import WAYS, start_over
+from tests.effort import IS_THOROUGH
 
 pytestmark = pytest.mark.anyio
 
 LATE_S = 0.15
 """One loop plays the server, the robot and the test here; the 50 ms are held by the rig's tests."""
+TIMES = 20 if IS_THOROUGH else 2
 STILL_S = 0.4
 """Longer than a lease: whoever still ticked would be seen."""
 
@@ -61,59 +63,6 @@ async def test_a_held_stick_moves_and_letting_go_stops(new_page: PageMaker) -> N
         assert await text_of(page, "[data-who]").text_content() == "● You drive"
 
 
-Letting = Callable[[Page], Awaitable[object]]
-
-
-def script(text: str) -> Letting:
-    """Return what lets something happen in the page."""
-    return lambda page: fire(page, text)
-
-
-async def press_the_other_button(page: Page) -> None:
-    """A menu, as the second button of a mouse opens one."""
-    await page.mouse.down(button="right")
-
-
-HIDDEN = """
-Object.defineProperty(document, "hidden", { configurable: true, get: () => true });
-Object.defineProperty(document, "visibilityState", { configurable: true, get: () => "hidden" });
-document.dispatchEvent(new Event("visibilitychange"));
-"""
-LOST_CAPTURE = f"""
-(() => {{
-  const el = document.querySelector("{LEFT}");
-  for (let id = 0; id < 64; id += 1) {{
-    if (el.hasPointerCapture(id)) el.releasePointerCapture(id);
-  }}
-}})()
-"""
-CANCELLED = f"""
-(() => {{
-  const el = document.querySelector("{LEFT}");
-  for (let pointerId = 0; pointerId < 64; pointerId += 1) {{
-    if (el.hasPointerCapture(pointerId)) {{
-      el.dispatchEvent(new PointerEvent("pointercancel", {{ pointerId, bubbles: true }}));
-    }}
-  }}
-}})()
-"""
-
-WAYS: dict[str, Letting] = {
-    "pointerup": lambda page: page.mouse.up(),
-    "pointercancel": script(CANCELLED),
-    "lostpointercapture": script(LOST_CAPTURE),
-    "blur": script("window.dispatchEvent(new Event('blur'))"),
-    "hidden": script(HIDDEN),
-    "pagehide": script("window.dispatchEvent(new PageTransitionEvent('pagehide'))"),
-    "freeze": script("document.dispatchEvent(new Event('freeze'))"),
-    "resize": lambda page: page.set_viewport_size({"width": 900, "height": 700}),
-    "rotation": script("window.dispatchEvent(new Event('orientationchange'))"),
-    "full screen": script("document.documentElement.requestFullscreen().catch(() => {})"),
-    "context menu": press_the_other_button,
-    "pad lost": script("window.dispatchEvent(new Event('gamepaddisconnected'))"),
-}
-
-
 @pytest.mark.parametrize("way", WAYS)
 async def test_each_way_of_letting_go_is_neutral_and_ends_the_gesture(
     new_page: PageMaker, way: str
@@ -121,13 +70,22 @@ async def test_each_way_of_letting_go_is_neutral_and_ends_the_gesture(
     """The stop comes at once, not when the lease runs out; the hand that stays moves nothing."""
     async with calmly_driven() as (robot, address):
         page = await opened(new_page, address)
-        await push(page)
-        await robot.until_moving()
-        await WAYS[way](page)
-        await robot.until_stopped()
+        for time in range(TIMES):
+            if time:
+                await start_over(page, *SIZES["desktop"])
+            count = len(robot.line.written)
+            await push(page)
+            await until(partial(has_moved, robot, count))
+            await WAYS[way](page)
+            await robot.until_stopped()
         assert "expired" not in robot.line.reasons, "it did not wait for the lease to run out"
         await page.mouse.move(*(await centre(page, LEFT)), steps=5)
         await stays_still(robot)
+
+
+def has_moved(robot: Wire, count: int) -> bool:
+    """Return whether it was moved since so many words."""
+    return bool(moved(robot.after(count)))
 
 
 async def test_a_new_gesture_moves_again_after_each_of_them(new_page: PageMaker) -> None:
@@ -170,6 +128,15 @@ async def test_two_sticks_and_a_button_move_at_once_by_touch(new_page: PageMaker
         count = len(robot.line.written)
         await until(lambda: len(moved(robot.after(count), "lift")) > 3)
         await hands.lift(2)
+        await robot.until_stopped("lift")
+        await stays_still(robot)
+        for finger, (x, y) in enumerate(places):
+            await hands.put(finger, x, y)
+        await hands.put(0, places[0][0], places[0][1] - 40)
+        await robot.until_moving("drive")
+        await robot.until_moving("lift")
+        await fire(page, "window.dispatchEvent(new Event('blur'))")
+        await robot.until_stopped("drive")
         await robot.until_stopped("lift")
         await stays_still(robot)
 

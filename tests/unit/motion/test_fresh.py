@@ -1,6 +1,9 @@
 """Old inputs, and inputs played back, are refused without any clock but the server's."""
 
-from urc.motion.fresh import Freshness, Input
+from hypothesis import given
+from hypothesis import strategies as st
+
+from urc.motion.fresh import FirstOfTwo, Freshness, Input
 from urc.motion.stall import StallWatch
 
 
@@ -55,3 +58,26 @@ def test_a_line_that_was_clear_in_between_is_not_stalled() -> None:
     watch.saw(0, 1.1)
     assert not watch.saw(10, 1.3)
     assert watch.deadline == 1.55
+
+
+@given(st.lists(st.booleans(), max_size=40), st.lists(st.booleans(), max_size=40), st.randoms())
+def test_of_two_lines_in_order_each_number_counts_once_and_none_goes_back(
+    first: list[bool], second: list[bool], dice: st.DataObject
+) -> None:
+    """However late one line is, and whatever of it was left out: what counts only grows."""
+    lines = [[n for n, is_said in enumerate(one, 1) if is_said] for one in (first, second)]
+    last = max((n for one in lines for n in one), default=0)
+    order, taken = FirstOfTwo(), []
+    while any(lines):
+        number = dice.choice([one for one in lines if one]).pop(0)  # type: ignore[attr-defined]
+        if order.take("drive", number):
+            taken.append(number)
+    assert taken == sorted(set(taken))
+    assert taken[-1:] == [last] * bool(last), "the newest always counts"
+
+
+def test_what_is_said_of_one_control_is_nothing_to_another() -> None:
+    order = FirstOfTwo()
+    assert order.take("drive", 5)
+    assert order.take("lift", 4)
+    assert not order.take("drive", 4)

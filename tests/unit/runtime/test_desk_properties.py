@@ -57,6 +57,9 @@ class Line:
         self.is_up = True
         self.now = 0.0
 
+    def hint(self) -> None:
+        """Nothing sleeps here."""
+
     def arm(self, command: str, terms: Terms) -> None:
         self._mover(command, terms).arm()
 

@@ -335,21 +335,6 @@ def test_speed_grows_as_fast_as_the_driver_lets_it_and_falls_at_once() -> None:
     assert it.heard() == ["release drive"], "what is no number is still refused"
 
 
-def test_an_engine_that_was_held_up_stops_what_moves() -> None:
-    """And nothing goes on by itself; a latch it is not."""
-    it = Scene()
-    assert it.desk.halt() == []
-    it.drive("ann", "take")
-    it.tick(speed=0.5)
-    it.heard()
-    assert it.desk.halt() == ["drive"]
-    assert it.heard() == ["stop drive"]
-    assert it.tick(speed=0.5) == LET_GO
-    it.desk.release("ann", "drive")
-    it.drive("ann", "take")
-    assert it.tick(speed=0.5) == ""
-
-
 def test_too_many_screens_are_turned_away() -> None:
     """Each costs memory; the bound is the server's own."""
     it = Scene()

@@ -1,0 +1,28 @@
+"""How soon a robot is stopped when its guard is killed while it is driven.
+
+Another guard takes its place within half a second, and stops the robot before it says anything
+else.
+"""
+
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+
+from bench.harness import Result
+from bench.motion_engine import repeated, said
+from urc.testing.rig_engine import EngineRig
+
+__all__ = ["run"]
+
+LANES = 4
+KILLED, KILLED_IF_FULL = 20, 200
+BIN_MS = 50
+
+
+def run(*, full: bool) -> Sequence[Result]:
+    """Kill guards; the slowest stop is held to the bound."""
+    wanted = KILLED_IF_FULL if full else KILLED
+    with tempfile.TemporaryDirectory() as folder, EngineRig(Path(folder), lanes=LANES) as rig:
+        rig.bout("close")
+        trials = repeated(rig.guard_bout, wanted, LANES)
+    return [said("motion_guard", "guard-killed", trials, wanted, BIN_MS)]

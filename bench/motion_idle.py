@@ -1,0 +1,62 @@
+"""Is a robot that was stopped left alone? On every kind of line, all at once.
+
+Each robot is driven once and let go, while its page keeps the controls and goes on being told
+beats. From when the stop has been said, as often as its line needs it, not one byte may come: zeros
+would fight whoever else drives. Real programs over a relay between two network namespaces; needs
+root and /dev/net/tun, otherwise left out, and told.
+"""
+
+import json
+import tempfile
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+from bench.figures import tell
+from bench.harness import Result
+from urc.motion.hold import STOP_FOR_S
+from urc.testing.rig import can_relay
+from urc.testing.rig_cuts import CutRig
+from urc.testing.rig_kinds import KINDS
+
+__all__ = ["run"]
+
+LASTS_S, LASTS_IF_FULL_S = 20.0, 600.0
+SETTLED_S = STOP_FOR_S + 0.5
+"""After the first stop: its repeats have come, also over a broker."""
+SPARE_S = 120.0
+
+
+def run(*, full: bool) -> Sequence[Result]:
+    """Listen."""
+    if not can_relay():
+        print(json.dumps({"left_out": "motion_idle: needs root and /dev/net/tun"}))
+        return []
+    lasts_s = LASTS_IF_FULL_S if full else LASTS_S
+    with tempfile.TemporaryDirectory() as folder, CutRig(Path(folder), KINDS) as rig:
+        for lane in rig.lanes:
+            rig.drive_once(lane, lasts_s + SPARE_S)
+        time.sleep(SETTLED_S)
+        from_ns = time.monotonic_ns()
+        time.sleep(lasts_s)
+        return [_told(rig, lane, from_ns) for lane in rig.lanes]
+
+
+def _told(rig: CutRig, lane: int, from_ns: int) -> Result:
+    kind, texts = rig.kinds[lane], [one.text for one in rig.robots.since(lane, from_ns)]
+    seconds = (time.monotonic_ns() - from_ns) / 1e9
+    figures = {"line": kind, "seconds": round(seconds), "motions": _motions(texts)}
+    tell({"figure": "motion_idle", **figures, "stops": len(texts) - _motions(texts)})
+    return Result(
+        name=f"motion: words to a robot at rest over {kind} in {seconds:.0f} s",
+        ratio=float(len(texts)),
+        goal=0.0,
+        baseline_ms=0.0,
+        subject_ms=0.0,
+        spread=1.0,
+        rounds=1,
+    )
+
+
+def _motions(texts: Sequence[str]) -> int:
+    return sum(text != "M 0" for text in texts)

@@ -1,0 +1,102 @@
+"""Whether a guard that says nothing hangs, or only has no time to run."""
+
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from urc.guard import client
+from urc.guard.client import Guard
+from urc.guard.process import Standing, standing
+
+
+class FakePipe:
+    """A pipe on which nothing comes."""
+
+    is_closed = False
+
+    def close(self) -> None:
+        """Close."""
+        self.is_closed = True
+
+
+class Watched(Guard):
+    """A guard of whose process only the standing is known."""
+
+    def __init__(self) -> None:
+        super().__init__([])
+        self._pipe = self.pipe = FakePipe()  # type: ignore[assignment]
+        self._was_heard = True
+        self.deaths = 0
+
+    def looks(self, count: int) -> None:
+        """Look so often, each time in time."""
+        for _ in range(count):
+            if self.pipe.is_closed:
+                return
+            self._look_s = float("inf")
+            self._watch()
+            assert self._look is not None
+            self._look.cancel()
+
+    def _died(self) -> None:
+        self.deaths += 1
+
+
+@pytest.fixture
+def stands(monkeypatch: pytest.MonkeyPatch) -> list[Standing]:
+    """How the process stands: what was put here last."""
+    said = [Standing()]
+    monkeypatch.setattr(client, "standing", lambda pid: said[-1])
+    return said
+
+
+@pytest.mark.anyio
+async def test_one_that_is_silent_for_half_a_second_has_hung(stands: list[Standing]) -> None:
+    """It sleeps, was stopped, or runs in a circle: whoever could speak does."""
+    for standing_ in (Standing(), Standing(wants_to_run=False, ran_s=7.0)):
+        stands.append(standing_)
+        guard = Watched()
+        guard.looks(5)
+        assert guard.deaths == 0
+        guard.looks(1)
+        assert guard.deaths == 1
+    guard = Watched()
+    for number in range(6):
+        stands.append(Standing(wants_to_run=True, ran_s=1.0 + number * 0.1))
+        guard.looks(1)
+    assert guard.deaths == 1, "it had all the time there was"
+
+
+@pytest.mark.anyio
+async def test_one_that_is_let_run_by_nobody_is_waited_for(stands: list[Standing]) -> None:
+    """Another one would get no more of the machine; but not for ever, and not after it spoke."""
+    stands.append(Standing(wants_to_run=True, ran_s=3.0))
+    guard = Watched()
+    guard.looks(15)
+    assert guard.deaths == 0
+    guard.looks(10)
+    assert guard.deaths == 1
+
+
+@pytest.mark.skipif(not Path("/proc/self/schedstat").exists(), reason="the system tells nothing")
+def test_a_process_tells_whether_it_would_run(tmp_path: Path) -> None:
+    """Itself, one that was stopped, one that is gone, and a strange name that waits its turn."""
+    assert standing(os.getpid()).wants_to_run
+    with subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE) as sleeper:
+        try:
+            os.kill(sleeper.pid, signal.SIGSTOP)
+            os.waitpid(sleeper.pid, os.WUNTRACED)
+            stopped = standing(sleeper.pid)
+        finally:
+            sleeper.kill()
+    assert not stopped.wants_to_run
+    assert stopped.ran_s > 0
+    assert standing(sleeper.pid) == Standing()
+    (tmp_path / "5").mkdir()
+    (tmp_path / "5" / "stat").write_text("5 (a) S (b) R 1 2 3")
+    (tmp_path / "5" / "schedstat").write_text("1500000000 2 3")
+    assert standing(5, tmp_path) == Standing(wants_to_run=True, ran_s=1.5)

@@ -1,0 +1,72 @@
+"""What the operator filled in: kept whole or not at all, and read by nobody else."""
+
+import os
+import stat
+from pathlib import Path
+
+import pytest
+
+from urc.problems import UrcError
+from urc.runtime.kept import Kept, KeptFile
+from urc.runtime.probe import advice
+
+KEPT = Kept(version="1.0.0", interface="wide", settings={"host": "10.0.0.5", "key": "hush"})
+
+
+def test_what_was_kept_comes_back(tmp_path: Path) -> None:
+    file = KeptFile(tmp_path / "robots", "rover")
+    assert file.load() == Kept()
+    file.save(KEPT)
+    assert KeptFile(tmp_path / "robots", "rover").load() == KEPT
+    file.forget()
+    assert file.load() == Kept()
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no such rights")
+def test_only_its_owner_can_read_it(tmp_path: Path) -> None:
+    file = KeptFile(tmp_path, "rover")
+    file.save(KEPT)
+    assert stat.S_IMODE(file.file.stat().st_mode) == 0o600
+
+
+def test_a_name_never_leads_out_of_the_folder(tmp_path: Path) -> None:
+    assert KeptFile(tmp_path, "../../etc/passwd").file.parent == tmp_path
+
+
+@pytest.mark.parametrize("text", ["", "[]", '{"format": 2}', '{"settings": {"a": 1}}', "\xff"])
+def test_a_damaged_file_is_told_in_one_line(tmp_path: Path, text: str) -> None:
+    file = KeptFile(tmp_path, "rover")
+    file.file.write_text(text, encoding="latin-1")
+    with pytest.raises(UrcError, match="this file is damaged") as caught:
+        file.load()
+    assert "\n" not in str(caught.value)
+
+
+def test_a_failure_to_write_changes_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = KeptFile(tmp_path, "rover")
+    file.save(KEPT)
+
+    def full(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("urc.runtime.kept.os.fsync", full)
+    with pytest.raises(UrcError, match="No space left on device"):
+        file.save(Kept())
+    assert file.load() == KEPT
+    assert list(tmp_path.iterdir()) == [file.file]
+
+
+@pytest.mark.parametrize(
+    ("text", "what"),
+    [
+        ("nothing listens on 10.0.0.5:80 (connection refused)", "check the port"),
+        ("10.0.0.5 did not answer within 3 s", "check the address"),
+        ("the network is unreachable", "robot's network"),
+        ("permission denied (publickey)", "check user, password and key file"),
+        ("something that nobody has seen before", "check the settings of this line"),
+    ],
+)
+def test_a_failure_comes_with_what_to_do(text: str, what: str) -> None:
+    assert what in advice(text)
