@@ -131,12 +131,9 @@ def add_port(parser: argparse.ArgumentParser) -> None:
 
 def load(word: str) -> "Profile":
     """Return the profile that `word` names; raise `UrcError` with what is wrong with it."""
-    from urc.config.load import load_profile
-    from urc.runtime.catalog import built_in_catalog
-    from urc.runtime.shelves import shelf_of
+    from urc.runtime.opened import open_document
 
-    path = profile_path(word)
-    return load_profile(path, built_in_catalog(), shelf_of(path))
+    return open_document(profile_path(word))
 
 
 def profile_path(word: str) -> str:

@@ -1,26 +1,42 @@
 """What `urc serve` and `urc demo` share: profiles → robots of the dashboard → a running server."""
 
+import gc
+import time
 from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 from contextlib import AsyncExitStack, asynccontextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
 from urc._folders import data_folder
 from urc.cli.failures import Misuse
+from urc.cli.output import complain
 from urc.cli.running import run_loop
 from urc.model.profile import Profile
 from urc.model.values import Value
+from urc.problems import UrcError
 from urc.runtime.catalog import built_in_catalog
+from urc.runtime.kept import Kept
 from urc.runtime.selftest import sample_settings
 from urc.runtime.session import Motion, Session
 from urc.simulator.stand_in import stand_in
+from urc.simulator.twin import Twin
 from urc.web.app import Robot, build_app, serve
+from urc.web.garage import Garage, Workshop
+from urc.web.robots import Glimpse
 
-__all__ = ["Place", "SettingsOf", "run_dashboard"]
+__all__ = ["Place", "SettingsOf", "run_dashboard", "workshop_of"]
 
 SettingsOf = Callable[[Profile], Mapping[str, Value]]
-"""The settings of a profile that are known; raises `UrcError` for those that no longer fit."""
+"""The settings of a profile that were given at the start; raises `UrcError` for those that no
+longer fit."""
+_LOOK = (320, 240)
+"""Columns and rows of the picture on a card."""
+
+
+def _nothing(_: Profile) -> Mapping[str, Value]:
+    """Nothing was given."""
+    return {}
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,85 +52,139 @@ class Place:
     """Whether a process of its own stops what moves when this one cannot."""
     tiles: Path | None = None
     """Folder of map pictures; None: maps are grids."""
+    is_managed: bool = False
+    """Whether other machines may install packages and change settings, too."""
+    shows_installed: bool = False
+    """Whether the robots and drivers that are installed are on the menu."""
+    trusted: Sequence[str] = ()
+    """Widgets that do not ship with URC, and share the page all the same."""
 
 
 def run_dashboard(
-    profiles: Sequence[tuple[Profile, Mapping[str, Value]]],
+    profiles: Sequence[Profile],
     place: Place,
     *,
     is_simulated: bool,
     on_ready: Callable[[str], None],
-    settings_of: SettingsOf | None = None,
+    given: SettingsOf = _nothing,
+    is_dev: bool = False,
 ) -> int:
     """Serve the dashboard until a signal ends it, which is fine: return 0.
 
     Args:
-        profiles: each with the settings that are known.
-        place: address, port and the names it answers to.
+        profiles: the robots that are there from the start.
+        place: address, port, the names it answers to, and what is kept where.
         is_simulated: each robot is emulated, over a real socket, instead of the real one.
         on_ready: called once with the address.
-        settings_of: the settings of a profile that was saved anew, for the dev pages; None: there
-            are none.
+        given: the settings of a profile that were given at the start.
+        is_dev: whether there are dev pages, and documents are read again when they are saved.
 
     Raises:
         UrcError: a port that cannot be had, two robots of one name.
     """
-    names = [profile.name for profile, _ in profiles]
+    names = [profile.name for profile in profiles]
     for name in names:
         if names.count(name) > 1:
             raise Misuse(f"two robots are named {name!r}; a name must be unique")
-    work = _serve(profiles, place, is_simulated, on_ready, settings_of)
+    work = _serve(profiles, place, is_simulated, on_ready, given, is_dev)
     return run_loop(work, code_when_ended=0, is_fast=True)
 
 
 async def _serve(
-    profiles: Sequence[tuple[Profile, Mapping[str, Value]]],
+    profiles: Sequence[Profile],
     place: Place,
     is_simulated: bool,
     on_ready: Callable[[str], None],
-    settings_of: SettingsOf | None,
+    given: SettingsOf,
+    is_dev: bool,
 ) -> int:
     async with AsyncExitStack() as stack:
-        transports = built_in_catalog().transports
-        motion: Motion = "guarded" if place.has_guard else "here"
+        workshop = workshop_of(place, given, is_simulated=is_simulated)
+        garage = Garage(workshop)
         robots: dict[str, Robot] = {}
-        for original, known in profiles:
-            profile, settings = original, known
+        for profile in profiles:
+            robot = _first(garage, profile)
             if is_simulated:
-                # What only a real robot needs to be told, nobody must fill in for its twin.
-                settings = sample_settings(profile.settings) | dict(known)
-                profile = await stack.enter_async_context(stand_in(profile, settings))
-            session = partial(Session, profile, settings, transports, motion=motion)
-            robots[profile.name] = Robot(profile, settings, session)
-        data = place.data or data_folder()
-        remake = settings_of and dict.fromkeys(robots, _remaker(settings_of, is_simulated, motion))
+                # Emulated from the start, whether somebody looks at it or not.
+                twin = Twin(robot.profile, robot.settings)
+                redirected = await stack.enter_async_context(
+                    stand_in(robot.profile, robot.settings, twin)
+                )
+                robot = _robot(_motion(place), False, redirected, robot.settings)
+                robot = replace(robot, glimpse=partial(_seen, twin))
+            robots[profile.name] = robot
+        remade = {name: partial(garage.robot, name) for name in robots} if is_dev else None
         app = build_app(
-            robots, allowed_hosts=place.allowed_hosts, data=data, tiles=place.tiles, remake=remake
+            robots,
+            allowed_hosts=place.allowed_hosts,
+            data=workshop.data,
+            tiles=place.tiles,
+            remake=remade,
+            workshop=workshop,
+            trusted=place.trusted,
         )
+        gc.collect()
+        gc.freeze()  # what is loaded by now stays: looking through it again would hold us up
         await serve(app, host=place.host, port=place.port, on_ready=on_ready)
     return 0
 
 
-def _remaker(
-    settings_of: SettingsOf, is_simulated: bool, motion: Motion
-) -> Callable[[Profile], Robot]:
-    """Return what makes the robot of a profile that was saved anew."""
+def workshop_of(
+    place: Place, given: SettingsOf = _nothing, *, is_simulated: bool = False
+) -> Workshop:
+    """Return what makes the robots of a dashboard while it runs."""
+    return Workshop(
+        place.data or data_folder(),
+        make=partial(_robot, _motion(place), is_simulated),
+        tried=partial(_session, "none", is_simulated),
+        given=given,
+        shows_installed=place.shows_installed,
+        is_open=place.is_managed,
+    )
+
+
+def _motion(place: Place) -> Motion:
+    return "guarded" if place.has_guard else "here"
+
+
+def _first(garage: Garage, profile: Profile) -> Robot:
+    """Return a robot that is there from the start, whatever was kept of it."""
+    try:
+        return garage.robot(profile.name, profile)
+    except UrcError as error:
+        complain(f"urc: {error}; what was filled in for {profile.name} is left out")
+        return garage.robot(profile.name, profile, Kept())
+
+
+def _robot(
+    motion: Motion, is_simulated: bool, profile: Profile, values: Mapping[str, Value]
+) -> Robot:
+    """Return a robot whose session is opened when somebody looks at it."""
+    settings = _complete(profile, values) if is_simulated else values
+    opened = partial(_session, motion, is_simulated, profile, settings)
+    return Robot(profile, settings, opened)
+
+
+def _seen(twin: Twin) -> Glimpse:
+    """Return what an emulated robot looks like: through its camera, from above, or in figures."""
+    now_s = time.time()
+    return twin.camera(now_s) or twin.top_view(*_LOOK, now_s) or twin.readings(now_s)
+
+
+@asynccontextmanager
+async def _session(
+    motion: Motion, is_simulated: bool, profile: Profile, values: Mapping[str, Value]
+) -> AsyncIterator[Session]:
+    """Open a session with a robot, or with its twin, which lives as long as the session."""
     transports = built_in_catalog().transports
+    async with AsyncExitStack() as stack:
+        settings = values
+        if is_simulated:
+            settings = _complete(profile, values)
+            profile = await stack.enter_async_context(stand_in(profile, settings))
+        yield await stack.enter_async_context(Session(profile, settings, transports, motion=motion))
 
-    def remake(profile: Profile) -> Robot:
-        known = settings_of(profile)
-        if not is_simulated:
-            session = partial(Session, profile, known, transports, motion=motion)
-            return Robot(profile, known, session)
-        settings = sample_settings(profile.settings) | dict(known)
-        return Robot(profile, settings, partial(_with_twin, profile, settings))
 
-    @asynccontextmanager
-    async def _with_twin(profile: Profile, settings: Mapping[str, Value]) -> AsyncIterator[Session]:
-        async with (
-            stand_in(profile, settings) as redirected,
-            Session(redirected, settings, transports, motion=motion) as session,
-        ):
-            yield session
-
-    return remake
+def _complete(profile: Profile, values: Mapping[str, Value]) -> dict[str, Value]:
+    """Return settings with what only a real robot needs to be told: nobody must fill it in."""
+    return sample_settings(profile.settings) | dict(values)

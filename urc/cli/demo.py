@@ -2,6 +2,7 @@
 
 import argparse
 import os
+import socket
 import sys
 import threading
 import webbrowser
@@ -14,12 +15,14 @@ from urc.problems import UrcError
 from urc.shipped import shipped
 
 EXAMPLE = "urc demo"
+USUAL_PORT = 8080
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add where to listen, and whether a browser is opened."""
     add_host(parser)
     add_port(parser)
+    parser.set_defaults(port=None)
     add_dev(parser)
     parser.add_argument("--no-browser", action="store_true", help="print the address only")
 
@@ -44,12 +47,24 @@ def run(arguments: argparse.Namespace) -> int:
             threading.Thread(target=_open_browser, args=(url,), daemon=True).start()
 
     return run_dashboard(
-        [(profile, {}) for profile in profiles],
-        Place(arguments.host, arguments.port),
+        profiles,
+        Place(arguments.host, _port(arguments)),
         is_simulated=True,
         on_ready=announce,
-        settings_of=(lambda _: {}) if arguments.dev else None,
+        is_dev=arguments.dev,
     )
+
+
+def _port(arguments: argparse.Namespace) -> int:
+    """Return the port that was asked for, else the usual one, else any: a demo always begins."""
+    if arguments.port is not None:
+        return int(arguments.port)
+    family = socket.AF_INET6 if ":" in arguments.host else socket.AF_INET
+    with socket.socket(family, socket.SOCK_STREAM) as probe, suppress(OSError):
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        probe.bind((arguments.host, USUAL_PORT))
+        return USUAL_PORT
+    return 0
 
 
 def has_screen(platform: str, environment: Mapping[str, str]) -> bool:

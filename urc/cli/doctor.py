@@ -32,7 +32,7 @@ OPTIONAL = {
     "cbor2": "images from rosbridge without detours (pip install 'urc[cbor]')",
     "zeroconf": "robots that announce themselves, for urc discover (pip install 'urc[mdns]')",
     "google-re2": "patterns that are not provably fast; without it they are refused",
-    "uvloop": "a faster event loop (pip install 'urc[fast]')",
+    "uvloop": "a faster event loop; without it, ticks take a little longer to the robot",
 }
 FOLDERS: tuple[Literal["schemas", "robots", "widgets", "templates"], ...] = (
     "schemas",

@@ -18,19 +18,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--into",
         metavar="DIR",
         type=Path,
-        help="folder in which the new folder is made; by default where URC looks for widgets",
+        help="folder in which the new folder is made; by default 'widgets' in this one, where "
+        "the robots beside it look for it",
     )
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Make the folder; nothing that is there already is changed."""
     from urc.problems import UrcError
-    from urc.shipped import shipped
 
     name: str = arguments.name
     if not _NAME.fullmatch(name):
         raise UrcError(f"a widget cannot be called {name!r}: write small letters, digits and '-'")
-    home: Path = arguments.into or shipped("widgets")
+    home: Path = arguments.into or Path("widgets")
     folder = home / name
     try:
         home.mkdir(parents=True, exist_ok=True)

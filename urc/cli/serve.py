@@ -1,6 +1,7 @@
 """`urc serve`: the dashboard on real robots."""
 
 import argparse
+import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -18,7 +19,12 @@ EXAMPLE = "urc serve robots/puppet.yaml --set host=192.168.1.20"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the profiles, their settings, and where to listen."""
-    parser.add_argument("profiles", metavar="PROFILE", nargs="+", help="robot files or names")
+    parser.add_argument(
+        "profiles",
+        metavar="PROFILE",
+        nargs="*",
+        help="robot files or names; without any, all that is installed",
+    )
     add_settings(parser)
     add_host(parser)
     add_port(parser)
@@ -34,6 +40,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--simulate", action="store_true", help="emulate the robots instead of connecting"
     )
     add_dev(parser)
+    parser.add_argument(
+        "--installed",
+        action="store_true",
+        help="beside the profiles, all robots and drivers that are installed",
+    )
+    parser.add_argument(
+        "--manage",
+        action="store_true",
+        help="other machines, too, may install packages and change settings",
+    )
     parser.add_argument(
         "--no-guard",
         dest="has_guard",
@@ -53,33 +69,48 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=Path,
         help="pictures of maps, as FOLDER/z/x/y.png, for the option tiles of the widget map",
     )
+    parser.add_argument(
+        "--trust-widget",
+        dest="trusted",
+        metavar="NAME",
+        action="append",
+        default=[],
+        help="let a widget that does not ship with URC share the page instead of a frame of its "
+        "own: it can then do all that the page may do",
+    )
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Serve until Ctrl-C or SIGTERM."""
     from urc.cli.dashboard import Place, run_dashboard
     from urc.cli.settings import settings_given
+    from urc.runtime.settings import resolve_settings
 
     if arguments.dev and not is_loopback(arguments.host):
         raise Misuse(f"--dev shows all traffic and is for this machine alone, not {arguments.host}")
     if arguments.tiles and not arguments.tiles.is_dir():
         raise Misuse(f"--tiles names a folder of map pictures; {arguments.tiles} is none")
     profiles = [load(word) for word in arguments.profiles]
-    values = [values for values, _ in settings_given(profiles, arguments)]
+    if not profiles and (arguments.settings or arguments.settings_file):
+        raise Misuse("--set and --settings are for the profiles that are named; name one")
+    settings_given(profiles, arguments)  # what is wrong with them is said before anything starts
     if not is_loopback(arguments.host):
-        complain(
-            f"urc serve: {arguments.host} can be reached by others, and there is no sign-in yet:"
-            " anyone on that network can drive these robots"
-        )
+        _warn(arguments)
 
-    def settings_of(saved: "Profile") -> Mapping[str, "Value"]:
-        others = [profile for profile in profiles if profile.name != saved.name]
-        return settings_given([saved, *others], arguments)[0][0]
+    def given(profile: "Profile") -> Mapping[str, "Value"]:
+        bare = profile._replace(
+            settings={name: one._replace(default=None) for name, one in profile.settings.items()}
+        )
+        named = [one.name for one in profiles]
+        if profile.name not in named:
+            return resolve_settings(bare, {}, os.environ)[0]  # an installed one
+        others = [one for one in profiles if one.name != profile.name]
+        return settings_given([bare, *others], arguments)[0][0]
 
     if not arguments.has_guard:
         complain("urc serve: no guard: a robot that moves is not stopped when this process hangs")
     return run_dashboard(
-        list(zip(profiles, values, strict=True)),
+        profiles,
         Place(
             arguments.host,
             arguments.port,
@@ -87,11 +118,26 @@ def run(arguments: argparse.Namespace) -> int:
             arguments.data,
             arguments.has_guard,
             arguments.tiles,
+            arguments.manage,
+            arguments.installed or not profiles,
+            tuple(arguments.trusted),
         ),
         is_simulated=arguments.simulate,
         on_ready=_print_address,
-        settings_of=settings_of if arguments.dev else None,
+        given=given,
+        is_dev=arguments.dev,
     )
+
+
+def _warn(arguments: argparse.Namespace) -> None:
+    complain(
+        f"urc serve: {arguments.host} can be reached by others, and there is no sign-in yet:"
+        " anyone on that network can drive these robots"
+    )
+    if arguments.manage:
+        complain(
+            "urc serve: --manage: anyone on that network can install packages and change settings"
+        )
 
 
 def _print_address(url: str) -> None:

@@ -12,7 +12,7 @@ from typing import Final
 from urc.config.part import Findings, Part
 from urc.model.widget import Widget
 
-__all__ = ["FILE_TYPES", "MOST_BYTES", "link_files"]
+__all__ = ["FILE_TYPES", "MOST_BYTES", "link_files", "named_texts"]
 
 FILE_TYPES: Final = (
     *(".urdf", ".stl", ".dae", ".glb", ".obj", ".mtl", ".md", ".txt", ".json", ".csv"),
@@ -33,7 +33,7 @@ def link_files(options: Part, widget: Widget, findings: Findings) -> dict[str, s
         findings: takes what is wrong.
     """
     found = {}
-    for part in _named_files(options, widget.options):
+    for _, part in named_texts(options, widget.options, "file"):
         fault = _fault(part.data)
         place = FilePath(part.document.file).absolute().parent / part.data
         if fault:
@@ -51,16 +51,19 @@ def link_files(options: Part, widget: Widget, findings: Findings) -> dict[str, s
     return found
 
 
-def _named_files(options: Part, schemas: Mapping[str, object]) -> Iterator[Part]:
+def named_texts(
+    options: Part, schemas: Mapping[str, object], keyword: str
+) -> Iterator[tuple[str, Part]]:
+    """Yield the texts whose schema says `keyword: true`, each with the name of its option."""
     for name, part in options.entries().items():
         schema = schemas.get(name)
         if not isinstance(schema, Mapping):
             continue
         items = schema.get("items")
-        if schema.get("file") and isinstance(part.data, str):
-            yield part
-        elif isinstance(items, Mapping) and items.get("file") and isinstance(part.data, list):
-            yield from (each for each in part.items() if isinstance(each.data, str))
+        if schema.get(keyword) and isinstance(part.data, str):
+            yield name, part
+        elif isinstance(items, Mapping) and items.get(keyword) and isinstance(part.data, list):
+            yield from ((name, each) for each in part.items() if isinstance(each.data, str))
 
 
 def _fault(name: str) -> str:

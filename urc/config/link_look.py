@@ -5,6 +5,7 @@ from typing import NamedTuple, TypeVar
 
 from urc.config.gather import Sources
 from urc.config.link_files import link_files
+from urc.config.link_pages import link_pages
 from urc.config.link_outputs import link_output
 from urc.config.parse_widget import Shelf
 from urc.config.part import Findings, Part
@@ -113,7 +114,7 @@ def _use(
             )
         return None  # a broken manifest is told where it stands
     bound = _bindings(part, widget, base, driver, findings)
-    options, files = _options(part, widget, base, findings)
+    options, files, pages = _options(part, widget, base, findings)
     return WidgetUse(
         slot=part.name,
         widget=name,
@@ -124,6 +125,7 @@ def _use(
         given=bound.given,
         lists=bound.lists,
         files=files,
+        pages=pages,
     )
 
 
@@ -270,17 +272,19 @@ def misfit(port: Port, signal: Signal) -> str:
 
 def _options(
     part: Part, widget: Widget, base: WidgetUse | None, findings: Findings
-) -> tuple[dict[str, object], dict[str, str]]:
-    """Return the options with the manifest's defaults filled in, and the files they name."""
+) -> tuple[dict[str, object], dict[str, str], dict[str, tuple[str, ...]]]:
+    """Return the options, the manifest's defaults filled in, and the files and pages they name."""
     options: dict[str, object] = {
         name: schema["default"]
         for name, schema in widget.options.items()
         if isinstance(schema, dict) and "default" in schema
     }
     files: dict[str, str] = {}
+    pages: dict[str, tuple[str, ...]] = {}
     if base is not None and base.widget == widget.name:
         options |= base.options
         files |= base.files
+        pages |= base.pages
     given = part.get("options")
     if given is not None:
         problems = check_options(given.document, given.path, given.data, widget.options)
@@ -288,4 +292,5 @@ def _options(
         options |= given.data
         if not problems:
             files |= link_files(given, widget, findings)
-    return options, files
+            pages |= link_pages(given, widget, findings)
+    return options, files, pages

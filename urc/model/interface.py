@@ -39,6 +39,8 @@ class WidgetUse(NamedTuple):
     """Input of the widget that takes many → signals of the driver, in order."""
     files: Mapping[str, str] = NOTHING
     """File as an option names it → where it is."""
+    pages: Mapping[str, tuple[str, ...]] = NOTHING
+    """Option → URLs of other people's pages that it names, as they were found to be right."""
 
 
 class Slot(NamedTuple):

@@ -56,6 +56,9 @@ class EnvelopeWriter:
         if self._body is None:
             return found
         body = envelope.body
+        if "type" in self._attributes and isinstance(self._body, JsonWriter):
+            body = self._body.completed(body)
+            envelope = envelope._replace(body=body)
         said = self._body.read(
             Frame(body if isinstance(body, bytes) else envelope, self._context.encoding)
         )

@@ -62,11 +62,11 @@ class JsonReader:
     def write(self, fields: Mapping[str, object]) -> Payload:
         """Return a document with `fields` where their paths lead."""
         root: dict[str, Any] = {}
-        for name, value in fields.items():
-            if name in self._paths:
-                _put(root, self._paths[name], value)
-            elif name in self._finders:
-                raise NotWritable(f"{name}: a search in a document cannot be turned round")
+        for name in fields.keys() & self._finders.keys() - self._paths.keys():
+            raise NotWritable(f"{name}: a search in a document cannot be turned round")
+        for name, path in self._paths.items():  # as declared: some readers want the kind first
+            if name in fields:
+                _put(root, path, fields[name])
         try:
             payload = json.dumps(root, separators=(",", ":"), default=_plain).encode("utf-8")
         except (TypeError, ValueError, RecursionError) as error:

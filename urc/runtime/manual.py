@@ -4,6 +4,7 @@ Floor 4, pure: the same profile gives the same page. It is made for who operates
 document says in its descriptions is passed on word by word.
 """
 
+import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Final
 
@@ -226,6 +227,16 @@ def _releases(driver: Driver) -> Iterator[str]:
             }
             given = ", ".join(f"{name} {_value(value)}" for name, value in values.items())
             yield f"- {_code(command.name)}: {_code(given) if given else 'nothing more is sent'}"
+            yield f"  - {_by_itself(command.hold.watchdog_s)}"
+
+
+def _by_itself(watchdog_s: float | None) -> str:
+    """Return what the robot does when nothing more comes, not even the release."""
+    if watchdog_s is None:
+        return "Whether the robot stops by itself when nothing more comes is not said."
+    if math.isinf(watchdog_s):
+        return "The robot does not stop by itself: what was sent last goes on."
+    return f"Without any further command the robot ends it by itself: {shown_duration(watchdog_s)}."
 
 
 def _interfaces(profile: Profile) -> Iterator[str]:

@@ -37,7 +37,8 @@ def permissions(document: Path, folder: Path, widgets: Sequence[str]) -> list[st
     return [
         *lines,
         *(
-            f"widget {name}: a program in the dashboard's page, with all that the page may do"
+            f"widget {name}: a program in a frame of its own; it sees and gives what its cell is "
+            "bound to, and nothing else"
             for name in widgets
         ),
     ] or ["nothing: it is a layout, with no connection of its own"]

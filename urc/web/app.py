@@ -9,12 +9,12 @@ from collections.abc import AsyncIterator, Iterable, Mapping
 from contextlib import asynccontextmanager
 from dataclasses import dataclass, field
 from http import HTTPStatus
-from ipaddress import ip_address
 from pathlib import Path
+from urllib.parse import quote
 
 from starlette.applications import Starlette
 from starlette.exceptions import HTTPException
-from starlette.requests import HTTPConnection, Request
+from starlette.requests import Request
 from starlette.responses import HTMLResponse, JSONResponse, RedirectResponse, Response
 from starlette.routing import Route, WebSocketRoute
 from starlette.types import ASGIApp
@@ -24,22 +24,37 @@ from urc import __version__
 from urc.model.widget import Widget
 from urc.runtime.audit import AuditLog
 from urc.runtime.latch import LatchFile
+from urc.runtime.shelves import shelf_of
 from urc.runtime.trail import Trail
 from urc.shipped import vendored
 from urc.web import wire, words
-from urc.web.assets import STATIC, Assets, folder_assets, import_map, script, widget_assets
+from urc.web.api_document import DOCUMENT, document
+from urc.web.assets import STATIC, Assets, folder_assets, import_map, script
+from urc.web.card import Cards
 from urc.web.dev import Dev, dev_url, no_dev_routes
 from urc.web.dev_secrets import secret_texts
+from urc.web.dev_start import DevStart, no_dev_start
 from urc.web.dev_watch import Remake
-from urc.web.files import robot_file, tile
+from urc.web.files import tile
+from urc.web.fleet import Fleet
+from urc.web.foreign import OURS, Border
+from urc.web.foreign_frame import Frames
+from urc.web.framed import Linked
 from urc.web.gallery import Gallery
+from urc.web.garage import Garage, Workshop
 from urc.web.interfaces import KEPT, chosen
-from urc.web.pages import Head, error_page, menu_page, robot_page
+from urc.web.manage_routes import ManageRoutes
+from urc.web.manager import Manager
+from urc.web.menu import Ways, menu_page
+from urc.web.pages import Head, error_page, robot_page
 from urc.web.policy import Policy
 from urc.web.robots import LINGER_S, Robot, Station, missing_settings
 from urc.web.server import serve
-from urc.web.socket import Client, Guest
+from urc.web.settings_routes import SettingsRoutes
+from urc.web.socket import Client
+from urc.web.spare import Spare
 from urc.web.timeline import timeline
+from urc.web.visitor import guest_of, is_here
 
 __all__ = ["Robot", "build_app", "serve"]
 
@@ -54,6 +69,8 @@ def build_app(
     data: Path | None = None,
     tiles: Path | None = None,
     remake: Mapping[str, Remake] | None = None,
+    workshop: Workshop | None = None,
+    trusted: Iterable[str] = (),
 ) -> Starlette:
     """Return the application that serves `robots`.
 
@@ -65,39 +82,42 @@ def build_app(
         tiles: folder of map pictures, ``z/x/y.png``; None: there are none.
         remake: makes each robot anew when its document is saved, and turns the dev pages on; None:
             there are none.
+        workshop: makes robots while the server runs, and turns the managers and the settings pages
+            on; None: there are none.
+        trusted: widgets that do not ship with URC, and live in the page all the same.
 
     Raises:
         UrcError: two robots bring different widgets of one name.
     """
     vendor = vendored()
     audit = AuditLog(data / "audit.sqlite") if data else None
+    fleet = Fleet(
+        robots,
+        lambda name, robot: Station(
+            robot, linger_s=linger_s, latch=_latch(data, robot), trail=_trail(audit, name, robot)
+        ),
+    )
     routes = _Routes(
-        robots=dict(robots),
-        stations={
-            name: Station(
-                robot,
-                linger_s=linger_s,
-                latch=_latch(data, robot),
-                trail=_trail(audit, name, robot),
-            )
-            for name, robot in robots.items()
-        },
+        fleet=fleet,
         modules=import_map(vendor),
         static=folder_assets(STATIC),
         vendor=folder_assets(vendor) if vendor else Assets(),
-        widgets=widget_assets(
-            widget for robot in robots.values() for widget in robot.profile.widgets.values()
-        ),
+        ways=Ways(has_managers=workshop is not None, has_dev=remake is not None),
         audit=audit,
         tiles=tiles,
+        border=Border.of(trusted),
     )
-    dev = remake and Dev(
-        routes.stations,
-        remake,
-        lambda name, robot: routes.renew(name, robot, _latch(data, robot)),
-        lambda connection: not _guest(connection).place,
-    )
-    return _Dashboard(routes, frozenset(allowed_hosts), dev or None)
+
+    def renew(name: str, robot: Robot) -> None:
+        routes.renew(name, robot, _latch(data, robot))
+
+    if workshop is not None:
+        routes.manager = Manager(Garage(workshop), fleet, time.monotonic, renew)
+    dev = None
+    if remake is not None:
+        dev = Dev(fleet.stations, remake, renew, is_here)
+        routes.dev_start = DevStart(fleet, remake, renew, routes.ways, is_here)
+    return _Dashboard(routes, frozenset(allowed_hosts), dev)
 
 
 def _latch(data: Path | None, robot: Robot) -> LatchFile | None:
@@ -120,12 +140,21 @@ class _Dashboard(Starlette):
     ) -> None:
         self._allowed_hosts = allowed_hosts
         routes.dev = dev
-        gallery = routes.gallery = Gallery(routes.modules, routes.brought, is_dev=dev is not None)
+        gallery = routes.gallery = Gallery(
+            routes.modules,
+            routes.brought,
+            is_dev=dev is not None,
+            border=routes.border,
+            ways=routes.ways,
+        )
+        frames = Frames(routes.modules, routes.has_widget)
         super().__init__(
             routes=[
                 Route("/", routes.menu),
                 Route("/robots/{name}/", routes.robot),
+                *Cards(lambda: routes.stations).routes(),
                 Route("/healthz", routes.health),
+                Route(DOCUMENT, document),
                 Route("/api/v1/robots/{name}/stop", routes.stop, methods=["POST"]),
                 Route("/api/v1/robots/{name}/timeline", routes.timeline),
                 Route("/favicon.ico", routes.favicon),
@@ -134,12 +163,16 @@ class _Dashboard(Starlette):
                 Route("/words/{tag}.js", routes.words),
                 Route("/static/{file:path}", routes.static_file),
                 Route("/vendor/{file:path}", routes.vendor_file),
+                *routes.manage_routes(),
                 *gallery.routes(),
                 Route("/widgets/{file:path}", routes.widget_file),
-                Route("/robots/{name}/files/{file:path}", routes.robot_file),
+                Route("/frames/{widget}", frames.frame),
+                *Linked(lambda: routes.robots).routes(),
                 Route("/tiles/{z:int}/{x:int}/{y:int}.{kind}", routes.tile),
                 WebSocketRoute("/ws", routes.socket),
+                WebSocketRoute("/ws/spare", routes.spare),
                 *(dev.routes() if dev else no_dev_routes()),
+                *(routes.dev_start.routes() if routes.dev_start else no_dev_start()),
             ],
             exception_handlers={HTTPException: _told, 404: _told, 405: _told, Exception: _broken},
             lifespan=routes.lifespan,
@@ -153,27 +186,49 @@ class _Dashboard(Starlette):
 
 @dataclass(slots=True)
 class _Routes:
-    robots: dict[str, Robot]
-    stations: Mapping[str, Station]
+    fleet: Fleet
     modules: Mapping[str, object]
     static: Assets
     vendor: Assets
-    widgets: Assets
+    ways: Ways
     audit: AuditLog | None = None
     tiles: Path | None = None
+    border: Border = field(default_factory=Border)
+    manager: Manager | None = None
     dev: Dev | None = None
+    dev_start: DevStart | None = None
     gallery: Gallery = field(init=False)
 
+    @property
+    def robots(self) -> Mapping[str, Robot]:
+        """All that are served now, by the name in their URL."""
+        return self.fleet.robots
+
+    @property
+    def stations(self) -> Mapping[str, Station]:
+        """Their stations."""
+        return self.fleet.stations
+
+    def manage_routes(self) -> list[Route]:
+        """Return the routes of the managers, where there are any."""
+        if self.manager is None:
+            return []
+        manage = ManageRoutes(self.manager, self.ways, is_here)
+        return [*manage.routes(), *SettingsRoutes(self.manager, manage, self.ways).routes()]
+
     def brought(self) -> list[Widget]:
-        """Return the widgets that the robots bring."""
-        return [one for each in self.robots.values() for one in each.profile.widgets.values()]
+        """Return the widgets that the robots bring, and those beside their documents."""
+        profiles = [each.profile for each in self.robots.values()]
+        shelves = [shelf_of(file) for file in dict.fromkeys(one.file for one in profiles)]
+        beside = [
+            shelf.get(name) for shelf in shelves for name in shelf.names() if name not in OURS
+        ]
+        brought = [widget for one in profiles for widget in one.widgets.values()]
+        return [*filter(None, beside), *brought]
 
     def renew(self, name: str, robot: Robot, latch: LatchFile | None) -> None:
         """Go on with another version of a robot; raise `UrcError` when its widgets clash."""
-        others = [each for other, each in self.robots.items() if other != name]
-        brought = [w for each in (*others, robot) for w in each.profile.widgets.values()]
-        self.widgets = widget_assets(brought)
-        self.robots[name] = robot
+        robot = self.fleet.renew(name, robot)
         secrets = secret_texts(robot.profile, robot.settings)
         self.stations[name].controls.trail.hide(secrets)
         self.stations[name].replace(robot, latch)
@@ -182,22 +237,29 @@ class _Routes:
     async def lifespan(self, _: Starlette) -> AsyncIterator[None]:
         """Keep one supervisor a robot for as long as the server runs."""
         try:
-            async with asyncio.TaskGroup() as group:
-                tasks = [group.create_task(station.run()) for station in self.stations.values()]
-                if self.dev:
-                    tasks.append(group.create_task(self.dev.run()))
+            async with self.fleet.running() as group:
+                if self.manager is not None:
+                    await self.manager.changed()
+                watching = group.create_task(self.dev.run()) if self.dev else None
                 yield
-                for task in tasks:
-                    task.cancel()
+                if self.manager is not None:
+                    await self.manager.close()
+                if watching is not None:
+                    watching.cancel()
         finally:
             if self.audit:  # the last: how the robots were stopped is in it
                 await asyncio.to_thread(self.audit.close)
 
     async def menu(self, request: Request) -> Response:
         head = Head(request.state.nonce, "URC")
-        return HTMLResponse(
-            menu_page(head, self.robots, is_dev=self.dev is not None), headers=_PAGE
+        drivers: Mapping[str, str] = {}
+        if self.manager is not None:
+            await self.manager.look()
+            drivers = self.manager.drivers()
+        html = menu_page(
+            head, self.robots, ways=self.ways, drivers=drivers, broken=self.fleet.broken
         )
+        return HTMLResponse(html, headers=_PAGE)
 
     async def robot(self, request: Request) -> Response:
         name = request.path_params["name"]
@@ -205,13 +267,15 @@ class _Routes:
         if robot is None:
             raise HTTPException(404, words.t("No robot of that name is served here."))
         if missing_settings(robot):
-            return RedirectResponse("/", status_code=303)
+            settings = f"/robots/{quote(name, safe='')}/settings"
+            place = settings if self.ways.has_managers else "/"
+            return RedirectResponse(place, status_code=303)
         query = request.query_params
         kept = request.cookies.get(KEPT, "")
         interface = chosen(robot.profile, query.get("interface"), kept)
         if interface is None:
             raise HTTPException(404, words.t("This robot has no interface of that name."))
-        is_here = self.dev is not None and not _guest(request).place
+        is_dev = self.dev is not None and is_here(request)
         html = robot_page(
             request.state.nonce,
             name,
@@ -220,8 +284,9 @@ class _Routes:
             self.modules,
             is_watching="watch" in query,
             tab=query.get("tab", ""),
-            wire=dev_url(name) if is_here else "",
+            wire=dev_url(name) if is_dev else "",
             is_part="part" in query,
+            border=self.border,
         )
         return HTMLResponse(html, headers=_PAGE)
 
@@ -235,7 +300,7 @@ class _Routes:
             return JSONResponse({"error": "no robot of that name is served here"}, 404, _PAGE)
         if not station.controls.desk.can_move:
             return JSONResponse({"error": "this robot has nothing that is held"}, 409, _PAGE)
-        station.controls.stop(_guest(request).place or "a screen of this machine")
+        station.controls.stop(guest_of(request).place or "a screen of this machine")
         is_confirmed = await station.deliver_stop()
         by = station.controls.desk.lease.state.latched_by
         return JSONResponse({"latched": by, "confirmed": is_confirmed}, headers=_PAGE)
@@ -245,7 +310,7 @@ class _Routes:
         name = request.path_params["name"]
         if name not in self.stations:
             return JSONResponse({"error": "no robot of that name is served here"}, 404, _PAGE)
-        return await timeline(request, self.audit, name, is_here=not _guest(request).place)
+        return await timeline(request, self.audit, name, is_here=is_here(request))
 
     async def favicon(self, request: Request) -> Response:
         return self.static.respond("favicon.svg", request)
@@ -270,49 +335,44 @@ class _Routes:
     async def vendor_file(self, request: Request) -> Response:
         return self.vendor.respond(request.path_params["file"], request)
 
-    async def robot_file(self, request: Request) -> Response:
-        """Serve what a robot's documents name for their widgets."""
-        robot = self.robots.get(request.path_params["name"])
-        if robot is None:
-            raise HTTPException(404)
-        return robot_file(robot.profile, request.path_params["file"], request)
-
     async def tile(self, request: Request) -> Response:
         """Serve a square of a map, where a folder with tiles was given."""
         if self.tiles is None:
             raise HTTPException(404)
         return tile(self.tiles, **request.path_params, request=request)
 
+    def has_widget(self, name: str) -> bool:
+        """Return whether pages load files of a widget of that name."""
+        module = f"{name}/widget.js"
+        return module in self.fleet.widgets.files or module in self.gallery.assets.files
+
     async def widget_file(self, request: Request) -> Response:
         file = request.path_params["file"]
-        table = self.widgets if file in self.widgets.files else self.gallery.assets
+        mine = self.fleet.widgets
+        table = mine if file in mine.files else self.gallery.assets
         return table.respond(file, request)
 
     async def socket(self, websocket: WebSocket) -> None:
+        station = await self._accepted(websocket)
+        if station is not None:
+            flow = websocket.scope["state"].get("flow")
+            await Client(websocket, station, flow, guest_of(websocket)).serve()
+
+    async def spare(self, websocket: WebSocket) -> None:
+        """Be a second line of a page that drives."""
+        station = await self._accepted(websocket)
+        if station is not None:
+            flow = websocket.scope["state"].get("flow")
+            await Spare(websocket, station.controls, station.clock, flow).serve()
+
+    async def _accepted(self, websocket: WebSocket) -> Station | None:
         await websocket.accept()
         names = list(self.stations)
         default = names[0] if len(names) == 1 else ""
         station = self.stations.get(websocket.query_params.get("robot", default))
         if station is None:
             await websocket.close(wire.CLOSE_NO_ROBOT, "no robot of that name is served here")
-            return
-        flow = websocket.scope["state"].get("flow")
-        await Client(websocket, station, flow, _guest(websocket)).serve()
-
-
-def _guest(connection: HTTPConnection) -> Guest:
-    """Return who asks: whoever sits at this machine may do more; a page may choose to watch only.
-
-    Until people sign in, this is all that is known of them.
-    """
-    host = connection.client.host if connection.client else ""
-    try:
-        is_here = ip_address(host.partition("%")[0]).is_loopback
-    except ValueError:
-        is_here = False
-    if "watch" in connection.query_params:
-        return Guest("" if is_here else host, "viewer")
-    return Guest("", "engineer") if is_here else Guest(host, "driver")
+        return station
 
 
 async def _told(request: Request, error: Exception) -> Response:

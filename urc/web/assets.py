@@ -25,6 +25,8 @@ KIT = ("curve", "giving", "kit", "motion", "padmap", "palette", "scale", "stroke
 WIDGET_FILES = ("widget.js", "widget.css")
 MOST_FILES = 200
 """That pages may load of one widget."""
+CODE = ("/static/", "/vendor/", "/words/", "/widgets/")
+"""Where frames may load from."""
 MEDIA_TYPES = {
     ".css": "text/css; charset=utf-8",
     ".js": "text/javascript; charset=utf-8",
@@ -86,6 +88,8 @@ def script(source: str, request: Request) -> Response:
 
 
 def _kept(body: bytes, tag: str, media_type: str, request: Request) -> Response:
+    # Foreign widgets load it from their frames.
+    request.state.is_code = request.url.path.startswith(CODE)
     headers = {"etag": tag, "cache-control": "no-cache"}
     if tag in request.headers.get("if-none-match", ""):
         return Response(status_code=304, headers=headers)

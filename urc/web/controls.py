@@ -6,7 +6,8 @@ takes them are thinned: the newest wins, and the last one always arrives.
 """
 
 from collections.abc import Callable
-from typing import Literal, Protocol
+from hmac import compare_digest
+from typing import Literal
 
 from urc.model.driver import Driver
 from urc.motion.fresh import Input
@@ -18,9 +19,10 @@ from urc.runtime.clock import Alarm, Clock
 from urc.runtime.hub import Hub, Note
 from urc.runtime.latch import LatchFile
 from urc.runtime.lateness import TOO_LATE_S, LoopWatch
-from urc.runtime.motion import Frames, MotionDesk, Movers
+from urc.runtime.motion import MotionDesk
 from urc.runtime.trail import Trail
 from urc.web import wire_drive as wire
+from urc.web.seat import FLOOD, Drivable, Seat
 
 __all__ = ["BEAT_S", "Controls", "Drivable", "Seat"]
 
@@ -32,53 +34,8 @@ PATIENCE_S = 0.25
 """A tick that came late is no news while the control moves all the same."""
 
 
-class Drivable(Protocol):
-    """The part of a session that the controls need."""
-
-    @property
-    def frames(self) -> Frames:
-        """The engine."""
-
-    @property
-    def movers(self) -> Movers | None:
-        """Who writes motion; None where the robot has no held command."""
-
-    @property
-    def hub(self) -> Hub:
-        """Takes what everybody should know."""
-
-
-class Seat:
-    """One screen at the controls."""
-
-    def __init__(self, client: Client, wake: Callable[[], None]) -> None:
-        self.client = client
-        self.wake = wake
-        self.beat: int | None = None
-        self.notices: dict[str, str] = {}
-        """Control or verb → the newest line about it."""
-        self.seen = -1
-        """Number of the lease that it was told."""
-        self.pending: dict[str, wire.Tick] = {}
-        """Control → the newest tick that waits to be looked at."""
-        self.paces: dict[str, Pace] = {}
-        self.alarms: dict[str, Alarm] = {}
-        self.moved_s: dict[str, float] = {}
-        """Control → when a tick of it was last taken."""
-        self.dropped = 0
-        """Ticks that a newer one took the place of: nothing was made of them."""
-
-    def notice(self, key: str, text: str) -> None:
-        """Tell it; a newer line about the same replaces one that was not taken yet."""
-        self.notices[key] = text
-        self.wake()
-
-    def forget(self, command: str) -> None:
-        """Drop what waits of a control."""
-        self.pending.pop(command, None)
-        alarm = self.alarms.pop(command, None)
-        if alarm is not None:
-            alarm.cancel()
+Offered = Literal["in time", "one more", "no tick"]
+"""A tick at a pace that any robot may have, or faster than that, or something else."""
 
 
 class Controls:
@@ -194,7 +151,16 @@ class Controls:
         for command in list(seat.alarms):
             seat.forget(command)
         self._seats.pop(seat.client.id, None)
+        if seat.spare is not None:
+            seat.spare.end()
         self.desk.part(seat.client.id)
+
+    def seat_of(self, key: str) -> Seat | None:
+        """Return the seat with this key."""
+        said = key.encode()
+        return next(
+            (one for one in self._seats.values() if compare_digest(one.key.encode(), said)), None
+        )
 
     def take(self, seat: Seat) -> list[str]:
         """Return the messages that bring a screen up to date."""
@@ -211,16 +177,49 @@ class Controls:
 
     # -- what screens say
 
+    def offer(self, seat: Seat, data: bytes) -> Offered:
+        """Take a tick as it came, unread; return what it was.
+
+        Nothing is made of one that comes while another waits: it only takes its place. When many
+        do, the rest waits with it where it is, and costs nobody anything.
+        """
+        if seat.alarms and seat.doubled is None:
+            command = wire.command_of(data)
+            if command in seat.alarms:
+                self._wait(seat, command, data)
+                seat.crowd += 1
+                if seat.crowd == FLOOD:
+                    seat.hold_back(True)
+                return "one more"
+        now = self._clock.now()
+        is_moving = now - seat.moved_at_s < PATIENCE_S and not seat.alarms
+        if is_moving:
+            self.desk.hint()  # first of all: what it wakes up is there when the rest is done
+        try:
+            tick = wire.decode_tick(data)
+        except wire.NO_TICK:
+            return "no tick"
+        pace = seat.paces.get(tick.command)
+        if is_moving and not seat.doubled and pace is not None and pace.take(now):
+            self._tick(seat, tick, now)
+            return "in time"
+        self._thin(seat, tick)
+        return "one more"
+
     def hear(self, seat: Seat, said: wire.Driving) -> None:
         """Do what a screen says."""
         match said:
             case wire.Tick():
                 self._thin(seat, said)
             case wire.Release():
+                if self.desk.holds(said.command) and not seat.is_first(said.command, said.number):
+                    return
                 seat.forget(said.command)
                 seat.moved_s.pop(said.command, None)
                 self.desk.release(seat.client.id, said.command)
             case wire.Stop():
+                if not seat.is_first("", said.number):
+                    return
                 self.stop(seat.client.name)
             case wire.Drive():
                 self._drive(seat, said)
@@ -247,32 +246,49 @@ class Controls:
             seat.notice("tick", wire.encode_refused("tick", "", text))
             self.trail.refused(seat.client, tick.command, text, now)
             return
+        if not seat.is_first(tick.command, tick.number):
+            return
         pace = seat.paces.get(tick.command)
         if pace is None:
             pace = seat.paces[tick.command] = Pace(THINNED_S)
-        if tick.command in seat.alarms or not pace.take(now):
-            seat.dropped += tick.command in seat.pending
-            seat.pending[tick.command] = tick
-            if tick.command not in seat.alarms:
-                alarm = self._clock.call_at(pace.free_at, lambda: self._ripe(seat, tick.command))
-                seat.alarms[tick.command] = alarm
-            return
-        self._tick(seat, tick, now)
+        if tick.command in seat.alarms:
+            self._wait(seat, tick.command, tick)
+        elif pace.take(now):
+            self._tick(seat, tick, now)
+        else:
+            alarm = self._clock.call_at(pace.free_at, lambda: self._ripe(seat, tick.command))
+            seat.alarms[tick.command] = alarm
+            self._wait(seat, tick.command, tick)
+
+    def _wait(self, seat: Seat, command: str, tick: wire.Tick | bytes) -> None:
+        """Keep a tick until its turn; the newest wins."""
+        seat.dropped += command in seat.pending
+        seat.pending[command] = tick
 
     def _ripe(self, seat: Seat, command: str) -> None:
         seat.alarms.pop(command, None)
+        seat.relax()
         tick = seat.pending.pop(command, None)
+        if isinstance(tick, bytes):
+            tick = self._read(seat, tick)
         if tick is not None:
             now = self._clock.now()
             seat.paces[command].take(now)
             self._tick(seat, tick, now)
 
+    def _read(self, seat: Seat, data: bytes) -> wire.Tick | None:
+        try:
+            return wire.decode_tick(data)
+        except wire.NO_TICK as fault:
+            seat.notice("tick", wire.encode_refused("tick", "", str(fault)))
+            return None
+
     def _tick(self, seat: Seat, tick: wire.Tick, now: float) -> None:
-        given = Input(tick.epoch, tick.number, tick.echo)
+        given = tuple.__new__(Input, (tick.epoch, tick.number, tick.echo))  # one of many a second
         command = tick.command
         reason = self.desk.tick(seat.client.id, command, tick.arguments, given, now)
         if not reason:
-            seat.moved_s[command] = now
+            seat.moved_s[command] = seat.moved_at_s = now
         elif now - seat.moved_s.get(command, float("-inf")) > PATIENCE_S or self._is_closed(given):
             seat.notice(command, wire.encode_refused("tick", command, reason))
             self.trail.refused(seat.client, command, reason, now)
@@ -341,6 +357,8 @@ class Controls:
             return
         now = self._clock.now()
         seat.beat = self.desk.beat(seat.client.id, now)
+        if seat.spare is not None:
+            seat.spare.beat(seat.beat)
         seat.wake()
         self._beating = self._clock.call_at(now + BEAT_S, self._beat)
 
@@ -359,7 +377,11 @@ class Controls:
         state = self.desk.lease.state
         left_s = state.asked_until - self._clock.now() if state.asked_by is not None else 0.0
         return wire.encode_lease(
-            state, seat.client, left_s=max(0.0, left_s), is_confirmed=self.desk.is_confirmed
+            state,
+            seat.client,
+            left_s=max(0.0, left_s),
+            is_confirmed=self.desk.is_confirmed,
+            spare=seat.key,
         )
 
 

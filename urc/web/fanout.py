@@ -6,8 +6,8 @@ encoded text, so a frame is encoded once however many watch; one that fell behin
 values merged into one frame, and is nobody else's problem.
 """
 
-from dataclasses import dataclass
-from typing import Protocol
+from dataclasses import dataclass, field
+from typing import NamedTuple, Protocol
 
 from urc.model.values import Sample
 from urc.runtime.clock import Clock, LoopClock
@@ -17,7 +17,7 @@ from urc.web.wire import encode_links, encode_log, encode_values
 from urc.web.wire_ask import encode_progress
 from urc.web.wire_picture import as_frame
 
-__all__ = ["FRAMES_PER_SECOND", "Fanout", "Listener", "Pacer", "Place"]
+__all__ = ["FRAMES_PER_SECOND", "Fanout", "Known", "Listener", "Pacer", "Place"]
 
 FRAMES_PER_SECOND = 60.0
 LOG_LINES_FOR_NEWCOMERS = 50
@@ -32,9 +32,8 @@ class Listener(Protocol):
         """Take a look, soon. Must return at once."""
 
 
-@dataclass(slots=True)
-class Place:
-    """How far one client has got."""
+class Known(NamedTuple):
+    """How far somebody has got."""
 
     revision: int = 0
     """Hub revision up to which it has the values."""
@@ -46,12 +45,29 @@ class Place:
     """Log lines it has, or was told it lost."""
 
 
-@dataclass(frozen=True, slots=True)
-class _Frame:
+@dataclass(slots=True)
+class Place:
+    """One client's; those that have got equally far share what they know."""
+
+    known: Known = field(default_factory=Known)
+
+
+class _Frame(NamedTuple):
     """An encoded frame, the revision it leads to, and when it was encoded."""
 
     text: str
     revision: int
+    time_s: float
+
+
+class _Taken(NamedTuple):
+    """What everybody gets who knows equally much."""
+
+    before: Known
+    after: Known
+    messages: tuple[str, ...]
+    frames: bytes
+    """The same as WebSocket frames, one behind the other; empty until somebody wants them."""
     time_s: float
 
 
@@ -91,7 +107,10 @@ class Fanout:
         self._pacer = Pacer(rate_hz)
         self._head = 0
         self._frames: dict[int, _Frame] = {}
-        self._framed = ("", b"")
+        self._taken: dict[Known, _Taken] = {}
+        self._usual: _Taken | None = None
+        """What nearly everybody gets in the flush that is under way."""
+        self._is_flushing = False
         self._looked_at = -1
         self._links: tuple[LinkStatus, ...] = ()
         self._links_number = 0
@@ -116,33 +135,64 @@ class Fanout:
         """Forget the last frame and wake everybody."""
         self._head = self.hub.revision
         self._frames.clear()
+        self._taken.clear()
+        self._is_flushing = True
         for listener in self.listeners:
             listener.wake()
+        self._is_flushing = False
+        self._usual = None
 
     def newcomer(self) -> Place:
         """Return the place of a client that knows nothing yet."""
-        return Place(notes=max(0, self.hub.notes_count - LOG_LINES_FOR_NEWCOMERS))
+        return Place(Known(notes=max(0, self.hub.notes_count - LOG_LINES_FOR_NEWCOMERS)))
 
-    def take(self, place: Place) -> list[str]:
+    def take(self, place: Place) -> tuple[str, ...]:
         """Return the messages that bring `place` up to date, and move it there."""
+        taken = self._shared(place)
+        place.known = taken.after
+        return taken.messages
+
+    def take_frames(self, place: Place) -> bytes:
+        """Return the same as WebSocket frames, one behind the other; empty when there is nothing.
+
+        They are made once for all who know equally much.
+        """
+        taken = self._usual
+        if taken is None or taken.before is not place.known:
+            taken = self._shared(place)
+            if taken.messages and not taken.frames:
+                frames = b"".join(as_frame(text.encode(), is_text=True) for text in taken.messages)
+                taken = self._taken[place.known] = taken._replace(frames=frames)
+            self._usual = taken if self._is_flushing else None
+        place.known = taken.after
+        return taken.frames
+
+    def _shared(self, place: Place) -> _Taken:
         if self._looked_at != self.hub.revision:
             self._look()
+        taken, now_s = self._taken.get(place.known), self._clock.now()
+        if taken is None or now_s - taken.time_s > SHARED_FOR_S:
+            taken = self._taken[place.known] = self._make(place.known, now_s)
+        return taken
+
+    def _make(self, known: Known, now_s: float) -> _Taken:
         messages = []
-        if place.links != self._links_number:
-            place.links = self._links_number
-            messages.append(encode_links(self._links, self._clock.now()))
-        if values := self._take_values(place):
+        if known.links != self._links_number:
+            messages.append(encode_links(self._links, now_s))
+        values, revision = self._take_values(known.revision, now_s)
+        if values:
             messages.append(values)
-        if log := self._take_log(place):
-            messages.append(log)
-        if place.progress != self._progress_number:
-            place.progress = self._progress_number
+        if self.hub.notes_count > known.notes:
+            messages.append(self._take_log(self.hub.notes_count - known.notes, now_s))
+        if known.progress != self._progress_number:
             messages.append(encode_progress(self._progress))
-        return messages
+        after = Known(revision, self._links_number, self._progress_number, self.hub.notes_count)
+        return _Taken(known, after, tuple(messages), b"", now_s)
 
     def _look(self) -> None:
         """Number what is not a value anew, when it has changed; once for all clients."""
         self._looked_at = self.hub.revision
+        self._taken.clear()
         links = tuple(self.hub.links.values())
         if links != self._links:
             self._links = links
@@ -152,23 +202,16 @@ class Fanout:
             self._progress = progress
             self._progress_number += 1
 
-    def _take_values(self, place: Place) -> str:
-        if place.revision >= self._head:
-            return ""  # what came since the last flush waits for the next one
-        now_s = self._clock.now()
-        frame = self._frames.get(place.revision)
+    def _take_values(self, revision: int, now_s: float) -> tuple[str, int]:
+        """Return the frame with what is newer, and the revision it leads to."""
+        if revision >= self._head:
+            return "", revision  # what came since the last flush waits for the next one
+        frame = self._frames.get(revision)
         if frame is None or now_s - frame.time_s > SHARED_FOR_S:
-            samples = self._plain(self.hub.changed_since(place.revision))
+            samples = self._plain(self.hub.changed_since(revision))
             text = encode_values(samples, self.hub.index, now_s) if samples else ""
-            frame = self._frames[place.revision] = _Frame(text, self.hub.revision, now_s)
-        place.revision = frame.revision
-        return frame.text
-
-    def frame_of(self, text: str) -> bytes:
-        """Return a message of `take` as a WebSocket frame; made once for all who got the same."""
-        if text is not self._framed[0]:
-            self._framed = (text, as_frame(text.encode(), is_text=True))
-        return self._framed[1]
+            frame = self._frames[revision] = _Frame(text, self.hub.revision, now_s)
+        return frame.text, frame.revision
 
     def _plain(self, samples: list[Sample]) -> list[Sample]:
         """Return the readings without the images, which only go to those who show them."""
@@ -180,10 +223,6 @@ class Fanout:
             if sample.signal not in self._pictures or sample.value is None
         ]
 
-    def _take_log(self, place: Place) -> str:
-        wanted = self.hub.notes_count - place.notes
-        if wanted <= 0:
-            return ""
-        place.notes = self.hub.notes_count
+    def _take_log(self, wanted: int, now_s: float) -> str:
         kept = list(self.hub.notes)[-wanted:]
-        return encode_log(kept, self.hub.notes_count - len(kept), self._clock.now())
+        return encode_log(kept, self.hub.notes_count - len(kept), now_s)

@@ -1,11 +1,13 @@
 """Files that a robot's documents name for their widgets, and tiles of maps: looked up, never found.
 
+So are pages of somebody else; the document that shows one is made in ``framed.py``.
+
 Floor 5. A URL is a key into a table made from the loaded profile, or three numbers; no path is ever
 made from what a browser sends.
 """
 
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from http import HTTPStatus
 from pathlib import Path
 from urllib.parse import quote
@@ -17,7 +19,7 @@ from starlette.responses import FileResponse, Response
 from urc.model.interface import WidgetUse
 from urc.model.profile import Profile
 
-__all__ = ["TILE_TYPES", "linked_options", "robot_file", "tile"]
+__all__ = ["TILE_TYPES", "linked_options", "page_key", "robot_file", "tile", "uses_of"]
 
 MEDIA_TYPES = {
     ".urdf": "application/xml",
@@ -47,11 +49,15 @@ EMPTY_TILE = bytes.fromhex(
 
 
 def linked_options(use: WidgetUse, robot: str) -> dict[str, object]:
-    """Return a widget's options as the page gets them: instead of a file, its address."""
-    if not use.files:
-        return dict(use.options)
-    urls = {name: _url(robot, name, place) for name, place in use.files.items()}
-    return {name: _linked(value, urls) for name, value in use.options.items()}
+    """Return a widget's options as the page gets them: instead of a file, its address.
+
+    Instead of the URL of a page it gets the address of the document that shows the page.
+    """
+    files = {name: _url(robot, name, place) for name, place in use.files.items()}
+    options = {name: _linked(value, files) for name, value in use.options.items()}
+    for name, pages in use.pages.items():
+        options[name] = _linked(use.options[name], {url: _framed(robot, url) for url in pages})
+    return options
 
 
 def _linked(value: object, urls: Mapping[str, str]) -> object:
@@ -64,6 +70,22 @@ def _url(robot: str, name: str, place: str) -> str:
     return f"/robots/{quote(robot, safe='')}/files/{quote(_key(name, place))}"
 
 
+def _framed(robot: str, url: str) -> str:
+    return f"/robots/{quote(robot, safe='')}/framed/{page_key(url)}"
+
+
+def page_key(url: str) -> str:
+    """Return the word under which a page that an option names is looked up."""
+    return hashlib.blake2b(url.encode(), digest_size=8).hexdigest()
+
+
+def uses_of(profile: Profile) -> Iterator[WidgetUse]:
+    """Yield every slot that a widget fills: of the profile, and of its interfaces."""
+    yield from profile.slots.values()
+    for interface in profile.interfaces.values():
+        yield from interface.widgets.values()
+
+
 def _key(name: str, place: str) -> str:
     # Two documents may call different files the same; what follows is for models, which name their
     # parts by path.
@@ -72,8 +94,7 @@ def _key(name: str, place: str) -> str:
 
 def robot_file(profile: Profile, key: str, request: Request) -> Response:
     """Return a file that the profile names for a widget; raise 404 for any other."""
-    uses = [*profile.slots.values()]
-    uses += [use for interface in profile.interfaces.values() for use in interface.widgets.values()]
+    uses = uses_of(profile)
     table = {_key(name, place): place for use in uses for name, place in use.files.items()}
     if key not in table:
         raise HTTPException(404)

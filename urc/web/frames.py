@@ -7,7 +7,7 @@ are counted, so that the next frame is known to begin where it begins.
 
 from typing import Final
 
-__all__ = ["Frames"]
+__all__ = ["Frames", "text_of"]
 
 _TEXT: Final = 0x81
 """First byte of a text that is not continued."""
@@ -15,6 +15,8 @@ _MASKED: Final = 0x80
 _SHORT, _LONG = 126, 127
 _HEAD: Final = 2
 _MASK: Final = 4
+_PLAIN: Final = bytes(_MASK)
+"""A mask that changes nothing."""
 _CONTROL: Final = 0x08
 
 
@@ -22,30 +24,34 @@ class Frames:
     """What came from one client, from the first byte after the handshake on."""
 
     def __init__(self) -> None:
+        self._is_between = True
+        """The next byte begins a frame that begins a message."""
         self._left = 0
         """Bytes of the present frame that have not come."""
         self._head = b""
         """Of a frame of whose head a part has not come."""
         self._is_inside = False
         """A message has begun and is to be continued."""
+        self.spans: list[tuple[int, int]] = []
+        """Of what came last and was no single text: where the texts at its beginning, each in one
+        whole frame, begin and end. Each is for `text_of`."""
 
     def whole(self, data: bytes) -> bytes | None:
         """Return the text in `data` if that is one whole frame and nothing else, else None."""
-        if self._left or self._head or self._is_inside:
-            self._walk(data)
-            return None
-        if len(data) < _HEAD + _MASK or data[0] != _TEXT or not data[1] & _MASKED:
-            self._walk(data)
-            return None
-        size, at = data[1] & 0x7F, _HEAD
-        if size == _SHORT:
-            size, at = int.from_bytes(data[2:4], "big"), _HEAD + 2
-        if size == _LONG or len(data) != at + _MASK + size:
-            self._walk(data)
-            return None
-        return _unmasked(data[at : at + _MASK], data[at + _MASK :])
+        size = len(data)
+        if self._is_between and size >= _HEAD + _MASK and data[0] == _TEXT and data[1] & _MASKED:
+            at, said = _HEAD + _MASK, data[1] & 0x7F
+            if said == _SHORT:
+                at, said = at + 2, data[2] << 8 | data[3]
+            if size == at + said and said != _LONG:
+                mask = data[at - _MASK : at]
+                return data[at:] if mask == _PLAIN else _unmasked(mask, data[at:])
+        self._walk(data)
+        return None
 
     def _walk(self, data: bytes) -> None:
+        self.spans = spans = []
+        is_leading = self._is_between
         data, self._head = self._head + data, b""
         at = 0
         while at < len(data):
@@ -53,15 +59,31 @@ class Frames:
             at += skipped
             self._left -= skipped
             if at == len(data):
-                return
+                break
             size = _size(data, at)
             if size is None:
                 self._head = data[at:]
-                return
+                break
             first = data[at]
             if not first & _CONTROL:
                 self._is_inside = not first & 0x80
             self._left = size
+            is_leading = is_leading and at + size <= len(data) and _is_text(data, at)
+            if is_leading:
+                spans.append((at, at + size))
+        self._is_between = not (self._left or self._head or self._is_inside)
+
+
+def text_of(frame: bytes) -> bytes:
+    """Return the text in a whole frame of `Frames.spans`."""
+    at = _HEAD + _MASK + (2 if frame[1] & 0x7F == _SHORT else 0)
+    return _unmasked(frame[at - _MASK : at], frame[at:])
+
+
+def _is_text(data: bytes, at: int) -> bool:
+    """Return whether a text in one frame of a usual length begins there."""
+    size = data[at + 1]
+    return data[at] == _TEXT and bool(size & _MASKED) and size & 0x7F != _LONG
 
 
 def _size(data: bytes, at: int) -> int | None:
@@ -79,8 +101,6 @@ def _size(data: bytes, at: int) -> int | None:
 
 
 def _unmasked(mask: bytes, data: bytes) -> bytes:
-    if mask == b"\0\0\0\0":
-        return data
     size = len(data)
     key = (mask * (size // _MASK + 1))[:size]
     return (int.from_bytes(data, "big") ^ int.from_bytes(key, "big")).to_bytes(size, "big")

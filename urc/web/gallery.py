@@ -21,6 +21,8 @@ from urc.runtime.changes import Watched
 from urc.shipped import shipped
 from urc.web.assets import Assets, widget_assets
 from urc.web.demos import DemoState, demo_states
+from urc.web.foreign import Border
+from urc.web.menu import Nav, Ways
 from urc.web.pages import Cell, Head, render, widget_cell, with_words
 from urc.web.words import t
 
@@ -48,6 +50,7 @@ class GalleryPage:
     """``widgets.html.j2``: the list of widgets."""
 
     head: Head
+    nav: Nav
     entries: tuple[Entry, ...]
 
 
@@ -81,6 +84,8 @@ class Gallery:
         modules: the import map.
         brought: returns the widgets that the served robots bring.
         is_dev: pages load themselves anew when a file of their widgets is saved.
+        ways: which pages there are beside.
+        border: which widgets live in frames.
     """
 
     def __init__(
@@ -89,10 +94,14 @@ class Gallery:
         brought: Callable[[], Iterable[Widget]],
         *,
         is_dev: bool = False,
+        border: Border = Border(),  # noqa: B008  # frozen
+        ways: Ways = Ways(),  # noqa: B008 - it cannot be changed
     ) -> None:
         self._modules = modules
         self._brought = brought
         self._is_dev = is_dev
+        self._ways = ways
+        self._border = border
         self.assets = Assets()
         """Of the widgets that were looked at; they need not belong to any robot."""
 
@@ -109,7 +118,9 @@ class Gallery:
         """List the widgets."""
         entries = await asyncio.to_thread(self._entries)
         head = self._head(request, t("Widgets"))
-        return _answer(render("widgets.html.j2", GalleryPage(head, tuple(entries))))
+        return _answer(
+            render("widgets.html.j2", GalleryPage(head, Nav("widgets", self._ways), tuple(entries)))
+        )
 
     async def demo(self, request: Request) -> Response:
         """Show one widget, or several with a plus between their names."""
@@ -119,7 +130,11 @@ class Gallery:
             states = [(one, await asyncio.to_thread(demo_states, one)) for one in widgets]
         except UrcError as error:
             raise HTTPException(409, f"{error}") from error
-        styles = tuple(f"/widgets/{quote(one.name)}/widget.css" for one in widgets)
+        styles = tuple(
+            f"/widgets/{quote(one.name)}/widget.css"
+            for one in widgets
+            if not self._border.is_foreign(one)
+        )
         single = widgets[0] if len(widgets) == 1 else None
         page = DemoPage(
             head=replace(
@@ -128,7 +143,7 @@ class Gallery:
             ),
             title=t(single.title) if single else ", ".join(t(one.title) for one in widgets),
             summary=single.summary if single else "",
-            exhibits=tuple(_exhibits(states)),
+            exhibits=tuple(_exhibits(states, self._border)),
             stamp_url="stamp" if self._is_dev else "",
         )
         return _answer(render("widget.html.j2", page))
@@ -179,11 +194,13 @@ class Gallery:
         return known
 
 
-def _exhibits(states: Iterable[tuple[Widget, list[DemoState]]]) -> Iterable[Exhibit]:
+def _exhibits(
+    states: Iterable[tuple[Widget, list[DemoState]]], border: Border
+) -> Iterable[Exhibit]:
     index = 0
     for widget, shown in states:
         for state in shown:
-            cell = widget_cell(index, state.use, state.profile)
+            cell = widget_cell(index, state.use, state.profile, border)
             yield Exhibit(widget.name, state.name, widget.title, cell, state.news)
             index += 1
 

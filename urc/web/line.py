@@ -47,6 +47,9 @@ class Flow(Protocol):
         It saves the turns of a task. What it does not take, returning False, is for `receive`.
         """
 
+    def hold_back(self, is_held: bool) -> None:
+        """Let nothing more be read for now, or let it go on: what comes waits where it is."""
+
     def abort(self) -> None:
         """Cut the connection without waiting for anything."""
 

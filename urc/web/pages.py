@@ -20,12 +20,13 @@ from markupsafe import Markup
 from urc import __version__
 from urc.model.driver import Driver
 from urc.model.interface import Interface, WidgetUse
-from urc.model.profile import Profile, Setting
-from urc.model.values import Signal, Value
+from urc.model.profile import Profile
+from urc.model.values import Signal
 from urc.model.widget import Widget
 from urc.shipped import shipped
 from urc.web import words
 from urc.web.files import linked_options
+from urc.web.foreign import Border, frame_url
 from urc.web.interfaces import (
     DEBUG_STYLES,
     DEBUGGING,
@@ -40,22 +41,18 @@ from urc.web.interfaces import (
 from urc.web.layout import grid_css
 from urc.web.markdown import markdown
 from urc.web.outputs import inputs_config, motion_lines, output_config
-from urc.web.robots import Robot, missing_settings
 
 __all__ = [
-    "Card",
     "Cell",
     "ErrorPage",
     "Head",
-    "MenuPage",
     "RobotPage",
-    "SettingRow",
     "WidgetContext",
     "error_page",
-    "menu_page",
     "render",
     "render_widget",
     "robot_page",
+    "spoken",
     "widget_cell",
     "widget_context",
 ]
@@ -79,40 +76,6 @@ class Head:
 
 
 @dataclass(frozen=True, slots=True)
-class SettingRow:
-    """One line of a robot's settings."""
-
-    title: str
-    name: str
-    value: str
-    """As shown; "" when nothing is set."""
-    description: str
-    is_missing: bool
-
-
-@dataclass(frozen=True, slots=True)
-class Card:
-    """One robot on the menu."""
-
-    title: str
-    summary: str
-    url: str
-    rows: tuple[SettingRow, ...]
-    missing: tuple[str, ...]
-    """Names of the settings that keep Connect disabled."""
-    dev_url: str = ""
-    """Of its dev page; "" where there are none."""
-
-
-@dataclass(frozen=True, slots=True)
-class MenuPage:
-    """``menu.html.j2``: the robots that are served, and what is set for each."""
-
-    head: Head
-    cards: tuple[Card, ...]
-
-
-@dataclass(frozen=True, slots=True)
 class Cell:
     """One slot of the grid with its widget's markup."""
 
@@ -125,6 +88,8 @@ class Cell:
     error: str
     """Why the widget's template failed, when it did."""
     is_background: bool
+    frame: str = ""
+    """URL of the frame that it lives in; "" for one that lives in the page."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -189,12 +154,6 @@ class WidgetContext:
     missing, so that a widget can leave out what would do nothing."""
 
 
-def menu_page(head: Head, robots: Mapping[str, Robot], *, is_dev: bool = False) -> str:
-    """Return the menu."""
-    cards = tuple(_card(name, robot, is_dev=is_dev) for name, robot in robots.items())
-    return render("menu.html.j2", MenuPage(head, cards))
-
-
 def robot_page(
     nonce: str,
     name: str,
@@ -206,6 +165,7 @@ def robot_page(
     tab: str = "",
     wire: str = "",
     is_part: bool = False,
+    border: Border = Border(),  # noqa: B008  # frozen
 ) -> str:
     """Return the page of one interface.
 
@@ -219,10 +179,13 @@ def robot_page(
         tab: name of the page of it that is open; "" or an unknown one: the first.
         wire: path of the dev page; "" where there is none for who asks.
         is_part: a page that is open already wants the interface in place of another.
+        border: which widgets live in frames.
     """
     uses = _uses(profile, interface)
     slots = tuple(uses)
-    widgets = dict.fromkeys(use.widget for use in uses.values())
+    used = dict.fromkeys(use.widget for use in uses.values())
+    # The sheet of a foreign widget could change the whole page.
+    widgets = [name for name in used if not border.is_foreign(profile.widgets[name])]
     head = Head(
         nonce=nonce,
         title=profile.title,
@@ -247,7 +210,7 @@ def robot_page(
         is_part=is_part,
         debug=debug_part(profile, wire) if interface is DEBUGGING else None,
         cells=tuple(
-            widget_cell(index, use, profile, is_background=slot == interface.background)
+            widget_cell(index, use, profile, border, is_background=slot == interface.background)
             for index, (slot, use) in enumerate(uses.items())
         ),
         stop_url=f"/api/v1/robots/{place}/stop",
@@ -296,7 +259,7 @@ def widget_context(use: WidgetUse, widget: Widget, profile: Profile, uid: str) -
 def _heading(widget: Widget, inputs: Mapping[str, Signal], outputs: Mapping[str, str]) -> str:
     """Return what the widget is about: the first signal it needs, else its command."""
     needed = [name for name in inputs if widget.inputs[name].is_required]
-    about = [inputs[name].title or _spoken(inputs[name].name) for name in (*needed, *inputs)]
+    about = [inputs[name].title or spoken(inputs[name].name) for name in (*needed, *inputs)]
     if not needed:
         about = [*outputs.values(), *about]
     return next(iter(about), widget.title)
@@ -304,11 +267,16 @@ def _heading(widget: Widget, inputs: Mapping[str, Signal], outputs: Mapping[str,
 
 def _called(command: str, driver: Driver) -> str:
     known = driver.commands.get(command)
-    return (known and known.title) or _spoken(command)
+    return (known and known.title) or spoken(command)
 
 
 def widget_cell(
-    index: int, use: WidgetUse, profile: Profile, *, is_background: bool = False
+    index: int,
+    use: WidgetUse,
+    profile: Profile,
+    border: Border = Border(),  # noqa: B008  # frozen
+    *,
+    is_background: bool = False,
 ) -> Cell:
     """Return one slot with its widget; whatever the widget's template raises costs this one."""
     widget = profile.widgets[use.widget]
@@ -327,7 +295,8 @@ def widget_cell(
         "outputs": {name: output_config(use, name, widget, profile.driver) for name in use.outputs},
         "options": dict(context.options),
     }
-    return Cell(index, json.dumps(config), html, error, is_background)
+    frame = frame_url(widget) if border.is_foreign(widget) else ""
+    return Cell(index, json.dumps(config), html, error, is_background, frame)
 
 
 def _uses(profile: Profile, interface: Interface) -> dict[str, WidgetUse]:
@@ -338,33 +307,7 @@ def _uses(profile: Profile, interface: Interface) -> dict[str, WidgetUse]:
     return {name: use for name, use in found.items() if use is not None}
 
 
-def _card(name: str, robot: Robot, *, is_dev: bool) -> Card:
-    profile = robot.profile
-    missing = missing_settings(robot)
-    rows = tuple(
-        _row(setting, robot.settings.get(setting.name, setting.default), setting in missing)
-        for setting in profile.settings.values()
-    )
-    url = f"/robots/{quote(name, safe='')}/"
-    names = tuple(setting.name for setting in missing)
-    dev_url = f"{url}dev" if is_dev else ""
-    return Card(profile.title or name, profile.summary, url, rows, names, dev_url)
-
-
-def _row(setting: Setting, value: Value, is_missing: bool) -> SettingRow:
-    if is_missing:
-        shown = ""
-    elif setting.is_secret:
-        shown = "••••••"
-    elif isinstance(value, bool):
-        shown = "yes" if value else "no"
-    else:
-        shown = str(value)
-    title = setting.title or _spoken(setting.name)
-    return SettingRow(title, setting.name, shown, setting.description, is_missing)
-
-
-def _spoken(name: str) -> str:
+def spoken(name: str) -> str:
     """Return an identifier as a person would write it: ``left_motor`` → ``Left motor``."""
     words = name.replace("_", " ").replace("-", " ").strip()
     return words[:1].upper() + words[1:]

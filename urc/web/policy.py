@@ -20,6 +20,7 @@ __all__ = [
     "REFUSAL_HEADERS",
     "Authority",
     "Policy",
+    "frame_policy",
     "is_host_allowed",
     "is_origin_ours",
     "parse_host",
@@ -56,7 +57,33 @@ _FIXED_HEADERS = (
         b"display-capture=(), payment=(), usb=(), serial=(), hid=(), midi=()",
     ),
 )
-
+_FRAME_POLICY = (
+    "sandbox allow-scripts; default-src 'none'; script-src '{digest}' {code}; "
+    "style-src 'unsafe-inline' {code}; img-src data: blob: {code}; font-src data: {code}; "
+    "media-src data: blob:; connect-src 'none'; base-uri 'none'; form-action 'none'; "
+    "frame-ancestors 'self'; "
+    "require-trusted-types-for 'script'; trusted-types urc"
+)
+_SENSORS = (
+    *("accelerometer", "gyroscope", "magnetometer", "gamepad", "fullscreen", "screen-wake-lock"),
+    *("camera", "microphone", "geolocation", "display-capture", "payment", "usb", "serial", "hid"),
+    *("midi", "autoplay", "clipboard-read", "clipboard-write", "publickey-credentials-get"),
+)
+_FRAME_HEADERS = (
+    (b"x-content-type-options", b"nosniff"),
+    (b"x-frame-options", b"SAMEORIGIN"),
+    (b"referrer-policy", b"no-referrer"),
+    (b"cross-origin-resource-policy", b"same-origin"),
+    (b"permissions-policy", ", ".join(f"{name}=()" for name in _SENSORS).encode()),
+)
+_CODE_FOLDERS = ("static", "vendor", "words")
+_CODE_HEADERS = (
+    *(pair for pair in _FIXED_HEADERS if pair[0] != b"cross-origin-resource-policy"),
+    # A frame without an origin is nobody's own, so what it may load is open to all; it is code
+    # that anybody can download, and says nothing of a robot.
+    (b"cross-origin-resource-policy", b"cross-origin"),
+    (b"access-control-allow-origin", b"*"),
+)
 
 REFUSAL_HEADERS = (
     (b"content-security-policy", b"default-src 'none'; frame-ancestors 'none'"),
@@ -122,6 +149,28 @@ def is_origin_ours(origin: str, scheme: str, authority: Authority) -> bool:
     )
 
 
+def frame_policy(scope: Scope, widget: str, digest: str) -> str:
+    """Return the policy of a frame: code of ours and of one widget, and nothing else at all.
+
+    No nonce: with one, a script or style of any other address could be loaded, and an address is a
+    message. The digest opens the import map alone.
+
+    Args:
+        scope: of the request for the frame, whose host was let in.
+        widget: its name, as in a URL.
+        digest: ``sha256-…`` of the import map.
+    """
+    authority = parse_host(_values(scope, b"host")[0])
+    # The grammar of sources has no IPv6 addresses.
+    if authority is None or authority.host.startswith("["):
+        return _FRAME_POLICY.format(digest=digest, code="'self'")
+    port = "" if authority.port is None else f":{authority.port}"
+    origin = f"{scope['scheme']}://{authority.host}{port}"
+    folders = (*_CODE_FOLDERS, f"widgets/{widget}")
+    code = " ".join(f"{origin}/{folder}/" for folder in folders)
+    return _FRAME_POLICY.format(digest=digest, code=code)
+
+
 class Policy:
     """The ASGI layer. Puts the page's nonce into ``scope["state"]["nonce"]``."""
 
@@ -160,23 +209,35 @@ class Policy:
 
 
 class _Answer:
-    """Adds the headers of the page policy to whatever answer goes out first."""
+    """Adds the headers of the page policy to whatever answer goes out first.
+
+    A route may leave two words in the request's state: ``frame_policy``, the policy of a frame
+    instead of a page's; and ``is_code``, for what frames may load too.
+    """
 
     def __init__(self, scope: Scope, send: Send, nonce: str) -> None:
         self._send = send
+        self._state = scope["state"]
         self._is_upgrade = scope["type"] == "websocket"
         self._can_explain = "websocket.http.response" in (scope.get("extensions") or {})
         self._has_begun = False
-        policy = _CONTENT_POLICY.format(nonce=nonce).encode()
-        self._headers = [(b"content-security-policy", policy), *_FIXED_HEADERS]
+        self._policy = _CONTENT_POLICY.format(nonce=nonce)
+
+    def _headers(self) -> list[tuple[bytes, bytes]]:
+        framed = self._state.get("frame_policy")
+        fixed = _CODE_HEADERS if self._state.get("is_code") else _FIXED_HEADERS
+        if framed is not None:
+            fixed = _FRAME_HEADERS
+        return [(b"content-security-policy", (framed or self._policy).encode()), *fixed]
 
     async def send(self, message: Message) -> None:
         kind = message["type"]
         if kind in ("http.response.start", "websocket.http.response.start"):
             self._has_begun = True
-            ours = {name for name, _ in self._headers}
+            headers = self._headers()
+            ours = {name for name, _ in headers}
             theirs = [pair for pair in message.get("headers", ()) if pair[0].lower() not in ours]
-            message = {**message, "headers": [*theirs, *self._headers]}
+            message = {**message, "headers": [*theirs, *headers]}
         elif kind == "websocket.accept":
             self._has_begun = True
         elif kind == "websocket.close" and not self._has_begun:

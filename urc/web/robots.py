@@ -7,8 +7,8 @@ gone, so that a reload of the page does not cut the robot off and Back does.
 import asyncio
 import logging
 import secrets
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import AbstractAsyncContextManager, contextmanager
+from collections.abc import AsyncIterator, Callable, Iterator, Mapping
+from contextlib import AbstractAsyncContextManager, asynccontextmanager, contextmanager
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -30,6 +30,7 @@ from urc.web.fanout import Fanout
 
 __all__ = [
     "HELD",
+    "Glimpse",
     "Live",
     "Robot",
     "SessionFailed",
@@ -43,6 +44,8 @@ LINGER_S = 2.0
 OPEN_TIMEOUT_S = 10.0
 RETRY_S = 1.0
 CLIENTS = 256
+CLOSE_TIMEOUT_S = 8.0
+"""How long a session that is to end is waited for."""
 STOP_WITHIN_S = 1.0
 """How long somebody who stops a robot without a socket waits to hear that it was reached."""
 _LOOK_S = 0.01
@@ -80,6 +83,10 @@ class SessionLike(Protocol):
         """Let a sequence pause, do one more step, go on, or end."""
 
 
+Glimpse = bytes | Mapping[str, Reading] | None
+"""A picture, or values by signal; None: nothing is known of the robot."""
+
+
 @dataclass(frozen=True, slots=True)
 class Robot:
     """One robot to serve."""
@@ -89,6 +96,8 @@ class Robot:
     """What is set now, defaults included."""
     open_session: Callable[[], AbstractAsyncContextManager[SessionLike]]
     """Connects while the context lasts. Must not wait for the robot to answer."""
+    glimpse: Callable[[], Glimpse] | None = None
+    """What is seen of an emulated robot without being connected to it; None for a real one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -152,6 +161,8 @@ class Station:
         self._stirred = asyncio.Event()
         self._next: asyncio.Future[Live] | None = None
         self._is_open = False
+        self._held_off = 0
+        """How many want the robot left alone."""
         self._successor: tuple[Robot, LatchFile | None] | None = None
 
     @property
@@ -178,6 +189,19 @@ class Station:
         except TimeoutError:
             raise SessionFailed("the robot's session did not open in time") from None
 
+    def glimpse(self) -> Glimpse:
+        """Return what can be seen of the robot just now; nobody is connected for it."""
+        if self.robot.glimpse is not None:
+            return self.robot.glimpse()
+        coming = self._next
+        if coming is None or not coming.done() or coming.cancelled() or coming.exception():
+            return None
+        hub = coming.result().session.hub
+        samples = {name: hub.latest(name) for name in hub.signals}
+        values = {name: one.value for name, one in samples.items() if one is not None}
+        pictures = (value for value in values.values() if isinstance(value, bytes))
+        return next(pictures, None) or values or None
+
     async def deliver_stop(self) -> bool:
         """Wait a moment for the stop to reach the robot, connecting it when nobody looks at it."""
         desk = self.controls.desk
@@ -192,6 +216,28 @@ class Station:
         """Whether nobody has the controls and every stop has reached the robot."""
         desk = self.controls.desk
         return desk.lease.state.holder is None and desk.is_confirmed
+
+    @property
+    def is_open(self) -> bool:
+        """Whether there is a session, or one is being opened or closed."""
+        return self._is_open
+
+    @asynccontextmanager
+    async def held_off(self) -> AsyncIterator[None]:
+        """Leave the robot alone for as long as the context lasts: many robots serve one at a time.
+
+        For a robot that nobody drives. An open session ends first; clients wait for the next one.
+        """
+        self._held_off += 1
+        self._stirred.set()
+        try:
+            end_s = self.clock.now() + CLOSE_TIMEOUT_S
+            while self._is_open and self.clock.now() < end_s:
+                await self.clock.sleep(_LOOK_S)
+            yield
+        finally:
+            self._held_off -= 1
+            self._stirred.set()
 
     def replace(self, robot: Robot, latch: LatchFile | None = None) -> None:
         """Go on with another version of the robot; an open session ends, and the next is its own.
@@ -248,19 +294,36 @@ class Station:
     async def _until_deserted(self) -> None:
         while True:
             await self._wait_for(present=False)
-            end_s = self.clock.now() + self._linger_s
-            alarm = self.clock.call_at(end_s, self._stirred.set)
-            while not self._visitors and self.clock.now() < end_s and not self._successor:
+            # Whether the time is over the alarm says, not the clock: a loop's timer may be a
+            # fraction of a millisecond early, and would then not ring again.
+            rung = asyncio.Event()
+
+            def ring(rung: asyncio.Event = rung) -> None:
+                rung.set()
+                self._stirred.set()
+
+            alarm = self.clock.call_at(self.clock.now() + self._linger_s, ring)
+            while not (self._visitors or self._is_unwanted or rung.is_set()):
                 self._stirred.clear()
                 await self._stirred.wait()
             alarm.cancel()
-            if not self._visitors or self._successor:
+            if not self._visitors or self._is_unwanted:
                 return
 
+    @property
+    def _is_unwanted(self) -> bool:
+        """Whether an open session is to end, whoever looks on."""
+        return self._successor is not None or self._held_off > 0
+
     async def _wait_for(self, *, present: bool) -> None:
-        while (self._visitors > 0) is not present and not self._successor:
+        """Wait until the robot is wanted, or until it is not, for any reason."""
+        while not (self._is_wanted if present else self._visitors == 0 or self._is_unwanted):
             self._stirred.clear()
             await self._stirred.wait()
+
+    @property
+    def _is_wanted(self) -> bool:
+        return (self._visitors > 0 and not self._held_off) or self._successor is not None
 
     def _coming(self) -> asyncio.Future[Live]:
         if self._next is None:

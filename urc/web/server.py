@@ -9,7 +9,7 @@ import contextlib
 import ipaddress
 import signal
 import socket
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from functools import partial
 from typing import Any, cast
 
@@ -21,7 +21,7 @@ from uvicorn.server import ServerState
 from urc.problems import UrcError
 from urc.web.addresses import local_addresses
 from urc.web.connection import CONNECTIONS, REQUEST_S, Connection
-from urc.web.frames import Frames
+from urc.web.frames import Frames, text_of
 from urc.web.wire import INBOUND_BYTES
 
 __all__ = ["reachable_urls", "serve"]
@@ -119,6 +119,10 @@ class _Flow:
     def listen(self, sink: Callable[[bytes], bool]) -> None:
         self.sink = sink
 
+    def hold_back(self, is_held: bool) -> None:
+        if self.transport and not self.transport.is_closing():
+            (self.transport.pause_reading if is_held else self.transport.resume_reading)()
+
     def abort(self) -> None:
         if self.transport:
             self.transport.abort()
@@ -163,8 +167,24 @@ class _DashboardSocket(WebSocketsSansIOProtocol):
             return
         text = self._urc_frames.whole(data)
         sink = self._urc_flow.sink
-        if text is None or sink is None or not sink(text):
+        if sink is None:
             super().data_received(data)
+        elif text is None:
+            self._urc_several(data, self._urc_frames.spans, sink)
+        elif not sink(text):
+            super().data_received(data)
+
+    def _urc_several(
+        self, data: bytes, spans: Iterable[tuple[int, int]], sink: Callable[[bytes], bool]
+    ) -> None:
+        """Pass on what came together, up to the first that the client does not take."""
+        at = 0
+        for begin, end in spans:
+            if not sink(text_of(data[begin:end])):
+                break
+            at = end
+        if at < len(data):
+            super().data_received(data[at:])
 
     def pause_writing(self) -> None:
         """Tell the client that the kernel is full."""

@@ -17,7 +17,6 @@ from starlette.websockets import WebSocketDisconnect
 
 from urc.model.codec import Payload
 from urc.model.values import NOTHING, Reading
-from urc.protocol.commands import questions
 from urc.runtime.session import CommandFailed
 from urc.web import wire
 from urc.web.controls import Seat
@@ -32,7 +31,7 @@ from urc.web.robots import (
     missing_settings,
     needs_holding,
 )
-from urc.web.wire_ask import Agree, Steer
+from urc.web.wire_ask import Agree, Prepare, Steer, encode_token
 from urc.web.wire_drive import Drive, Driving, Release, Stop, Tick
 from urc.web.wire_picture import Show
 
@@ -89,12 +88,16 @@ class Client:
         if live is None or flow is None or self._news.is_set() or not flow.is_free():
             self._news.set()
             return
-        for text in live.fanout.take(self._place):
-            flow.write(live.fanout.frame_of(text))
-        while flow.is_free() and (picture := live.fanout.shelf.take(self._looks)):
+        frames = live.fanout.take_frames(self._place)
+        if frames:
+            flow.write(frames)
+        while self._looks.names and flow.is_free():
+            picture = live.fanout.shelf.take(self._looks)
+            if picture is None:
+                break
             flow.write(picture.frame)
-        if not flow.is_free() or live.ended.is_set():
-            self._news.set()  # the newest, once the line is free; or the end
+        if live.ended.is_set() or (self._looks.names and not flow.is_free()):
+            self._news.set()  # the end; or the newest, once the line is free
 
     async def serve(self) -> None:
         """Be this client from the accepted socket to its end."""
@@ -224,6 +227,8 @@ class Client:
     async def _read(self, live: Live, group: asyncio.TaskGroup, first: Message | None) -> None:
         if self._flow:
             self._flow.listen(self._offered)
+            if self._seat is not None:
+                self._seat.hold_back = self._flow.hold_back
         message = first or await self._listen()
         while message["type"] != "websocket.disconnect" and not self._closing:
             self._take(message, live, group)
@@ -238,16 +243,14 @@ class Client:
 
     def _offered(self, data: bytes) -> bool:
         """Take a tick that has just come, with nothing before it; all else is for `_take`."""
-        if not (self._is_listening and data.startswith(TICK)) or self._closing:
+        seat = self._seat
+        if seat is None or not (self._is_listening and data.startswith(TICK)) or self._closing:
             return False
-        try:
-            said = wire.decode(data)
-        except wire.BadMessage:
-            return False
-        if not isinstance(said, Tick) or not self._ticks.take(self._station.clock.now()):
-            return False
-        self._hear(said)
-        return True
+        how = self._station.controls.offer(seat, data)
+        # Those that come in time are not counted: they are far fewer than may be.
+        return how == "in time" or (
+            how == "one more" and self._ticks.take(self._station.clock.now())
+        )
 
     def _take(self, message: Message, live: Live, group: asyncio.TaskGroup) -> None:
         now_s = self._station.clock.now()
@@ -271,7 +274,7 @@ class Client:
         elif isinstance(asked, Show):
             self._looks.show(asked.signals)
             self._news.set()
-        elif isinstance(asked, (Agree, Steer)):
+        elif isinstance(asked, (Agree, Prepare, Steer)):
             self._advise(asked, live)
         elif isinstance(asked, wire.Ping):
             if math.isfinite(asked.c):
@@ -284,10 +287,12 @@ class Client:
         if self._seat is not None:
             self._station.controls.hear(self._seat, said)
 
-    def _advise(self, said: Agree | Steer, live: Live) -> None:
+    def _advise(self, said: Agree | Prepare | Steer, live: Live) -> None:
         if self._seat is None:
             return
-        if isinstance(said, Agree):
+        if isinstance(said, Prepare):
+            self._answer(encode_token(said.id, self._station.consent.prepare(self._seat, said)))
+        elif isinstance(said, Agree):
             self._station.consent.hear(self._seat, said)
         elif self._seat.client.role == "viewer":
             text = "this page only watches"
@@ -359,18 +364,11 @@ class Client:
     async def _confirmed(self, asked: wire.Run) -> tuple[str, ...]:
         """Return who has said yes to a command; raise `CommandFailed` while somebody must."""
         known = self._station.robot.profile.driver.commands.get(asked.command)
-        asks = questions(known, asked.arguments) if known is not None else ()
-        if not asks or known is None or self._seat is None:
+        if known is None or self._seat is None:
             return ()
-        if not asked.confirmed:
-            text = f"nobody was asked first: {asks[0].text or known.title or known.name}"
-            raise CommandFailed("not-confirmed", text)
-        people = (self._seat.client.name,)
-        two = next((one for one in asks if one.is_two_person), None)
-        if two is None:
-            return people
-        name = known.title or known.name
-        return (*people, await self._station.consent.second(self._seat, asked.id, name, two))
+        return await self._station.consent.people(
+            self._seat, asked.id, known, asked.arguments, asked.token
+        )
 
     def _reply(
         self,

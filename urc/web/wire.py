@@ -19,12 +19,14 @@ Server → page, by ``t``::
     refused a tick, or a wish about the controls, was not taken
 
     ask     a question that a second person must answer; ``asked``: it is over
+    token   the answer to ``prepare``: lets one command be given, once, within 5 s
     progress where the sequences stand
 
 Images go as binary messages, see `wire_picture`.
 
-Page → server: ``ping``, ``run``, ``show``, ``agree``, ``steer``, and for the controls ``drive``,
-``tick``, ``release`` and ``stop``. The types below bound their nesting: anything deeper than an
+Page → server: ``ping``, ``run``, ``show``, ``agree``, ``prepare``, ``steer``, and for the controls
+``drive``, ``tick``, ``release`` and ``stop``; the last three also on a second line, which begins
+with ``spare`` and is told beats. The types below bound their nesting: anything deeper than an
 argument map of plain values is refused by the decoder without being read further.
 """
 
@@ -36,7 +38,7 @@ from urc.model.driver import Command, Driver, Poll
 from urc.model.profile import Profile
 from urc.model.values import Reading, Sample, Signal
 from urc.runtime.hub import LinkStatus, Note
-from urc.web.wire_ask import Agree, Steer
+from urc.web.wire_ask import Agree, Arguments, Prepare, Steer
 from urc.web.wire_drive import Drive, Release, Stop, Tick
 from urc.web.wire_picture import Show
 from urc.web.wire_text import Outbound, cut, encoded, milliseconds
@@ -66,6 +68,7 @@ __all__ = [
 VERSION = 1
 INBOUND_BYTES = 64 * 1024
 """Longest message taken from a page."""
+_AS_THEY_ARE = (float, bool, type(None))
 _EXACT = 2**53 - 1  # beyond it a browser's numbers skip integers
 
 CLOSE_BAD_MESSAGES = 4400
@@ -169,20 +172,17 @@ class Ping(msgspec.Struct, tag_field="t", tag="ping", forbid_unknown_fields=True
     c: float
 
 
-_Scalar = bool | int | float | str
-
-
 class Run(msgspec.Struct, tag_field="t", tag="run", forbid_unknown_fields=True, frozen=True):
     """One command. The page chooses `id`; exactly one reply carries it."""
 
     id: int
     command: str
-    arguments: dict[str, bool | int | float | str | tuple[_Scalar, ...] | None] = {}
-    confirmed: bool = False
-    """Whether somebody was asked what the driver wants people to be asked, and said yes."""
+    arguments: Arguments = {}
+    token: str = ""
+    """Answer to `Prepare`, where the driver wants people to be asked: somebody said yes to this."""
 
 
-Inbound = Ping | Run | Show | Agree | Steer | Drive | Tick | Release | Stop
+Inbound = Ping | Run | Show | Agree | Prepare | Steer | Drive | Tick | Release | Stop
 
 _decoder: msgspec.json.Decoder[Inbound] = msgspec.json.Decoder(Inbound)
 
@@ -216,13 +216,15 @@ def encode_hello(profile: Profile, session: str, now_s: float) -> str:
 
 def encode_values(samples: Sequence[Sample], index: Mapping[str, int], now_s: float) -> str:
     """Return one frame with the newest reading of each changed signal."""
-    alarms = [sample.alarm for sample in samples]
+    names, values, times, alarms = zip(*samples, strict=True)
+    # What came together is equally old.
+    ages = {time_s: max(0, milliseconds(now_s - time_s)) for time_s in set(times)}
     return encoded(
         _Values(
             n=milliseconds(now_s),
-            i=[index[sample.signal] for sample in samples],
-            v=[_plain(sample.value) for sample in samples],
-            a=[max(0, milliseconds(now_s - sample.time_s)) for sample in samples],
+            i=[*map(index.__getitem__, names)],
+            v=[each if type(each) in _AS_THEY_ARE else _plain(each) for each in values],
+            a=[*map(ages.__getitem__, times)],
             s=list(alarms) if any(alarms) else None,
         )
     )

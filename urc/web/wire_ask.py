@@ -11,7 +11,16 @@ from urc.protocol.reins import Pull
 from urc.runtime.hub import Progress
 from urc.web.wire_text import Outbound, cut, encoded, milliseconds
 
-__all__ = ["Agree", "Steer", "encode_ask", "encode_asked", "encode_progress"]
+__all__ = [
+    "Agree",
+    "Arguments",
+    "Prepare",
+    "Steer",
+    "encode_ask",
+    "encode_asked",
+    "encode_progress",
+    "encode_token",
+]
 
 
 class _Ask(Outbound, tag="ask", omit_defaults=False, frozen=True):
@@ -31,6 +40,11 @@ class _Asked(Outbound, tag="asked", frozen=True):
     n: int
 
 
+class _Token(Outbound, tag="token", omit_defaults=False, frozen=True):
+    id: int
+    token: str
+
+
 class _Progress(msgspec.Struct, omit_defaults=False, frozen=True):
     command: str
     place: int
@@ -48,6 +62,21 @@ class Agree(msgspec.Struct, tag_field="t", tag="agree", forbid_unknown_fields=Tr
 
     n: int
     yes: bool
+
+
+_Scalar = bool | int | float | str
+Arguments = dict[str, bool | int | float | str | tuple[_Scalar, ...] | None]
+"""Of a command, as a page says them."""
+
+
+class Prepare(
+    msgspec.Struct, tag_field="t", tag="prepare", forbid_unknown_fields=True, frozen=True
+):
+    """Somebody has said yes to just this command: asks for the `token` that lets it be given."""
+
+    id: int
+    command: str
+    arguments: Arguments = {}
 
 
 class Steer(msgspec.Struct, tag_field="t", tag="steer", forbid_unknown_fields=True, frozen=True):
@@ -73,6 +102,11 @@ def encode_ask(
 def encode_asked(number: int) -> str:
     """Return that a question is over."""
     return encoded(_Asked(number))
+
+
+def encode_token(run: int, token: str) -> str:
+    """Return what lets the command `run` be given, once and soon."""
+    return encoded(_Token(run, token))
 
 
 def encode_progress(all_progress: tuple[Progress, ...]) -> str:

@@ -12,11 +12,16 @@ from urc.motion.lease import REQUEST_S, Client, LeaseState
 from urc.web.wire_text import Outbound, cut, encoded, milliseconds
 
 __all__ = [
+    "NO_TICK",
+    "Doubled",
     "Drive",
     "Driving",
     "Release",
+    "Spare",
     "Stop",
     "Tick",
+    "command_of",
+    "decode_tick",
     "encode_beat",
     "encode_lease",
     "encode_refused",
@@ -48,6 +53,8 @@ class _Lease(Outbound, tag="lease", omit_defaults=False, frozen=True):
     """Whether this screen may drive, ..."""
     forces: bool
     """... and take the controls from whoever has them."""
+    spare: str
+    """Names the seat of this screen on a second line; nobody else is told. "" for viewers."""
 
 
 class _Beat(Outbound, tag="beat", frozen=True):
@@ -88,20 +95,46 @@ class Tick(msgspec.Struct, tag_field="t", tag="tick", forbid_unknown_fields=True
 class Release(
     msgspec.Struct, tag_field="t", tag="release", forbid_unknown_fields=True, frozen=True
 ):
-    """A control was let go."""
+    """A control was let go. `number` counts with the ticks; 0: there is no second line."""
 
     command: str
+    number: int = 0
 
 
 class Stop(msgspec.Struct, tag_field="t", tag="stop", forbid_unknown_fields=True, frozen=True):
-    """STOP."""
+    """STOP; `number` as of `Release`."""
+
+    number: int = 0
 
 
 Driving = Drive | Tick | Release | Stop
+decode_tick = msgspec.json.Decoder(Tick).decode
+"""Of a text that is most likely one; raises what is in `NO_TICK`."""
+NO_TICK = (msgspec.MsgspecError, UnicodeError, RecursionError)
+_TICK_OF = b'{"t":"tick","command":"'
+"""So a page's ticks begin; written otherwise they only take the longer way."""
 
 
-def encode_lease(state: LeaseState, you: Client, *, left_s: float, is_confirmed: bool) -> str:
-    """Return who has the controls, as one screen is told."""
+def command_of(data: bytes) -> str:
+    """Return whose tick this is by its first bytes, without reading the rest; "" where unclear."""
+    end = data.find(b'"', len(_TICK_OF)) if data.startswith(_TICK_OF) else -1
+    return data[len(_TICK_OF) : end].decode("ascii", "replace") if end > 0 else ""
+
+
+Doubled = Tick | Release | Stop
+"""What a screen may say on its second line."""
+
+
+class Spare(msgspec.Struct, tag_field="t", tag="spare", forbid_unknown_fields=True, frozen=True):
+    """First on a second line: whose it is, by the key of the lease."""
+
+    key: str
+
+
+def encode_lease(
+    state: LeaseState, you: Client, *, left_s: float, is_confirmed: bool, spare: str = ""
+) -> str:
+    """Return who has the controls, as one screen is told; `spare` is the key of its seat."""
     return encoded(
         _Lease(
             you=you.id,
@@ -114,6 +147,7 @@ def encode_lease(state: LeaseState, you: Client, *, left_s: float, is_confirmed:
             confirmed=is_confirmed,
             drives=you.role != "viewer",
             forces=you.role in ("engineer", "admin"),
+            spare=spare if you.role != "viewer" else "",
         )
     )
 

@@ -34,7 +34,7 @@
  * @property {(command: string, verb: string) => void} steer
  * @property {(wish: import("./types.js").Wish) => void} drive
  * @property {() => void} wake asks for an animation frame
- * @property {Pick<import("./input.js").Input, "hold" | "gate" | "letGo" | "refusal"> & {pads: PadDesk}} input
+ * @property {Pick<import("./input.js").Input, "hold" | "gate" | "letGo" | "refusal" | "isDriving"> & {pads: PadDesk}} input
  * @property {Pick<import("./stop.js").StopButton, "press" | "follow">} stop
  * @property {Pick<import("./follow.js").Follows, "listen">} follows
  * @property {Store} store
@@ -47,7 +47,16 @@ import { t } from "./kit.js";
 const LOADING_MS = 5000;
 const PICTURES = new Set(["image", "blob"]);
 
-/** Signals of one input. @typedef {{input: string, signals: string[], isMany: boolean}} Bound */
+/** @type {readonly string[]} */
+const NONE = Object.freeze([]);
+/** What a widget without outputs is told of them. @type {Record<string, Outlet>} */
+const NO_OUTLETS = Object.freeze(Object.create(null));
+
+/**
+ * Signals of one input, and what each was like when the widget last saw it.
+ *
+ * @typedef {{input: string, signals: string[], isMany: boolean, seen: (number | string)[], alarms: string}} Bound
+ */
 
 export class Cell {
   /**
@@ -62,7 +71,7 @@ export class Cell {
     /** @type {Bound[]} */
     this.inputs = Object.entries(this.config.inputs).map(([input, bound]) => {
       const isMany = Array.isArray(bound);
-      return { input, isMany, signals: isMany ? bound : [bound] };
+      return { input, isMany, signals: isMany ? bound : [bound], seen: [], alarms: "" };
     });
     this.outputs = Object.entries(this.config.outputs);
     this.end = new AbortController();
@@ -73,8 +82,14 @@ export class Cell {
     this.budget = new Budget();
     /** @type {Map<string, ((reading: Reading) => void)[]>} */
     this.listeners = new Map();
-    /** What each input and output was like when the widget last saw it. @type {Map<string, string>} */
-    this.seen = new Map();
+    /** What the outputs were like when the widget last saw them; null: it never did. @type {string | null} */
+    this.seenOutlets = null;
+    /** Edition of the store of which all was shown. */
+    this.edition = -1;
+    /** Its inputs that are images. @type {{edition: number, names: readonly string[]}} */
+    this.images = { edition: -1, names: NONE };
+    /** What the context said of units. @type {Map<string, {edition: number, symbol: string, factor: (value: number) => number}>} */
+    this.shownIn = new Map();
     /** @type {{width: number, height: number} | null} */
     this.size = null;
     /** Said over the widget: that it is still loading, or slow. @type {HTMLElement | null} */
@@ -155,38 +170,83 @@ export class Cell {
 
   /** Names of the images that it shows now. @param {Store} store */
   pictures(store) {
-    if (!this.isMounted || !this.isVisible) return [];
-    const names = this.inputs.flatMap(({ signals }) => signals);
-    return names.filter((name) => PICTURES.has(store.signals.get(name)?.type ?? ""));
+    if (!this.isMounted || !this.isVisible) return NONE;
+    if (this.images.edition !== store.edition) {
+      const names = this.inputs.flatMap(({ signals }) => signals);
+      const found = names.filter((name) => PICTURES.has(store.signals.get(name)?.type ?? ""));
+      this.images = { edition: store.edition, names: found };
+    }
+    return this.images.names;
   }
 
   /**
-   * Give the widget what has changed. Called in an animation frame.
+   * Whether the widget has to be called: 0 not, 1 something is new, 2 something is that waits for no
+   * turn (a size, an output, a value that is no longer live, an alarm that comes or goes).
+   *
+   * @param {Store} store
+   * @param {number} nowMs
+   * @returns {0 | 1 | 2}
+   */
+  news(store, nowMs) {
+    if (!this.isDue(nowMs)) return 0;
+    if (this.size || this.edition !== store.edition) return 2;
+    if (this.outputs.length > 0 ? this.outlook(store) !== this.seenOutlets : this.seenOutlets === null) return 2;
+    /** @type {0 | 1 | 2} */
+    let found = 0;
+    for (const { signals, seen, alarms } of this.inputs) {
+      for (let place = 0; place < signals.length; place += 1) {
+        const name = signals[place] ?? "";
+        const look = store.look(name, nowMs);
+        if (look === seen[place]) continue;
+        if (typeof look === "string" || typeof seen[place] === "string") return 2;
+        found = 1;
+      }
+      if (found && alarms !== alarmsOf(signals, store)) return 2;
+    }
+    return found;
+  }
+
+  /** @param {Store} store */
+  outlook(store) {
+    return JSON.stringify(this.outlets(store));
+  }
+
+  /**
+   * Give the widget what has changed, if anything has. Called in an animation frame.
    *
    * @param {Store} store
    * @param {number} nowMs
    */
   frame(store, nowMs) {
-    if (!this.isDue(nowMs)) return;
+    if (this.news(store, nowMs)) this.show(store, nowMs);
+  }
+
+  /**
+   * Give the widget what has changed since it was last shown something.
+   *
+   * @param {Store} store
+   * @param {number} nowMs
+   */
+  show(store, nowMs) {
     /** An input of many signals is a list. @type {Record<string, any>} */
     const readings = Object.create(null);
     /** @type {string[]} */
     const changed = [];
-    const outlets = this.outlets(store);
-    const outlook = JSON.stringify(outlets);
-    const isOutputNews = this.seen.get("") !== outlook; // no input has this name
-    this.seen.set("", outlook);
+    const isAllNew = this.edition !== store.edition;
+    const outlets = this.outputs.length > 0 ? this.outlets(store) : NO_OUTLETS;
+    const outlook = this.outputs.length > 0 ? JSON.stringify(outlets) : "";
+    const isOutputNews = this.seenOutlets !== outlook;
+    this.edition = store.edition;
+    this.seenOutlets = outlook;
     for (const bound of this.inputs) {
-      const each = bound.signals.map((_, place) => this.reading(bound, place, store, nowMs));
-      const looks = each.map(({ serial, state, age }) => `${serial} ${state} ${age}`);
-      const look = `${looks.join()} ${store.edition}`;
-      readings[bound.input] = bound.isMany ? each : each[0];
-      if (this.seen.get(bound.input) !== look) {
-        this.seen.set(bound.input, look);
-        changed.push(bound.input);
-      }
+      const { input, signals, seen } = bound;
+      const each = signals.map((_, place) => this.reading(bound, place, store, nowMs));
+      const looks = signals.map((name) => store.look(name, nowMs));
+      readings[input] = bound.isMany ? each : each[0];
+      if (isAllNew || looks.some((look, place) => look !== seen[place])) changed.push(input);
+      bound.seen = looks;
+      bound.alarms = alarmsOf(signals, store);
     }
-    if (changed.length === 0 && !isOutputNews && !this.size) return;
     this.measured(nowMs, () => this.call(readings, changed, outlets, isOutputNews));
   }
 
@@ -292,4 +352,13 @@ export class Cell {
       console.warn(`widget ${this.config.widget}: destroy failed:`, error);
     }
   }
+}
+
+/**
+ * @param {readonly string[]} signals
+ * @param {Store} store
+ */
+function alarmsOf(signals, store) {
+  if (signals.length === 1) return store.samples.get(signals[0] ?? "")?.alarm ?? "";
+  return signals.map((name) => store.samples.get(name)?.alarm ?? "").join();
 }

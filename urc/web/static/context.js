@@ -31,13 +31,8 @@ export function contextOf(cell) {
     on: (/** @type {string} */ input, /** @type {(reading: Reading) => void} */ listener) => {
       cell.listen(input, listener);
     },
-    send: (/** @type {string} */ output, /** @type {Record<string, Given>} */ args = {}) => {
-      const bound = cell.output(output);
-      if (bound === undefined) {
-        return Promise.reject(new Error(`the output ${output} is not bound to a command`));
-      }
-      return give(cell, bound.command, argumentsOf(bound, args), bound.asks ?? []);
-    },
+    send: (/** @type {string} */ output, /** @type {Record<string, Given>} */ args = {}) =>
+      give(cell, output, args),
     command: (/** @type {string} */ output) => describe(cell.output(output)),
     steer: (/** @type {string} */ output, /** @type {string} */ verb) => {
       const bound = cell.output(output);
@@ -69,15 +64,18 @@ export function contextOf(cell) {
 }
 
 /**
- * Give a command, after the questions that the driver has for people.
+ * Give the command that an output is bound to, after the questions that the driver has for people.
  *
- * @param {Cell} cell
- * @param {string} command
- * @param {Record<string, Given>} args
- * @param {readonly import("./types.js").Question[]} asks
+ * @param {Pick<Cell, "doors" | "el" | "end" | "output">} cell
+ * @param {string} output
+ * @param {Record<string, Given>} given by the names of the widget's manifest
  */
-async function give(cell, command, args, asks) {
-  const questions = questionsOf(asks, args);
+export async function give(cell, output, given) {
+  const bound = cell.output(output);
+  if (bound === undefined) throw new Error(`the output ${output} is not bound to a command`);
+  const { command } = bound;
+  const args = argumentsOf(bound, given);
+  const questions = questionsOf(bound.asks ?? [], args);
   if (questions.length === 0) return cell.doors.run(command, args);
   const ticket = await cell.doors.asks.ask(cell.el, questions, cell.end.signal);
   try {
@@ -114,6 +112,19 @@ function picture(cell, input, show) {
  * @param {string} input
  */
 function unit(cell, input) {
+  const { edition } = cell.doors.store;
+  const known = cell.shownIn.get(input);
+  if (known?.edition === edition) return known;
+  const made = { edition, ...unitOf(cell, input) };
+  cell.shownIn.set(input, made);
+  return made;
+}
+
+/**
+ * @param {Cell} cell
+ * @param {string} input
+ */
+function unitOf(cell, input) {
   const bound = cell.inputs.find((each) => each.input === input);
   const { store } = cell.doors;
   const reading = bound ? cell.reading(bound, 0, store, 0) : null;

@@ -56,7 +56,9 @@ const desk = {
     /** @type {Record<string, unknown>} */ args,
     /** @type {boolean} */ confirmed,
   ) => {
-    const reply = await request(values, { t: "run", command, arguments: args, confirmed });
+    const said = { command, arguments: args };
+    const { token } = confirmed ? await request(values, { t: "prepare", ...said }) : { token: "" };
+    const reply = await request(values, { t: "run", ...said, token });
     if (!reply.ok) throw new Error(reply.message ?? reply.code ?? "it was not done");
     return reply.values ?? {};
   },
@@ -120,6 +122,7 @@ function takeValues(message) {
     case "pong":
       store.pong(message.n, nowMs, values.tripMs);
       break;
+    case "token":
     case "reply":
       settle(message.id, message);
       break;

@@ -8,18 +8,26 @@
  * @typedef {"" | "sending" | "sent" | "failed"} StopPhase What is known of the last press of STOP,
  *   before the lease says that it is latched.
  */
+import { Spare } from "./spare.js";
 
 /** Without a word of the server for so long, STOP goes the other way too. */
 const STOP_AGAIN_MS = 300;
 const POST_WITHIN_MS = 3000;
+/** A way there and back that takes longer makes what is lost on it cost too much time: see `Spare`. */
+const FAR_MS = 40;
+/** So much later than the one before it, a beat was lost on the way, or held up. */
+const LATE_BEAT_MS = 150;
+/** For so long a link that has lost something counts as one that does. */
+const LOSSY_MS = 5000;
 
 export class Drive {
   /**
    * @param {Socket} socket
    * @param {string} stopUrl where STOP goes when the socket is down
    * @param {() => void} changed something to show
+   * @param {string} [spareUrl] where a second line goes
    */
-  constructor(socket, stopUrl, changed) {
+  constructor(socket, stopUrl, changed, spareUrl = "") {
     this.socket = socket;
     this.stopUrl = stopUrl;
     this.changed = changed;
@@ -27,7 +35,11 @@ export class Drive {
     this.lease = null;
     /** Newest number that the server has told this page; 0 while it has not. */
     this.beat = 0;
-    /** Counts the ticks of this page. */
+    this.beatMs = 0;
+    /** When a beat came late, on this page's clock. */
+    this.lateMs = -Infinity;
+    this.spare = new Spare(spareUrl, (message) => this.hear(message.n, performance.now()));
+    /** Counts what this page says of held controls. */
     this.number = 0;
     /** @type {StopPhase} */
     this.phase = "";
@@ -61,11 +73,56 @@ export class Drive {
     const wasMine = this.isMine;
     this.lease = lease;
     this.handedMs = nowMs + lease.left;
-    if (!this.isMine) this.beat = 0;
+    if (!this.isMine) this.beat = this.beatMs = 0;
     if (this.isMine !== wasMine || lease.latched) this.refusal = "";
     if (lease.latched || this.phase === "failed") this.settle("");
     this.posted = null;
+    this.double();
     this.changed();
+  }
+
+  /**
+   * A number of the server, on either line.
+   *
+   * @param {number} beat
+   * @param {number} nowMs
+   */
+  hear(beat, nowMs) {
+    if (!this.isMine || beat <= this.beat) return;
+    if (this.beat && nowMs - this.beatMs > LATE_BEAT_MS) this.lateMs = nowMs;
+    this.beat = beat;
+    this.beatMs = nowMs;
+    this.double();
+  }
+
+  /** Whether the way to the server has lost or held up something just now. */
+  get isLossy() {
+    return performance.now() - this.lateMs < LOSSY_MS;
+  }
+
+  /** Have a second line where the first one may be held up for longer than a lease. */
+  double() {
+    if (!this.isMine) this.spare.want("");
+    else if ((this.socket.tripMs ?? 0) > FAR_MS || this.isLossy) this.spare.want(this.lease?.spare ?? "");
+  }
+
+  /** Whether a tick would go out at once. */
+  get isFree() {
+    return this.socket.unsent === 0 || this.spare.isFree;
+  }
+
+  /**
+   * Say something of held controls on every line; a tick only where nothing waits before it.
+   *
+   * @param {Record<string, unknown>} message
+   * @param {boolean} isTick
+   * @returns {boolean} whether it was handed to the browser
+   */
+  tell(message, isTick = false) {
+    this.number += 1;
+    const numbered = { ...message, number: this.number };
+    const isSent = (!isTick || this.socket.unsent === 0) && this.socket.send(numbered);
+    return this.spare.send(numbered) || isSent;
   }
 
   /** The page has lost the server: it holds nothing any more. */
@@ -74,7 +131,8 @@ export class Drive {
       this.posted = { latched: this.lease.latched, confirmed: this.lease.confirmed };
     }
     this.lease = null;
-    this.beat = 0;
+    this.beat = this.beatMs = 0;
+    this.double();
     this.changed();
   }
 
@@ -96,7 +154,7 @@ export class Drive {
   /** Stop the robot: at once, by the socket, and by a request of its own where that says nothing. */
   stop() {
     this.settle("sending");
-    if (this.socket.send({ t: "stop" })) {
+    if (this.tell({ t: "stop" })) {
       this.phase = "sent";
       this.timer = window.setTimeout(() => void this.post(), STOP_AGAIN_MS);
     } else {

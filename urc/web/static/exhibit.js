@@ -61,6 +61,7 @@ const FREE = {
   confirmed: false,
   drives: true,
   forces: true,
+  spare: "",
 };
 
 /** Takes what a page says to its server, and gives the controls to whoever asks. */

@@ -9,6 +9,10 @@
  * @typedef {import("./store.js").Store} Store
  */
 import { Cell } from "./cell.js";
+import { Pace } from "./pace.js";
+
+/** Fewer widgets than these never take turns: looking at what they cost would cost more. */
+const FEW = 8;
 
 export class Host {
   /**
@@ -21,6 +25,18 @@ export class Host {
     this.doors = { ...doors, store };
     /** @type {Map<Element, Cell>} */
     this.cells = new Map();
+    this.pace = new Pace();
+    /** Cells that wait for their turn, longest first. @type {Set<Cell>} */
+    this.waiting = new Set();
+    /** Drawn in the frame that is being painted; 0 when none is. */
+    this.drawn = 0;
+    this.begunMs = 0;
+    // A message that is sent in a frame comes when that frame was painted.
+    this.painted = new MessageChannel();
+    this.painted.port1.onmessage = () => {
+      this.pace.learn(this.drawn, performance.now() - this.begunMs, this.cells.size);
+      this.drawn = 0;
+    };
     /** Whether also cells that cannot be seen are called. */
     this.isAllInSight = false;
     this.sight = new IntersectionObserver((entries) => {
@@ -48,13 +64,27 @@ export class Host {
     const mounted = [];
     for (const el of root.querySelectorAll("[data-config]")) {
       if (!(el instanceof HTMLElement) || this.cells.has(el)) continue;
-      const cell = new Cell(el, this.doors);
-      this.cells.set(el, cell);
-      this.sight.observe(el);
-      this.sizes.observe(el);
-      mounted.push(cell.mount());
+      mounted.push(el.dataset["frame"] ? this.mountForeign(el) : this.mount(new Cell(el, this.doors)));
     }
     await Promise.all(mounted);
+  }
+
+  /** @param {Cell} cell */
+  mount(cell) {
+    this.cells.set(cell.el, cell);
+    this.sight.observe(cell.el);
+    this.sizes.observe(cell.el);
+    return cell.mount();
+  }
+
+  /**
+   * A widget that does not ship with URC lives in a frame.
+   *
+   * @param {HTMLElement} el
+   */
+  async mountForeign(el) {
+    const { Warden } = await import("./warden.js"); // most pages have none
+    if (el.isConnected && !this.cells.has(el)) await this.mount(new Warden(el, this.doors));
   }
 
   /**
@@ -68,18 +98,48 @@ export class Host {
       this.cells.delete(el);
       this.sight.unobserve(el);
       this.sizes.unobserve(el);
+      this.waiting.delete(cell);
       cell.unmount();
     }
   }
 
-  /** @param {number} nowMs */
+  /**
+   * Let the widgets draw what is new; where that is too much for one frame, in turn.
+   *
+   * @param {number} nowMs
+   */
   frame(nowMs) {
-    for (const cell of this.cells.values()) cell.frame(this.store, nowMs);
+    let left = this.pace.allowed(this.cells.size);
+    let drawn = 0;
+    const draw = (/** @type {Cell} */ cell) => {
+      const news = cell.news(this.store, nowMs);
+      if (news === 1 && left <= 0) {
+        this.waiting.add(cell);
+        return;
+      }
+      this.waiting.delete(cell);
+      if (news === 0) return;
+      drawn += 1;
+      left -= 1;
+      cell.show(this.store, nowMs);
+    };
+    for (const cell of [...this.waiting]) draw(cell);
+    for (const cell of this.cells.values()) {
+      if (!this.waiting.has(cell)) draw(cell);
+    }
+    if (this.waiting.size > 0) this.doors.wake();
+    if (drawn < FEW || this.drawn > 0) return;
+    this.drawn = drawn;
+    this.begunMs = nowMs;
+    this.painted.port2.postMessage(null);
   }
 
   /** Names of the images that can be seen now, each once, in a steady order. */
   pictures() {
-    const names = [...this.cells.values()].flatMap((cell) => cell.pictures(this.store));
-    return [...new Set(names)].sort();
+    const names = new Set();
+    for (const cell of this.cells.values()) {
+      for (const name of cell.pictures(this.store)) names.add(name);
+    }
+    return [...names].sort();
   }
 }

@@ -181,7 +181,7 @@ export class Input {
   release(control) {
     if (!control.isReleaseOwed) return;
     control.isReleaseOwed = false;
-    this.drive.socket.send({ t: "release", command: control.command });
+    this.drive.tell({ t: "release", command: control.command });
   }
 
   /**
@@ -328,16 +328,10 @@ export class Input {
     for (const grip of control.grips) values = { ...values, ...grip.given() };
     const text = JSON.stringify(values);
     if (text === control.sent && nowMs - control.sentMs < TICK_MS) return;
-    if (drive.socket.unsent > 0) return; // the newest goes when the line is free, not after others
-    drive.number += 1;
-    control.isReleaseOwed = drive.socket.send({
-      t: "tick",
-      command: control.command,
-      arguments: values,
-      epoch: control.epoch,
-      number: drive.number,
-      echo: drive.beat,
-    });
+    if (!drive.isFree) return; // the newest goes when the line is free, not after others
+    const { command, epoch } = control;
+    const tick = { t: "tick", command, arguments: values, epoch, echo: drive.beat };
+    control.isReleaseOwed = drive.tell(tick, true);
     control.sent = text;
     control.sentMs = nowMs;
   }

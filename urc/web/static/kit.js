@@ -87,16 +87,79 @@ export function attribute(el, name, value) {
   }
 }
 
+/** What was written: reading it back from the element costs more. @type {WeakMap<Element, Map<string, string>>} */
+const styles = new WeakMap();
+
 /**
- * Write a property of the element's style, on change only.
+ * Write a property of the element's style, on change only. Whoever uses it for a property writes
+ * that one by nothing else.
  *
  * @param {Element} el
  * @param {string} name as "--value-share" or "transform"
  * @param {string} value
  */
 export function style(el, name, value) {
+  const known = styles.get(el);
+  if (known?.get(name) === value) return;
   if (!(el instanceof HTMLElement || el instanceof SVGElement)) return;
-  if (el.style.getPropertyValue(name) !== value) el.style.setProperty(name, value);
+  if (known) known.set(name, value);
+  else styles.set(el, new Map([[name, value]]));
+  el.style.setProperty(name, value);
+}
+
+/** For how long a text has to be shorter before it is written larger. */
+const LARGER_AFTER_MS = 2000;
+/** For how many characters each place has room, and until when more than it needs. @type {WeakMap<Element, {room: number, untilMs: number}>} */
+const rooms = new WeakMap();
+
+/**
+ * Tell the style sheet, by a property, for how many characters a text has to have room. In steps of
+ * two, larger at once and smaller only after a while, so that digits which change change no size.
+ *
+ * @param {Element} el
+ * @param {string} name as "--value-characters"
+ * @param {number} characters
+ */
+export function fit(el, name, characters) {
+  const needed = clamp(2 * Math.ceil(characters / 2), 4, 40);
+  const known = rooms.get(el);
+  const nowMs = performance.now();
+  if (known && needed === known.room) known.untilMs = nowMs + LARGER_AFTER_MS;
+  if (known && needed <= known.room && nowMs < known.untilMs) return;
+  rooms.set(el, { room: needed, untilMs: nowMs + LARGER_AFTER_MS });
+  style(el, name, String(needed));
+}
+
+/** What has to be told when a while has passed. @type {Map<Element, Readonly<Record<string, string | null>>>} */
+const untold = new Map();
+/** When each element told last. @type {WeakMap<Element, number>} */
+const toldMs = new WeakMap();
+const TELL_EVERY_MS = 500;
+
+/**
+ * Write attributes that only screen readers read, on change only: at once, and then at most twice a
+ * second, the newest winning. Nobody hears more, and a meter that moves in each frame need not pay
+ * for it.
+ *
+ * @param {Element} el
+ * @param {Readonly<Record<string, string | null>>} attributes
+ */
+export function tell(el, attributes) {
+  const waitMs = (toldMs.get(el) ?? -Infinity) + TELL_EVERY_MS - performance.now();
+  if (waitMs > 0) {
+    if (untold.size === 0) setTimeout(tellRest, waitMs);
+    untold.set(el, attributes);
+    return;
+  }
+  untold.delete(el);
+  toldMs.set(el, performance.now());
+  for (const [name, value] of Object.entries(attributes)) attribute(el, name, value);
+}
+
+function tellRest() {
+  const rest = [...untold];
+  untold.clear();
+  for (const [el, attributes] of rest) tell(el, attributes);
 }
 
 /**
@@ -242,8 +305,12 @@ export function colours(el, names) {
 
 /** Whether a person has asked for less motion. */
 export function isStill() {
-  return matchMedia("(prefers-reduced-motion: reduce)").matches;
+  still ??= matchMedia("(prefers-reduced-motion: reduce)");
+  return still.matches;
 }
+
+/** Asked for in each frame. @type {MediaQueryList | undefined} */
+let still;
 
 /**
  * Let the browser keep a text as a file on this device.

@@ -7,6 +7,7 @@
  */
 import { Alarms } from "./alarms.js";
 import { Asks } from "./asks.js";
+import { backSafely } from "./back.js";
 import { Badge, part } from "./badge.js";
 import { Controls } from "./controls.js";
 import { Drive } from "./drive.js";
@@ -28,6 +29,8 @@ const STOPPED = {
   expired: t("too long without a sign of this page"),
   revoked: t("the line to the robot was cut"),
 };
+/** So long a yes counts before the server has heard of it. */
+const MEANT_MS = 5000;
 /** How often ages are looked at when nothing arrives. */
 const AGE_EVERY_MS = 250;
 
@@ -39,6 +42,8 @@ const alarms = new Alarms(part(root, "[data-alarms]"));
 
 /** @type {Map<number, {resolve: (values: Record<string, Value>) => void, reject: (error: Error) => void}>} */
 const waiting = new Map();
+/** Commands that somebody has said yes to, and that wait for their tokens. @type {Map<number, {atMs: number, said: object}>} */
+const meant = new Map();
 let lastId = 0;
 let isFrameDue = false;
 let session = "";
@@ -60,7 +65,9 @@ const socket = new Socket(address.href, {
     wake();
   },
 });
-const drive = new Drive(socket, root.dataset["stop"] ?? "", wake);
+const spare = new URL(address);
+spare.pathname += "/spare";
+const drive = new Drive(socket, root.dataset["stop"] ?? "", wake, spare.href);
 const input = new Input(drive);
 const stop = new StopButton(drive, input, store, JSON.parse(root.dataset["lines"] ?? "[]"));
 const asks = new Asks(part(root, ".urc-bar"), (message) => socket.send(message));
@@ -183,6 +190,9 @@ function take(message) {
     case "pong":
       store.pong(message.n, nowMs, socket.tripMs);
       break;
+    case "token":
+      give(message);
+      break;
     case "reply":
       settle(message);
       break;
@@ -191,10 +201,15 @@ function take(message) {
       input.leaseChanged();
       break;
     case "beat":
-      drive.beat = message.n;
+      drive.hear(message.n, nowMs);
       return; // nothing to draw
     case "stopped":
-      input.stopped(message.command, STOPPED[message.reason] ?? message.reason);
+      input.stopped(
+        message.command,
+        message.reason === "expired" && drive.isLossy
+          ? t("the link to URC lost or held up too much for the lease of this control")
+          : (STOPPED[message.reason] ?? message.reason),
+      );
       break;
     case "refused":
       if (message.command) input.stopped(message.command, said(message.message));
@@ -221,13 +236,30 @@ function run(command, args, ticket) {
   const id = lastId;
   return new Promise((resolve, reject) => {
     waiting.set(id, { resolve, reject });
-    const said = { t: "run", id, command, arguments: args };
+    const said = { id, command, arguments: args };
     ticket?.began(id);
-    if (!socket.send(ticket ? { ...said, confirmed: true } : said)) {
+    if (ticket) meant.set(id, { atMs: performance.now(), said });
+    if (!socket.send({ t: ticket ? "prepare" : "run", ...said })) {
+      meant.delete(id);
       waiting.delete(id);
       reject(new Error(t("no connection to URC")));
     }
   });
+}
+
+/**
+ * Give what somebody has said yes to, unless that was too long ago.
+ *
+ * @param {{id: number, token: string}} message
+ */
+function give({ id, token }) {
+  const yes = meant.get(id);
+  meant.delete(id);
+  if (!yes) return;
+  const isLate = performance.now() - yes.atMs > MEANT_MS;
+  if (isLate || !socket.send({ t: "run", ...yes.said, token })) {
+    settle({ id, ok: false, message: t("it took too long: not sent") });
+  }
 }
 
 /** @param {Reply} reply */
@@ -244,8 +276,15 @@ function giveUpCommands() {
     reject(new Error(t("the connection to URC was lost; whether it was done is not known")));
   }
   waiting.clear();
+  meant.clear();
 }
 
+backSafely(part(root, "[data-back]"), {
+  letGo: () => input.letGo(t("the page was left")),
+  isMine: () => drive.isMine,
+  leave: () => void drive.say("leave"),
+  close: () => socket.close(),
+});
 offerSystems((system) => store.setUnits(system));
 socket.open();
 setInterval(wake, AGE_EVERY_MS);

@@ -37,6 +37,8 @@ const CUT_OFF_MS = 60_000;
 const DRIFT = 1e-4;
 const SHORT_TRIP_MS = 250;
 const LONG_LAG_MS = 1000;
+/** A signal of which nothing was declared. @type {Signal} */
+const UNKNOWN = { name: "", type: "string" };
 
 export class Store {
   constructor() {
@@ -51,6 +53,8 @@ export class Store {
     /** Since when each line that is down has been so. @type {Map<string, number>} */
     this.downMs = new Map();
     this.isUp = false;
+    /** Whether every line is connected: then nobody has to look at each. */
+    this.isAllUp = false;
     /** When the connection to URC was lost. */
     this.lostMs = 0;
     this.serial = 0;
@@ -77,6 +81,7 @@ export class Store {
     this.downMs = new Map();
     this.skewMs = Infinity;
     this.lagMs(hello.now, nowMs);
+    this.countLinks();
   }
 
   /**
@@ -87,6 +92,11 @@ export class Store {
     if (this.isUp && !isUp) this.lostMs = nowMs;
     this.isUp = isUp;
     if (!isUp) this.links = new Map();
+    this.countLinks();
+  }
+
+  countLinks() {
+    this.isAllUp = this.isUp && [...this.links.values()].every(({ state }) => isConnected(state));
   }
 
   /**
@@ -145,6 +155,7 @@ export class Store {
       // Lost, connecting, lost again: it has been down since the first of them.
       else if (!this.downMs.has(transport)) this.downMs.set(transport, nowMs - since);
     }
+    this.countLinks();
   }
 
   /**
@@ -160,6 +171,22 @@ export class Store {
     if (tripMs !== null && tripMs < SHORT_TRIP_MS && lagMs > LONG_LAG_MS) {
       this.skewMs = nowMs - serverMs;
     }
+  }
+
+  /**
+   * Return what differs when a reading has to be shown anew. It is asked for each signal in each
+   * frame, so for one that is live it is only its number.
+   *
+   * @param {string} name
+   * @param {number} nowMs
+   * @returns {number | string}
+   */
+  look(name, nowMs) {
+    const sample = this.samples.get(name);
+    if (!sample) return 0;
+    const ageMs = Math.max(0, nowMs - sample.timeMs);
+    const state = this.stateOf(this.signals.get(name) ?? UNKNOWN, sample, ageMs, nowMs);
+    return state === "live" ? sample.serial : `${sample.serial} ${state} ${ageText(ageMs / 1000)}`;
   }
 
   /**
@@ -181,7 +208,10 @@ export class Store {
       value,
       state,
       alarm: isShown ? sample.alarm : "",
-      text: textOf(shown.factor === 1 && !shown.offset ? value : converted(value, shown), signal),
+      // Made when somebody asks: of a scan it is a thousand numbers that nobody reads.
+      get text() {
+        return textOf(shown.factor === 1 && !shown.offset ? value : converted(value, shown), signal);
+      },
       unit: shown.symbol,
       age: state === "stale" || state === "gone" ? ageText(ageMs / 1000) : "",
       time: (sample?.timeMs ?? 0) / 1000,
@@ -237,6 +267,8 @@ export class Store {
    * @param {number} nowMs
    */
   cutOffMs(signal, nowMs) {
+    const [first] = signal.sources ?? [];
+    if (this.isAllUp && (first === undefined || this.links.has(first))) return -1;
     const sources = signal.sources?.length ? signal.sources : [...this.links.keys()];
     const states = sources.map((source) => this.links.get(source)?.state);
     if (this.isUp && (states.length === 0 || states.some(isConnected))) return -1;

@@ -139,6 +139,7 @@
  * @property {boolean} confirmed Whether the robot's lines have taken the stop.
  * @property {boolean} drives Whether this page may drive.
  * @property {boolean} forces Whether it may take the controls from whoever has them.
+ * @property {string} spare Names its seat on a second line; "" when it may have none.
  *
  * @typedef {object} Hand What holds a control, at this moment.
  * @property {"pointer" | "keys" | "pad" | "stay"} kind stay: the pointer has let it go, and it stays

@@ -58,12 +58,15 @@ export class Units {
   /** @param {string} system one of the systems; anything else leaves units as they are declared */
   constructor(system = "") {
     this.system = "";
+    /** What was asked before. @type {Map<string, Conversion>} */
+    this.known = new Map();
     this.use(system);
   }
 
   /** @param {string} system */
   use(system) {
     this.system = Object.hasOwn(SYSTEMS, system) ? system : "";
+    this.known.clear();
   }
 
   /**
@@ -73,6 +76,18 @@ export class Units {
    * @returns {Conversion}
    */
   shown(symbol) {
+    const known = this.known.get(symbol);
+    if (known) return known;
+    const made = this.make(symbol);
+    this.known.set(symbol, made);
+    return made;
+  }
+
+  /**
+   * @param {string} symbol
+   * @returns {Conversion}
+   */
+  make(symbol) {
     const system = SYSTEMS[this.system] ?? {};
     const found = Object.hasOwn(system, symbol) ? system[symbol] : undefined;
     const sign = Object.entries(SIGNS).find(([name]) => name === symbol)?.[1];

@@ -1,0 +1,83 @@
+"""An interface that was added beside a robot's own: whether it fits there, and what it brings."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import NamedTuple
+
+from urc.config.gather import gather
+from urc.config.link_look import link_interface
+from urc.config.parse_interface import parse_interface
+from urc.config.parse_widget import Shelf
+from urc.config.part import Findings
+from urc.model.interface import Interface
+from urc.model.profile import Profile
+from urc.model.values import NOTHING
+from urc.model.widget import Widget
+from urc.problems import has_errors
+
+__all__ = ["Fitted", "fit_interface"]
+
+
+class Fitted(NamedTuple):
+    """What came of an interface on a robot."""
+
+    interface: Interface | None
+    """None: it does not fit."""
+    widgets: Mapping[str, Widget] = NOTHING
+    """Those that it uses."""
+    fault: str = ""
+    """Why it does not fit, in one line."""
+
+
+class _Known(Shelf):
+    """The widgets of a profile, and behind them those of a shelf: one name is one widget."""
+
+    def __init__(self, widgets: Mapping[str, Widget], behind: Shelf) -> None:
+        super().__init__(Path())
+        self._mine = widgets
+        self._behind = behind
+        self.problems = behind.problems
+
+    def names(self) -> list[str]:
+        """Return the names of all widgets there are."""
+        return sorted({*self._mine, *self._behind.names()})
+
+    def get(self, name: str) -> Widget | None:
+        """Return a widget, or None."""
+        return self._mine.get(name) or self._behind.get(name)
+
+    def has(self, name: str) -> bool:
+        """Return whether there is a widget of that name."""
+        return name in self._mine or self._behind.has(name)
+
+
+def fit_interface(path: str, profile: Profile, shelf: Shelf) -> Fitted:
+    """Return an interface with what a robot's driver puts into its slots.
+
+    Args:
+        path: the interface's document.
+        profile: of the robot.
+        shelf: the widgets that the document may use beside those of the robot.
+    """
+    gathered = gather(path)
+    sources = gathered.sources
+    if sources is None or sources.kind != "interface":
+        faults = [one.message for one in gathered.problems if one.severity == "error"]
+        return Fitted(None, fault=next(iter(faults), "it is no interface"))
+    findings = Findings()
+    interface = parse_interface(sources.root, sources.root.text("name"), findings)
+    known = _Known(profile.widgets, shelf)
+    if not has_errors(findings):
+        interface = link_interface(
+            sources.root, interface, profile.slots, profile.driver, known, findings
+        )
+    errors = [one.message for one in (*findings, *shelf.problems) if one.severity == "error"]
+    if errors:
+        return Fitted(None, fault=errors[0])
+    uses = {
+        name: interface.widgets.get(name) or profile.slots.get(name) for name in interface.shown
+    }
+    widgets = {use.widget: known.get(use.widget) for use in uses.values() if use is not None}
+    if not widgets:
+        return Fitted(None, fault="this robot fills none of its slots")
+    return Fitted(interface, {name: one for name, one in widgets.items() if one is not None})

@@ -1,0 +1,44 @@
+"""A robot's document as it is driven: with the widgets beside it, and the interfaces it came with.
+
+Floor 4. A driver's document names no interface; an installed driver is offered with those that were
+installed because it needs them.
+"""
+
+from os import PathLike
+from pathlib import Path
+from typing import Final
+
+from urc.config.fit import fit_interface
+from urc.config.load import load_profile
+from urc.model.profile import Profile
+from urc.packages.store import ecosystem_of
+from urc.runtime.catalog import built_in_catalog
+from urc.runtime.shelves import shelf_of
+
+__all__ = ["open_document"]
+
+_DRIVER: Final = "driver.yaml"
+_MADE: Final = "default"
+"""The interface that is made where a document has none."""
+
+
+def open_document(path: str | PathLike[str]) -> Profile:
+    """Return the profile in a robot's or driver's document.
+
+    Raises:
+        ProblemsError: with every finding of the pass that stopped it.
+    """
+    profile = load_profile(path, built_in_catalog(), shelf_of(path))
+    home = ecosystem_of(Path(path))
+    if home is None or Path(path).name != _DRIVER:
+        return profile
+    interfaces, widgets = dict(profile.interfaces), dict(profile.widgets)
+    for document in sorted(home.glob("interfaces/*/interface.yaml")):
+        found = fit_interface(str(document), profile, shelf_of(document))
+        name = document.parent.name
+        if found.interface is not None and name not in interfaces:
+            interfaces[name] = found.interface._replace(name=name)
+            widgets |= found.widgets
+    if len(interfaces) > 1 and _MADE in interfaces:
+        interfaces[_MADE] = interfaces.pop(_MADE)  # what somebody has drawn goes first
+    return profile._replace(interfaces=interfaces, widgets=widgets)

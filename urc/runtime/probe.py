@@ -1,0 +1,200 @@
+"""Tries the lines of a robot once, for real, and says of each what worked, or why not.
+
+Floor 4. It opens a session as a page would, so logins, polls and time-outs are the driver's own;
+nothing is steered. A line that is opened for a request only, and that nothing asks by itself, is
+opened and closed once.
+"""
+
+import asyncio
+from collections.abc import Callable
+from contextlib import AbstractAsyncContextManager, suppress
+from typing import Final, Literal, NamedTuple
+
+from urc.model.driver import TransportSpec
+from urc.registry import Table
+from urc.runtime.hub import LinkStatus
+from urc.runtime.lines import make_lines
+from urc.runtime.session import Session
+from urc.transports.base import TransportError
+
+__all__ = ["LONGEST_S", "Tried", "Verdict", "probe"]
+
+LONGEST_S: Final = 12.0
+"""A test takes no longer, whatever the driver declares; saying good-bye comes on top."""
+_ANSWER_S: Final = 4.0
+"""How long a connected robot has to say something."""
+_FIRST_S: Final = 1.0
+"""A line that nothing was asked on by then is one that only commands use."""
+_LOOK_S: Final = 0.05
+_CLOSE_S: Final = 2.0
+
+Verdict = Literal["answers", "opens", "fails"]
+
+
+class Tried(NamedTuple):
+    """What became of one transport."""
+
+    transport: str
+    type: str
+    address: str
+    """Where it leads, for people."""
+    verdict: Verdict
+    """answers: it is live. opens: it can be connected, and said nothing. fails: neither."""
+    text: str
+    """What was seen, in one line."""
+    advice: str
+    """What to do about it, in one line; "" where nothing is wrong."""
+
+
+async def probe(
+    opened: Callable[[], AbstractAsyncContextManager[Session]],
+    table: Table,
+    *,
+    longest_s: float = LONGEST_S,
+) -> list[Tried]:
+    """Try every transport of a robot; each wait is bounded.
+
+    Args:
+        opened: gives the session that is tried.
+        table: the kinds of transport.
+        longest_s: when to stop waiting, in seconds.
+
+    Raises:
+        UrcError: the session cannot be made with these settings.
+    """
+    async with opened() as session:
+        specs = session.profile.driver.transports
+        loop = asyncio.get_running_loop()
+        longest = max((one.timeouts.connect_s for one in specs.values()), default=0.0) + _ANSWER_S
+        began_s = loop.time()
+        until_s = began_s + min(longest, longest_s)
+        connected_s: dict[str, float] = {}
+        while loop.time() < until_s:
+            now_s = loop.time()
+            for name, status in session.hub.links.items():
+                if _is_connected(status):
+                    connected_s.setdefault(name, now_s)
+            if all(
+                _is_settled(
+                    session.hub.links.get(name),
+                    now_s - began_s,
+                    now_s - connected_s.get(name, now_s),
+                )
+                for name in specs
+            ):
+                break
+            await asyncio.sleep(_LOOK_S)
+        found = dict(session.hub.links)
+        idle = [name for name, one in found.items() if one.state == "idle" and not one.attempts]
+        lone = await _opened_alone(session, idle, table)
+    return [lone.get(name) or _told(spec, found.get(name)) for name, spec in specs.items()]
+
+
+def _is_connected(status: LinkStatus) -> bool:
+    return status.state in ("live", "silent") or (
+        status.state == "connecting" and status.detail.startswith("connected")
+    )
+
+
+def _is_settled(status: LinkStatus | None, since_s: float, connected_s: float) -> bool:
+    """Return whether nothing more is to be learned of a line.
+
+    Args:
+        status: of the line.
+        since_s: how long the test has been going on, in seconds.
+        connected_s: how long the line has been connected.
+    """
+    if status is None:
+        return False
+    if status.state in ("live", "lost") or status.attempts:
+        return True
+    if status.state == "idle":  # until something is asked, which polls do at once
+        return since_s >= _FIRST_S
+    return connected_s >= _ANSWER_S
+
+
+async def _opened_alone(session: Session, names: list[str], table: Table) -> dict[str, Tried]:
+    """Open and close lines that nothing has asked for."""
+    driver = session.profile.driver
+    tried: dict[str, Tried] = {}
+    if not names:
+        return tried
+    made = make_lines(driver, session.settings, table)
+    for name in names:
+        spec, transport = driver.transports[name], made[name].transport
+        if spec.via:
+            text = f"is opened through {spec.via} when a command needs it; it was not tried"
+            tried[name] = Tried(name, spec.type, transport.address, "opens", text, "")
+            continue
+        try:
+            async with asyncio.timeout(spec.timeouts.connect_s + 1):
+                await transport.open(spec.timeouts.connect_s)
+            text = "can be opened; commands use it one by one"
+            tried[name] = Tried(name, spec.type, transport.address, "opens", text, "")
+        except (TransportError, TimeoutError) as error:
+            text = str(error) or f"not open within {spec.timeouts.connect_s:g} s"
+            tried[name] = _failed(spec, transport.address, text)
+        finally:
+            with suppress(TimeoutError):
+                async with asyncio.timeout(_CLOSE_S):
+                    await transport.close()
+    return tried
+
+
+def _told(spec: TransportSpec, status: LinkStatus | None) -> Tried:
+    if status is None:
+        return _failed(spec, "", "it was not tried in time")
+    if status.state == "live":
+        return Tried(spec.name, spec.type, status.address, "answers", "answers", "")
+    if _is_connected(status) and not status.attempts:
+        text = status.detail or "connected, and an answer is overdue"
+        advice = (
+            "something is there and does not speak as this driver expects: check the port, and"
+            " whether it is this robot; many robots serve one program at a time"
+        )
+        return Tried(spec.name, spec.type, status.address, "opens", text, advice)
+    return _failed(spec, status.address, status.detail or "not connected in time")
+
+
+def _failed(spec: TransportSpec, address: str, text: str) -> Tried:
+    return Tried(spec.name, spec.type, address, "fails", text, advice(text))
+
+
+_ADVICE: Final = (
+    (
+        ("refused",),
+        "the machine is there, and nothing listens on that port: check the port, and that the"
+        " robot's program runs",
+    ),
+    (
+        ("name or service", "no address", "not known", "resolve", "look up", "no such host"),
+        "nobody knows that name: check its spelling, or write the address in numbers",
+    ),
+    (
+        ("unreachable", "no route"),
+        "no network leads there: is this machine on the robot's network?",
+    ),
+    (
+        ("timed out", "within", "time-out", "timeout"),
+        "nobody answers there: check the address, that the robot is on, and the network",
+    ),
+    (("host key", "fingerprint"), "look at the robot's key, then trust it with urc trust"),
+    (
+        ("authenticat", "password", "permission denied", "login", "publickey", "401", "403"),
+        "the robot refuses who asks: check user, password and key file",
+    ),
+    (
+        ("no such file", "could not open port", "no such device"),
+        "the file or device is not there: check its path, and that it is plugged in",
+    ),
+    (("certificate", "tls", "ssl"), "check the certificate, and whether the port speaks TLS"),
+)
+
+
+def advice(text: str) -> str:
+    """Return what to do about a failure, by the words that it is told in."""
+    lower = text.lower()
+    for words, what in _ADVICE:
+        if any(word in lower for word in words):
+            return what
+    return "check the settings of this line"

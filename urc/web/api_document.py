@@ -1,0 +1,175 @@
+"""What can be asked under ``/api/v1``, as an OpenAPI 3.1 document, made from what is decoded.
+
+Floor 5. The shapes are those of `urc.web.manage_wire`, so the document cannot say another
+thing than the server does; a test compares its paths with the routes.
+"""
+
+from functools import cache
+from typing import Any, Final, NamedTuple
+
+import msgspec
+from starlette.requests import Request
+from starlette.responses import Response
+
+from urc import __version__
+from urc.web.manage_wire import (
+    Add,
+    Agree,
+    Failure,
+    Gone,
+    Healthy,
+    JobNews,
+    Line,
+    Package,
+    SettingsAnswer,
+    SettingsAsked,
+    Shelf,
+    Started,
+    Stopped,
+    Timeline,
+    Url,
+)
+
+__all__ = ["DOCUMENT", "api_document", "document"]
+
+DOCUMENT: Final = "/api/v1/openapi.json"
+
+
+class _Call(NamedTuple):
+    path: str
+    summary: str
+    answer: type
+    body: type | None = None
+    """What is sent; None: it is a GET, or a POST without one."""
+    is_post: bool = True
+    status: int = 200
+    query: tuple[str, ...] = ()
+
+
+_CALLS: Final = (
+    _Call("/healthz", "Whether the server runs, and its version.", Healthy, is_post=False),
+    _Call(
+        "/api/v1/packages",
+        "What is installed, what repositories have, and the job that is under way.",
+        Shelf,
+        is_post=False,
+        query=("kinds", "words", "anew"),
+    ),
+    _Call("/api/v1/repositories", "Connect to a repository: it must answer.", Line, Url),
+    _Call("/api/v1/repositories/remove", "Forget a repository.", Line, Url),
+    _Call(
+        "/api/v1/packages/install",
+        "Begin a job that fetches a package and all that it needs, and says what it may do.",
+        JobNews,
+        Package,
+        status=202,
+    ),
+    _Call(
+        "/api/v1/packages/add",
+        "Begin a job with a package at a path in a repository, or on this machine.",
+        JobNews,
+        Add,
+        status=202,
+    ),
+    _Call(
+        "/api/v1/packages/upload",
+        "Begin a job with a package, bundle or interface.yaml: the body is the file.",
+        JobNews,
+        bytes,
+        status=202,
+        query=("name",),
+    ),
+    _Call(
+        "/api/v1/packages/update",
+        "Begin a job that fetches a newer version, and says what it changes.",
+        JobNews,
+        Package,
+        status=202,
+    ),
+    _Call("/api/v1/packages/back", "Put back the version before an update.", Gone, Package),
+    _Call(
+        "/api/v1/packages/remove",
+        "Remove a package; without yes, only tell what would go.",
+        Gone,
+        Package,
+    ),
+    _Call("/api/v1/job/agree", "Install what the job has planned.", JobNews, Agree),
+    _Call("/api/v1/job/cancel", "Give the job up; nothing has changed.", JobNews, Agree),
+    _Call(
+        "/api/v1/robots/{name}/settings",
+        "Try settings for real, keep them, and use them at once.",
+        SettingsAnswer,
+        SettingsAsked,
+    ),
+    _Call("/api/v1/robots/{name}/stop", "Stop a robot, and latch.", Stopped),
+    _Call(
+        "/api/v1/robots/{name}/timeline",
+        "What made a robot move, newest first; on the machine that runs URC only.",
+        Timeline,
+        is_post=False,
+        query=("last", "since"),
+    ),
+    _Call(
+        "/api/v1/robots/{name}/dev/start",
+        "Read a robot's documents anew; with --dev, on the machine that runs URC only.",
+        Started,
+    ),
+)
+
+
+async def document(_: Request) -> Response:
+    """Answer with the document."""
+    headers = {"cache-control": "no-store"}
+    return Response(api_document(), media_type="application/json", headers=headers)
+
+
+@cache
+def api_document() -> bytes:
+    """Return the document as JSON."""
+    kinds = [call.answer for call in _CALLS]
+    kinds += [call.body for call in _CALLS if call.body not in (None, bytes)]
+    kinds.append(Failure)
+    _, components = msgspec.json.schema_components(
+        list(dict.fromkeys(kinds)), ref_template="#/components/schemas/{name}"
+    )
+    paths = {call.path: {"post" if call.is_post else "get": _operation(call)} for call in _CALLS}
+    found = {
+        "openapi": "3.1.0",
+        "info": {
+            "title": "URC",
+            "version": __version__,
+            "description": "Everything that changes something is a POST from the server's own"
+            " origin: the header Origin is expected and compared.",
+        },
+        "paths": paths,
+        "components": {"schemas": components},
+    }
+    return msgspec.json.format(msgspec.json.encode(found), indent=1) + b"\n"
+
+
+def _operation(call: _Call) -> dict[str, Any]:
+    names = [part[1:-1] for part in call.path.split("/") if part.startswith("{")]
+    text = {"type": "string"}
+    parameters = [{"name": one, "in": "path", "required": True, "schema": text} for one in names]
+    parameters += [
+        {"name": one, "in": "query", "required": False, "schema": text} for one in call.query
+    ]
+    failure = {"description": "Why not, in one line.", "content": _json(Failure)}
+    found: dict[str, Any] = {
+        "summary": call.summary,
+        "responses": {
+            str(call.status): {"description": "Done.", "content": _json(call.answer)},
+            "4XX": failure,
+        },
+    }
+    if parameters:
+        found["parameters"] = parameters
+    if call.body is bytes:
+        found["requestBody"] = {"required": True, "content": {"application/octet-stream": {}}}
+    elif call.body is not None:
+        found["requestBody"] = {"required": True, "content": _json(call.body)}
+    return found
+
+
+def _json(kind: type) -> dict[str, Any]:
+    return {"application/json": {"schema": {"$ref": f"#/components/schemas/{kind.__name__}"}}}

@@ -1,0 +1,147 @@
+"""The dev interface: one robot with what was fixed at the start, read anew each time it is begun.
+
+Floor 5. Only there with ``--dev``, and only for who sits at this machine. What a driver's author
+saves is used at once by the dev page's watch; to begin here reads everything again, saved or not
+noticed.
+"""
+
+import asyncio
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from urllib.parse import quote
+
+from starlette.exceptions import HTTPException
+from starlette.requests import HTTPConnection, Request
+from starlette.responses import HTMLResponse, Response
+from starlette.routing import Route
+
+from urc.problems import UrcError
+from urc.runtime.opened import open_document
+from urc.web.dev_watch import Remake
+from urc.web.fleet import Fleet
+from urc.web.manage_routes import answer, told
+from urc.web.manage_wire import Started
+from urc.web.menu import Nav, SettingRow, Ways, setting_row
+from urc.web.pages import Head, render
+from urc.web.robots import Robot
+from urc.web.words import t
+
+__all__ = ["DevStart", "DevStartPage", "no_dev_start"]
+
+_NO_STORE = {"cache-control": "no-store"}
+
+
+@dataclass(frozen=True, slots=True)
+class Fixed:
+    """One robot with its fixed values."""
+
+    name: str
+    title: str
+    file: str
+    interface: str
+    rows: tuple[SettingRow, ...]
+    start_url: str
+    dev_url: str
+
+
+@dataclass(frozen=True, slots=True)
+class DevStartPage:
+    """``dev_start.html.j2``: what is fixed, and the button that begins."""
+
+    head: Head
+    nav: Nav
+    robots: tuple[Fixed, ...]
+
+
+class DevStart:
+    """The page and what its button does."""
+
+    def __init__(
+        self,
+        fleet: Fleet,
+        remake: Mapping[str, Remake],
+        take: Callable[[str, Robot], None],
+        ways: Ways,
+        is_here: Callable[[HTTPConnection], bool],
+    ) -> None:
+        """Begin nothing yet.
+
+        Args:
+            fleet: the robots.
+            remake: makes the robot of a profile that was read anew, by name.
+            take: goes on with that one; may raise `UrcError`.
+            ways: which pages there are.
+            is_here: tells whether a request comes from this machine.
+        """
+        self._fleet = fleet
+        self._remake = remake
+        self._take = take
+        self._ways = ways
+        self._is_here = is_here
+
+    def routes(self) -> list[Route]:
+        """Return the page, and what begins."""
+        return [
+            Route("/dev", self.page),
+            Route("/api/v1/robots/{name}/dev/start", self.start, methods=["POST"]),
+        ]
+
+    async def page(self, request: Request) -> Response:
+        """Show what is fixed."""
+        if not self._is_here(request):
+            raise HTTPException(403, t("The dev interface is for the machine that runs URC."))
+        head = Head(request.state.nonce, t("Dev interface"))
+        robots = tuple(
+            _fixed(name, self._fleet.robots[name])
+            for name in self._remake
+            if name in self._fleet.robots
+        )
+        page = DevStartPage(head, Nav("dev", self._ways), robots)
+        return HTMLResponse(render("dev_start.html.j2", page), headers=_NO_STORE)
+
+    async def start(self, request: Request) -> Response:
+        """Read everything anew, and tell where the robot is."""
+        name = request.path_params["name"]
+        if not self._is_here(request):
+            return told(403, "the dev interface is for the machine that runs URC")
+        if name not in self._remake or name not in self._fleet.robots:
+            return told(404, "no robot of that name is served here")
+        driver = self._fleet.driven_by(name)
+        if driver:
+            return told(409, f"{name} is being driven ({driver}): let go first")
+        try:
+            robot = await asyncio.to_thread(self._read, name)
+            self._take(name, robot)
+        except (UrcError, OSError) as error:
+            return told(422, str(error).strip().partition("\n")[0])
+        return answer(Started(t("read anew"), f"/robots/{quote(name, safe='')}/"))
+
+    def _read(self, name: str) -> Robot:
+        return self._remake[name](open_document(self._fleet.robots[name].profile.file))
+
+
+def no_dev_start() -> list[Route]:
+    """Return the route of a server without a dev interface: it says how to get it."""
+
+    async def tell(_: Request) -> Response:
+        raise HTTPException(404, t("The dev interface is off. Start URC with --dev to turn it on."))
+
+    return [Route("/dev", tell)]
+
+
+def _fixed(name: str, robot: Robot) -> Fixed:
+    profile = robot.profile
+    place = quote(name, safe="")
+    first = next(iter(profile.interfaces.values()), None)
+    return Fixed(
+        name=name,
+        title=profile.title or name,
+        file=profile.file,
+        interface=(first.title or first.name) if first is not None else "",
+        rows=tuple(
+            setting_row(one, robot.settings.get(one.name, one.default))
+            for one in profile.settings.values()
+        ),
+        start_url=f"/api/v1/robots/{place}/dev/start",
+        dev_url=f"/robots/{place}/dev",
+    )

@@ -1,0 +1,273 @@
+"""The managers over HTTP: their pages, and what these ask for under ``/api/v1``.
+
+Floor 5. Everything that changes something is a POST with a JSON body, from this server's own pages
+(`urc.web.policy` sees to it), by somebody who sits at this machine or where that was opened.
+"""
+
+import asyncio
+from collections.abc import Awaitable, Callable
+from functools import wraps
+from pathlib import Path
+from typing import Final, TypeVar
+
+import msgspec
+from starlette.requests import HTTPConnection, Request
+from starlette.responses import HTMLResponse, Response
+from starlette.routing import Route
+
+from urc.packages.names import FOLDERS, PackageError, Wish, parse_wish
+from urc.problems import UrcError
+from urc.web.given import given_source
+from urc.web.jobs import Busy, Wanted
+from urc.web.manage_pages import manage_page
+from urc.web.manage_wire import Add, Agree, Failure, Gone, JobNews, Line, Package, Url
+from urc.web.manager import Manager
+from urc.web.menu import Ways
+from urc.web.words import t
+
+__all__ = ["ManageRoutes", "Refusal", "answer", "body_of", "told"]
+
+_NO_STORE: Final = {"cache-control": "no-store"}
+_KINDS: Final = tuple(FOLDERS.values())
+_T = TypeVar("_T")
+_Handler = Callable[["ManageRoutes", Request], Awaitable[Response]]
+
+ONLY_HERE: Final = (
+    "this is done on the machine that runs URC; started with --manage, other machines may, too"
+)
+
+
+class Refusal(Exception):
+    """An answer that is no success: status, and one line."""
+
+    def __init__(self, status: int, line: str) -> None:
+        super().__init__(line)
+        self.status = status
+        self.line = line
+
+
+def answer(value: object, status: int = 200) -> Response:
+    """Return JSON that nobody keeps."""
+    return Response(msgspec.json.encode(value), status, _NO_STORE, media_type="application/json")
+
+
+async def body_of(request: Request, kind: type[_T]) -> _T:
+    """Return the JSON body of a request as a `kind`; raise `Refusal`."""
+    if request.headers.get("content-type", "").partition(";")[0].strip() != "application/json":
+        raise Refusal(415, "a body of application/json is expected")
+    try:
+        return msgspec.json.decode(await request.body(), type=kind)
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
+        raise Refusal(400, f"the request does not fit: {error}") from None
+
+
+def told(status: int, line: str) -> Response:
+    """Return a failure in one line."""
+    return answer(Failure(line), status)
+
+
+def _api(handler: _Handler) -> _Handler:
+    """Turn our own errors into one line each."""
+
+    @wraps(handler)
+    async def handle(self: "ManageRoutes", request: Request) -> Response:
+        try:
+            return await handler(self, request)
+        except Refusal as refusal:
+            return told(refusal.status, refusal.line)
+        except Busy as error:
+            return told(409, str(error))
+        except UrcError as error:
+            return told(422, str(error).strip().partition("\n")[0])
+        except OSError as error:
+            return told(503, f"{error.filename or 'the disk'}: {error.strerror or error}")
+
+    return handle
+
+
+class ManageRoutes:
+    """The routes of the managers of one dashboard."""
+
+    def __init__(
+        self, manager: Manager, ways: Ways, is_here: Callable[[HTTPConnection], bool]
+    ) -> None:
+        """Answer nothing yet.
+
+        Args:
+            manager: does the work.
+            ways: which pages there are.
+            is_here: tells whether a request comes from this machine.
+        """
+        self._manager = manager
+        self._ways = ways
+        self._is_here = is_here
+
+    def routes(self) -> list[Route]:
+        """Return the pages, and what they ask for."""
+        posts = {
+            "repositories": self.connect,
+            "repositories/remove": self.disconnect,
+            "packages/install": self.install,
+            "packages/add": self.add,
+            "packages/upload": self.upload,
+            "packages/update": self.update,
+            "packages/back": self.back,
+            "packages/remove": self.remove,
+            "job/agree": self.agree,
+            "job/cancel": self.cancel,
+        }
+        return [
+            Route("/drivers", self.page),
+            Route("/interfaces", self.page),
+            Route("/widgets/installed", self.page),
+            Route("/api/v1/packages", self.shelf),
+            *(Route(f"/api/v1/{path}", one, methods=["POST"]) for path, one in posts.items()),
+        ]
+
+    def may_manage(self, connection: HTTPConnection) -> bool:
+        """Return whether who asks may change anything."""
+        return self._manager.garage.workshop.is_open or self._is_here(connection)
+
+    def check(self, connection: HTTPConnection) -> None:
+        """Raise `Refusal` when who asks may not change anything."""
+        if not self.may_manage(connection):
+            raise Refusal(403, ONLY_HERE)
+
+    async def page(self, request: Request) -> Response:
+        """Show a manager."""
+        which = request.url.path.split("/")[1]
+        html = manage_page(
+            request.state.nonce,
+            which,
+            self._ways,
+            may_manage=self.may_manage(request),
+            may_name_paths=self._is_here(request),
+            is_shown=self._manager.garage.workshop.shows_installed,
+        )
+        return HTMLResponse(html, headers=_NO_STORE)
+
+    @_api
+    async def shelf(self, request: Request) -> Response:
+        """Tell what there is; ``kinds`` and ``words`` choose, ``anew`` asks the repositories."""
+        query = request.query_params
+        kinds = tuple(one for one in query.get("kinds", "").split(",") if one in _KINDS) or _KINDS
+        self._manager.catalogue.ask(anew="anew" in query)
+        shelf = await asyncio.to_thread(
+            self._manager.shelf,
+            query.get("words", "")[:200],
+            kinds,
+            may_manage=self.may_manage(request),
+        )
+        return answer(shelf)
+
+    @_api
+    async def connect(self, request: Request) -> Response:
+        """Connect to a repository: it must answer."""
+        self.check(request)
+        said = await body_of(request, Url)
+        text = said.url.strip()
+        if "://" not in text:
+            text = f"http://{text}"
+        await self._manager.connect(text)
+        return answer(Line(t("connected")))
+
+    @_api
+    async def disconnect(self, request: Request) -> Response:
+        """Forget a repository; what was installed from it stays."""
+        self.check(request)
+        said = await body_of(request, Url)
+        await self._manager.disconnect(said.url)
+        return answer(Line(t("forgotten; what is installed stays")))
+
+    @_api
+    async def install(self, request: Request) -> Response:
+        """Begin to install a package: fetch it, and say what it may do."""
+        self.check(request)
+        said = await body_of(request, Package)
+        return self._begun(parse_wish(said.package))
+
+    @_api
+    async def add(self, request: Request) -> Response:
+        """Begin to add a package by its path in a repository, or on this machine."""
+        self.check(request)
+        said = await body_of(request, Add)
+        return self._begun(self._meant(said.path.strip(), request))
+
+    @_api
+    async def upload(self, request: Request) -> Response:
+        """Begin to add the package, bundle or interface whose bytes are the body."""
+        self.check(request)
+        if request.headers.get("content-type") != "application/octet-stream":
+            raise Refusal(415, "a body of application/octet-stream is expected")
+        name = request.query_params.get("name", "")[:200]
+        data = await request.body()
+        source = await asyncio.to_thread(
+            given_source, name, data, self._manager.garage.store.installed()
+        )
+        return self._begun(source)
+
+    @_api
+    async def update(self, request: Request) -> Response:
+        """Begin to update a package: fetch the newest, and say what it changes."""
+        self.check(request)
+        said = await body_of(request, Package)
+        return self._begun(await asyncio.to_thread(self._manager.installed, said.package))
+
+    @_api
+    async def back(self, request: Request) -> Response:
+        """Put back the version that an update took the place of."""
+        self.check(request)
+        said = await body_of(request, Package)
+        old = await self._manager.back(said.package)
+        return answer(Gone((), t("{name} is back", name=old)))
+
+    @_api
+    async def remove(self, request: Request) -> Response:
+        """Remove a package; without ``yes`` only tell what would go."""
+        self.check(request)
+        said = await body_of(request, Package)
+        if not said.yes:
+            gone = await asyncio.to_thread(self._manager.gone, parse_wish(said.package))
+            return answer(Gone(tuple(gone), ""))
+        gone = await self._manager.remove(said.package)
+        line = t("removed {names}", names=", ".join(gone))
+        if not gone:
+            line = t("removed; another package needs its files")
+        return answer(Gone(tuple(gone), line))
+
+    @_api
+    async def agree(self, request: Request) -> Response:
+        """Install what the job has planned."""
+        self.check(request)
+        said = await body_of(request, Agree)
+        job = await self._manager.agree(said.number)
+        return answer(job.news())
+
+    @_api
+    async def cancel(self, request: Request) -> Response:
+        """Give the job up; nothing has changed."""
+        self.check(request)
+        said = await body_of(request, Agree)
+        return answer(self._manager.jobs.give_up(said.number).news())
+
+    def _begun(self, what: Wanted) -> Response:
+        news: JobNews = self._manager.jobs.begin(what).news()
+        return answer(news, 202)
+
+    def _meant(self, path: str, request: Request) -> Wish | Path:
+        """Return what a path means: ``/interfaces/wide/`` in a repository, or a place here."""
+        inside = path.strip("/")
+        if inside.partition("/")[0] in FOLDERS:
+            try:
+                return parse_wish(inside)
+            except PackageError:
+                pass  # a folder of this machine may be called so
+        if not self._is_here(request):
+            raise Refusal(403, "a path of this machine is only named by who sits at it")
+        place = Path(path).expanduser()
+        if not place.is_absolute():
+            raise PackageError(
+                f"{path!r} is neither a path in a repository, as /interfaces/NAME/, nor a full path"
+                " on this machine"
+            )
+        return place

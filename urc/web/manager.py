@@ -1,0 +1,338 @@
+"""Packages and the robots on the menu in step: what is installed is served, what goes is not.
+
+Floor 5. It has no route and no page: `urc.web.manage_routes` asks it.
+"""
+
+import asyncio
+import logging
+from collections.abc import Callable, Iterable
+from urllib.parse import quote
+
+from urc.model.profile import Profile
+from urc.packages.index import Entry
+from urc.packages.lock import Lock
+from urc.packages.names import Key, PackageError, Wish, parse_wish
+from urc.packages.repositories import Repository
+from urc.packages.sources import Source
+from urc.problems import UrcError
+from urc.web.catalogue import Catalogue
+from urc.web.daemon import in_daemon
+from urc.web.fleet import Broken, Fleet
+from urc.web.garage import Garage
+from urc.web.jobs import Busy, Job, Jobs
+from urc.web.manage_wire import MOST_HITS, Available, Installed, Shelf
+from urc.web.robots import Robot
+
+__all__ = ["Manager"]
+
+log = logging.getLogger(__name__)
+
+
+class Manager:
+    """All that the managers' pages do."""
+
+    def __init__(
+        self,
+        garage: Garage,
+        fleet: Fleet,
+        now: Callable[[], float],
+        renew: Callable[[str, Robot], None],
+    ) -> None:
+        """Look at nothing yet.
+
+        Args:
+            garage: makes the robots.
+            fleet: where they are served.
+            now: the time, in seconds.
+            renew: goes on with another version of a robot; raises `UrcError`.
+        """
+        self.garage = garage
+        self.fleet = fleet
+        self._renew = renew
+        self.catalogue = Catalogue(garage.workshop.data / "packages", now)
+        self.jobs = Jobs(garage.store, self._sources)
+        self._parked: dict[str, Lock] = {}
+        """Robots that stand on the menu because they are installed: name → what is served."""
+        self._offered: dict[str, str] = {}
+        """Interfaces that robots offer because they are installed: name → digest."""
+        self._seen: object = None
+        """What told the state of the store apart from others when it was looked at last."""
+        self._changing = asyncio.Lock()
+
+    def _sources(self, complain: Callable[[str], None]) -> list[Source]:
+        known: list[Repository] = self.catalogue.repositories(complain).all()
+        return list(known)
+
+    async def close(self) -> None:
+        """Wait for nobody any more."""
+        await self.jobs.close()
+        await self.catalogue.close()
+
+    # The menu
+
+    async def park(self) -> None:
+        """Serve what is installed, where the menu has it, and no more than that."""
+        if not self.garage.workshop.shows_installed:
+            return
+        parked = await asyncio.to_thread(self.garage.parked)
+        for name in [one for one in self._parked if one not in parked]:
+            await self.fleet.remove(name)
+            del self._parked[name]
+        for name, locks in parked.items():
+            if name in self.fleet.robots and name not in self._parked:
+                continue  # one of that name was there from the start
+            await self._park(name, locks)
+
+    async def _park(self, name: str, locks: list[Lock]) -> None:
+        try:
+            kept = await asyncio.to_thread(self.garage.kept(name).load)
+            lock = self.garage.chosen(locks, kept.version)
+            if self._parked.get(name) == lock and name in self.fleet.robots:
+                return
+            profile = await asyncio.to_thread(self.garage.profile, lock)
+            robot = await asyncio.to_thread(self.garage.robot, name, profile, kept)
+            if name in self.fleet.robots:
+                self._renew(name, robot)
+            else:
+                self.fleet.add(name, robot)
+            self._parked[name] = lock
+        except (UrcError, OSError) as error:
+            text = str(error).strip().partition("\n")[0]
+            self.fleet.broken[name] = Broken(name, text)
+            self._parked.setdefault(name, locks[-1])
+
+    async def refurnish(self) -> None:
+        """Offer the interfaces that are installed now, on every robot that nobody drives."""
+        added = await asyncio.to_thread(self.garage.interfaces)
+        now = {one.lock.key.name: one.lock.digest for one in added}
+        changed = {name for name, _ in now.items() ^ self._offered.items()}
+        self._offered = now
+        if not changed:
+            return
+        for name, robot in list(self.fleet.robots.items()):
+            if self.fleet.driven_by(name):
+                continue
+            try:
+                profile = await asyncio.to_thread(self.document_of, name, robot)
+                made = await asyncio.to_thread(self.garage.robot, name, profile)
+                if changed & {*robot.profile.interfaces, *made.profile.interfaces}:
+                    self._renew(name, made)
+            except (UrcError, OSError) as error:
+                log.warning("%s: %s", name, error)
+
+    async def take(self, name: str, robot: Robot, version: str) -> None:
+        """Go on with a robot whose settings were filled in; raise `UrcError` when widgets clash."""
+        if name in self.fleet.robots:
+            self._renew(name, robot)
+        else:
+            self.fleet.add(name, robot)
+        if name in self._parked:
+            locks = (await asyncio.to_thread(self.garage.parked)).get(name)
+            if locks:
+                self._parked[name] = self.garage.chosen(locks, version)
+
+    def document_of(self, name: str, robot: Robot) -> Profile:
+        """Return a robot's profile as its document says, without what was added to it."""
+        lock = self._parked.get(name)
+        if lock is not None:
+            return self.garage.profile(lock)
+        return self.garage.reread(robot.profile)
+
+    def drivers(self) -> dict[str, str]:
+        """Return name → installed package, as ``drivers/puppet 1.0.0``."""
+        return {name: str(lock) for name, lock in self._parked.items()}
+
+    def lock_of(self, name: str) -> Lock | None:
+        """Return which installed package a robot is; None: it was there from the start."""
+        return self._parked.get(name)
+
+    # Changes
+
+    async def look(self) -> None:
+        """Bring the menu up to date when another program has installed or removed something."""
+        if await asyncio.to_thread(self.garage.stamp) != self._seen:
+            await self.changed()
+
+    async def changed(self) -> None:
+        """Bring the menu up to date with what is installed."""
+        async with self._changing:
+            self._seen = await asyncio.to_thread(self.garage.stamp)
+            try:
+                await self.park()
+                await self.refurnish()
+            except (UrcError, OSError) as error:  # the managers' pages tell it, too
+                log.warning("what is installed cannot be read: %s", error)
+
+    async def connect(self, url: str) -> None:
+        """Remember a repository that answers; raise `PackageError`."""
+        known = self.catalogue.repositories(log.info)
+        await in_daemon(lambda: known.add(url), "connect")
+        self.catalogue.ask(anew=True)
+
+    async def disconnect(self, url: str) -> None:
+        """Forget a repository; raise `PackageError` when it was never added."""
+        known = self.catalogue.repositories(log.info)
+        await asyncio.to_thread(known.remove, url)
+        self.catalogue.ask(anew=True)
+
+    def gone(self, wish: Wish) -> list[str]:
+        """Return all that would go with a package, as ``drivers/puppet 1.0.0``; raise."""
+        before = self.garage.store.installed()
+        meant = self._meant(wish)
+        after = [lock for lock in before if lock not in meant]
+        return sorted(_all(before) - _all(after))
+
+    def _meant(self, wish: Wish) -> list[Lock]:
+        """Return the installed packages that a wish means; raise `PackageError` for none."""
+        meant = [
+            lock
+            for lock in self.garage.store.installed()
+            if lock.key == Key(wish.kind or lock.key.kind, wish.name)
+            and wish.range in ("*", lock.version)
+        ]
+        if not meant:
+            raise PackageError(f"{wish} was not installed by itself")
+        return meant
+
+    async def remove(self, text: str) -> list[str]:
+        """Remove a package and what only it needed; return what is gone.
+
+        Raises:
+            PackageError: it is not installed, or its robot is being driven.
+        """
+        wish = parse_wish(text)
+        for lock in await asyncio.to_thread(self._meant, wish):
+            self._check_idle_of(lock.key)
+
+        def work() -> list[str]:
+            with self.garage.store.changing() as change:
+                return change.remove(wish)[1]
+
+        gone = await asyncio.to_thread(work)
+        await self.changed()
+        return gone
+
+    async def agree(self, number: int) -> Job:
+        """Install what the job has planned; raise `Busy` while its robot is being driven."""
+        old = self.jobs.replaced(number)
+        if old is not None:
+            self._check_idle_of(old.key)
+        job = await self.jobs.agree(number)
+        await self.changed()
+        return job
+
+    def installed(self, text: str) -> Lock:
+        """Return the newest installed version of a package; raise `PackageError`."""
+        lock = self.garage.store.find(parse_wish(text))
+        if lock is None:
+            raise PackageError(f"{text} is not installed")
+        return lock
+
+    async def back(self, text: str) -> Lock:
+        """Go back to the version before an update; return it. Raise `PackageError`."""
+        lock = await asyncio.to_thread(self.installed, text)
+        self._check_idle_of(lock.key)
+
+        def work() -> Lock:
+            with self.garage.store.changing() as change:
+                return change.back(lock)
+
+        old = await asyncio.to_thread(work)
+        await self.changed()
+        return old
+
+    def _check_idle_of(self, key: Key) -> None:
+        for name, lock in self._parked.items():
+            if lock.key == key:
+                self.check_idle(name)
+
+    def check_idle(self, name: str) -> None:
+        """Raise `Busy` while somebody drives a robot."""
+        driver = self.fleet.driven_by(name)
+        if driver:
+            raise Busy(f"{name} is being driven ({driver}): wait until the controls are given back")
+
+    # What pages show
+
+    def shelf(self, words: str, kinds: tuple[str, ...], *, may_manage: bool) -> Shelf:
+        """Return what a page shows; in a thread, since it reads files.
+
+        Args:
+            words: that packages of repositories must have.
+            kinds: of packages.
+            may_manage: whether who asks may change anything.
+        """
+        catalogue = self.catalogue
+        locks = self.garage.store.installed()
+        hits = catalogue.hits(words, kinds)
+        has = {lock.root: lock.version for lock in sorted(locks, key=lambda lock: lock.number)}
+        job = self.jobs.newest
+        return Shelf(
+            repositories=catalogue.places,
+            installed=tuple(self._installed(lock) for lock in locks if lock.key.kind in kinds),
+            available=tuple(self._available(entry, has) for entry in hits[:MOST_HITS]),
+            total=len(hits),
+            is_asking=catalogue.is_asking,
+            may_manage=may_manage,
+            job=job.news() if job is not None else None,
+        )
+
+    def _available(self, entry: Entry, has: dict[str, str]) -> Available:
+        versions = self.catalogue.versions(entry.key)
+        return Available(
+            package=str(entry.key),
+            name=entry.name,
+            kind=entry.kind,
+            version=entry.version,
+            versions=tuple(one.version for one in versions[:20]),
+            summary=entry.summary,
+            licence=entry.licence,
+            authors=entry.authors,
+            origin=self.catalogue.origin(entry),
+            size=entry.size,
+            has=has.get(str(entry.key), ""),
+        )
+
+    def _installed(self, lock: Lock) -> Installed:
+        said, fault = None, ""
+        try:
+            said = self.garage.manifest(lock)
+        except UrcError as error:
+            fault = str(error)
+        key, name = lock.key, lock.key.name
+        is_served = self._parked.get(name) == lock
+        page = f"/robots/{quote(name, safe='')}/"
+        broken = self.fleet.broken.get(name) if is_served else None
+        newest = next(iter(self.catalogue.versions(key)), None)
+        is_old = newest is not None and newest.number > lock.number
+        url = page if is_served else f"/widgets/{quote(name)}/" if key.kind == "widget" else ""
+        return Installed(
+            package=lock.root,
+            name=name,
+            kind=key.kind,
+            version=lock.version,
+            summary=said.summary if said else "",
+            licence=said.licence if said else "",
+            authors=said.authors if said else (),
+            brings=tuple(
+                f"{root} {pin.version}" for root, pin in lock.packages.items() if root != lock.root
+            ),
+            before=before.version if (before := self.garage.store.previous(lock)) else "",
+            newer=newest.version if newest is not None and is_old else "",
+            url=url,
+            settings_url=f"{page}settings" if is_served else "",
+            fits=self._fits(name) if key.kind == "interface" else (),
+            fault=fault or (broken.fault if broken else ""),
+        )
+
+    def _fits(self, interface: str) -> tuple[str, ...]:
+        """Return the titles of the robots that offer an added interface."""
+        return tuple(
+            robot.profile.title or name
+            for name, robot in self.fleet.robots.items()
+            if interface in robot.profile.interfaces
+        )
+
+
+def _all(locks: Iterable[Lock]) -> set[str]:
+    return {f"{key} {pin.version}" for lock in locks for key, pin in lock.packages.items()}

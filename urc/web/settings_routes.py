@@ -1,0 +1,222 @@
+"""The settings of one robot over HTTP: filled in, tried for real, kept, and used at once.
+
+Floor 5. What cannot be reached is not kept, unless it is told to be: a robot may be switched off.
+"""
+
+import asyncio
+from collections.abc import Mapping
+from contextlib import nullcontext
+from typing import Final
+
+from starlette.exceptions import HTTPException
+from starlette.requests import Request
+from starlette.responses import HTMLResponse, Response
+from starlette.routing import Route
+
+from urc.model.profile import Profile
+from urc.model.values import Value
+from urc.problems import UrcError, printable
+from urc.runtime.catalog import built_in_catalog
+from urc.runtime.kept import Kept
+from urc.runtime.probe import Tried, probe
+from urc.runtime.settings import parse_setting
+from urc.web.jobs import Busy
+from urc.web.manage_routes import ManageRoutes, Refusal, answer, body_of, told
+from urc.web.manage_wire import SettingsAnswer, SettingsAsked, TriedLine
+from urc.web.manager import Manager
+from urc.web.menu import Ways
+from urc.web.pages import spoken
+from urc.web.robots import Station, missing_settings
+from urc.web.settings_page import settings_page
+from urc.web.words import t
+
+__all__ = ["SettingsRoutes"]
+
+_NO_STORE: Final = {"cache-control": "no-store"}
+_LOOK_S: Final = 0.05
+_END_S: Final = 5.0
+
+
+class SettingsRoutes:
+    """The settings pages of all robots."""
+
+    def __init__(self, manager: Manager, manage: ManageRoutes, ways: Ways) -> None:
+        """Answer nothing yet.
+
+        Args:
+            manager: knows the robots.
+            manage: knows who may change anything.
+            ways: which pages there are.
+        """
+        self._manager = manager
+        self._manage = manage
+        self._ways = ways
+        self._trying: set[str] = set()
+
+    def routes(self) -> list[Route]:
+        """Return the page, and where it says what was filled in."""
+        return [
+            Route("/robots/{name}/settings", self.page),
+            Route("/api/v1/robots/{name}/settings", self.save, methods=["POST"]),
+        ]
+
+    async def page(self, request: Request) -> Response:
+        """Show the settings of a robot."""
+        name = request.path_params["name"]
+        html = await asyncio.to_thread(self._page, request, name)
+        return HTMLResponse(html, headers=_NO_STORE)
+
+    def _page(self, request: Request, name: str) -> str:
+        garage = self._manager.garage
+        lock = self._manager.lock_of(name)
+        locks = garage.parked().get(name, []) if lock is not None else []
+        fault = ""
+        try:
+            kept = garage.kept(name).load()
+        except UrcError as error:
+            kept, fault = Kept(), str(error)
+        profile = self._profile(name)
+        if profile is None:
+            broken = self._manager.fleet.broken.get(name)
+            if broken is None:
+                raise HTTPException(404, t("No robot of that name is served here."))
+            profile, fault = Profile(name, broken.title, ""), broken.fault
+        return settings_page(
+            request.state.nonce,
+            name,
+            profile,
+            kept,
+            {} if fault else garage.workshop.given(profile),
+            ways=self._ways,
+            driver=str(lock) if lock is not None else profile.file,
+            versions=[one.version for one in reversed(locks)],
+            may_manage=self._manage.may_manage(request),
+            fault=fault,
+        )
+
+    def _profile(self, name: str) -> Profile | None:
+        robot = self._manager.fleet.robots.get(name)
+        return robot.profile if robot is not None else None
+
+    async def save(self, request: Request) -> Response:
+        """Try what was filled in, and keep it."""
+        name = request.path_params["name"]
+        try:
+            self._manage.check(request)
+            said = await body_of(request, SettingsAsked)
+            if name in self._trying:
+                raise Busy(f"the settings of {name} are being tried already")
+            self._trying.add(name)
+            try:
+                return answer(await self._save(name, said))
+            finally:
+                self._trying.discard(name)
+        except Refusal as refusal:
+            return told(refusal.status, refusal.line)
+        except Busy as error:
+            return told(409, str(error))
+        except UrcError as error:
+            return told(422, str(error).strip().partition("\n")[0])
+
+    async def _save(self, name: str, said: SettingsAsked) -> SettingsAnswer:
+        manager, garage = self._manager, self._manager.garage
+        if name not in manager.fleet.robots and name not in manager.fleet.broken:
+            raise Refusal(404, "no robot of that name is served here")
+        manager.check_idle(name)
+        before = await asyncio.to_thread(self._kept, name)
+        bare = await asyncio.to_thread(self._document, name, said.version)
+        kept, faults = _filled_in(bare, before, said)
+        if faults:
+            text = t("not saved: look at what is marked")
+            return SettingsAnswer(is_saved=False, text=text, faults=faults)
+        robot = await asyncio.to_thread(garage.robot, name, bare, kept)
+        missing = tuple(one.title or spoken(one.name) for one in missing_settings(robot))
+        lines: tuple[TriedLine, ...] = ()
+        if said.test and not missing:
+            lines = await self._tried(name, bare, robot.settings)
+            if any(one.verdict == "fails" for one in lines) and not said.anyway:
+                text = t("not saved: the robot could not be reached")
+                return SettingsAnswer(is_saved=False, text=text, lines=lines)
+        manager.check_idle(name)  # trying takes a while
+        await asyncio.to_thread(garage.kept(name).save, kept)
+        await manager.take(name, robot, said.version)
+        text = t("saved, and used from now on")
+        if missing:
+            text = t("saved; not set yet: {names}", names=", ".join(missing))
+        return SettingsAnswer(is_saved=True, text=text, missing=missing, lines=lines)
+
+    def _kept(self, name: str) -> Kept:
+        try:
+            return self._manager.garage.kept(name).load()
+        except UrcError:
+            return Kept()  # damaged: what is filled in now takes its place
+
+    def _document(self, name: str, version: str) -> Profile:
+        """Return the profile of the version that is chosen, as its document says."""
+        manager, garage = self._manager, self._manager.garage
+        lock = manager.lock_of(name)
+        if lock is not None:
+            locks = garage.parked().get(name, [lock])
+            if version and version not in [one.version for one in locks]:
+                raise UrcError(f"{name} {version} is not installed")
+            return garage.profile(garage.chosen(locks, version))
+        return garage.reread(manager.fleet.robots[name].profile)
+
+    async def _tried(
+        self, name: str, profile: Profile, values: Mapping[str, Value]
+    ) -> tuple[TriedLine, ...]:
+        """Try every line, alone with the robot; a STOP ends that at once."""
+        workshop = self._manager.garage.workshop
+        station = self._manager.fleet.stations.get(name)
+        held_off = station.held_off() if station is not None else nullcontext()
+        epoch = _epoch(station)
+        async with held_off:
+            work = probe(lambda: workshop.tried(profile, values), built_in_catalog().transports)
+            trying = asyncio.get_running_loop().create_task(work)
+            try:
+                while not trying.done():
+                    if _epoch(station) != epoch:
+                        raise Busy(t("the robot was stopped meanwhile: try again"))
+                    await asyncio.wait((trying,), timeout=_LOOK_S)
+            finally:
+                trying.cancel()
+                await asyncio.wait((trying,), timeout=_END_S)
+            return tuple(map(_line, trying.result()))
+
+
+def _epoch(station: Station | None) -> int:
+    """Return a number that is another one after every STOP, and whenever somebody drives."""
+    return station.controls.desk.lease.state.epoch if station is not None else 0
+
+
+def _line(tried: Tried) -> TriedLine:
+    return TriedLine(
+        tried.transport,
+        tried.type,
+        printable(tried.address),
+        tried.verdict,
+        printable(tried.text),
+        tried.advice,
+    )
+
+
+def _filled_in(profile: Profile, before: Kept, said: SettingsAsked) -> tuple[Kept, dict[str, str]]:
+    """Return what is to be kept, and what is wrong with it, field by field."""
+    texts: dict[str, str] = {}
+    faults: dict[str, str] = {}
+    for name, setting in profile.settings.items():
+        text = said.settings.get(name, "")
+        if text is None:  # a secret that was not touched
+            text = before.settings.get(name, "")
+        text = text if setting.is_secret else text.strip()
+        if not text:
+            continue
+        try:
+            parse_setting(setting, text)
+            texts[name] = text
+        except UrcError as error:
+            faults[name] = printable(str(error))
+    for name in said.settings:
+        if name not in profile.settings:
+            faults[name] = "the driver has no such setting"
+    return Kept(version=said.version, interface=said.interface, settings=texts), faults

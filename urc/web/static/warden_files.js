@@ -1,0 +1,50 @@
+// @ts-check
+/**
+ * Files that a document names for a foreign widget: its frame may load nothing of a robot itself,
+ * so the page hands them over.
+ */
+
+const FILE = /^\/robots\/[^/]+\/files\//;
+const MOST_FILES = 16;
+const MOST_BYTES = 16 << 20;
+const WITHIN_MS = 15_000;
+
+/**
+ * Whether it is the address of a robot's file: one that leads there without any detour.
+ *
+ * @param {string} text
+ */
+function isFile(text) {
+  return FILE.test(text) && new URL(text, "http://here").pathname === text;
+}
+
+/**
+ * Return address → file, for each that the options name; those that cannot be had are left out.
+ *
+ * @param {Readonly<Record<string, unknown>>} options
+ * @param {AbortSignal} signal
+ * @returns {Promise<Record<string, Blob>>}
+ */
+export async function filesOf(options, signal) {
+  const texts = Object.values(options).flat().filter((value) => typeof value === "string");
+  const urls = [...new Set(texts.filter(isFile))].slice(0, MOST_FILES);
+  /** @type {Record<string, Blob>} */
+  const found = {};
+  let bytes = 0;
+  const limit = AbortSignal.any([signal, AbortSignal.timeout(WITHIN_MS)]);
+  await Promise.all(
+    urls.map(async (url) => {
+      try {
+        const answer = await fetch(url, { signal: limit });
+        if (!answer.ok) throw new Error(`the server said ${answer.status}`);
+        const file = await answer.blob();
+        bytes += file.size;
+        if (bytes > MOST_BYTES) throw new Error("its files are too large together");
+        found[url] = file;
+      } catch (error) {
+        console.warn(`URC: ${url} cannot be given to a widget:`, error);
+      }
+    }),
+  );
+  return found;
+}
