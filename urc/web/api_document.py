@@ -1,6 +1,6 @@
 """What can be asked under ``/api/v1``, as an OpenAPI 3.1 document, made from what is decoded.
 
-Floor 5. The shapes are those of `urc.web.manage_wire`, so the document cannot say another
+Floor 5. The shapes are those of `urc.web.manage.wire`, so the document cannot say another
 thing than the server does; a test compares its paths with the routes.
 """
 
@@ -12,7 +12,7 @@ from starlette.requests import Request
 from starlette.responses import Response
 
 from urc import __version__
-from urc.web.manage_wire import (
+from urc.web.manage.wire import (
     Add,
     Agree,
     Failure,

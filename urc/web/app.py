@@ -31,10 +31,10 @@ from urc.web import wire, words
 from urc.web.api_document import DOCUMENT, document
 from urc.web.assets import STATIC, Assets, folder_assets, import_map, script
 from urc.web.card import Cards
-from urc.web.dev import Dev, dev_url, no_dev_routes
-from urc.web.dev_secrets import secret_texts
-from urc.web.dev_start import DevStart, no_dev_start
-from urc.web.dev_watch import Remake
+from urc.web.dev.routes import Dev, dev_url, no_dev_routes
+from urc.web.dev.secrets import secret_texts
+from urc.web.dev.start import DevStart, no_dev_start
+from urc.web.dev.watch import Remake
 from urc.web.files import tile
 from urc.web.fleet import Fleet
 from urc.web.foreign import OURS, Border
@@ -43,14 +43,14 @@ from urc.web.framed import Linked
 from urc.web.gallery import Gallery
 from urc.web.garage import Garage, Workshop
 from urc.web.interfaces import KEPT, chosen
-from urc.web.manage_routes import ManageRoutes
-from urc.web.manager import Manager
+from urc.web.manage.manager import Manager
+from urc.web.manage.routes import ManageRoutes
+from urc.web.manage.settings_routes import SettingsRoutes
 from urc.web.menu import Ways, menu_page
 from urc.web.pages import Head, error_page, robot_page
 from urc.web.policy import Policy
 from urc.web.robots import LINGER_S, Robot, Station, missing_settings
 from urc.web.server import serve
-from urc.web.settings_routes import SettingsRoutes
 from urc.web.socket import Client
 from urc.web.spare import Spare
 from urc.web.timeline import timeline

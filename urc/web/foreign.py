@@ -15,10 +15,11 @@ __all__ = ["OURS", "Border", "frame_url"]
 
 OURS = frozenset({
     "alerts", "altitude", "attitude", "axis", "bar", "battery", "button", "camera", "checklist",
-    "compass", "deadman", "depth", "dpad", "gamepad", "gauge", "hold-button", "iframe", "image", "joystick",
-    "keyboard", "knob", "link", "log", "map", "markdown", "number", "pano360", "path-pad", "plot",
-    "range", "recorder", "scan", "scene3d", "select", "sequence", "signal", "slider", "speed",
-    "state", "stop", "switch", "table", "terminal", "text", "tilt", "value", "vector-pad",
+    "compass", "deadman", "depth", "dpad", "gamepad", "gauge", "hold-button", "iframe", "image",
+    "joystick", "keyboard", "knob", "link", "log", "map", "markdown", "number", "pano360",
+    "path-pad", "plot", "range", "recorder", "scan", "scene3d", "select", "sequence", "signal",
+    "slider", "speed", "state", "stop", "switch", "table", "terminal", "text", "tilt", "value",
+    "vector-pad",
 })  # fmt: skip
 """Widgets that ship with URC. Named here, so that a folder beside theirs is not taken for one."""
 

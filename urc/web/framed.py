@@ -1,7 +1,8 @@
 """What a robot's documents name for their widgets, as routes: files, and pages of somebody else.
 
-Floor 5. A page is shown by a document that can do nothing else: no script, one frame. The dashboard's own policy lets it frame only what is ours. So
-this document frames the other page, and its policy names the one origin that the option of a widget names.
+Floor 5. A page is shown by a document that can do nothing else: no script, one frame. The
+dashboard's own policy lets it frame only what is ours. So this document frames the other page, and
+its policy names the one origin that the option of a widget names.
 """
 
 import base64
@@ -26,7 +27,10 @@ from urc.web.robots import Robot
 
 __all__ = ["FramedPage", "Linked", "framed_page"]
 
-_STYLE: Final = Markup("html,body,iframe{display:block;width:100%;height:100%;margin:0;border:0}")
+# White, as pages expect that bring no colour of their own; a dark one paints its own ground.
+_STYLE: Final = Markup(
+    "html,body,iframe{display:block;width:100%;height:100%;margin:0;border:0;background:white}"
+)
 _DIGEST: Final = base64.b64encode(hashlib.sha256(_STYLE.encode()).digest()).decode()
 _POLICY: Final = (
     f"default-src 'none'; frame-src {{frames}}; style-src 'sha256-{_DIGEST}'; base-uri 'none'; "

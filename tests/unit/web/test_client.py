@@ -34,6 +34,7 @@ class FakeLine:
         self.free.set()
         self.was_aborted = False
         self.frames: list[bytes] = []
+        self.is_held_back = False
 
     async def receive(self) -> Message:
         return await self.inbox.get()
@@ -59,6 +60,9 @@ class FakeLine:
 
     def listen(self, sink: Callable[[bytes], bool]) -> None:
         self.sink = sink
+
+    def hold_back(self, is_held: bool) -> None:
+        self.is_held_back = is_held
 
     async def drained(self) -> None:
         await self.free.wait()

@@ -15,13 +15,14 @@ from urc.runtime.audit import Entry
 from urc.runtime.trail import Trail
 from urc.testing.clock import FakeClock, settle
 from urc.testing.dashboard import FakeRobot, dashboard_profile
-from urc.web.consent import WAIT_S
+from urc.web.consent import TOKEN_S, WAIT_S
 from urc.web.robots import Robot, Station
 from urc.web.socket import Client, Guest
 
 pytestmark = pytest.mark.anyio
 
 DOCK = Command("dock", "wire", WriteSpec("text"), confirm=Confirm("normal", "Dock now?"))
+ERASE = Command("erase", "wire", WriteSpec("text"), confirm=Confirm("hazardous", "All is lost"))
 BEAM = Command(
     "beam",
     "wire",
@@ -62,7 +63,7 @@ class Screens:
 async def screens() -> AsyncIterator[Screens]:
     """Serve a robot with questions."""
     clock = FakeClock()
-    commands = {"dock": DOCK, "beam": BEAM}
+    commands = {"dock": DOCK, "beam": BEAM, "erase": ERASE}
     robot = FakeRobot(dashboard_profile(commands=commands), clock)
     audit: list[Entry] = []
     trail = Trail("puppet", audit.append, utc=lambda: 99.0)
@@ -78,16 +79,29 @@ async def screens() -> AsyncIterator[Screens]:
         await settle()
 
 
-def run(line: FakeLine, command: str, *, confirmed: bool = True) -> None:
-    """Let a screen give a command."""
-    line.say({"t": "run", "id": 5, "command": command, "confirmed": confirmed})
+async def token_for(line: FakeLine, command: str, **arguments: object) -> str:
+    """Let somebody say yes to a command; return what the server gives for it."""
+    line.say({"t": "prepare", "id": 5, "command": command, "arguments": arguments})
+    await settle()
+    return str(line.of_type("token")[-1]["token"])
+
+
+def give(line: FakeLine, command: str, token: str, **arguments: object) -> None:
+    """Let a screen give a command with a token."""
+    said = {"id": 5, "command": command, "arguments": arguments, "token": token}
+    line.say({"t": "run", **said})
+
+
+async def run(line: FakeLine, command: str) -> None:
+    """Let somebody at a screen say yes to a command, and give it."""
+    give(line, command, await token_for(line, command))
 
 
 async def test_a_command_that_asks_is_refused_when_nobody_was_asked() -> None:
     """And given once somebody was; the audit has who it was."""
     async with screens() as it:
         line = await it.come()
-        run(line, "dock", confirmed=False)
+        give(line, "dock", "")
         await settle()
         assert it.robot.commands == []
         (reply,) = line.of_type("reply")
@@ -95,7 +109,7 @@ async def test_a_command_that_asks_is_refused_when_nobody_was_asked() -> None:
             "not-confirmed",
             "nobody was asked first: Dock now?",
         )
-        run(line, "dock")
+        await run(line, "dock")
         await settle()
         assert it.robot.confirmed_by == [("screen 1",)]
         assert [entry.outcome for entry in it.audit] == [
@@ -108,7 +122,7 @@ async def test_a_second_screen_says_yes() -> None:
     """Every screen that may drive is asked, the asker is told, and the audit has both."""
     async with screens() as it:
         asker, other, viewer = await it.come(), await it.come(), await it.come("viewer")
-        run(asker, "beam")
+        await run(asker, "beam")
         await settle()
         late = await it.come()
         (mine,), (asked,) = asker.of_type("ask"), other.of_type("ask")
@@ -139,7 +153,7 @@ async def test_no_is_no_whoever_says_it(who: str) -> None:
     """So is silence."""
     async with screens() as it:
         asker, other = await it.come(), await it.come()
-        run(asker, "beam")
+        await run(asker, "beam")
         await settle()
         number = asker.of_type("ask")[0]["n"]
         if who == "nobody":
@@ -161,7 +175,7 @@ async def test_a_question_is_over_when_its_asker_leaves() -> None:
     """Nobody can say yes to it any more."""
     async with screens() as it:
         asker, other = await it.come(), await it.come()
-        run(asker, "beam")
+        await run(asker, "beam")
         await settle()
         asker.leave()
         await settle()
@@ -186,3 +200,91 @@ async def test_what_is_wanted_of_a_sequence_reaches_the_session() -> None:
             ("ran", "take_off", "told to pause"),
         ]
         assert len(line.of_type("error")) == 1
+
+
+async def refused(it: Screens, line: FakeLine) -> str:
+    """Return why the newest command was not given; nothing reached the robot."""
+    await settle()
+    assert it.robot.commands == []
+    reply = line.of_type("reply")[-1]
+    assert reply["code"] == "not-confirmed"
+    return str(reply["message"])
+
+
+async def test_a_yes_that_is_played_back_counts_no_second_time() -> None:
+    """Not even when it was refused the first time."""
+    async with screens() as it:
+        line = await it.come()
+        token = await token_for(line, "dock")
+        give(line, "dock", token)
+        await settle()
+        assert len(it.robot.commands) == 1
+        it.robot.commands.clear()
+        for _ in range(3):
+            give(line, "dock", token)
+            assert await refused(it, line) == "the yes is used up or too old: Dock now?"
+        token = await token_for(line, "dock")
+        give(line, "dock", token, place="ceiling")
+        await refused(it, line)
+        give(line, "dock", token)
+        assert await refused(it, line) == "the yes is used up or too old: Dock now?"
+
+
+@pytest.mark.parametrize(
+    ("command", "arguments"),
+    [
+        ("erase", {}),
+        ("dock", {"place": "ceiling"}),
+        ("dock", {}),
+        ("dock", {"place": "home", "x": 1}),
+    ],
+)
+async def test_a_yes_to_something_else_is_none(command: str, arguments: dict[str, object]) -> None:
+    """Another command, other arguments, fewer or more of them."""
+    async with screens() as it:
+        line = await it.come()
+        token = await token_for(line, "dock", place="home")
+        give(line, command, token, **arguments)
+        assert (await refused(it, line)).startswith("the yes was to something else: ")
+
+
+async def test_a_yes_that_was_held_up_on_its_way_is_none() -> None:
+    """Five seconds; whoever meant it says it again."""
+    async with screens() as it:
+        line = await it.come()
+        token = await token_for(line, "dock")
+        await it.clock.advance(TOKEN_S)
+        give(line, "dock", token)
+        assert await refused(it, line) == "the yes is used up or too old: Dock now?"
+        token = await token_for(line, "dock")
+        await it.clock.advance(TOKEN_S - 0.1)
+        give(line, "dock", token)
+        await settle()
+        assert len(it.robot.commands) == 1
+
+
+async def test_a_yes_counts_on_its_own_screen_alone() -> None:
+    """And one that was made up on none."""
+    async with screens() as it:
+        ann, bob = await it.come(), await it.come()
+        give(bob, "dock", await token_for(ann, "dock"))
+        await refused(it, bob)
+        for forged in ("0", "A" * 22, "x" * 5000):
+            give(ann, "dock", forged)
+            await refused(it, ann)
+
+
+async def test_a_screen_that_says_yes_to_everything_keeps_little() -> None:
+    """The oldest are forgotten; the newest still counts, and so does that of another screen."""
+    async with screens() as it:
+        ann, bob = await it.come(), await it.come()
+        other = await token_for(bob, "dock")
+        first = await token_for(ann, "dock")
+        for _ in range(50):
+            token = await token_for(ann, "dock")
+        give(ann, "dock", first)
+        await refused(it, ann)
+        give(ann, "dock", token)
+        give(bob, "dock", other)
+        await settle()
+        assert len(it.robot.commands) == 2

@@ -122,6 +122,69 @@ async def test_a_flood_is_thinned_and_its_last_value_arrives() -> None:
         assert len(it.movers.texts) <= 1.1 / 0.05 + 2, "the declared rate, on the wire"
 
 
+async def test_a_flood_is_neither_read_nor_received_until_its_turn() -> None:
+    """Its line is held back for some milliseconds, and then brings the newest."""
+    async with scene() as it:
+        ann = it.sit()
+        it.say(ann, "take")
+        held: list[bool] = []
+        ann.hold_back = held.append
+
+        def offered(number: int, speed: float) -> str:
+            it.read(ann)
+            epoch, echo = it.controls.desk.lease.state.epoch, it.beats["s1"]
+            tick = (
+                f'"epoch":{epoch},"number":{number},"echo":{echo},"arguments":{{"speed":{speed}}}'
+            )
+            return it.controls.offer(ann, f'{{"t":"tick","command":"drive",{tick}}}'.encode())
+
+        assert offered(1, 0.1) == "one more", "the first is looked at in full"
+        await it.clock.advance(0.05)
+        assert [offered(2, 0.2), offered(3, 0.3)] == ["in time"] * 2, "two at once are in time"
+        assert [offered(number, 0.01 * number) for number in range(4, 8)] == ["one more"] * 4
+        assert held == []
+        assert it.controls.offer(ann, b'{"t":"tick","command":"drive", nonsense') == "one more"
+        assert held == [True], "five that wait for one turn are a flood"
+        assert offered(9, 0.9) == "one more"
+        assert ann.dropped == 5
+        await it.clock.advance(THINNED_S)
+        assert held == [True, False]
+        await it.clock.advance(0.05)
+        assert it.movers.texts[-1] == "drive speed=0.9"
+
+
+async def test_a_tick_that_waits_unread_and_is_none_is_told() -> None:
+    """It took the place of a good one, and moves nothing."""
+    async with scene() as it:
+        ann = it.sit()
+        it.say(ann, "take")
+        for speed in (0.1, 0.2, 0.3):
+            it.tick(ann, speed)
+        assert it.controls.offer(ann, b'{"t":"tick","command":"drive","number":7}') == "one more"
+        await it.clock.advance(THINNED_S)
+        (told,) = it.read(ann)
+        assert told["about"] == "tick"
+        assert "epoch" in told["message"]
+        assert not ann.pending
+
+
+async def test_whoever_writes_is_told_of_a_tick_before_it_is_read() -> None:
+    """While it moves, and only then: being awake in vain costs time."""
+    async with scene() as it:
+        ann = it.sit()
+        tick = b'{"t":"tick","command":"drive","epoch":1,"number":1,"echo":1}'
+        assert it.controls.offer(ann, tick) == "one more"
+        assert it.movers.hints == 0, "nobody drives"
+        it.say(ann, "take")
+        it.tick(ann, 0.5)
+        await it.clock.advance(0.05)
+        it.controls.offer(ann, tick)
+        assert it.movers.hints == 1
+        await it.clock.advance(0.5)
+        it.controls.offer(ann, tick)
+        assert it.movers.hints == 1, "it has stopped"
+
+
 async def test_what_waits_is_forgotten_by_a_release_a_stop_and_a_page_that_goes() -> None:
     """A thinned tick that comes after the hand has gone would move the robot again."""
     async with scene() as it:
@@ -298,26 +361,6 @@ async def test_a_latch_that_cannot_be_written_is_told_and_stops_all_the_same(
         it.say(bob, "reset")
         await file.settle()
         assert it.hub.notes[-1].text == "STOP outlasts a restart of the server again"
-
-
-async def test_a_server_that_was_held_up_stops_what_moves() -> None:
-    """A short time is told alone; after half a second whoever drives begins anew."""
-    async with scene() as it:
-        ann = it.sit()
-        it.say(ann, "take")
-        it.tick(ann)
-        await it.clock.advance(0.05)
-        await it.clock.hold_up(0.2)
-        assert [note.text for note in it.hub.notes] == ["the server was held up for 150 ms"]
-        it.tick(ann)
-        assert it.movers.texts[-1] == "drive speed=0.5"
-        await it.clock.hold_up(0.7)
-        assert it.movers.texts[-1] == "drive stop"
-        assert {"t": "stopped", "command": "drive", "reason": "expired"} in it.read(ann)
-        it.tick(ann)
-        assert it.movers.texts[-1] == "drive stop"
-        assert it.controls.watch.count == 2
-        assert len(it.hub.notes) == 1
 
 
 async def test_a_flood_costs_no_more_than_its_thinned_rate() -> None:

@@ -18,9 +18,9 @@ from urc.runtime.hub import Note, Traffic
 from urc.testing.clock import FakeClock, settle
 from urc.testing.codec import text
 from urc.testing.dashboard import FakeRobot, dashboard_profile
-from urc.web.dev_client import BAD_MESSAGES, MESSAGES_PER_S, ROWS_KEPT, Backlog, DevClient
-from urc.web.dev_rows import Row
-from urc.web.dev_watch import ProfileWatch
+from urc.web.dev.client import BAD_MESSAGES, MESSAGES_PER_S, ROWS_KEPT, Backlog, DevClient
+from urc.web.dev.rows import Row
+from urc.web.dev.watch import ProfileWatch
 from urc.web.robots import Robot, Station
 
 pytestmark = pytest.mark.anyio

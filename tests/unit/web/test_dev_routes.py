@@ -8,7 +8,7 @@ from starlette.testclient import TestClient
 from urc.model.profile import Profile
 from urc.testing.dashboard import FakeRobot, dashboard_profile
 from urc.web.app import build_app
-from urc.web.dev import HOW_TO_TURN_ON
+from urc.web.dev.routes import HOW_TO_TURN_ON
 from urc.web.robots import Robot
 
 HOSTILE = '"><script>alert(1)</script>{{ 7*7 }}'

@@ -9,8 +9,8 @@ from urc.model.codec import Envelope
 from urc.model.driver import Driver
 from urc.problems import UrcError
 from urc.runtime.catalog import built_in_catalog
-from urc.web.dev_preview import preview
-from urc.web.dev_tryout import MOST_PIECES, Taker, pasted_bytes, try_out
+from urc.web.dev.preview import preview
+from urc.web.dev.tryout import MOST_PIECES, Taker, pasted_bytes, try_out
 
 WIRE = """
 urc: 1

@@ -127,3 +127,46 @@ def test_a_tile_is_served_from_its_folder_and_a_clear_one_where_there_is_none(
     ):
         assert client.get(other).status_code == 404, other
     assert client_of(use).get("/tiles/3/4/5.png").status_code == 404
+
+
+def page_in(folder: Path, options: str) -> WidgetUse:
+    """Return the slot of a robot that shows a page."""
+    file = folder / "robot.yaml"
+    slot = f"widgets:\n  arm: {{ use: iframe, options: {options} }}\n"
+    file.write_text(head("robot", "robot") + ARM + slot, "utf-8")
+    checked = check(file, built_in_catalog(), Shelf(shipped("widgets")))
+    assert checked.profile is not None, checked.problems
+    return checked.profile.slots["arm"]
+
+
+def test_a_page_of_somebody_else_has_an_address_whose_policy_names_its_origin_alone(
+    tmp_path: Path,
+) -> None:
+    use = page_in(tmp_path, "{ url: 'HTTPS://Wiki.local:8443/a?b=', label: wiki }")
+    options = linked_options(use, "puppet")
+    assert options["label"] == "wiki"
+    answer = client_of(use).get(str(options["url"]))
+    assert answer.status_code == 200
+    policy = answer.headers["content-security-policy"]
+    assert policy.startswith(
+        "default-src 'none'; frame-src https://wiki.local:8443; style-src 'sha"
+    )
+    assert "frame-ancestors 'self'" in policy
+    assert "script" not in policy + answer.text.replace("allow-scripts", "")
+    assert 'src="HTTPS://Wiki.local:8443/a?b="' in answer.text
+    assert client_of(use).get("/robots/puppet/framed/0123456789abcdef").status_code == 404
+    assert client_of(use).get(str(options["url"]).replace("puppet", "other")).status_code == 404
+
+
+@pytest.mark.parametrize("url", ["http://LOCALHOST:8080/", "https://localhost:8080/robots/puppet/"])
+def test_a_page_of_the_dashboard_itself_is_not_framed(tmp_path: Path, url: str) -> None:
+    use = page_in(tmp_path, f"{{ url: '{url}' }}")
+    answer = client_of(use).get(str(linked_options(use, "puppet")["url"]))
+    assert answer.status_code == 404
+    assert "frame-src 'none'" in answer.headers["content-security-policy"]
+    assert "<iframe" not in answer.text
+    assert "this is a page of the dashboard itself" in answer.text
+
+
+def test_no_page_has_no_address(tmp_path: Path) -> None:
+    assert linked_options(page_in(tmp_path, "{ url: '' }"), "puppet")["url"] == ""

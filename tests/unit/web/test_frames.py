@@ -5,7 +5,7 @@ from random import Random
 import pytest
 from websockets.frames import Frame, Opcode
 
-from urc.web.frames import Frames
+from urc.web.frames import Frames, text_of
 
 
 def masked(text: bytes, opcode: Opcode = Opcode.TEXT, *, fin: bool = True) -> bytes:
@@ -52,6 +52,21 @@ def test_a_text_within_a_message_of_parts_is_not_taken() -> None:
     assert frames.whole(masked(b"ping", Opcode.PING)) is None
     assert frames.whole(masked(b"text")) is None
     assert frames.whole(masked(b"end", Opcode.CONT)) is None
+
+
+def test_texts_that_came_together_are_found_up_to_what_is_none() -> None:
+    """A page that floods is read seldom, and then brings many at once."""
+    frames = Frames()
+    texts = [b"one", b"two" * 100, b""]
+    data = b"".join(map(masked, texts))
+    rest = masked(b"ping", Opcode.PING) + masked(b"three") + masked(b"half")[:3]
+    assert frames.whole(data + rest) is None
+    found = [data[begin:end] for begin, end in frames.spans]
+    assert [text_of(frame) for frame in found] == texts
+    assert b"".join(found) == data
+    assert frames.whole(masked(b"half")[3:] + masked(b"four")) is None
+    assert frames.spans == [], "what comes first is the end of another one"
+    assert frames.whole(masked(b"five")) == b"five"
 
 
 def test_however_the_stream_is_cut_only_frames_that_came_whole_are_found() -> None:

@@ -1,13 +1,14 @@
 """The life of a robot's session: opened for the first client, closed after the last."""
 
 import asyncio
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 from contextlib import ExitStack, asynccontextmanager
 
 import pytest
 
 from urc.model.profile import Setting
 from urc.problems import UrcError
+from urc.runtime.clock import Alarm
 from urc.testing.clock import FakeClock, settle
 from urc.testing.dashboard import FakeRobot, dashboard_profile
 from urc.web.robots import Robot, SessionFailed, Station, missing_settings
@@ -123,3 +124,52 @@ def test_a_robot_is_not_ready_while_a_setting_is_undefined() -> None:
     assert [setting.name for setting in missing_settings(robot)] == ["a", "b"]
     robot = Robot(profile, {"a": "1", "b": "2"}, FakeRobot(profile).open)
     assert missing_settings(robot) == ()
+
+
+async def test_a_robot_that_is_held_off_is_let_go_of_and_comes_back() -> None:
+    """Whoever looks on waits for the next session; without anybody nothing is opened."""
+    clock = FakeClock()
+    robot = FakeRobot(dashboard_profile(), clock)
+    async with stationed(robot, clock) as station:
+        with station.visit():
+            first = await station.live()
+            release = asyncio.Event()
+            holding = asyncio.create_task(_hold(station, release))
+            await clock.advance(0.1)
+            assert (robot.is_open, first.ended.is_set()) == (False, True)
+            with station.visit():
+                await clock.advance(0.1)
+                assert not robot.is_open
+            release.set()
+            await holding
+            assert await station.live() is not first
+            assert robot.opened == 2
+        await clock.advance(2.1)
+        async with station.held_off():
+            assert not station.is_open
+        await settle()
+        assert robot.opened == 2
+
+
+async def _hold(station: Station, release: asyncio.Event) -> None:
+    async with station.held_off():
+        await release.wait()
+
+
+class HastyClock(FakeClock):
+    """A clock whose alarms ring a little before their time, as those of some event loops do."""
+
+    def call_at(self, when_s: float, callback: Callable[[], object]) -> Alarm:
+        """Ring half a millisecond early."""
+        return super().call_at(when_s - 0.0005, callback)
+
+
+async def test_an_alarm_that_rings_early_ends_the_session_all_the_same() -> None:
+    """Else a robot would stay connected for ever after Back."""
+    clock = HastyClock()
+    robot = FakeRobot(dashboard_profile(), clock)
+    async with stationed(robot, clock) as station:
+        with station.visit():
+            await station.live()
+        await clock.advance(2.1)
+        assert not robot.is_open

@@ -20,12 +20,12 @@ from urc.problems import UrcError
 from urc.runtime.clock import within
 from urc.runtime.hub import Note, Tap, Traffic
 from urc.runtime.selftest import sample_settings
-from urc.web import dev_wire as wire
-from urc.web.dev_preview import Preview, preview
-from urc.web.dev_rows import Row, held_row, note_row, traffic_row
-from urc.web.dev_secrets import Blanker, stand_ins
-from urc.web.dev_tryout import pasted_bytes, try_out
-from urc.web.dev_watch import ProfileWatch
+from urc.web.dev.preview import Preview, preview
+from urc.web.dev import wire
+from urc.web.dev.rows import Row, held_row, note_row, traffic_row
+from urc.web.dev.secrets import Blanker, stand_ins
+from urc.web.dev.tryout import pasted_bytes, try_out
+from urc.web.dev.watch import ProfileWatch
 from urc.web.robots import Robot, SessionFailed, missing_settings
 from urc.web.socket import STALL_S, Allowance, Flow, Line
 from urc.web.wire import (

@@ -24,8 +24,8 @@ from urc.problems import UrcError, printable
 from urc.runtime.look import look
 from urc.runtime.permissions import permissions
 from urc.web.daemon import in_daemon
-from urc.web.given import source_at
-from urc.web.manage_wire import JobNews, JobState
+from urc.web.manage.given import source_at
+from urc.web.manage.wire import JobNews, JobState
 
 __all__ = ["Busy", "Job", "Jobs", "Wanted"]
 

@@ -17,11 +17,11 @@ from starlette.routing import Route
 
 from urc.packages.names import FOLDERS, PackageError, Wish, parse_wish
 from urc.problems import UrcError
-from urc.web.given import given_source
-from urc.web.jobs import Busy, Wanted
-from urc.web.manage_pages import manage_page
-from urc.web.manage_wire import Add, Agree, Failure, Gone, JobNews, Line, Package, Url
-from urc.web.manager import Manager
+from urc.web.manage.given import given_source
+from urc.web.manage.jobs import Busy, Wanted
+from urc.web.manage.manager import Manager
+from urc.web.manage.pages import manage_page
+from urc.web.manage.wire import Add, Agree, Failure, Gone, JobNews, Line, Package, Url
 from urc.web.menu import Ways
 from urc.web.words import t
 

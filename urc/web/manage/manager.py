@@ -1,6 +1,6 @@
 """Packages and the robots on the menu in step: what is installed is served, what goes is not.
 
-Floor 5. It has no route and no page: `urc.web.manage_routes` asks it.
+Floor 5. It has no route and no page: `urc.web.manage.routes` asks it.
 """
 
 import asyncio
@@ -15,12 +15,12 @@ from urc.packages.names import Key, PackageError, Wish, parse_wish
 from urc.packages.repositories import Repository
 from urc.packages.sources import Source
 from urc.problems import UrcError
-from urc.web.catalogue import Catalogue
 from urc.web.daemon import in_daemon
 from urc.web.fleet import Broken, Fleet
 from urc.web.garage import Garage
-from urc.web.jobs import Busy, Job, Jobs
-from urc.web.manage_wire import MOST_HITS, Available, Installed, Shelf
+from urc.web.manage.catalogue import Catalogue
+from urc.web.manage.jobs import Busy, Job, Jobs
+from urc.web.manage.wire import MOST_HITS, Available, Installed, Shelf
 from urc.web.robots import Robot
 
 __all__ = ["Manager"]

@@ -17,8 +17,8 @@ from starlette.routing import BaseRoute, Route, WebSocketRoute
 from starlette.websockets import WebSocket
 
 from urc.web import wire
-from urc.web.dev_client import DevClient
-from urc.web.dev_watch import ProfileWatch, Remake
+from urc.web.dev.client import DevClient
+from urc.web.dev.watch import ProfileWatch, Remake
 from urc.web.pages import Head, render
 from urc.web.robots import Robot, Station
 

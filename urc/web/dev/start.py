@@ -17,10 +17,10 @@ from starlette.routing import Route
 
 from urc.problems import UrcError
 from urc.runtime.opened import open_document
-from urc.web.dev_watch import Remake
+from urc.web.dev.watch import Remake
 from urc.web.fleet import Fleet
-from urc.web.manage_routes import answer, told
-from urc.web.manage_wire import Started
+from urc.web.manage.routes import answer, told
+from urc.web.manage.wire import Started
 from urc.web.menu import Nav, SettingRow, Ways, setting_row
 from urc.web.pages import Head, render
 from urc.web.robots import Robot

@@ -13,7 +13,7 @@ from urc.packages.index import Entry, search
 from urc.packages.names import Key, PackageError
 from urc.packages.repositories import Repositories, Repository
 from urc.web.daemon import in_daemon
-from urc.web.manage_wire import Place
+from urc.web.manage.wire import Place
 
 __all__ = ["FRESH_S", "Catalogue"]
 

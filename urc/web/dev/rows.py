@@ -9,7 +9,7 @@ import msgspec
 
 from urc.model.codec import Envelope
 from urc.runtime.hub import Note, Traffic
-from urc.web.dev_secrets import Blanker
+from urc.web.dev.secrets import Blanker
 from urc.web.wire_text import cut
 
 __all__ = [

@@ -1,0 +1,75 @@
+"""What a card shows of a robot: a picture, values, or nothing; and nobody is connected for it."""
+
+from starlette.testclient import TestClient
+
+from urc.model.driver import Driver
+from urc.model.values import Signal
+from urc.testing.dashboard import FakeRobot, dashboard_profile
+from urc.web.app import build_app
+from urc.web.card import VALUES, small_values
+from urc.web.robots import Glimpse, Robot
+
+JPEG = b"\xff\xd8\xff\xe0 a picture"
+
+
+def client_of(robot: FakeRobot, glimpse: Glimpse | str = "real") -> TestClient:
+    """Return a client of a dashboard; "real": the robot is not emulated."""
+    look = None if isinstance(glimpse, str) else lambda: glimpse
+    app = build_app({"puppet": Robot(robot.profile, {}, robot.open, glimpse=look)})
+    return TestClient(app, base_url="http://localhost:8080")
+
+
+def test_an_emulated_robot_shows_its_picture_and_is_not_connected() -> None:
+    robot = FakeRobot(dashboard_profile())
+    answer = client_of(robot, JPEG).get("/robots/puppet/card")
+    assert (answer.status_code, answer.content) == (200, JPEG)
+    assert answer.headers["content-type"] == "image/jpeg"
+    assert answer.headers["cache-control"] == "no-store"
+    assert robot.opened == 0
+
+
+def test_one_without_a_world_shows_its_values() -> None:
+    robot = FakeRobot(dashboard_profile())
+    answer = client_of(robot, {"battery": 42}).get("/robots/puppet/card")
+    assert answer.json() == [["Battery", "42 %"]]
+
+
+def test_of_a_real_robot_that_nobody_looks_at_nothing_is_known() -> None:
+    robot = FakeRobot(dashboard_profile())
+    client = client_of(robot)
+    assert client.get("/robots/puppet/card").status_code == 204
+    assert client.get("/robots/nobody/card").status_code == 404
+    assert robot.opened == 0
+
+
+def test_a_real_robot_is_shown_while_somebody_is_connected() -> None:
+    robot = FakeRobot(dashboard_profile())
+    ours = {"origin": "http://localhost:8080"}
+    with (
+        client_of(robot) as client,
+        client.websocket_connect("ws://localhost:8080/ws?robot=puppet", headers=ours) as line,
+    ):
+        assert line.receive_json()["t"] == "hello"
+        assert client.portal is not None
+        client.portal.call(robot.say, "battery", 77)
+        assert client.get("/robots/puppet/card").json() == [["Battery", "77 %"]]
+
+
+def test_the_menu_says_where_the_picture_is_and_a_tap_on_it_drives() -> None:
+    page = client_of(FakeRobot(dashboard_profile()), JPEG).get("/").text
+    assert 'href="/robots/puppet/" data-look="/robots/puppet/card"' in page
+    assert page.count("/static/card.js") == 1
+
+
+def test_values_are_the_first_few_that_fit_and_are_known() -> None:
+    signals = {
+        "speed": Signal("speed", "number", unit="m/s", precision=2),
+        "scan": Signal("scan", "array"),
+        "on_ground": Signal("on_ground", "boolean"),
+        "far": Signal("far", "number"),
+        **{f"s{place}": Signal(f"s{place}", "integer") for place in range(9)},
+    }
+    known = {"speed": 0.123, "scan": (1, 2), "on_ground": True, **{f"s{n}": n for n in range(9)}}
+    found = small_values(Driver(signals=signals), known)
+    assert found[:2] == [("Speed", "0.12 m/s"), ("On ground", "yes")]
+    assert len(found) == VALUES

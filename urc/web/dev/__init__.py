@@ -1,0 +1,1 @@
+"""The dev page of a robot: its traffic, a parser to try, what a command would send."""
