@@ -51,7 +51,8 @@ STATIC = (
 )
 # Two processes: the browser's loop stays out of the way of the rest.
 TESTS = (
-    Step("tests", (PYTHON, "-m", "pytest", "tests/unit", "tests/contract"), timeout_s=420),
+    Step("tests unit", (PYTHON, "-m", "pytest", "tests/unit", "-n", "2"), timeout_s=240),
+    Step("tests contract", (PYTHON, "-m", "pytest", "tests/contract", "-n", "2"), timeout_s=420),
     # Most of them wait for a server or for silence, so a few at a time take no more processor.
     Step(
         "tests e2e",

@@ -94,6 +94,13 @@ NEEDS = (
         is_of_root=True,
     ),
     Need(
+        name="netns",
+        executables=(),
+        package="iproute2",
+        purpose="the test of a robot whose ports cannot be chosen, as root only",
+        other=lambda: shutil.which("ip", path=_SYSTEM_PATH) if _is_root() else None,
+    ),
+    Need(
         name="ser2net",
         executables=("ser2net",),
         package="ser2net",

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 
+from scripts.robot_pictures import with_picture
 from urc.cli.main import main
 from urc.config.load import load_profile
 from urc.runtime.catalog import built_in_catalog
@@ -119,10 +120,11 @@ By Ada.
 def test_page_in_the_docs_is_what_the_document_says(
     name: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """A robot that was changed needs `urc docs robots/NAME.yaml > docs/robots/NAME.md`."""
+    """And a picture; a robot that was changed needs `python -m scripts.robot_pictures NAME`."""
     assert main(["docs", str(ROOT / "robots" / f"{name}.yaml")]) == 0
     page = capsys.readouterr().out
-    assert (ROOT / "docs" / "robots" / f"{name}.md").read_text("utf-8") == page
+    assert (ROOT / "docs" / "robots" / f"{name}.md").read_text("utf-8") == with_picture(page, name)
+    assert (ROOT / "docs" / "images" / "robots" / f"{name}.png").is_file()
 
 
 def test_page_says_all_that_the_operator_needs(tmp_path: Path) -> None:
@@ -145,3 +147,4 @@ def test_page_says_what_happens_when_control_is_lost(tmp_path: Path) -> None:
     assert "- held: sent every 100ms while it is held\n" in page
     assert "## When control is lost\n\n" in page
     assert "- `set`: `level 0, side a`\n" in page
+    assert "  - Whether the robot stops by itself when nothing more comes is not said.\n" in page

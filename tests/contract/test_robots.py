@@ -8,7 +8,7 @@ import pytest
 from starlette.testclient import TestClient
 
 from tests.contract.test_protocols import Conversation
-from urc.config.load import check
+from urc.config.load import Shelf, check
 from urc.model.profile import Profile
 from urc.problems import to_text
 from urc.runtime.catalog import built_in_catalog
@@ -19,6 +19,7 @@ from urc.web.app import build_app
 from urc.web.robots import Robot
 
 FOLDER = Path(__file__).parents[2] / "robots"
+WIDGETS = FOLDER.parent / "widgets"
 FILES = sorted(FOLDER.glob("*.yaml"))
 SHARED = sorted([*FOLDER.glob("drivers/*.yaml"), *FOLDER.glob("interfaces/*.yaml")])
 
@@ -36,6 +37,15 @@ def file(request: pytest.FixtureRequest) -> Path:
     """The document of one robot."""
     path: Path = request.param
     return path
+
+
+def test_every_shipped_document_has_no_finding() -> None:
+    """What ships is an example, so not even a warning is left in it."""
+    files = [*FOLDER.glob("**/*.yaml"), *WIDGETS.glob("*/widget.yaml")]
+    shelf = Shelf(WIDGETS)
+    found = {os.fspath(file): check(file, built_in_catalog(), shelf).problems for file in files}
+    assert len(found) >= 2
+    assert {name: problems for name, problems in found.items() if problems} == {}
 
 
 def profile_of(file: Path) -> Profile:

@@ -1,7 +1,7 @@
 """A dashboard in the test's own loop, so that the test can play the robot's part."""
 
 import asyncio
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Iterable
 from contextlib import asynccontextmanager
 
 from playwright.async_api import Page
@@ -21,12 +21,17 @@ async def running_dashboard(
     port: int = 0,
     request_s: float = REQUEST_S,
     connections: int = CONNECTIONS,
+    trusted: Iterable[str] = (),
 ) -> AsyncIterator[str]:
-    """Serve the robots on this machine; give the address, and end cleanly."""
+    """Serve the robots on this machine; give the address, and end cleanly.
+
+    Foreign widgets live in frames, but for those whose names are `trusted`.
+    """
     ready: asyncio.Future[str] = asyncio.get_running_loop().create_future()
     app = build_app(
         {robot.profile.name: Robot(robot.profile, {}, robot.open) for robot in robots},
         linger_s=0.2,
+        trusted=trusted,
     )
     task = asyncio.create_task(
         serve(

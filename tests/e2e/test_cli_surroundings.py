@@ -114,6 +114,14 @@ def test_closed_streams_change_nothing(redirection: str) -> None:
     assert (done.stderr == "") is ("2>&-" in redirection)
 
 
+def test_doctor_finds_this_machine_fit() -> None:
+    """Every check is a line; nothing that is needed is missing."""
+    done = run("doctor", "--port", "0")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert {line[:7].strip() for line in done.stdout.splitlines()} <= {"ok", "note"}
+    assert re.search(r"^ok +robots +\d+ of \d+ load$", done.stdout, re.MULTILINE)
+
+
 @pytest.mark.parametrize(
     ("words", "code"),
     [

@@ -244,7 +244,7 @@ async def test_connect_is_disabled_until_the_settings_are_complete(new_page: Pag
         button = page.get_by_role("button", name="Connect")
         assert await button.is_disabled()
         described = await button.get_attribute("aria-describedby")
-        assert "Not set yet: host." in await page.inner_text(f"[id='{described}']")
+        assert "Not set yet: Host." in await page.inner_text(f"[id='{described}']")
 
 
 @pytest.mark.parametrize("size", ["phone", "tablet", "desktop"])

@@ -5,8 +5,8 @@ from typing import NamedTuple, TypeVar
 
 from urc.config.gather import Sources
 from urc.config.link_files import link_files
-from urc.config.link_pages import link_pages
 from urc.config.link_outputs import link_output
+from urc.config.link_pages import link_pages
 from urc.config.parse_widget import Shelf
 from urc.config.part import Findings, Part
 from urc.config.shape import check_options

@@ -23,7 +23,7 @@ from urc.config.parse_widget import Shelf, parse_widget
 from urc.config.part import Findings
 from urc.config.rules import check_profile
 from urc.model.driver import Driver
-from urc.model.interface import Interface
+from urc.model.interface import Interface, WidgetUse
 from urc.model.profile import DocumentTest, Profile, Setting
 from urc.problems import Problem, ProblemsError, has_errors
 from urc.registry import Catalog
@@ -42,6 +42,8 @@ class Checked(NamedTuple):
     """``robot``, ``driver``, ``interface``, ``widget``, or "" when a first pass stopped."""
     files: tuple[str, ...] = ()
     """Every document that was looked at, whether there is one or not; this one is the first."""
+    pages: tuple[str, ...] = ()
+    """URLs of other people's pages that its widgets show, as they are written."""
 
 
 def load_profile(
@@ -88,20 +90,29 @@ def check(path: str | PathLike[str], catalog: Catalog, shelf: Shelf | None = Non
     shelf = shelf or Shelf(shipped("widgets"))
     findings = Findings()
     profile: Profile | None = None
+    uses: list[WidgetUse] = []
     if sources.kind == "widget":
         parse_widget(sources.root.document, findings)
     elif sources.kind == "interface":
         interface = parse_interface(sources.root, sources.root.text("name"), findings)
         if not has_errors(findings):
-            link_interface(sources.root, interface, {}, None, shelf, findings)
+            interface = link_interface(sources.root, interface, {}, None, shelf, findings)
+            uses += interface.widgets.values()
     else:
         profile = _profile(sources, catalog, shelf, findings)
+    if profile is not None:
+        uses += profile.slots.values()
+        uses += [use for each in profile.interfaces.values() for use in each.widgets.values()]
     problems += sorted(findings, key=lambda one: (one.file != path, one.file, one.line, one.column))
     problems += shelf.problems
     problems = _told_once(problems)
     if has_errors(problems):
         profile = None
-    return Checked(profile, tuple(problems), sources.kind, (*files, *shelf.files))
+    return Checked(profile, tuple(problems), sources.kind, (*files, *shelf.files), _pages(uses))
+
+
+def _pages(uses: Iterable[WidgetUse]) -> tuple[str, ...]:
+    return tuple(sorted({url for use in uses for many in use.pages.values() for url in many}))
 
 
 def _told_once(problems: Iterable[Problem]) -> list[Problem]:

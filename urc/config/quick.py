@@ -14,7 +14,10 @@ __all__ = ["QuickCheck"]
 
 _Check = Callable[[Any], bool]
 _ANNOTATIONS: Final = frozenset(
-    ("$schema", "$defs", "title", "description", "examples", "default", "file", "page", "then", "else")
+    (
+        *("$schema", "$defs", "title", "description", "examples", "default"),
+        *("file", "page", "then", "else"),
+    )
 )
 
 

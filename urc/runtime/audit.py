@@ -33,6 +33,8 @@ _GATHER_S: Final = 0.05
 """How long a batch is gathered: one commit for many entries."""
 _RETRY_S: Final = 5.0
 """After how long a disk that took nothing is tried again."""
+_LOCKED_S: Final = 1.0
+"""How long whoever else writes the file, or looks at it, is waited for."""
 _CLOSE_S: Final = 2.0
 _LONGEST_TEXT: Final = 1000
 _SHARE: Final = 10
@@ -194,7 +196,7 @@ class AuditLog:
             return self._connected()
 
     def _connected(self) -> sqlite3.Connection:
-        base = sqlite3.connect(self.file, timeout=1.0, isolation_level=None)
+        base = sqlite3.connect(self.file, timeout=_LOCKED_S, isolation_level=None)
         try:
             base.execute(f"PRAGMA page_size = {_PAGE}")
             base.execute("PRAGMA journal_mode = WAL")
@@ -312,7 +314,7 @@ def check(file: Path) -> str:
 
 
 def _reading(file: Path) -> sqlite3.Connection:
-    return sqlite3.connect(f"{file.absolute().as_uri()}?mode=ro", uri=True, timeout=1.0)
+    return sqlite3.connect(f"{file.absolute().as_uri()}?mode=ro", uri=True, timeout=_LOCKED_S)
 
 
 def _link(before: str, entry: Entry) -> str:

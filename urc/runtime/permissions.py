@@ -36,6 +36,7 @@ def permissions(document: Path, folder: Path, widgets: Sequence[str]) -> list[st
     lines = _of_profile(checked.profile) if checked.profile else []
     return [
         *lines,
+        *(f"has the browser show the page {url}" for url in checked.pages),
         *(
             f"widget {name}: a program in a frame of its own; it sees and gives what its cell is "
             "bound to, and nothing else"

@@ -2,7 +2,9 @@
 
 from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 from contextlib import AbstractAsyncContextManager, asynccontextmanager
+from functools import lru_cache
 from pathlib import Path
+from typing import Any
 
 import yaml
 
@@ -33,11 +35,16 @@ BATTERY = Signal(
 )
 
 
+@lru_cache(maxsize=64)  # the same few, for each profile anew
+def _declared(manifest: str) -> Any:
+    return yaml.safe_load(manifest)
+
+
 def plain_widget(name: str, inputs: Sequence[str], folder: Path | None = None) -> Widget:
     """Return a widget of the shipped folder `name`, or of `folder`, that takes anything."""
     place = folder or shipped("widgets") / name
     manifest = place / "widget.yaml"
-    declared = yaml.safe_load(manifest.read_text("utf-8")) if manifest.is_file() else {}
+    declared = _declared(manifest.read_text("utf-8")) if manifest.is_file() else {}
     types = ("integer", "number", "boolean", "string", "array", "object", "image", "blob")
     known = declared.get("inputs", {})
     ports = {

@@ -2,7 +2,7 @@
 /** @typedef {import("../../urc/web/static/types.js").Context} Context */
 /** @typedef {import("../../urc/web/static/types.js").Instance} Instance */
 /** @typedef {import("../../urc/web/static/types.js").Signal} Signal */
-import { attribute, clamp, format, noteOf, number, part, style, write } from "urc/kit";
+import { attribute, fit, format, noteOf, number, part, style, tell, write } from "urc/kit";
 import { bands, digitsOf, ends, share, ticks } from "urc/scale";
 
 const TICKS = 4;
@@ -18,6 +18,7 @@ export default {
     const meter = part(el, ".bar-meter");
     const fill = part(el, ".bar-fill");
     const target = part(el, ".bar-target");
+    const readout = part(el, ".bar-number");
     const text = part(el, ".bar-text");
     const unit = part(el, ".bar-unit");
     const note = part(el, ".bar-note");
@@ -53,20 +54,21 @@ export default {
         style(fill, "--bar-long", Math.abs(place - origin).toFixed(4));
         if (known !== null) extremes?.add(place);
         const aim = number(wanted);
-        target.hidden = aim === null;
+        attribute(target, "hidden", aim === null ? "" : null);
         if (aim !== null) style(target, "--bar-target", share(aim, ...scale).toFixed(4));
 
         const digits = options["precision"] ?? value.signal.precision;
         const figure = format(known === null ? null : factor(known), typeof digits === "number" ? digits : undefined);
-        // In steps of two characters, so that 9.9 → 10.0 changes no size.
-        style(root, "--bar-characters", String(clamp(2 * Math.ceil((figure.length + symbol.length / 2) / 2), 4, 40)));
+        fit(readout, "--bar-characters", figure.length + symbol.length / 2);
         write(text, figure);
         write(unit, known === null ? "" : symbol);
         const said = noteOf(value, t);
         write(note, said);
-        attribute(meter, "aria-valuenow", format(factor(known ?? scale[0])));
-        const spoken = [`${figure} ${symbol}`, said.replace(/[▲◆] /g, "")].filter(Boolean).join(", ");
-        attribute(meter, "aria-valuetext", known === null ? t("unknown") : spoken);
+        const spoken = said ? `${figure} ${symbol}, ${said.replace(/[▲◆] /g, "")}` : `${figure} ${symbol}`;
+        tell(meter, {
+          "aria-valuenow": format(factor(known ?? scale[0])),
+          "aria-valuetext": known === null ? t("unknown") : spoken,
+        });
       },
     };
   },

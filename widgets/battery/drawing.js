@@ -17,20 +17,6 @@ const HIGH = 8;
 const HALF = 5;
 
 /**
- * The part of the inside that is full: a lying battery fills from the left, a standing one from
- * below.
- *
- * @param {Box} inside
- * @param {number} share 0..1
- * @param {boolean} isLying
- * @returns {Box}
- */
-export function filled({ x, y, w, h }, share, isLying) {
-  if (isLying) return { x, y, w: share * w, h };
-  return { x, y: y + (1 - share) * h, w, h: share * h };
-}
-
-/**
  * Two triangles that point at the shell from outside, where a limit is.
  *
  * @param {Box} inside

@@ -3,10 +3,10 @@
 /** @typedef {import("../../urc/web/static/types.js").Context} Context */
 /** @typedef {import("../../urc/web/static/types.js").Instance} Instance */
 /** @typedef {Readonly<Record<string, Reading>>} Readings */
-import { attribute, drawing, format, many, noteOf, number, numbers, part, style, worst, write } from "urc/kit";
+import { attribute, drawing, format, many, noteOf, number, numbers, part, style, tell, worst, write } from "urc/kit";
 import { share } from "urc/scale";
 import { Mean, cellScale, clock, spread, timeLeft } from "./charge.js";
-import { INSIDE, filled, mark } from "./drawing.js";
+import { INSIDE, mark } from "./drawing.js";
 
 /** Of a unit's character against a digit's. */
 const UNIT_WIDTH = 0.86;
@@ -58,16 +58,18 @@ class Shell {
   /** @param {Context} ctx */
   constructor({ el, t }) {
     this.t = t;
-    this.root = part(el, ".battery");
     this.meter = part(el, ".battery-meter");
-    this.digits = [...el.querySelectorAll(".battery-digits")];
-    this.units = [...el.querySelectorAll(".battery-unit")];
+    this.full = part(el, ".battery-level");
+    this.number = el.querySelector(".battery-number");
+    this.digits = el.querySelector(".battery-digits");
+    this.unit = el.querySelector(".battery-unit");
     this.pictures = Object.entries(INSIDE).map(([name, inside]) => ({
       inside,
       isLying: name === "lying",
-      full: drawing(el, `.battery-${name} .battery-full`),
       limits: drawing(el, `.battery-${name} .battery-limits`),
     }));
+    /** Whose limits are drawn. @type {Reading["signal"] | null} */
+    this.drawn = null;
   }
 
   /** @param {Reading} level */
@@ -78,27 +80,38 @@ class Shell {
     const full = known === null ? 0 : share(known, least, most);
     const symbol = known === null ? "" : (signal.unit ?? "%");
     const text = known === null ? "—" : level.text;
+    if (this.number && this.digits && this.unit) {
+      style(this.number, "--battery-characters", String(text.length + UNIT_WIDTH * symbol.length));
+      write(this.digits, text);
+      write(this.unit, symbol);
+    }
+    style(this.full, "--battery-full", full.toFixed(3));
+    if (signal !== this.drawn) this.draw(signal, least, most);
+    const said = noteOf(level, this.t).replace(/[▲◆] /, "");
+    tell(this.meter, {
+      "aria-valuemin": String(least),
+      "aria-valuemax": String(most),
+      "aria-valuenow": String(known ?? least),
+      "aria-valuetext": known === null ? this.t("unknown") : `${text} ${symbol}${said ? `, ${said}` : ""}`,
+    });
+  }
+
+  /**
+   * Mark the limits.
+   *
+   * @param {Reading["signal"]} signal
+   * @param {number} least
+   * @param {number} most
+   */
+  draw(signal, least, most) {
+    this.drawn = signal;
     const marks = Object.values(signal.limits ?? {})
       .filter((limit) => typeof limit === "number")
       .map((limit) => (limit - least) / (most - least))
       .filter((place) => place > 0 && place < 1);
-    style(this.root, "--battery-characters", String(text.length + UNIT_WIDTH * symbol.length));
-    for (const digits of this.digits) write(digits, text);
-    for (const unit of this.units) write(unit, symbol);
-    for (const { inside, isLying, full: rect, limits } of this.pictures) {
-      const { x, y, w, h } = filled(inside, full, isLying);
-      attribute(rect, "x", x.toFixed(1));
-      attribute(rect, "y", y.toFixed(1));
-      attribute(rect, "width", w.toFixed(1));
-      attribute(rect, "height", h.toFixed(1));
+    for (const { inside, isLying, limits } of this.pictures) {
       attribute(limits, "d", marks.map((place) => mark(inside, place, isLying)).join(""));
     }
-    attribute(this.meter, "aria-valuemin", String(least));
-    attribute(this.meter, "aria-valuemax", String(most));
-    attribute(this.meter, "aria-valuenow", String(known ?? least));
-    const said = noteOf(level, this.t).replace(/[▲◆] /, "");
-    const spoken = known === null ? this.t("unknown") : `${text} ${symbol}${said ? `, ${said}` : ""}`;
-    attribute(this.meter, "aria-valuetext", spoken);
   }
 }
 

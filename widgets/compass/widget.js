@@ -79,7 +79,7 @@ class Rose {
     this.isVehicleUp = isVehicleUp;
     this.rose = drawing(el, ".compass-rose");
     this.letters = drawRose(drawing(el, ".compass-ticks"), drawing(el, ".compass-letters"));
-    this.needle = drawing(el, ".compass-needle");
+    this.needle = part(el, ".compass-needle");
     this.marks = [drawing(el, ".compass-course"), drawing(el, ".compass-target")];
     this.up = 0;
   }

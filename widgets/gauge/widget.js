@@ -2,7 +2,7 @@
 /** @typedef {import("../../urc/web/static/types.js").Context} Context */
 /** @typedef {import("../../urc/web/static/types.js").Instance} Instance */
 /** @typedef {import("../../urc/web/static/types.js").Signal} Signal */
-import { attribute, drawing, format, noteOf, number, part, style, svg, write } from "urc/kit";
+import { attribute, drawing, format, noteOf, number, part, style, svg, tell, write } from "urc/kit";
 import { bands, digitsOf, ends, share, ticks } from "urc/scale";
 import { angle, arc, dashes, place } from "./arc.js";
 
@@ -17,10 +17,10 @@ export default {
     const { el, options, t } = ctx;
     const root = part(el, ".gauge");
     const meter = part(el, ".gauge-meter");
-    const needle = drawing(el, ".gauge-needle");
+    const needle = part(el, ".gauge-needle");
     const target = drawing(el, ".gauge-target");
-    const text = drawing(el, ".gauge-text");
-    const unit = drawing(el, ".gauge-unit");
+    const text = part(el, ".gauge-text");
+    const unit = part(el, ".gauge-unit");
     const note = part(el, ".gauge-note");
     const extremes = options["extremes"] === true ? new Extremes(drawing(el, ".gauge-extremes")) : null;
     /** What the scale was drawn for. @type {Signal | null} */
@@ -57,8 +57,10 @@ export default {
         write(unit, known === null ? "" : symbol);
         const said = noteOf(value, t);
         write(note, said);
-        attribute(meter, "aria-valuenow", format(factor(known ?? scale[0])));
-        attribute(meter, "aria-valuetext", known === null ? t("unknown") : spoken(`${figure} ${symbol}`, said));
+        tell(meter, {
+          "aria-valuenow": format(factor(known ?? scale[0])),
+          "aria-valuetext": known === null ? t("unknown") : spoken(`${figure} ${symbol}`, said),
+        });
       },
     };
   },

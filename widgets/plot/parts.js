@@ -2,6 +2,7 @@
 /**
  * Small elements of the plot, and what it does with the browser.
  */
+import { style, write } from "urc/kit";
 
 /** Milliseconds since 1970 at time 0 of the page's clock. */
 export function epoch() {
@@ -38,8 +39,35 @@ export function legendItem(name, hint) {
     const made = document.createElement("span");
     made.className = `plot-${part}`;
     made.textContent = text;
-    button.append(made);
+    button.append(part === "value" ? roomFor(made) : made);
   }
   item.append(button);
   return { item, button };
+}
+
+/** @param {HTMLElement} value */
+function roomFor(value) {
+  const room = document.createElement("span");
+  room.className = "plot-room";
+  room.append(value);
+  return room;
+}
+
+/** So many characters of a value have room from the beginning. */
+const CHARACTERS = 6;
+/** Where there is room for more. @type {WeakMap<Element, number>} */
+const rooms = new WeakMap();
+
+/**
+ * Write a value of the legend; its room grows when it has to.
+ *
+ * @param {Element} el
+ * @param {string} text
+ */
+export function writeValue(el, text) {
+  write(el, text);
+  const room = el.parentElement;
+  if (!room || text.length <= (rooms.get(room) ?? CHARACTERS)) return;
+  rooms.set(room, text.length);
+  style(room, "--plot-characters", String(text.length));
 }

@@ -7,7 +7,7 @@ import { ALARMS, attribute, colours, format, isStill, many, noteOf, number, part
 import { digitsOf, spanOf, ticks } from "urc/scale";
 import { History } from "./history.js";
 import { Live } from "./live.js";
-import { epoch, legendItem, placed } from "./parts.js";
+import { epoch, legendItem, placed, writeValue } from "./parts.js";
 import { Ring, csv, extent, seconds, table } from "./traces.js";
 
 const COLOURS = /** @type {const} */ (["series-1", "series-2", "series-3", "series-4", "series-5", "series-6"]);
@@ -34,9 +34,12 @@ class Plot {
     this.pauseButton = part(el, ".plot-pause");
     this.place = part(el, ".plot-history");
     const canvas = part(el, ".plot-canvas");
-    if (!(canvas instanceof HTMLCanvasElement)) throw new Error("the template has no canvas");
+    const newest = part(el, ".plot-newest");
+    if (!(canvas instanceof HTMLCanvasElement) || !(newest instanceof HTMLCanvasElement)) {
+      throw new Error("the template has no canvas");
+    }
     this.windowS = seconds(options["window"]);
-    this.live = new Live(canvas, this.windowS);
+    this.live = new Live(canvas, newest, this.windowS);
     /** @type {readonly Reading[]} */
     this.readings = [];
     /** @type {number[]} */
@@ -271,7 +274,7 @@ class Plot {
     this.readings.forEach((reading, place) => {
       const value = units[place];
       if (!value) return;
-      write(value, reading.value === null ? reading.text : `${reading.text} ${reading.unit}`.trim());
+      writeValue(value, reading.value === null ? reading.text : `${reading.text} ${reading.unit}`.trim());
       attribute(value, "data-state", reading.state);
     });
   }
@@ -337,7 +340,8 @@ class Plot {
     this.readings.forEach((reading, place) => {
       const value = values[place] ?? null;
       const el = places[place];
-      if (el) write(el, `${format(value, reading.signal.precision)} ${value === null ? "" : reading.unit}`.trim());
+      const text = `${format(value, reading.signal.precision)} ${value === null ? "" : reading.unit}`.trim();
+      if (el) writeValue(el, text);
     });
   }
 

@@ -31,13 +31,12 @@ class Recorder {
 
   /** @param {readonly Reading[]} readings */
   update(readings) {
-    const isFirst = this.readings.length === 0;
     this.readings = readings;
     attribute(this.root, "data-state", worst(readings).state);
     if (this.isOn && this.recording.add(readings, performance.now() / 1000, Date.now()) && this.recording.isFull) {
       this.stop();
     }
-    if (isFirst && !this.isOn) this.show();
+    if (!this.isOn) this.show(); // the first readings may say that there are none
   }
 
   begin() {

@@ -76,6 +76,15 @@ class Scan {
     };
     this.image = new ImageData(1, 1);
     this.pixels = new Uint32Array(this.image.data.buffer);
+    /** Of the picture. Asking the page for it would have it laid out at once. */
+    this.room = { width: 0, height: 0 };
+    const sizes = new ResizeObserver(([entry]) => {
+      if (!entry) return;
+      this.room = { width: Math.round(entry.contentRect.width), height: Math.round(entry.contentRect.height) };
+      this.resize();
+    });
+    sizes.observe(this.face);
+    signal.addEventListener("abort", () => sizes.disconnect());
     this.theme();
     if (options["choose"] !== false) this.addButton(signal);
   }
@@ -152,7 +161,7 @@ class Scan {
 
   draw() {
     const { reading } = this;
-    const [width, height] = [this.face.clientWidth, this.face.clientHeight];
+    const { width, height } = this.room;
     if (!reading || width === 0 || height === 0) return;
     const isFlat = this.view === "graph" || this.view === "depth";
     this.overlay.draw({

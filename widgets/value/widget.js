@@ -2,7 +2,7 @@
 /** @typedef {import("../../urc/web/static/types.js").Reading} Reading */
 /** @typedef {import("../../urc/web/static/types.js").Context} Context */
 /** @typedef {import("../../urc/web/static/types.js").Instance} Instance */
-import { attribute, clamp, format, noteOf, number, part as find, style, write } from "urc/kit";
+import { attribute, fit, format, noteOf, number, part as find, write } from "urc/kit";
 import { spanOf } from "urc/scale";
 import { Trend } from "./trend.js";
 
@@ -23,7 +23,7 @@ export default {
   mount(ctx) {
     const { el, options, signal, t } = ctx;
     const root = find(el, ".value");
-    const line = find(el, ".value-line");
+    const line = find(el, ".value-figure");
     const text = find(el, ".value-text");
     const unit = find(el, ".value-unit");
     const note = find(el, ".value-note");
@@ -41,7 +41,7 @@ export default {
         const symbol = reading.value === null ? "" : reading.unit || known;
         attribute(root, "data-state", reading.state);
         attribute(root, "data-alarm", reading.alarm);
-        fitText(line, shown.length + symbol.length / 2);
+        fit(line, "--value-characters", shown.length + symbol.length / 2);
         write(text, shown);
         write(unit, symbol);
         write(note, noteOf(reading, t));
@@ -276,16 +276,6 @@ function sizeOf(place) {
 function seconds(text) {
   const match = /^(\d+)(s|min)$/.exec(String(text ?? ""));
   return match ? Number(match[1]) * (match[2] === "min" ? 60 : 1) : 0;
-}
-
-/**
- * Tell the style sheet how many characters must fit, in steps, so that 9.9 → 10.0 changes nothing.
- *
- * @param {Element} line
- * @param {number} characters
- */
-function fitText(line, characters) {
-  style(line, "--value-characters", String(clamp(2 * Math.ceil(characters / 2), 4, 40)));
 }
 
 /**

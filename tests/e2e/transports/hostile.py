@@ -11,7 +11,7 @@ from urc.transports.base import PeerClosed, Transport
 
 __all__ = ["WAIT_S", "Talk", "bounded", "ended", "liar", "turn_deaf", "until"]
 
-WAIT_S = 20.0
+WAIT_S = 45.0
 
 Talk = Callable[[asyncio.StreamReader, asyncio.StreamWriter], Awaitable[None]]
 """What the server does with one connection; the connection is closed when it returns."""

@@ -7,6 +7,7 @@ import re
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager, suppress
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -154,18 +155,17 @@ class Ear:
     def __init__(self, patch: pytest.MonkeyPatch) -> None:
         self.numbers: list[tuple[int, float]] = []
         self.greetings = 0
-        hear = TwinLine.receive
+        hear = TwinLine._heard
 
-        def receive(
-            line: TwinLine, data: Payload, now_s: float, limit: int | None = None
-        ) -> list[Payload]:
+        def heard(line: TwinLine, data: Payload, *more: Any) -> list[Payload]:
             said = str(data.body if isinstance(data, Envelope) else data)
             at_s = asyncio.get_running_loop().time()
             self.numbers += [(int(number), at_s) for number in re.findall(r"say (\d+)", said)]
             self.greetings += said.count("hello")
-            return hear(line, data, now_s, limit)
+            return hear(line, data, *more)
 
-        patch.setattr(TwinLine, "receive", receive)
+        # What every door hands its frames to, whether it answers in a stream or each by itself.
+        patch.setattr(TwinLine, "_heard", heard)
 
     async def hears_more(self) -> None:
         """Wait until a few more numbers have come."""

@@ -68,7 +68,7 @@ async def test_images_go_to_cells_that_can_be_seen(new_page: PageMaker, tmp_path
     widget = plain_widget("eye", ["eye"], folder)
     signals = {"battery": BATTERY, "cam": Signal("cam", "image", stale_after_s=60)}
     robot = FakeRobot(dashboard_profile(signals=signals, uses=uses, widgets=[widget]))
-    async with running_dashboard(robot) as address:
+    async with running_dashboard(robot, trusted=robot.profile.widgets) as address:
         page = await new_page(size="phone")
         came: list[int] = []
         page.on(
@@ -111,7 +111,7 @@ async def test_lists_arrays_and_units_reach_a_widget(new_page: PageMaker, tmp_pa
     }
     widget = Widget("lines", "Lines", folder, ports)
     robot = FakeRobot(dashboard_profile(signals=signals, uses=[use], widgets=[widget]))
-    async with running_dashboard(robot) as address:
+    async with running_dashboard(robot, trusted=robot.profile.widgets) as address:
         page = await new_page()
         await page.goto(f"{address}robots/puppet/")
         await until(lambda: robot.is_open)
@@ -161,7 +161,7 @@ async def test_a_slow_widget_says_so_and_leaves_the_page_to_the_others(
         for name, widget in (("slow", "slow"), ("good", "battery"), ("late", "late"))
     ]
     robot = FakeRobot(dashboard_profile(uses=uses, widgets=[slow, late]))
-    async with running_dashboard(robot) as address:
+    async with running_dashboard(robot, trusted=robot.profile.widgets) as address:
         page = await new_page()
         await page.goto(f"{address}robots/puppet/")
         await until(lambda: robot.is_open)

@@ -60,7 +60,6 @@ def test_options_may_stand_among_the_words() -> None:
 WRONG = [
     (("watch",), "the following arguments are required: PROFILE"),
     (("send", "puppet"), "the following arguments are required: COMMAND"),
-    (("serve",), "the following arguments are required: PROFILE"),
     (("validate",), "the following arguments are required: PATH"),
     (("watch", "p", "--nope"), "unrecognized arguments: --nope"),
     (("watch", "p", "--wir"), "unrecognized arguments: --wir"),

@@ -60,7 +60,8 @@ async def test_refusal_is_told_in_the_robots_words() -> None:
         await opening
 
 
-async def test_opening_ends_in_its_time_without_a_guard() -> None:
+async def test_opening_ends_in_its_time_without_a_guard(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("urc.guard.proxy._OPEN_GRACE_S", 0.01)
     guard = Guard(is_there=False)
     with pytest.raises(ConnectFailed, match=r"no answer from tcp robot:1 within 0\.01 s"):
         await guard.line.open(0.01)

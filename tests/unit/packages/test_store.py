@@ -246,14 +246,16 @@ def test_a_disk_that_gets_full_at_any_moment_changes_nothing(
 ) -> None:
     """At every write, flush, rename and new file, one after the other."""
     outcomes = set()
+    first = Store(tmp_path / "first")
+    install(first, CAR, DIAL)
+    if act != "install":
+        install(first, BOT, DIAL)
+    if act == "back":
+        update(first)
+    before = assert_whole(first)
     for changes in range(200):
         store = Store(tmp_path / f"{act}-{changes}")
-        install(store, CAR, DIAL)
-        if act != "install":
-            install(store, BOT, DIAL)
-        if act == "back":
-            update(store)
-        before = assert_whole(store)
+        shutil.copytree(first.folder, store.folder)
         full = _FullDisk(changes)
         with monkeypatch.context() as patch:
             patch.setattr(disk, "os", full)

@@ -1,5 +1,6 @@
 """Frames of public documents, for each framing: declared as in a document, byte for byte."""
 
+from functools import cache
 from typing import Any
 
 from tests.unit.protocol.framing_samples_sized import SIZED, Sample, wire
@@ -16,6 +17,7 @@ __all__ = ["SAMPLES", "Sample", "framing", "spec", "wire"]
 CATALOG = Catalog(transports=Table("none", {}), framings=FRAMINGS)
 
 
+@cache
 def spec(text: str, encoding: str = "latin-1") -> FramingSpec:
     """Return the framing that a document declares with `text`; it must have no finding."""
     document = parse_document(f"framing: {text}\n", "sample.yaml")

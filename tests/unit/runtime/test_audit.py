@@ -10,6 +10,12 @@ import pytest
 from urc.runtime.audit import AuditLog, Entry, check, read, shown
 
 
+@pytest.fixture(autouse=True)
+def no_batch_is_waited_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    """An entry is written when it comes."""
+    monkeypatch.setattr("urc.runtime.audit._GATHER_S", 0.001)
+
+
 @pytest.fixture
 def file(tmp_path: Path) -> Path:
     return tmp_path / "folder" / "audit.sqlite"
@@ -177,6 +183,7 @@ def test_a_file_that_somebody_locks_holds_nobody_up_and_is_told_once(
     file: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     monkeypatch.setattr("urc.runtime.audit._RETRY_S", 0.0)
+    monkeypatch.setattr("urc.runtime.audit._LOCKED_S", 0.05)
     with AuditLog(file) as log:
         log.note(entry(1))
         assert log.settle()

@@ -11,6 +11,7 @@ from urc.config.load import check
 from urc.config.parse_widget import Shelf
 from urc.model.interface import WidgetUse
 from urc.runtime.catalog import built_in_catalog
+from urc.runtime.permissions import permissions
 from urc.shipped import shipped
 from urc.testing.dashboard import FakeRobot, dashboard_profile
 from urc.web.app import build_app
@@ -170,3 +171,22 @@ def test_a_page_of_the_dashboard_itself_is_not_framed(tmp_path: Path, url: str) 
 
 def test_no_page_has_no_address(tmp_path: Path) -> None:
     assert linked_options(page_in(tmp_path, "{ url: '' }"), "puppet")["url"] == ""
+
+
+def test_whoever_installs_a_robot_or_a_layout_is_told_of_the_pages_that_it_shows(
+    tmp_path: Path,
+) -> None:
+    page_in(tmp_path, "{ url: 'http://wiki.local/a' }")
+    layout = tmp_path / "layout.yaml"
+    layout.write_text(
+        head("interface", "layout")
+        + "grid: wiki\n"
+        + "widgets:\n  wiki: { use: iframe, options: { url: 'http://wiki.local/b' } }\n",
+        "utf-8",
+    )
+    assert "has the browser show the page http://wiki.local/a" in permissions(
+        tmp_path / "robot.yaml", tmp_path, ()
+    )
+    assert permissions(layout, tmp_path, ()) == [
+        "has the browser show the page http://wiki.local/b"
+    ]

@@ -1,6 +1,7 @@
 """The settings of one robot as its page shows them: a field for each, by the type of its value.
 
-Floor 5. Pure: what is in a field is decided here, what becomes of it in `urc.web.manage.settings_routes`.
+Floor 5. Pure: what is in a field is decided here, what becomes of it in
+`urc.web.manage.settings_routes`.
 """
 
 from collections.abc import Mapping, Sequence

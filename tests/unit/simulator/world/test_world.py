@@ -173,12 +173,12 @@ def test_a_receiver_writes_its_place_as_nmea_does() -> None:
 
 
 def test_a_battery_gives_as_much_as_is_drawn() -> None:
-    """An hour of one ampere out of two ampere hours is half of it; empty, it moves nothing."""
+    """Five minutes of twelve amperes are half of two ampere hours; empty, it moves nothing."""
     spec = WorldSpec(
         body=QUICK, plan=PlanSpec(), battery=BatterySpec(2.0, 100.0, idle=1.0, drive=2.0)
     )
-    made = world(spec)
-    for minute in range(1, 61):
+    made = world(spec._replace(battery=BatterySpec(2.0, 100.0, idle=12.0)))
+    for minute in range(1, 6):
         made.advance(60.0 * minute)
     assert made.battery.level == pytest.approx(50.0, abs=0.01)
     driven = world(spec, forward=1.0)

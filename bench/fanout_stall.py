@@ -1,0 +1,197 @@
+"""Pages that do not keep up, and what they cost the others: twenty, two of which read nothing.
+
+One more reads a quarter of what comes. Beside URC stands a server that keeps a queue for each page,
+without a bound, and sends from it: what the slow page then reads is as old as its queue is long.
+"""
+
+import asyncio
+import json
+import os
+import statistics
+import sys
+import time
+from collections.abc import Awaitable, Callable, Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import NamedTuple
+
+from starlette.applications import Starlette
+from starlette.routing import WebSocketRoute
+from starlette.types import ASGIApp
+from starlette.websockets import WebSocket, WebSocketDisconnect
+
+from bench.harness import Result
+from bench.watching import serving
+from urc.model.values import Sample, Signal
+from urc.testing.dashboard import FakeRobot, dashboard_profile
+from urc.web.app import Robot, build_app
+
+__all__ = ["run"]
+
+CHANNELS, RATE_HZ = 600, 50
+HEALTHY, STOPPED = 17, 2
+SLOW_SHARE = 0.25
+FRAME_BYTES = 7000
+"""About what a frame of all channels is."""
+LOOK_S, LOOK_IF_FULL_S = 15.0, 30.0
+WARM_S = 3.0
+MISSED_GOAL, GROWTH_MB, AGE_GOAL = 0.01, 2.0, 0.06
+READY_S = 20.0
+
+
+class Look(NamedTuple):
+    """What was seen in one run."""
+
+    ticks: int
+    healthy: int
+    """Frames of the healthy page that got fewest."""
+    age_ms: float
+    """Of what the slow page read, in the last quarter."""
+    growth_mb: float
+    """Of the server's memory, after its start."""
+
+
+class Naive:
+    """A queue for each page, without a bound."""
+
+    def __init__(self) -> None:
+        self.queues: set[asyncio.Queue[str]] = set()
+        self.app: ASGIApp = Starlette(routes=[WebSocketRoute("/ws", self.page)])
+
+    async def page(self, line: WebSocket) -> None:
+        """Send one page all there is."""
+        queue: asyncio.Queue[str] = asyncio.Queue()
+        await line.accept()
+        self.queues.add(queue)
+        try:
+            while text := await queue.get():
+                await line.send_text(text)
+        except (WebSocketDisconnect, RuntimeError):
+            return  # it is gone, or was cut off
+        finally:
+            self.queues.discard(queue)
+
+    def tick(self, number: int) -> None:
+        """Give every page all values."""
+        values = {
+            "t": "v",
+            "n": round(time.monotonic() * 1000),
+            "i": [*range(CHANNELS)],
+            "v": [number + 0.25] * CHANNELS,
+            "a": [0] * CHANNELS,
+        }
+        text = json.dumps(values, separators=(",", ":"))
+        for queue in self.queues:
+            queue.put_nowait(text)
+
+    def end(self) -> None:
+        """Let all pages go."""
+        for queue in self.queues:
+            queue.put_nowait("")
+
+
+def run(*, full: bool) -> Sequence[Result]:
+    """Compare the age at the slow page with that of queues without a bound."""
+    seconds = LOOK_IF_FULL_S if full else LOOK_S
+    ours = asyncio.run(_urc(seconds))
+    naive = Naive()
+    base = asyncio.run(_look(naive.app, "/ws", naive.tick, seconds, naive.end))
+    told = {"URC": ours._asdict(), "unbounded queue": base._asdict()}
+    print(json.dumps({"fanout_stall": told}), flush=True)
+    missed = max(0.0, 1 - ours.healthy / ours.ticks)
+    found = [
+        _result("frames that a healthy page missed", missed, MISSED_GOAL, ours.ticks, ours.healthy),
+        _result(
+            "age at the slow page / unbounded queue",
+            ours.age_ms / base.age_ms,
+            AGE_GOAL,
+            base.age_ms,
+            ours.age_ms,
+        ),
+    ]
+    if STATM.is_file():
+        growth = ours.growth_mb / GROWTH_MB
+        found.insert(1, _result(f"growth / {GROWTH_MB:g} MB", growth, 1.0, 0, 0))
+    return found
+
+
+def _result(name: str, ratio: float, goal: float, base: float, subject: float) -> Result:
+    title = f"{HEALTHY + STOPPED + 1} pages of which 3 do not keep up: {name}"
+    return Result(title, round(ratio, 3), goal, round(base, 1), round(subject, 1), 1.0, 1)
+
+
+async def _urc(seconds: float) -> Look:
+    signals = {f"s{place}": Signal(f"s{place}") for place in range(CHANNELS)}
+    robot = FakeRobot(dashboard_profile(signals=signals, uses=[]))
+    app = build_app({"puppet": Robot(robot.profile, {}, robot.open)})
+
+    def tick(number: int) -> None:
+        now_s = robot.clock.now()
+        robot.hub.put([Sample(name, number + 0.25, now_s) for name in signals])
+
+    return await _look(app, "/ws?robot=puppet", tick, seconds)
+
+
+async def _look(
+    app: ASGIApp,
+    path: str,
+    tick: Callable[[int], None],
+    seconds: float,
+    end: Callable[[], None] = lambda: None,
+) -> Look:
+    rate = str(int(FRAME_BYTES * RATE_HZ * SLOW_SHARE))
+    async with serving(app) as port:
+        command = (sys.executable, "-m", "bench.stalled", str(port), path)
+        pages = await asyncio.create_subprocess_exec(
+            *command,
+            *(str(HEALTHY), str(STOPPED), rate),
+            stdin=asyncio.subprocess.PIPE,
+            stdout=asyncio.subprocess.PIPE,
+            limit=1 << 24,
+        )
+        assert pages.stdin is not None
+        assert pages.stdout is not None
+        try:
+            said = await asyncio.wait_for(pages.stdout.readline(), READY_S)
+            if said.strip() != b"ready":
+                raise SystemExit("bench: the pages did not come up")
+            await asyncio.sleep(0.2)  # what every page is told at first
+            ticks, growth_mb = await _play(tick, seconds)
+            pages.stdin.close()
+            told = json.loads(await _in_time(pages.stdout.readline()))
+        finally:
+            if pages.returncode is None:
+                pages.kill()
+            await pages.wait()
+            end()
+    ages = [age for _, age in told["slow"]]
+    if not ages:
+        raise SystemExit("bench: the slow page read nothing")
+    return Look(ticks, min(told["healthy"]), statistics.median(ages[-len(ages) // 4 :]), growth_mb)
+
+
+async def _in_time(reading: Awaitable[bytes]) -> bytes:
+    return await asyncio.wait_for(reading, READY_S)
+
+
+async def _play(tick: Callable[[int], None], seconds: float) -> tuple[int, float]:
+    """Tell values; return how often, and by how much the memory grew after its start."""
+    began_s = time.monotonic()
+    number, before = 0, 0.0
+    while (passed_s := time.monotonic() - began_s) < seconds:
+        tick(number)
+        number += 1
+        if not before and passed_s >= WARM_S:
+            before = _memory_mb()
+        await asyncio.sleep(max(0.0, began_s + number / RATE_HZ - time.monotonic()))
+    await asyncio.sleep(0.2)  # the last frame
+    return number, _memory_mb() - before
+
+
+STATM = Path("/proc/self/statm")
+
+
+def _memory_mb() -> float:
+    with suppress(OSError):
+        return int(STATM.read_text("ascii").split()[1]) * os.sysconf("SC_PAGE_SIZE") / 1e6
+    return 0.0

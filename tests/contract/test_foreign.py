@@ -1,0 +1,109 @@
+"""Which widgets are foreign, and what their frames may load."""
+
+import base64
+import hashlib
+import re
+from pathlib import Path
+
+import pytest
+from starlette.testclient import TestClient
+
+from urc.config.load import Shelf
+from urc.model.interface import WidgetUse
+from urc.shipped import shipped
+from urc.testing.dashboard import FakeRobot, dashboard_profile, plain_widget
+from urc.web.app import Robot, build_app
+from urc.web.foreign import OURS, Border
+
+CODE = " ".join(
+    f"http://localhost:8080/{folder}/" for folder in ("static", "vendor", "words", "widgets/lamp")
+)
+
+
+def lamp(folder: Path) -> FakeRobot:
+    """Return a robot that brings a widget of its own."""
+    (folder / "lamp").mkdir()
+    for name in ("widget.js", "widget.css"):
+        (folder / "lamp" / name).write_text("", "utf-8")
+    (folder / "lamp" / "template.html.j2").write_text("<p title='&lt;'>{{ title }}</p>", "utf-8")
+    return FakeRobot(
+        dashboard_profile(
+            uses=[use_of("lamp"), use_of("battery")],
+            widgets=[plain_widget("lamp", ["level"], folder / "lamp")],
+        )
+    )
+
+
+def use_of(widget: str) -> WidgetUse:
+    """Return a use of a widget whose title is markup."""
+    return WidgetUse(widget, widget, {"level": "battery"}, title="<i>")
+
+
+def client(robot: FakeRobot, host: str = "localhost:8080", *trusted: str) -> TestClient:
+    """Return a browser's place."""
+    served = Robot(robot.profile, {}, robot.open)
+    return TestClient(build_app({"puppet": served}, trusted=trusted), base_url=f"http://{host}")
+
+
+def test_each_widget_that_ships_is_named() -> None:
+    """A folder that somebody puts beside them is not taken for one of them."""
+    names = Shelf(shipped("widgets")).names()
+    assert sorted(OURS) == names, "name the widgets that ship with URC in urc/web/foreign.py"
+
+
+def test_a_widget_of_another_folder_is_foreign_whatever_its_name(tmp_path: Path) -> None:
+    """Name and place must both be ours; a name can be trusted."""
+    ours = plain_widget("battery", ["level"])
+    named_so = plain_widget("battery", ["level"], tmp_path / "battery")
+    beside = plain_widget("lamp", ["level"], shipped("widgets") / "lamp")
+    border = Border()
+    assert [border.is_foreign(one) for one in (ours, named_so, beside)] == [False, True, True]
+    assert not Border.of(["lamp"]).is_foreign(beside)
+
+
+def test_the_page_holds_a_foreign_widget_as_text_and_loads_nothing_of_it(tmp_path: Path) -> None:
+    """Neither its markup nor its style sheet is in the page, unless it is trusted."""
+    robot = lamp(tmp_path)
+    page = client(robot).get("/robots/puppet/").text
+    assert 'data-frame="/frames/lamp"' in page
+    assert "&lt;p title=&#39;&amp;lt;&#39;&gt;&amp;lt;i&amp;gt;&lt;/p&gt;" in page
+    assert "/widgets/lamp/widget.css" not in page
+    assert "/widgets/battery/widget.css" in page
+    page = client(robot, "localhost:8080", "lamp").get("/robots/puppet/").text
+    assert "data-frame" not in page
+    assert "<p title='&lt;'>&lt;i&gt;</p>" in page
+    assert "/widgets/lamp/widget.css" in page
+
+
+@pytest.mark.parametrize(("host", "code"), [("localhost:8080", CODE), ("[::1]:8080", "'self'")])
+def test_a_frame_may_load_code_of_ours_and_its_own_and_reach_nothing(
+    tmp_path: Path, host: str, code: str
+) -> None:
+    """No nonce, no connection, no origin; the import map by its digest alone."""
+    answer = client(lamp(tmp_path), host).get("/frames/lamp")
+    text = re.search(r'<script type="importmap">(.*?)</script>', answer.text)
+    assert text is not None
+    digest = base64.b64encode(hashlib.sha256(text[1].encode()).digest()).decode()
+    assert answer.headers["content-security-policy"] == (
+        f"sandbox allow-scripts; default-src 'none'; script-src 'sha256-{digest}' {code}; "
+        f"style-src 'unsafe-inline' {code}; img-src data: blob: {code}; font-src data: {code}; "
+        "media-src data: blob:; connect-src 'none'; base-uri 'none'; form-action 'none'; "
+        "frame-ancestors 'self'; require-trusted-types-for 'script'; trusted-types urc"
+    )
+    assert answer.headers["x-frame-options"] == "SAMEORIGIN"
+    assert answer.headers["cross-origin-resource-policy"] == "same-origin"
+    assert "gamepad=()" in answer.headers["permissions-policy"]
+    assert "access-control-allow-origin" not in answer.headers
+    assert "puppet" not in answer.text
+
+
+def test_there_is_a_frame_only_for_a_widget_that_is_served(tmp_path: Path) -> None:
+    """And the API says nothing to whoever has no origin."""
+    browser = client(lamp(tmp_path))
+    for path in ("/frames/nope", "/frames/", "/frames/..%2fstatic", "/frames/LAMP"):
+        assert browser.get(path).status_code == 404
+    for path in ("/", "/healthz", "/robots/puppet/", "/api/v1/robots/puppet/timeline"):
+        answer = browser.get(path, headers={"origin": "null"})
+        assert "access-control-allow-origin" not in answer.headers
+    posted = browser.post("/api/v1/robots/puppet/stop", headers={"origin": "null"})
+    assert posted.status_code == 403

@@ -1,0 +1,135 @@
+"""A robot that ships, emulated behind real sockets, served as a dashboard, and overheard.
+
+What reached the emulated robot is noted where its side of each line takes it: behind the socket,
+before anything of URC's has looked at it.
+"""
+
+import asyncio
+from collections.abc import AsyncIterator, Mapping, Sequence
+from contextlib import asynccontextmanager
+from pathlib import Path
+
+import pytest
+
+from tests.e2e.dashboards import WAIT_S
+from urc.config.load import load_profile
+from urc.model.codec import Envelope, Payload
+from urc.model.profile import Profile
+from urc.model.values import Value
+from urc.runtime.catalog import built_in_catalog
+from urc.runtime.selftest import sample_settings
+from urc.runtime.session import Session
+from urc.simulator.stand_in import stand_in
+from urc.simulator.twin import Twin, TwinLine
+from urc.web.app import Robot, build_app, serve
+
+__all__ = ["FOLDER", "Overheard", "alive"]
+
+FOLDER = Path(__file__).parents[3] / "robots"
+
+
+class Overheard:
+    """What came to the emulated robot, line by line."""
+
+    def __init__(self, profile: Profile) -> None:
+        self.profile = profile
+        self.address = ""
+        """Of the dashboard."""
+        self.sessions = 0
+        """How many connections of URC to the robot there are."""
+        self._heard: dict[str, list[Payload]] = {}
+
+    def mark(self) -> Mapping[str, int]:
+        """Return how much there is by now."""
+        return {name: len(pieces) for name, pieces in self._heard.items()}
+
+    def bytes_since(self, transport: str, mark: Mapping[str, int]) -> bytes:
+        """Return the bytes that came on a line after `mark`."""
+        return b"".join(one for one in self._since(transport, mark) if isinstance(one, bytes))
+
+    def messages_since(self, transport: str, mark: Mapping[str, int]) -> Sequence[Envelope]:
+        """Return the messages that came on a line after `mark`."""
+        return [one for one in self._since(transport, mark) if isinstance(one, Envelope)]
+
+    def _since(self, transport: str, mark: Mapping[str, int]) -> Sequence[Payload]:
+        return self._heard.get(transport, [])[mark.get(transport, 0) :]
+
+    def twin(self, settings: Mapping[str, Value]) -> Twin:
+        """Return the emulated robot, whose lines are overheard."""
+        return _Overheard(self.profile, settings, self._heard)
+
+
+class _Overheard(Twin):
+    def __init__(
+        self,
+        profile: Profile,
+        settings: Mapping[str, Value],
+        heard: dict[str, list[Payload]],
+    ) -> None:
+        super().__init__(profile, settings)
+        self._notes = heard
+
+    def line(self, transport: str) -> TwinLine:
+        line = super().line(transport)
+        receive, ask, notes = line.receive, line.ask, self._notes.setdefault(transport, [])
+
+        def received(data: Payload, now_s: float, limit: int | None = None) -> list[Payload]:
+            notes.append(data)
+            return receive(data, now_s, limit)
+
+        def asked(data: Payload, now_s: float) -> list[Payload]:
+            notes.append(data)
+            return ask(data, now_s)
+
+        vars(line).update(receive=received, ask=asked)
+        return line
+
+
+def _calm(profile: Profile) -> Profile:
+    """Return a robot with the longest lease: a browser on a busy machine pauses for some ticks."""
+    commands = {
+        name: one if one.hold is None else one._replace(hold=one.hold._replace(lease_s=1.0))
+        for name, one in profile.driver.commands.items()
+    }
+    return profile._replace(driver=profile.driver._replace(commands=commands))
+
+
+@asynccontextmanager
+async def alive(name: str, data: Path, patch: pytest.MonkeyPatch) -> AsyncIterator[Overheard]:
+    """Emulate a robot, and serve it with the guard, as `urc demo` does."""
+    profile = _calm(load_profile(str(FOLDER / f"{name}.yaml"), built_in_catalog()))
+    settings = sample_settings(profile.settings)
+    transports = built_in_catalog().transports
+    overheard = Overheard(profile)
+    patch.setenv("URC_DATA_DIR", str(data))
+    async with stand_in(profile, settings, overheard.twin(settings)) as redirected:
+
+        @asynccontextmanager
+        async def session() -> AsyncIterator[Session]:
+            overheard.sessions += 1
+            try:
+                async with Session(redirected, settings, transports, motion="guarded") as opened:
+                    yield opened
+            finally:
+                overheard.sessions -= 1
+
+        async with served(Robot(redirected, settings, session)) as address:
+            overheard.address = address
+            yield overheard
+
+
+@asynccontextmanager
+async def served(robot: Robot) -> AsyncIterator[str]:
+    """Serve one robot in this loop; give the address of the menu."""
+    ready: asyncio.Future[str] = asyncio.get_running_loop().create_future()
+    app = build_app({robot.profile.name: robot}, linger_s=0.2)
+    task = asyncio.create_task(serve(app, port=0, on_ready=ready.set_result))
+    try:
+        async with asyncio.timeout(WAIT_S):
+            await asyncio.wait((ready, task), return_when=asyncio.FIRST_COMPLETED)
+        if task.done():
+            task.result()
+        yield await ready
+    finally:
+        task.cancel()
+        await asyncio.wait((task,), timeout=WAIT_S)

@@ -1,0 +1,61 @@
+"""What makes thousands of small tests quick: nothing is waited for, nothing made again and again.
+
+Whether a file survives a power cut can't be seen here; the tests that end a process at any moment,
+or fill the disk, put their own function in the place of ``os.fsync``.
+"""
+
+import gc
+import os
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from urc.config.parse_widget import Shelf
+from urc.model.widget import Widget
+from urc.shipped import shipped
+
+# By default what is new is gone over at each 700 objects; making the tests makes a million.
+gc.set_threshold(20_000, 20, 50)
+
+
+def pytest_collection_finish() -> None:
+    """Let the collector pass over what lives as long as the run: modules and tests."""
+    gc.collect()
+    gc.freeze()
+
+
+def seen_to_be_open(number: int) -> None:
+    """Refuse what ``os.fsync`` would refuse."""
+    os.fstat(number)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def never_wait_for_the_disk() -> Iterator[None]:
+    """Let ``os.fsync`` only see that the file is open: three thousand of them take seconds."""
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr("os.fsync", seen_to_be_open)
+        yield
+
+
+def read_shipped_widgets_once() -> None:
+    """Keep each good manifest that ships; every robot's default look asks for a dozen of them."""
+    read, folder = Shelf._read, shipped("widgets")
+    known: dict[tuple[str, Path], Widget | None] = {}
+
+    def once(self: Shelf, name: str) -> Widget | None:
+        place = (name, Path.cwd())  # findings name the file as seen from here
+        if self.folder != folder:
+            return read(self, name)
+        if place not in known:
+            told = len(self.problems)
+            widget = read(self, name)
+            if len(self.problems) != told:
+                return widget
+            known[place] = widget
+        return known[place]
+
+    Shelf._read = once  # type: ignore[method-assign]
+
+
+read_shipped_widgets_once()

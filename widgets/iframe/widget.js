@@ -1,0 +1,122 @@
+// @ts-check
+/** @typedef {import("../../urc/web/static/types.js").Context} Context */
+/** @typedef {import("../../urc/web/static/types.js").Instance} Instance */
+import { attribute, part, write } from "urc/kit";
+
+const LATE_MS = 10_000;
+const SHORTEST_S = 5;
+
+export default {
+  /**
+   * @param {Context} ctx
+   * @returns {Instance}
+   */
+  mount(ctx) {
+    const address = String(ctx.options["url"] ?? "");
+    // URC gives its own address of a page; without a robot, as in the gallery, there is none.
+    if (!address.startsWith("/robots/")) return { update() {} };
+    const shown = new Shown(ctx, address);
+    return { update() {}, destroy: () => shown.end() };
+  },
+};
+
+class Shown {
+  /**
+   * @param {Context} ctx
+   * @param {string} address
+   */
+  constructor({ el, options, signal, t }, address) {
+    this.t = t;
+    this.address = address;
+    this.root = part(el, ".iframe");
+    this.place = part(el, ".iframe-place");
+    this.note = part(el, ".iframe-note");
+    this.title = part(el, ".iframe-title").textContent ?? "";
+    this.fault = "";
+    /** @type {ReturnType<typeof setTimeout> | undefined} */
+    this.late = undefined;
+    this.addButton(part(el, ".iframe-top"), signal);
+    // A page of somebody else tells of no key; only that the focus has gone there can be seen.
+    for (const kind of ["blur", "focus"]) addEventListener(kind, () => this.tell(), { signal });
+    const every = Number(options["refresh"] ?? 0);
+    if (every > 0) this.timer = setInterval(() => this.refresh(), Math.max(every, SHORTEST_S) * 1000);
+    this.load();
+  }
+
+  /**
+   * @param {HTMLElement} top
+   * @param {AbortSignal} signal
+   */
+  addButton(top, signal) {
+    const button = document.createElement("button");
+    button.type = "button";
+    button.className = "iframe-reload";
+    button.textContent = "↻";
+    button.setAttribute("aria-label", this.t("Load the page again"));
+    button.addEventListener("click", () => this.load(), { signal });
+    top.append(button);
+  }
+
+  isInside() {
+    return document.activeElement instanceof HTMLIFrameElement && this.place.contains(document.activeElement);
+  }
+
+  refresh() {
+    if (!document.hidden && !this.isInside()) this.load();
+  }
+
+  /** A frame of its own each time: an address that changes in the same one would fill the history. */
+  load() {
+    for (const old of this.place.querySelectorAll("[data-coming]")) old.remove();
+    const frame = document.createElement("iframe");
+    frame.className = "iframe-page";
+    frame.title = this.title;
+    frame.dataset["coming"] = "yes";
+    frame.addEventListener("load", () => this.loaded(frame));
+    frame.src = this.address;
+    this.place.append(frame);
+    clearTimeout(this.late);
+    this.late = setTimeout(() => this.say("fault", this.silent()), LATE_MS);
+    if (this.place.childElementCount === 1) this.say("wait", `… ${this.t("loading")}`);
+  }
+
+  silent() {
+    return `◆ ${this.t("the page does not answer, or does not let itself be shown in another")}`;
+  }
+
+  /** @param {HTMLIFrameElement} frame */
+  loaded(frame) {
+    clearTimeout(this.late);
+    for (const old of this.place.querySelectorAll("iframe")) if (old !== frame) old.remove();
+    delete frame.dataset["coming"];
+    // The document around the page is ours. There is none when the server has not given it.
+    const ours = frame.contentDocument;
+    const refused = ours?.body.dataset["fault"] ?? "";
+    const isThere = ours?.querySelector("iframe") !== null && ours !== null;
+    attribute(frame, "data-refused", isThere ? null : "yes");
+    if (isThere) this.say("live", "");
+    else this.say("fault", refused ? `◆ ${refused}` : this.silent());
+  }
+
+  /**
+   * @param {"wait" | "live" | "fault"} state
+   * @param {string} fault
+   */
+  say(state, fault) {
+    attribute(this.root, "data-state", state);
+    this.fault = fault;
+    this.tell();
+  }
+
+  tell() {
+    const isInside = this.isInside();
+    attribute(this.root, "data-inside", isInside ? "yes" : null);
+    const keys = isInside ? `▲ ${this.t("keys go to this page, Space as well: STOP is on the screen")}` : "";
+    write(this.note, [this.fault, keys].filter(Boolean).join(" · "));
+  }
+
+  end() {
+    clearTimeout(this.late);
+    clearInterval(this.timer);
+  }
+}
