@@ -140,15 +140,19 @@ def _urc(folder: Path, ticks: int) -> Iterator[Callable[[], list[float]]]:
         file = folder / "path.yaml"
         file.write_text(PROFILE.format(port=robots.ports[0]), "utf-8")
         with Server([file], folder / "data") as server:
-            page = TimedPage(Plan(1, "127.0.0.1", server.port, "path", "", 0))
-            page.take_controls()
 
             def one_round() -> list[float]:
-                page.wait(time.monotonic_ns() + 100_000_000)
-                return ticks_of(page, robots, ticks)
+                # A page of its own: one that waits for the others' rounds answers no ping, and is
+                # closed.
+                page = TimedPage(Plan(1, "127.0.0.1", server.port, "path", "", 0))
+                try:
+                    page.take_controls()
+                    page.wait(time.monotonic_ns() + 100_000_000)
+                    return ticks_of(page, robots, ticks)
+                finally:
+                    page.socket.close()
 
             yield one_round
-            page.socket.close()
 
 
 def ticks_of(page: TimedPage, robots: Robots, ticks: int) -> list[float]:

@@ -17,7 +17,7 @@ async def main() -> None:
                 writer.write(b"M %d\n" % said["arguments"]["value"])
                 await writer.drain()
 
-    async with serve(relay, "127.0.0.1", 0, compression=None) as server:
+    async with serve(relay, "127.0.0.1", 0, compression=None, ping_interval=None) as server:
         print("ready", next(iter(server.sockets)).getsockname()[1], flush=True)
         await server.serve_forever()
 
