@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import pytest
-from playwright.async_api import Page, ViewportSize, expect
+from playwright.async_api import Locator, Page, ViewportSize, expect
 
 from tests.contract.test_robots import UNSAID
 from tests.e2e.conftest import PageMaker
@@ -36,6 +36,7 @@ DESKTOP = ViewportSize(width=1440, height=900)
 SLOWEST_S = 30.0
 """A signal that comes every eight seconds, on a machine that is busy."""
 PATIENCE_MS = 20_000
+LEAST_STEP_M = 0.1
 
 SWIMMERS = ("amphibot-ii", "amphibot-iii", "salamandra-i", "salamandra-ii")
 ORDER = {
@@ -228,6 +229,7 @@ async def driven(page: Page, robot: Overheard, stick: Stick, readings: Readings)
     if stick.sees:
         await until(lambda: bool(readings.pictures.get(stick.sees)), lambda: "no picture came")
     pictures = set(readings.pictures.get(stick.sees, ()))
+    places = await shown_places(page)
     cell = page.locator("[data-cell]", has=page.get_by_role("heading", name=stick.cell))
     pad = cell.locator(stick.pad)
     await expect(pad).to_be_visible()
@@ -238,13 +240,29 @@ async def driven(page: Page, robot: Overheard, stick: Stick, readings: Readings)
     def has_moved() -> bool:
         now = readings.values.get(stick.moves)
         is_told = newest(robot, transport, stop, mark) == "motion"
-        return is_told and now is not None and now != before
+        # On a map a step must be longer than the last digit of the place.
+        is_short = (
+            places and before is not None and now is not None and abs(now - before) < LEAST_STEP_M
+        )
+        return is_told and now is not None and now != before and not is_short
 
     await held(page, pad, has_moved, right=stick.right, up=stick.up)
     await until(
         lambda: newest(robot, transport, stop, mark) == "stop",
         lambda: f"it was not stopped: {robot.bytes_since(transport, mark)!r}",
     )
+    for text, before_text in places:
+        await expect(text).not_to_have_text(before_text, timeout=PATIENCE_MS)
     if stick.sees:
         seen = readings.pictures[stick.sees]
         await until(lambda: bool(seen - pictures), lambda: "the picture is the same as before")
+
+
+async def shown_places(page: Page) -> list[tuple[Locator, str]]:
+    """Return where each map of the page says that the robot is: the place itself, not its value."""
+    texts = await page.locator(".map-text").all()
+    found = []
+    for text in texts:
+        await expect(text).to_contain_text(" m", timeout=PATIENCE_MS)
+        found.append((text, await text.inner_text()))
+    return found
