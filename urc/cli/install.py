@@ -27,6 +27,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="refuse the package, unless the key of this fingerprint signed it",
     )
     parser.add_argument(
+        "--withdrawn",
+        action="store_true",
+        help="also take a version that its repository has withdrawn",
+    )
+    parser.add_argument(
         "--lock",
         metavar="FILE",
         type=Path,
@@ -44,7 +49,7 @@ def run(arguments: argparse.Namespace) -> int:
     pinned = _pinned(lock_file)
     if pinned is not None and is_path(arguments.package):
         raise Misuse("a lock chooses among the versions of repositories; name a package")
-    plan = planned(arguments.package, pinned)
+    plan = planned(arguments.package, pinned, takes_withdrawn=arguments.withdrawn)
     store = open_store()
     with store.changing() as change:
         folder = change.stage(plan)

@@ -16,18 +16,25 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Print what was asked for, and what it brought."""
     from urc.cli.output import json_text
-    from urc.cli.packages import open_store
+    from urc.cli.packages import known_entries, open_store
+    from urc.packages.install import withdrawn_lines
+    from urc.problems import printable
 
     if arguments.updates:
         return _updates(is_json=arguments.json)
-    for lock in open_store().installed():
+    installed = open_store().installed()
+    gone = [one for one in known_entries() if one.why_withdrawn] if installed else []
+    for lock in installed:
+        withdrawn = withdrawn_lines(lock, gone)
         needs = {key: pin.version for key, pin in lock.packages.items() if key != lock.root}
         if arguments.json:
             said = {"package": lock.root, "version": lock.version, "needs": needs}
-            print(json_text(said))
+            print(json_text({**said, "withdrawn": withdrawn} if withdrawn else said))
         else:
             rest = ", ".join(f"{key} {version}" for key, version in needs.items())
             print(f"{lock}  with {rest}" if rest else str(lock))
+            for line in withdrawn:
+                print(printable(f"  ▲ {line}"))
     return 0
 
 

@@ -10,6 +10,7 @@ from urc.cli.failures import Misuse
 from urc.cli.output import complain
 
 if TYPE_CHECKING:
+    from urc.packages.index import Entry
     from urc.packages.lock import Lock
     from urc.packages.plan import Plan
     from urc.packages.repositories import Repositories
@@ -20,6 +21,7 @@ __all__ = [
     "installed_document",
     "is_agreed",
     "is_path",
+    "known_entries",
     "open_store",
     "planned",
     "repositories",
@@ -69,7 +71,7 @@ def is_path(word: str) -> bool:
     return is_told or (path / "package.yaml").is_file()
 
 
-def planned(word: str, pinned: "Lock | None" = None) -> "Plan":
+def planned(word: str, pinned: "Lock | None" = None, *, takes_withdrawn: bool = False) -> "Plan":
     """Return what a package's name, file or folder comes to, with all archives fetched."""
     from urc.packages.install import plan_file, plan_wish
     from urc.packages.names import parse_wish
@@ -81,7 +83,20 @@ def planned(word: str, pinned: "Lock | None" = None) -> "Plan":
         return plan_file(source, known, store, complain)
     if not known:
         raise Misuse("no repository is known; 'urc repo add URL' adds one")
-    return plan_wish(parse_wish(word), known, store, complain, pinned)
+    return plan_wish(
+        parse_wish(word), known, store, complain, pinned, takes_withdrawn=takes_withdrawn
+    )
+
+
+def known_entries() -> "list[Entry]":
+    """Return what the repositories said last; nobody is asked."""
+    from urc.packages.names import PackageError
+
+    try:
+        return [entry for one in repositories().all() for entry in one.known()]
+    except PackageError as error:
+        complain(str(error))
+        return []
 
 
 def is_agreed(question: str) -> bool:

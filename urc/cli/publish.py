@@ -2,7 +2,13 @@
 
 import argparse
 from pathlib import Path
+from typing import TYPE_CHECKING
 
+if TYPE_CHECKING:
+    from urc.packages.notes import Provenance
+    from urc.packages.sources import FileSource
+
+_TOLD_MOST = 5
 EXAMPLE = "urc publish lab/drivers/puppet --to https://robots.example/ --token-file token.txt"
 
 
@@ -21,6 +27,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--key", metavar="FILE", type=Path, help="of the publisher (default: your own, if any)"
+    )
+    parser.add_argument(
+        "--source", metavar="URL", default="", help="where it was made from: told who installs it"
+    )
+    parser.add_argument(
+        "--commit", metavar="HEX", default="", help="of --source, that it was made from"
+    )
+    parser.add_argument(
+        "--allow-warnings", action="store_true", help="publish what 'urc validate' warns of"
     )
     parser.add_argument(
         "--insecure", action="store_true", help="send the token where others can read it"
@@ -42,16 +57,60 @@ def run(arguments: argparse.Namespace) -> int:
             f"{url} is not encrypted: anybody on the way can read the token; use https,"
             " or --insecure in a network that you trust"
         )
-    token = read_token(arguments.token_file)
+    token, made = read_token(arguments.token_file), _provenance(arguments)
     key = signer(arguments.key)
     for path in arguments.packages:
         source = open_source(path.expanduser())
         package = next(one for one in source.packages if one.manifest.key == source.roots[0])
+        _look(source, path.expanduser() / package.manifest.main, arguments)
         said = package.manifest
         signature = source.signatures.get(package.digest)
         if signature is None and key is not None:
             signature = key.sign(said.key, said.version, package.digest)
-        done = publish(url, package, signature, token)
+        done = publish(url, package, signature, token, made)
         who = f"signed by {signature}" if signature else "not signed"
         print(f"{'published' if done.is_new else 'there already:'} {done.listed}, {who}")
     return 0
+
+
+def _provenance(arguments: argparse.Namespace) -> "Provenance | None":
+    """Return where the packages were made, if that is told."""
+    import msgspec
+
+    from urc import __version__
+    from urc.cli.failures import Misuse
+    from urc.packages.names import PackageError
+    from urc.packages.notes import Provenance
+
+    if not arguments.source:
+        if arguments.commit:
+            raise Misuse("--commit names a commit of --source; name that, too")
+        return None
+    said = {"source": arguments.source, "commit": arguments.commit, "tool": f"urc {__version__}"}
+    try:
+        made = msgspec.convert(said, Provenance)
+        made.check()
+    except (msgspec.ValidationError, PackageError) as error:
+        raise Misuse(f"--source and --commit: {error}") from None
+    return made
+
+
+def _look(source: "FileSource", document: Path, arguments: argparse.Namespace) -> None:
+    """Refuse a package of a folder with findings; what is packed already the repository looks at.
+
+    Raises:
+        PackageError: the errors, and the warnings unless they are allowed.
+    """
+    from urc.packages.names import PackageError
+    from urc.runtime.examine import findings
+
+    if not source.is_folder:
+        return
+    found = findings(document)
+    if arguments.allow_warnings:
+        found = [one for one in found if one.severity == "error"]
+    if found:
+        told = "; ".join(problem.headline for problem in found[:_TOLD_MOST])
+        only = all(one.severity == "warning" for one in found)
+        hint = "; --allow-warnings publishes it all the same" if only else ""
+        raise PackageError(f"{told}{hint}")

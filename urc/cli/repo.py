@@ -1,6 +1,7 @@
 """`urc repo`: repositories of packages, those of others and one's own."""
 
 import argparse
+import asyncio
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -11,6 +12,7 @@ from urc.cli.output import complain
 from urc.cli.repo_keys import key, token
 
 if TYPE_CHECKING:
+    from urc.packages.head import Seal
     from urc.packages.tokens import Tokens
 
 EXAMPLE = "urc repo add http://192.168.1.5:8090/"
@@ -18,6 +20,8 @@ EXAMPLE = "urc repo add http://192.168.1.5:8090/"
 _PORT = 8090
 _ARCHIVE_S = 60.0
 """In which a whole archive must come that somebody publishes."""
+_RENEW_S = 3600.0
+"""How often a server looks whether its index must be signed anew."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -26,7 +30,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "action",
         metavar="ACTION",
         choices=tuple(_ACTIONS),
-        help="add URL, remove URL, list, search WORD…, index DIR, serve DIR;"
+        help="add URL, remove URL, list, search WORD…, index DIR, serve DIR,"
+        " withdraw DIR PACKAGE VERSION, restore DIR PACKAGE VERSION;"
         " token add|remove NAME, token list; key new NAME, key show, key list, key forget PACKAGE",
     )
     parser.add_argument(
@@ -50,12 +55,31 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--key",
         metavar="FILE",
         type=Path,
-        help="of index, serve and key: a publisher's key (default: your own, if any)",
+        help="of index, serve, withdraw, restore and key: a publisher's key (default: your own,"
+        " if any)",
+    )
+    parser.add_argument(
+        "--valid",
+        metavar="DAYS",
+        type=_days,
+        default=14,
+        help="of index, serve, withdraw and restore: for how long a signed index holds, 1 to 365"
+        " (default: 14)",
+    )
+    parser.add_argument(
+        "--why", metavar="TEXT", help="of withdraw: what is told who has it installed"
     )
     add_host(parser)
     parser.add_argument(
         "--port", type=port, default=_PORT, help=f"of serve; 0 takes a free one (default: {_PORT})"
     )
+
+
+def _days(text: str) -> int:
+    """Return a number of days; raise what argparse tells in one line."""
+    if text.isdecimal() and len(text) < 4 and 1 <= int(text) <= 365:
+        return int(text)
+    raise argparse.ArgumentTypeError(f"1 to 365 days are expected, found {text[:20]!r}")
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -73,8 +97,11 @@ def _add(arguments: argparse.Namespace) -> int:
     from urc.cli.packages import repositories
     from urc.problems import printable
 
-    url, index = repositories().add(_one(arguments, "URL"))
+    known = repositories()
+    url, index = known.add(_one(arguments, "URL"))
     print(printable(f"added {url}: {index.name}, {len(index.packages)} versions of packages"))
+    keeper = next((one.keeper for one in known.all() if one.name == url), "")
+    print(printable(f"its index is signed by {keeper}" if keeper else "its index is not signed"))
     if url.startswith("http:"):
         complain(f"urc repo: {url} is not encrypted: who is in between can change what is listed")
     return 0
@@ -89,11 +116,13 @@ def _remove(arguments: argparse.Namespace) -> int:
 
 def _list(arguments: argparse.Namespace) -> int:
     from urc.cli.packages import repositories
+    from urc.problems import printable
 
     if arguments.words:
         raise Misuse("'urc repo list' takes no more words")
     for repository in repositories().all():
-        print(repository.name)
+        keeper = repository.keeper
+        print(printable(f"{repository.name}  signed by {keeper}" if keeper else repository.name))
     return 0
 
 
@@ -105,16 +134,51 @@ def _search(arguments: argparse.Namespace) -> int:
 
 def _index(arguments: argparse.Namespace) -> int:
     """List what is in a folder, for any static web server; 1 when something is not listed."""
-    from urc.cli.packages import signer
     from urc.packages.keeper import make_index
     from urc.runtime.examine import examine
 
-    folder = Path(_one(arguments, "DIR"))
-    listing = make_index(folder, _name(arguments, folder), examine, signer(arguments.key))
+    folder, seal = Path(_one(arguments, "DIR")), _seal(arguments)
+    listing = make_index(folder, _name(arguments, folder), examine, seal)
     for fault in listing.faults:
         complain(f"not listed: {fault}")
     print(f"{folder / 'index.json'}  {len(listing.listed.packages)} versions of packages")
+    if seal is not None:
+        print(f"signed by {seal.signer}; sign it anew ('urc repo index', or a running"
+              f" 'urc repo serve') within {arguments.valid / 2:g} days")  # fmt: skip
     return 1 if listing.faults else 0
+
+
+def _seal(arguments: argparse.Namespace) -> "Seal | None":
+    """Return what the index is signed with; None: there is no key."""
+    from urc.cli.packages import signer
+    from urc.packages.head import Seal
+
+    key = signer(arguments.key)
+    return Seal(key, arguments.valid * 86400.0) if key is not None else None
+
+
+def _withdraw(arguments: argparse.Namespace) -> int:
+    """Offer a version no more, and say why."""
+    if not (arguments.why or "").strip():
+        raise Misuse("'urc repo withdraw' needs --why: it is told who has it installed")
+    return _note(arguments, arguments.why.strip())
+
+
+def _restore(arguments: argparse.Namespace) -> int:
+    """Offer a version again."""
+    return _note(arguments, "")
+
+
+def _note(arguments: argparse.Namespace, why: str) -> int:
+    from urc.packages.keeper import withdraw
+    from urc.packages.names import parse_key
+
+    if len(arguments.words) != 3:
+        raise Misuse(f"'urc repo {arguments.action}' takes DIR PACKAGE VERSION")
+    folder, package, version = arguments.words
+    entry = withdraw(Path(folder), parse_key(package), version, why, _seal(arguments))
+    print(f"{entry} is withdrawn: {why}" if why else f"{entry} is offered again")
+    return 0
 
 
 def _serve(arguments: argparse.Namespace) -> int:
@@ -126,22 +190,39 @@ def _serve(arguments: argparse.Namespace) -> int:
     from urc.web.server import serve
 
     folder = Path(_one(arguments, "DIR"))
-    tokens = _tokens(arguments, folder)
+    tokens, seal = _tokens(arguments, folder), _seal(arguments)
     _index(arguments)
     if not is_loopback(arguments.host):
         complain(f"urc repo: anyone on the network of {arguments.host} can read this repository")
 
     async def work() -> int:
-        await serve(
-            repository_app(folder, tokens, examine_apart),
-            host=arguments.host,
-            port=arguments.port,
-            on_ready=_print_url,
-            request_s=_ARCHIVE_S if tokens else REQUEST_S,
-        )
+        renewing = asyncio.create_task(_renewing(folder, seal))
+        try:
+            await serve(
+                repository_app(folder, tokens, examine_apart, seal),
+                host=arguments.host,
+                port=arguments.port,
+                on_ready=_print_url,
+                request_s=_ARCHIVE_S if tokens else REQUEST_S,
+            )
+        finally:
+            renewing.cancel()
         return 0
 
     return run_loop(work(), code_when_ended=0)
+
+
+async def _renewing(folder: Path, seal: "Seal | None") -> None:
+    """Sign the index anew before it expires, for as long as it is served."""
+    from urc.packages.keeper import renew
+    from urc.packages.names import PackageError
+
+    while seal is not None:
+        await asyncio.sleep(_RENEW_S)
+        try:
+            await asyncio.to_thread(renew, folder, seal)
+        except (PackageError, OSError) as error:
+            complain(f"urc repo: the index is not signed anew: {error}")
 
 
 def _tokens(arguments: argparse.Namespace, folder: Path) -> "Tokens | None":
@@ -177,6 +258,8 @@ _ACTIONS: dict[str, Callable[[argparse.Namespace], int]] = {
     "search": _search,
     "index": _index,
     "serve": _serve,
+    "withdraw": _withdraw,
+    "restore": _restore,
     "token": token,
     "key": key,
 }

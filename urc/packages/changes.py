@@ -1,7 +1,8 @@
 """An index that grows: how a keeper writes it, and how a client takes only what is new.
 
     index.json              all that there is, with a number that only ever grows
-    index/head.json         the number, and the digest of `index.json`: what is asked for first
+    index/head.json         the number, and the digest of `index.json`: what is asked for first,
+                            and what the keeper signs, see `head`
     index/changes-12.json   what made number 12 out of number 11; never changed afterwards
 
 All of them are plain files, so a static web server gives them out as well. A client that has number
@@ -12,40 +13,26 @@ the whole one.
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import Annotated, Final
+from typing import Annotated
 
 import msgspec
 
 from urc.packages import disk
+from urc.packages.head import HEAD, HEAD_BYTES, Head, Seal, next_head, read_head
 from urc.packages.index import INDEX, INDEX_BYTES, Entry, Index, check_entries, in_order, read_index
 from urc.packages.names import PackageError
 from urc.packages.package import sha256
 
 __all__ = [
-    "HEAD",
-    "HEAD_BYTES",
-    "Head",
     "IndexChange",
     "applied",
     "change_file",
+    "head_in",
     "read_change",
-    "read_head",
     "write_index",
 ]
 
-HEAD: Final = "index/head.json"
-HEAD_BYTES: Final = 4096
-_Digest = Annotated[str, msgspec.Meta(pattern=r"\A[0-9a-f]{64}\Z")]
 _Number = Annotated[int, msgspec.Meta(ge=0, le=1 << 53)]
-
-
-class Head(msgspec.Struct, frozen=True):
-    """What is asked for first."""
-
-    format: Annotated[int, msgspec.Meta(ge=1, le=1)]
-    number: _Number
-    sha256: _Digest
-    """Of `index.json`."""
 
 
 class IndexChange(msgspec.Struct, frozen=True, omit_defaults=True):
@@ -65,14 +52,6 @@ class IndexChange(msgspec.Struct, frozen=True, omit_defaults=True):
 def change_file(number: int) -> str:
     """Return where the change that made a number is, relative to the index."""
     return f"index/changes-{number}.json"
-
-
-def read_head(data: bytes, where: str) -> Head:
-    """Return a head that came from outside; raise `PackageError`."""
-    try:
-        return msgspec.json.decode(data, type=Head)
-    except (msgspec.DecodeError, UnicodeDecodeError) as error:
-        raise PackageError(f"{where}: this is no head of an index: {error}") from None
 
 
 def read_change(data: bytes, where: str) -> IndexChange:
@@ -103,7 +82,9 @@ def applied(index: Index, changes: Iterable[IndexChange]) -> Index:
     return Index(1, name, in_order(entries.values()), number)
 
 
-def write_index(folder: Path, name: str, entries: Sequence[Entry], work: Path) -> Index:
+def write_index(
+    folder: Path, name: str, entries: Sequence[Entry], work: Path, seal: Seal | None = None
+) -> Index:
     """Write what a repository has: its change first, then the whole, then the head.
 
     Whenever this ends, every file that can be asked for is whole, and the next call mends the rest.
@@ -113,19 +94,24 @@ def write_index(folder: Path, name: str, entries: Sequence[Entry], work: Path) -
         name: what it is called.
         entries: all that there is.
         work: for what is not whole yet.
+        seal: the keeper's, who answers for the index with it.
 
     Raises:
+        PackageError: the index is signed with a key that is not at hand; nothing has changed.
         OSError: the disk is full, for example.
     """
     before, number = _before(folder)
     index = Index(1, name, in_order(entries), number)
-    if before is None or (before.name, before.packages) != (index.name, index.packages):
+    is_new = before is None or (before.name, before.packages) != (index.name, index.packages)
+    if is_new:
         number += 1
         index = Index(1, name, index.packages, number)
+    data = index.to_bytes()
+    head = next_head(head_in(folder), number, sha256(data), seal).to_bytes()
+    if is_new:
         change = _difference(before or Index(1, "", ()), index)
         disk.put_file(folder / change_file(number), msgspec.json.encode(change) + b"\n", work)
-        disk.put_file(folder / INDEX, index.to_bytes(), work)
-    head = msgspec.json.encode(Head(1, number, sha256(index.to_bytes()))) + b"\n"
+        disk.put_file(folder / INDEX, data, work)
     if _content(folder / HEAD, HEAD_BYTES) != head:
         disk.put_file(folder / HEAD, head, work)
     return index
@@ -153,10 +139,15 @@ def _before(folder: Path) -> tuple[Index | None, int]:
     for file in (folder / "index").glob("changes-*.json"):
         digits = file.stem.removeprefix("changes-")
         numbers += [int(digits)] if digits.isdecimal() and len(digits) < 16 else []
-    head = _content(folder / HEAD, HEAD_BYTES)
+    head = head_in(folder)
+    return None, max(*numbers, head.number if head is not None else 0)
+
+
+def head_in(folder: Path) -> Head | None:
+    """Return the head that stands in a repository's folder; None: there is none that is sound."""
     with suppress(PackageError):
-        numbers.append(read_head(head or b"", HEAD).number)
-    return None, max(numbers)
+        return read_head(_content(folder / HEAD, HEAD_BYTES) or b"", HEAD)
+    return None
 
 
 def _content(file: Path, most: int) -> bytes | None:

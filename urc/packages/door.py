@@ -5,34 +5,44 @@ import base64
 import re
 from collections.abc import Callable
 from pathlib import Path
-from typing import Final
+from typing import Final, TypeVar
 
 import msgspec
 from starlette.requests import ClientDisconnect, Request
 from starlette.responses import JSONResponse, Response
 
 from urc.packages.archive import PACKAGE
+from urc.packages.head import Seal
 from urc.packages.intake import Refused, Taken, take
 from urc.packages.names import FOLDERS, Key, PackageError
+from urc.packages.notes import PROVENANCE, Provenance
 from urc.packages.package import sha256
 from urc.packages.signature import SIGNATURE, Signature
 from urc.packages.tokens import Tokens
 
 __all__ = ["Door"]
 
-_SIGNATURE_LONGEST: Final = 2048
+_HEADER_LONGEST: Final = 2048
 _FILE: Final = re.compile(r"archives/([a-z]+)/([a-z][a-z0-9-]{0,63})/([0-9A-Za-z.-]{1,64})\.zip")
 _WAITING_MOST: Final = 8
+_Told = TypeVar("_Told", Signature, Provenance)
 _HEADERS: Final = {"cache-control": "no-store", "x-content-type-options": "nosniff"}
 
 
 class Door:
     """Takes `PUT archives/drivers/puppet/1.0.0.zip`, with `authorization: Bearer TOKEN`."""
 
-    def __init__(self, folder: Path, tokens: Tokens, examine: Callable[[Path], list[str]]) -> None:
+    def __init__(
+        self,
+        folder: Path,
+        tokens: Tokens,
+        examine: Callable[[Path], list[str]],
+        seal: Seal | None = None,
+    ) -> None:
         self._folder = folder
         self._tokens = tokens
         self._examine = examine
+        self._seal = seal
         self._turn = asyncio.Lock()
         self._waiting = 0
 
@@ -83,7 +93,13 @@ class Door:
         return key
 
     async def _taken(self, request: Request, body: bytes) -> Taken:
-        signature = _signature(request.headers.get(SIGNATURE, ""))
+        signature = _header(request, SIGNATURE, Signature, "no signature")
+        provenance = _header(request, PROVENANCE, Provenance, "nothing of where it was made")
+        try:
+            if provenance is not None:
+                provenance.check()
+        except PackageError as error:
+            raise Refused(400, f"the header {PROVENANCE}: {error}") from None
         if self._waiting >= _WAITING_MOST:
             raise Refused(503, "too many packages are being published; try again")
         self._waiting += 1
@@ -98,6 +114,8 @@ class Door:
                         body,
                         signature,
                         self._examine,
+                        provenance,
+                        self._seal,
                     )
                 )
         finally:
@@ -121,15 +139,17 @@ async def _body(request: Request, *, is_kept: bool) -> bytes:
     return body
 
 
-def _signature(text: str) -> Signature | None:
+def _header(request: Request, name: str, kind: type[_Told], lacks: str) -> _Told | None:
+    """Return what a header says as JSON in base64, None where there is none; raise `Refused`."""
+    text = request.headers.get(name, "")
     if not text:
         return None
     try:
-        if len(text) > _SIGNATURE_LONGEST:
+        if len(text) > _HEADER_LONGEST:
             raise ValueError
-        return msgspec.json.decode(base64.b64decode(text, validate=True), type=Signature)
+        return msgspec.json.decode(base64.b64decode(text, validate=True), type=kind)
     except (ValueError, msgspec.DecodeError):
-        raise Refused(400, f"the header {SIGNATURE} holds no signature") from None
+        raise Refused(400, f"the header {name} holds {lacks}") from None
 
 
 def _told(status: int, said: dict[str, str], headers: dict[str, str] | None = None) -> Response:

@@ -7,6 +7,7 @@ import msgspec
 
 from urc.packages.archive import PACKAGE
 from urc.packages.names import KINDS, NAME, Key, PackageError, parse_key
+from urc.packages.notes import Notes, Provenance
 from urc.packages.package import Package
 from urc.packages.signature import Signature
 from urc.packages.versions import Version, parse_range, parse_version
@@ -44,6 +45,15 @@ class Entry(msgspec.Struct, frozen=True):
     needs: dict[str, _Text] = {}
     signature: Signature | msgspec.UnsetType = msgspec.UNSET
     """Who made it, if anybody says so."""
+    withdrawn: _Text | msgspec.UnsetType = msgspec.UNSET
+    """Why it is not offered any more."""
+    provenance: Provenance | msgspec.UnsetType = msgspec.UNSET
+    """Where it was made, if anybody says so."""
+
+    @property
+    def why_withdrawn(self) -> str:
+        """Why it is not offered any more; "" while it is."""
+        return self.withdrawn if isinstance(self.withdrawn, str) else ""
 
     @property
     def signed(self) -> Signature | None:
@@ -83,8 +93,11 @@ class Index(msgspec.Struct, frozen=True):
         return msgspec.json.format(msgspec.json.encode(self), indent=1) + b"\n"
 
 
-def entry_of(package: Package, signature: Signature | None = None) -> Entry:
+def entry_of(
+    package: Package, signature: Signature | None = None, notes: Notes | None = None
+) -> Entry:
     """Return what an index says of a package."""
+    notes = notes or Notes()
     said = package.manifest
     return Entry(
         *said.key,
@@ -97,6 +110,8 @@ def entry_of(package: Package, signature: Signature | None = None) -> Entry:
         summary=said.summary,
         needs=said.needs,
         signature=signature or msgspec.UNSET,
+        withdrawn=notes.withdrawn or msgspec.UNSET,
+        provenance=notes.provenance or msgspec.UNSET,
     )
 
 
@@ -135,7 +150,10 @@ def check_entries(entries: Iterable[Entry]) -> None:
 
 
 def search(entries: Iterable[Entry], words: Sequence[str], kind: str = "") -> list[Entry]:
-    """Return the newest version of each package that has all words, those named so first."""
+    """Return the newest version of each package that has all words, those named so first.
+
+    What was withdrawn is left out.
+    """
     wanted = [word.casefold() for word in words]
     found: dict[tuple[str, str], Entry] = {}
     for entry in entries:
@@ -144,6 +162,8 @@ def search(entries: Iterable[Entry], words: Sequence[str], kind: str = "") -> li
         text = f"{entry.kind} {entry.name} {entry.summary}".casefold()
         if all(word in text for word in wanted):
             other = found.get((entry.kind, entry.name))
+            if entry.withdrawn is not msgspec.UNSET:
+                continue
             if other is None or other.number < entry.number:
                 found[entry.kind, entry.name] = entry
     return sorted(

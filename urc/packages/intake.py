@@ -5,13 +5,17 @@ from pathlib import Path
 from secrets import token_hex
 from typing import NamedTuple
 
+import msgspec
+
 from urc.packages import disk
 from urc.packages.archive import PACKAGE, read_archive
-from urc.packages.changes import write_index
+from urc.packages.changes import head_in, write_index
+from urc.packages.head import Seal, check_key
 from urc.packages.index import INDEX, INDEX_BYTES, Entry, entry_of, read_index
 from urc.packages.install import check_names
 from urc.packages.keeper import changing, keep, read_signature
 from urc.packages.names import Key, PackageError
+from urc.packages.notes import Notes, Provenance, read_notes
 from urc.packages.package import Package, open_package
 from urc.packages.resolver import resolve
 from urc.packages.signature import Signature
@@ -41,6 +45,8 @@ def take(
     data: bytes,
     signature: Signature | None,
     examine: Callable[[Path], list[str]],
+    provenance: Provenance | None = None,
+    seal: Seal | None = None,
 ) -> Taken:
     """List a package, after looking at it as at any that a stranger sends.
 
@@ -50,6 +56,8 @@ def take(
         data: the archive.
         signature: who signed it, if anybody says so.
         examine: returns what is wrong with a document that stands in a folder of packages.
+        provenance: where it was made, if anybody says so.
+        seal: the keeper's, which signs the index.
 
     Raises:
         Refused: with what is wrong.
@@ -59,6 +67,7 @@ def take(
     with changing(folder) as work:
         with open(folder / INDEX, "rb") as file:
             index = read_index(file.read(INDEX_BYTES + 1), INDEX)
+        check_key(head_in(folder), seal)  # before anything is written
         archive = folder / entry.file
         is_known = archive.is_file()
         if is_known and archive.read_bytes() != data:
@@ -70,15 +79,23 @@ def take(
         before = read_signature(archive) if is_known else None
         if before is not None and signature is not None and before != signature:
             raise Refused(409, f"{entry} is listed already, signed by {before}")
-        entry = entry_of(package, signature or before)
+        notes = _noted(read_notes(archive) if is_known else Notes(), provenance, entry)
+        entry = entry_of(package, signature or before, notes)
         if entry in index.packages:
             return Taken(entry, False)
         others = [one for one in index.packages if one.file != entry.file]
         if not is_known:
             _look(package, entry, others, folder, work, examine)
-        entry = keep(folder, package, signature or before, work)
-        write_index(folder, index.name, [*others, entry], work)
+        entry = keep(folder, package, signature or before, work, notes)
+        write_index(folder, index.name, [*others, entry], work, seal)
     return Taken(entry, True)
+
+
+def _noted(notes: Notes, provenance: Provenance | None, entry: Entry) -> Notes:
+    """Return the notes about a version, and where it was made; the first who says that counts."""
+    if None not in (notes.provenance, provenance) and notes.provenance != provenance:
+        raise Refused(409, f"{entry} is listed already, {notes.provenance}")
+    return msgspec.structs.replace(notes, provenance=notes.provenance or provenance)
 
 
 def _opened(file: str, data: bytes, signature: Signature | None) -> tuple[Package, Entry]:
@@ -107,7 +124,8 @@ def _look(
     """Put a package and all that it needs into a folder of its own, and look at it there."""
     known: dict[Key, list[Entry]] = {}
     for one in (*others, entry):
-        known.setdefault(one.key, []).append(one)
+        if not one.why_withdrawn:
+            known.setdefault(one.key, []).append(one)
     try:
         chosen = resolve(entry.key, entry.version, known)
         home = work / token_hex(8)

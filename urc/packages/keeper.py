@@ -3,6 +3,7 @@
 DIR/drivers/puppet/package.yaml …     what the keeper writes, one folder for each package
 DIR/archives/drivers/puppet/1.0.0.zip every version that was ever listed
 DIR/archives/drivers/puppet/1.0.0.sig who signed it, if anybody did
+DIR/archives/drivers/puppet/1.0.0.json where it was made, and whether it is withdrawn
 DIR/index.json, DIR/index/…           what there is, and what changed, see `changes`
 DIR/drivers/puppet/urcpm.json         the same in the thesis's form
 """
@@ -17,14 +18,26 @@ import msgspec
 
 from urc.packages import disk
 from urc.packages.archive import PACKAGE
-from urc.packages.changes import write_index
+from urc.packages.changes import head_in, write_index
+from urc.packages.head import Seal, check_key
 from urc.packages.index import INDEX, INDEX_BYTES, Entry, Index, entry_of, read_index
 from urc.packages.manifest import MANIFEST, Manifest
-from urc.packages.names import FOLDERS, PackageError, parse_key
+from urc.packages.names import FOLDERS, Key, PackageError, parse_key
+from urc.packages.notes import Notes, Provenance, read_notes, write_notes
 from urc.packages.package import Package, open_package, pack_folder, sha256
 from urc.packages.signature import Signature, Signer
 
-__all__ = ["Listing", "changing", "keep", "make_index", "read_signature", "urcpm"]
+__all__ = [
+    "Listing",
+    "changing",
+    "keep",
+    "make_index",
+    "notes_of",
+    "read_signature",
+    "renew",
+    "urcpm",
+    "withdraw",
+]
 
 _THESIS: Final = ("driver", "interface", "widget")
 _PACKAGES_MOST: Final = 20_000
@@ -40,7 +53,7 @@ class Listing(NamedTuple):
 
 
 def make_index(
-    folder: Path, name: str, examine: Callable[[Path], list[str]], signer: Signer | None = None
+    folder: Path, name: str, examine: Callable[[Path], list[str]], seal: Seal | None = None
 ) -> Listing:
     """Look at every package in a folder, list those that are sound, and write `index.json`.
 
@@ -48,7 +61,7 @@ def make_index(
         folder: the repository.
         name: what it is called.
         examine: returns what is wrong with a package's document, one line each.
-        signer: signs what is new in the keeper's folders.
+        seal: the keeper's, which signs the index, and what is new in the keeper's folders.
 
     Raises:
         PackageError: there is no such folder, or it cannot be written to.
@@ -58,6 +71,7 @@ def make_index(
     try:
         with changing(folder) as work:
             faults: list[str] = []
+            signer = seal.signer if seal is not None else None
             for home in _homes(folder):
                 faults += _take(folder, home, work, examine, signer)
             entries = []
@@ -67,7 +81,7 @@ def make_index(
                     entries.append(_entry(folder, file, known))
                 except PackageError as error:
                     faults.append(str(error))
-            index = write_index(folder, name, entries, work)
+            index = write_index(folder, name, entries, work, seal)
     except OSError as error:
         raise PackageError(f"{error.filename or folder}: {error.strerror or error}") from None
     return Listing(index, tuple(faults))
@@ -89,13 +103,20 @@ def changing(folder: Path) -> Iterator[Path]:
             shutil.rmtree(work, ignore_errors=True)
 
 
-def keep(folder: Path, package: Package, signature: Signature | None, work: Path) -> Entry:
+def keep(
+    folder: Path,
+    package: Package,
+    signature: Signature | None,
+    work: Path,
+    notes: Notes | None = None,
+) -> Entry:
     """Put an archive into a repository; it is listed when the index is written next.
 
-    The signature goes first: an archive that is there is whole in every way.
+    What is said of it goes first: an archive that is there is whole in every way.
     """
-    entry = entry_of(package, signature)
+    entry = entry_of(package, signature, notes)
     archive = folder / entry.file
+    write_notes(archive, notes or Notes(), work)
     if signature is not None:
         disk.put_file(archive.with_suffix(_SIGNED), msgspec.json.encode(signature) + b"\n", work)
     elif not archive.is_file():
@@ -103,6 +124,71 @@ def keep(folder: Path, package: Package, signature: Signature | None, work: Path
     if not archive.is_file():
         disk.put_file(archive, package.data, work)
     return entry
+
+
+def notes_of(entry: Entry) -> Notes:
+    """Return what an index says of a version beside the package itself; raise `PackageError`."""
+    provenance = entry.provenance if isinstance(entry.provenance, Provenance) else None
+    try:
+        return Notes(entry.why_withdrawn, provenance)
+    except ValueError as error:
+        raise PackageError(f"{entry}: {error}") from None
+
+
+def withdraw(folder: Path, key: Key, version: str, why: str, seal: Seal | None) -> Entry:
+    """Offer a version no more, or again; return what the index says of it.
+
+    Args:
+        folder: the repository.
+        key: which package.
+        version: which version of it.
+        why: what is told who has it installed; "": it is offered again.
+        seal: the keeper's, for an index that is signed.
+
+    Raises:
+        PackageError: it is not listed, or the repository cannot be written to.
+    """
+    try:
+        with changing(folder) as work:
+            with open(folder / INDEX, "rb") as file:
+                index = read_index(file.read(INDEX_BYTES + 1), INDEX)
+            head = head_in(folder)
+            check_key(head, seal)  # before anything is written
+            before = _listed(index, key, version)
+            after = msgspec.structs.replace(before, withdrawn=why or msgspec.UNSET)
+            notes = _checked(notes_of(after))
+            entries = [after if one is before else one for one in index.packages]
+            # The note goes first: an index that is made anew in between says the same.
+            write_notes(folder / before.file, notes, work)
+            is_signed = head is not None and head.signed is not None
+            write_index(folder, index.name, entries, work, seal if is_signed else None)
+    except OSError as error:
+        raise PackageError(f"{error.filename or folder}: {error.strerror or error}") from None
+    return after
+
+
+def _listed(index: Index, key: Key, version: str) -> Entry:
+    for one in index.packages:
+        if (one.key, one.version) == (key, version):
+            return one
+    there = ", ".join(one.version for one in index.packages if one.key == key)
+    raise PackageError(f"{key} {version} is not listed; of it there is {there or 'nothing'}")
+
+
+def _checked(notes: Notes) -> Notes:
+    """Return notes that can be read again; raise `PackageError`."""
+    try:
+        return msgspec.json.decode(msgspec.json.encode(notes), type=Notes)
+    except msgspec.DecodeError as error:
+        raise PackageError(f"--why: {error}") from None
+
+
+def renew(folder: Path, seal: Seal) -> None:
+    """Sign an index anew where that is due; raise `PackageError`, or `OSError`."""
+    with changing(folder) as work:
+        with open(folder / INDEX, "rb") as file:
+            index = read_index(file.read(INDEX_BYTES + 1), INDEX)
+        write_index(folder, index.name, index.packages, work, seal)
 
 
 def _homes(folder: Path) -> list[Path]:
@@ -167,12 +253,12 @@ def _archives(folder: Path) -> list[Path]:
 def _entry(folder: Path, file: Path, known: Mapping[str, Entry]) -> Entry:
     with open(file, "rb") as opened:
         data = opened.read(PACKAGE.archive_bytes + 1)
-    signature = read_signature(file)
+    signature, notes = read_signature(file), read_notes(file)
     entry = known.get(file.relative_to(folder).as_posix())
     is_known = entry is not None and entry.sha256 == sha256(data) and entry.signed == signature
-    if entry is None or not is_known:
+    if entry is None or not is_known or notes_of(entry) != notes:
         package = open_package(data, str(file))
-        entry = entry_of(package, signature)
+        entry = entry_of(package, signature, notes)
         if signature is not None:
             signature.check(entry.key, entry.version, entry.sha256)
     if folder / entry.file != file:

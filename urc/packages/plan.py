@@ -22,3 +22,5 @@ class Plan(NamedTuple):
     own: frozenset[str] = frozenset()
     """``drivers/puppet``, of what comes from a folder that somebody named: it is taken as it is,
     whoever signed earlier versions."""
+    remarks: Mapping[str, str] = {}
+    """Digest → what its repository says of it beside: that it is withdrawn, where it was made."""

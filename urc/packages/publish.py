@@ -8,6 +8,7 @@ import msgspec
 
 from urc.packages.index import entry_of
 from urc.packages.names import PackageError
+from urc.packages.notes import PROVENANCE, Provenance
 from urc.packages.package import Package
 from urc.packages.remote import put, repository_url
 from urc.packages.signature import SIGNATURE, Signature
@@ -41,7 +42,13 @@ def is_overheard(url: str) -> bool:
         return parts.hostname != "localhost"
 
 
-def publish(url: str, package: Package, signature: Signature | None, token: str) -> Published:
+def publish(
+    url: str,
+    package: Package,
+    signature: Signature | None,
+    token: str,
+    provenance: Provenance | None = None,
+) -> Published:
     """Send a package to the repository at an address, where it is checked, tested and listed.
 
     Args:
@@ -49,6 +56,7 @@ def publish(url: str, package: Package, signature: Signature | None, token: str)
         package: what is published.
         signature: who made it, if it is signed.
         token: the keeper's.
+        provenance: where it was made, to be told who installs it.
 
     Raises:
         PackageError: what the repository has against it, or that it cannot be reached.
@@ -61,6 +69,8 @@ def publish(url: str, package: Package, signature: Signature | None, token: str)
     }
     if signature is not None:
         headers[SIGNATURE] = base64.b64encode(msgspec.json.encode(signature)).decode()
+    if provenance is not None:
+        headers[PROVENANCE] = base64.b64encode(msgspec.json.encode(provenance)).decode()
     answer = put(address, package.data, headers)
     if answer.status in (200, 201):
         try:

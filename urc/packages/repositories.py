@@ -1,26 +1,22 @@
 """The repositories that this user knows, and what they said last."""
 
 import hashlib
+import time
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import Annotated, Final
 
 import msgspec
 
 from urc.packages import disk
-from urc.packages.changes import (
-    HEAD,
-    HEAD_BYTES,
-    IndexChange,
-    applied,
-    change_file,
-    read_change,
-    read_head,
-)
+from urc.packages.changes import IndexChange, applied, change_file, read_change
+from urc.packages.head import HEAD, HEAD_BYTES, Head, read_head
 from urc.packages.index import INDEX, INDEX_BYTES, Entry, Index, read_index
 from urc.packages.names import PackageError
 from urc.packages.package import sha256
-from urc.packages.remote import ask, fetch_archive, repository_url
+from urc.packages.remote import Answer, ask, fetch_archive, repository_url
+from urc.packages.trust import Trust
 
 __all__ = ["Repositories", "Repository"]
 
@@ -28,6 +24,8 @@ _MOST: Final = 32
 _STEPS_MOST: Final = 64
 """Changes that are asked for one by one; where more is new, the whole index is."""
 _LIST_BYTES: Final = 1 << 20
+_TRIES: Final = 2
+"""A repository may change between two questions."""
 
 
 class _Known(msgspec.Struct, frozen=True):
@@ -41,30 +39,55 @@ class _Tags(msgspec.Struct, frozen=True):
     index: str = ""
     """ETag of the whole index; "" when it was put together from changes."""
     head: str = ""
+    said: Head | None = None
+    """The head itself, once it was checked; None: there was none that fits."""
 
 
 class Repository:
     """One repository. What it said last is kept, and used where it cannot be reached.
 
     Its number only ever grows: one that goes back is not believed, and what it said last is used.
+    The key that signs it first is kept; another one, or none, is not believed from then on.
     """
 
-    def __init__(self, url: str, folder: Path, complain: Callable[[str], None]) -> None:
+    def __init__(
+        self,
+        url: str,
+        folder: Path,
+        complain: Callable[[str], None],
+        now: Callable[[], float] = time.time,
+    ) -> None:
         self.name = url
         self._complain = complain
         self._folder = folder
         stem = hashlib.sha256(url.encode()).hexdigest()[:32]
         self._index = folder / f"{stem}.index.json"
         self._tags = folder / f"{stem}.tags.json"
+        self._trust = Trust(url, folder / f"{stem}.key.json", now)
+
+    @property
+    def keeper(self) -> str:
+        """Who signs the index, with the fingerprint; "" for nobody."""
+        return self._trust.keeper
+
+    def known(self) -> tuple[Entry, ...]:
+        """Return what it said last, without asking; nothing where that is not known."""
+        kept = self._kept()
+        return kept[0].packages if kept is not None else ()
 
     def entries(self) -> tuple[Entry, ...]:
-        """Return what it has, or what it had when it was last reached."""
+        """Return what it has, or what it had when it was last reached.
+
+        Raises:
+            PackageError: it was never reached, or what it said last has expired.
+        """
         try:
             return self.refresh().packages
         except PackageError as error:
             kept = self._kept()
             if kept is None:
                 raise
+            self._trust.check(kept[1].said)
             self._complain(f"{error}; what it said last is used")
             return kept[0].packages
 
@@ -72,26 +95,46 @@ class Repository:
         """Ask the repository for what is new, and return all that it has.
 
         Raises:
-            PackageError: it does not answer, sends something else, or goes back.
+            PackageError: it does not answer, sends something else, goes back, has expired, or is
+                not signed by the key that was kept.
         """
+        for _ in range(_TRIES):
+            index = self._asked()
+            if index is not None:
+                return index
+        raise PackageError(
+            f"{self.name}{INDEX}: these are not the bytes that {HEAD} names; try again"
+        )
+
+    def _asked(self) -> Index | None:
+        """Ask once; None: what came does not fit its signed head."""
         kept = self._kept()
-        if kept is None:
-            return self._whole(None, _Tags(""))
-        index, tags = kept
-        answer = ask(self.name + HEAD, HEAD_BYTES, tags.head, may_lack=True)
-        if answer.status == 304:
-            return index
+        said = kept[1].said if kept is not None else None
+        etag = kept[1].head if kept is not None and said is not None else ""
+        answer = ask(self.name + HEAD, HEAD_BYTES, etag, may_lack=True)
+        head = said if answer.status == 304 else _head(answer, self.name)
+        self._trust.check(head)
+        if kept is not None and answer.status == 304:
+            return kept[0]
+        if kept is not None and head is not None:
+            new = self._grown(*kept, head, answer.etag)
+            if new is not None:
+                return new
+        return self._whole(kept, head, answer.etag)
+
+    def _grown(self, index: Index, tags: _Tags, head: Head, etag: str) -> Index | None:
+        """Return what came of an index by what is new; None: the whole one must be asked for."""
+        if not index.number <= head.number <= index.number + _STEPS_MOST:
+            return None
         try:
-            head = read_head(answer.body, self.name + HEAD)
-            if not index.number <= head.number <= index.number + _STEPS_MOST:
-                return self._whole(index, tags)
             new = applied(index, self._changes(index.number, head.number))
-            if sha256(new.to_bytes()) != head.sha256:
-                return self._whole(index, tags)
-        except PackageError:  # there is no head, or a change is missing or damaged
-            return self._whole(index, tags)
-        etag = tags.index if head.number == index.number else ""
-        self._keep(new, new.to_bytes(), _Tags(head.sha256, etag, answer.etag))
+        except PackageError:  # a change is missing or damaged
+            return None
+        data = new.to_bytes()
+        if sha256(data) != head.sha256:
+            return None
+        of_whole = tags.index if head.number == index.number else ""
+        self._keep(new, data, _Tags(head.sha256, of_whole, etag, head))
         return new
 
     def _changes(self, first: int, last: int) -> Iterator[IndexChange]:
@@ -103,23 +146,38 @@ class Repository:
             left -= len(body)
             yield read_change(body, address)
 
-    def _whole(self, kept: Index | None, tags: _Tags) -> Index:
-        """Take the whole index; raise `PackageError` when it is older than what is known."""
+    def _whole(
+        self, kept: tuple[Index, _Tags] | None, head: Head | None, etag: str
+    ) -> Index | None:
+        """Take the whole index; None: it is not what a signed head names.
+
+        Raises:
+            PackageError: it is older than what is known.
+        """
         address = self.name + INDEX
-        answer = ask(address, INDEX_BYTES, tags.index if kept else "")
+        answer = ask(address, INDEX_BYTES, kept[1].index if kept is not None else "")
         if answer.status == 304 and kept is not None:
-            return kept
-        index = read_index(answer.body, self.name)
-        if kept is not None and (
-            index.number < kept.number or (index.number == kept.number > 0 and index != kept)
-        ):
+            index, digest = kept[0], kept[1].sha256
+        else:
+            index, digest = read_index(answer.body, self.name), sha256(answer.body)
+        is_named = head is not None and head.sha256 == digest
+        if head is not None and head.signed and not is_named:
+            return None
+        self._check_number(address, index, kept)
+        if answer.status != 304:
+            tags = _Tags(digest, answer.etag, etag if is_named else "", head if is_named else None)
+            self._keep(index, answer.body, tags)
+        return index
+
+    def _check_number(self, address: str, index: Index, kept: tuple[Index, _Tags] | None) -> None:
+        number = max(self._trust.number, kept[0].number if kept is not None else 0)
+        is_other = kept is not None and index.number == kept[0].number > 0 and index != kept[0]
+        if index.number < number or is_other:
             raise PackageError(
-                f"{address}: it went back from number {kept.number} to {index.number}, or changed"
+                f"{address}: it went back from number {number} to {index.number}, or changed"
                 f" without a new one; if its keeper says that this is right,"
                 f" 'urc repo remove {self.name}' and add it again"
             )
-        self._keep(index, answer.body, _Tags(sha256(answer.body), answer.etag))
-        return index
 
     def fetch(self, entry: Entry) -> bytes:
         """Return an archive of it."""
@@ -129,9 +187,12 @@ class Repository:
         """Drop what it said last."""
         self._index.unlink(missing_ok=True)
         self._tags.unlink(missing_ok=True)
+        self._trust.forget()
 
     def _keep(self, index: Index, data: bytes, tags: _Tags) -> None:
         work = self._folder / "work"
+        if tags.said is not None:
+            self._trust.keep(tags.said, work)
         disk.put_file(self._index, data, work)
         disk.put_file(self._tags, msgspec.json.encode(tags), work)
 
@@ -203,6 +264,13 @@ class Repositories:
     def _write(self, urls: tuple[str, ...]) -> None:
         data = msgspec.json.encode(_Known(1, urls))
         disk.put_file(self._file, data + b"\n", self._folder / "work")
+
+
+def _head(answer: Answer, url: str) -> Head | None:
+    """Return the head in an answer; None: there is none, or it is damaged."""
+    with suppress(PackageError):
+        return read_head(answer.body, url + HEAD)
+    return None
 
 
 def _content(file: Path, most: int) -> bytes | None:

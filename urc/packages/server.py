@@ -20,8 +20,8 @@ from starlette.responses import Response
 from starlette.routing import Route
 
 from urc.packages.archive import PACKAGE
-from urc.packages.changes import HEAD, Head
 from urc.packages.door import Door
+from urc.packages.head import HEAD, HEAD_BYTES, Head, Seal, read_head
 from urc.packages.index import INDEX, INDEX_BYTES, Entry, Index, read_index, search
 from urc.packages.keeper import urcpm
 from urc.packages.manifest import MANIFEST, parse_manifest
@@ -47,6 +47,7 @@ def repository_app(
     folder: Path,
     tokens: Tokens | None = None,
     examine: Callable[[Path], list[str]] | None = None,
+    seal: Seal | None = None,
 ) -> Starlette:
     """Return the application that gives out the repository in a folder.
 
@@ -54,11 +55,12 @@ def repository_app(
         folder: the repository.
         tokens: who may publish into it; None: nobody.
         examine: looks at what is published, see `urc.packages.intake.take`.
+        seal: the keeper's, which signs what is published into the index.
     """
     shop = _Shop(folder)
     routes = [Route("/{path:path}", shop.answer, methods=["GET", "HEAD"])]
     if tokens is not None and examine is not None:
-        door = Door(folder, tokens, examine)
+        door = Door(folder, tokens, examine, seal)
         routes.append(Route("/{path:path}", door.answer, methods=["PUT"]))
     return Starlette(routes=routes)
 
@@ -71,6 +73,7 @@ class _Shop:
         self._files: Mapping[str, Entry] = {}
         self._newest: Mapping[str, Entry] = {}
         self._lists: Mapping[str, bytes] = {}
+        self._known: Head | None = None
 
     async def answer(self, request: Request) -> Response:
         """Answer any request."""
@@ -120,21 +123,43 @@ class _Shop:
             return None
 
     def _refresh(self) -> None:
-        """Read the index when its file is another one than before."""
+        """Read the index when its file is another one than before, or its head is."""
         file = self._folder / INDEX
-        status = os.stat(file)
-        seen = status.st_mtime_ns, status.st_size, status.st_ino
+        head, stamp = self._head()
+        seen = (*_stamp(os.stat(file)), *stamp)
         if seen == self._seen:
             return
         with open(file, "rb") as opened:
             data = opened.read(INDEX_BYTES + 1)
+        digest = sha256(data)
+        if head is None or head.sha256 != digest:
+            if head is not None and head.signed and self._seen:
+                return  # it is being changed: until it is signed anew, the old one is given out
+            head = None
         index = read_index(data, str(file))
         newest = {str(entry.key): entry for entry in search(index.packages, ())}
         self._index, self._newest = index, newest
         self._files = {entry.file: entry for entry in index.packages}
-        head = msgspec.json.encode(Head(1, index.number, sha256(data)))
-        self._lists = {**_lists(index.name, newest), INDEX: data, HEAD: head}
+        head = head or Head(1, index.number, digest)
+        self._lists = {**_lists(index.name, newest), INDEX: data, HEAD: head.to_bytes()}
         self._seen = seen
+
+    def _head(self) -> tuple[Head | None, tuple[int, ...]]:
+        """Return the head as the keeper wrote it, and what tells its file from others."""
+        try:
+            with open(self._folder / HEAD, "rb") as opened:
+                stamp = _stamp(os.fstat(opened.fileno()))
+                if stamp == self._seen[-len(stamp) :]:
+                    return self._known, stamp
+                self._known = read_head(opened.read(HEAD_BYTES), HEAD)
+                return self._known, stamp
+        except (FileNotFoundError, PackageError):
+            return None, ()
+
+
+def _stamp(status: os.stat_result) -> tuple[int, ...]:
+    """Return what tells a file from what was there before it."""
+    return status.st_mtime_ns, status.st_size, status.st_ino
 
 
 def _lists(name: str, newest: Mapping[str, Entry]) -> dict[str, bytes]:

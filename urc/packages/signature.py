@@ -64,18 +64,23 @@ class Signature(msgspec.Struct, frozen=True):
 
     def check(self, package: Key, version: str, sha256: str) -> None:
         """Raise `PackageError` unless the key's holder signed exactly this."""
-        from cryptography.exceptions import InvalidSignature
-        from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PublicKey
-
-        said = _statement(package, version, sha256, self.by)
-        try:
-            key = Ed25519PublicKey.from_public_bytes(base64.b64decode(self.key))
-            key.verify(base64.b64decode(self.value), said)
-        except (InvalidSignature, ValueError):
+        if not self.verifies(_statement(package, version, sha256, self.by)):
             raise PackageError(
                 f"{package} {version}: the signature is not of these bytes: {self} never signed"
                 " them, or somebody changed them"
-            ) from None
+            )
+
+    def verifies(self, statement: bytes) -> bool:
+        """Return whether the key's holder signed exactly this statement."""
+        from cryptography.exceptions import InvalidSignature
+        from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PublicKey
+
+        try:
+            key = Ed25519PublicKey.from_public_bytes(base64.b64decode(self.key))
+            key.verify(base64.b64decode(self.value), statement)
+        except (InvalidSignature, ValueError):
+            return False
+        return True
 
     def __str__(self) -> str:
         return f"{self.by} ({self.fingerprint})"
@@ -96,7 +101,11 @@ class Signer:
 
     def sign(self, package: Key, version: str, sha256: str) -> Signature:
         """Return the signature; the same package always gives the same one."""
-        value = self._private.sign(_statement(package, version, sha256, self.by))
+        return self.signs(_statement(package, version, sha256, self.by))
+
+    def signs(self, statement: bytes) -> Signature:
+        """Return the signature of a statement, which names the signer and what it is about."""
+        value = self._private.sign(statement)
         return Signature(self.by, self.key, base64.b64encode(value).decode())
 
     def __str__(self) -> str:

@@ -11,7 +11,7 @@ from urc.packages.names import Key, PackageError, parse_key
 from urc.packages.package import Package, open_package, pack_folder, sha256
 from urc.packages.signature import Signature
 
-__all__ = ["FileSource", "Source", "make_bundle", "merged", "open_source"]
+__all__ = ["FileSource", "Source", "make_bundle", "merged", "offered", "open_source"]
 
 _ENDINGS: Final = (".urcof", ".zip")
 
@@ -150,10 +150,18 @@ def _open_bundle(data: bytes, name: str) -> FileSource:
     return FileSource(name, packages, roots, signatures)
 
 
+def offered(
+    found: Mapping[Key, list[tuple[Entry, Source]]],
+) -> dict[Key, list[tuple[Entry, Source]]]:
+    """Return what was not withdrawn."""
+    kept = {key: [one for one in some if not one[0].why_withdrawn] for key, some in found.items()}
+    return {key: some for key, some in kept.items() if some}
+
+
 def merged(
     sources: Iterable[Source], complain: Callable[[str], None]
 ) -> dict[Key, list[tuple[Entry, Source]]]:
-    """Return every version of every package, and where it is from.
+    """Return every version of every package, the withdrawn ones too, and where it is from.
 
     The first source that has a package gives all its versions: another one, added later, cannot
     slip in a newer version under a name that is known.

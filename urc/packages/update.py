@@ -9,11 +9,12 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple, Protocol
 
+from urc._phrases import phrase
 from urc.packages.install import Found, plan_root, settle
 from urc.packages.lock import Lock, lock_of
 from urc.packages.names import PackageError
 from urc.packages.plan import Plan
-from urc.packages.sources import Source, merged
+from urc.packages.sources import Source, merged, offered
 from urc.packages.store import Store, kinds_in
 from urc.packages.versions import parse_version
 
@@ -83,7 +84,7 @@ def newer(store: Store, sources: Sequence[Source], complain: Callable[[str], Non
     Raises:
         PackageError: the store cannot be read.
     """
-    found = merged(sources, complain)
+    found = offered(merged(sources, complain))
     updates = []
     for lock in _newest(store.installed()):
         if lock.key not in found:
@@ -117,7 +118,7 @@ def plan_update(
     Raises:
         PackageError: no source has it, needs collide, or an archive is not what was promised.
     """
-    found = merged(sources, complain)
+    found = offered(merged(sources, complain))
     if old.key not in found:
         raise PackageError(f"no repository has {old.root}; what is installed stays")
     new = _lock(old, wanted, found)
@@ -158,16 +159,19 @@ def headline(old: Lock, new: Lock) -> str:
 
 def version_lines(old: Lock, new: Lock) -> list[str]:
     """Return which packages change, for people."""
-    lines = []
+    lines: list[str] = []
     for name in sorted({*old.packages, *new.packages}):
         before, after = old.packages.get(name), new.packages.get(name)
         if before is None:
-            lines.append(f"{name} {after.version if after else ''}, new")
+            lines.append(
+                phrase("{package}, new", package=f"{name} {after.version if after else ''}")
+            )
         elif after is None:
-            lines.append(f"{name} {before.version}, no longer needed")
+            lines.append(phrase("{package}, no longer needed", package=f"{name} {before.version}"))
         elif before.version != after.version:
-            older = parse_version(after.version) < parse_version(before.version)
-            lines.append(f"{name} {before.version} → {after.version}{', which is older' * older}")
+            step = f"{name} {before.version} → {after.version}"
+            is_older = parse_version(after.version) < parse_version(before.version)
+            lines.append(phrase("{step}, which is older", step=step) if is_older else step)
     return lines
 
 

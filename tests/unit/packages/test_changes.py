@@ -10,7 +10,8 @@ import pytest
 
 from tests.unit.packages.made import entry
 from urc.packages import disk, repositories
-from urc.packages.changes import HEAD, change_file, read_head, write_index
+from urc.packages.changes import change_file, write_index
+from urc.packages.head import HEAD, read_head
 from urc.packages.index import INDEX, Entry, read_index
 from urc.packages.names import PackageError
 from urc.packages.package import sha256
@@ -82,8 +83,7 @@ def lab(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Lab]:
 def test_nothing_new_is_one_small_question(lab: Lab) -> None:
     """Answered without a byte of content."""
     assert lab.write(entries(3)) == 1
-    assert lab.asks() == [INDEX]
-    lab.asks()
+    assert lab.asks() == [HEAD, INDEX]
     sent = lab.web.sent
     assert lab.asks() == [HEAD]
     assert lab.web.sent == sent
@@ -195,7 +195,7 @@ def test_what_a_client_kept_may_be_damaged(lab: Lab) -> None:
     lab.asks()
     (kept,) = (lab.folder.parent / "client").glob("*.index.json")
     kept.write_bytes(b"{")
-    assert lab.asks() == [INDEX]
+    assert lab.asks() == [HEAD, INDEX]
     assert "it is asked for anew" in lab.said.pop()
 
 

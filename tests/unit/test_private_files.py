@@ -1,0 +1,43 @@
+"""Files that are there whole or not at all, and are read by their owner alone."""
+
+import os
+import stat
+from pathlib import Path
+
+import pytest
+
+from urc.private_files import put_private
+
+
+def full(number: int) -> None:
+    """Stand in for a disk that has no room."""
+    raise OSError(28, "No space left on device")
+
+
+def test_a_file_is_written_with_its_folder(tmp_path: Path) -> None:
+    """What was there before is replaced, and nothing is left beside it."""
+    file = tmp_path / "deep" / "kept"
+    put_private(file, b"first")
+    put_private(file, b"second")
+    assert file.read_bytes() == b"second"
+    assert os.listdir(file.parent) == ["kept"]
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows has other rights")
+def test_only_the_owner_may_read_it(tmp_path: Path) -> None:
+    """The folder, too, where that is asked for."""
+    file = tmp_path / "keys" / "known"
+    put_private(file, b"secret", folder_mode=0o700)
+    assert stat.S_IMODE(file.stat().st_mode) == 0o600
+    assert stat.S_IMODE(file.parent.stat().st_mode) == 0o700
+
+
+def test_a_full_disk_changes_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The old file stays, and what was begun is gone."""
+    file = tmp_path / "kept"
+    put_private(file, b"old")
+    monkeypatch.setattr("os.fsync", full)
+    with pytest.raises(OSError, match="No space left"):
+        put_private(file, b"new")
+    assert file.read_bytes() == b"old"
+    assert os.listdir(tmp_path) == ["kept"]
