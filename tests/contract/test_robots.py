@@ -25,11 +25,6 @@ SHARED = sorted([*FOLDER.glob("drivers/*.yaml"), *FOLDER.glob("interfaces/*.yaml
 
 LISTENED_S = 20.0
 """How long the emulated robot is listened to: more than twice the slowest poll."""
-UNSAID = {
-    "create-2": {"cliff_front_left", "virtual_wall"},  # only once a stream is asked for
-    "gpsd": {"complaint", "status"},  # nothing to complain of, and a plain fix
-    "tello": {"mission_pad"},  # it sees none
-}
 
 
 @pytest.fixture(params=FILES, ids=lambda file: file.stem)
@@ -108,4 +103,4 @@ def test_its_emulated_robot_says_all_that_there_is(file: Path) -> None:
     talk.wait(LISTENED_S)
     refused = {name: line.last_fault for name, line in talk.lines.items() if line.faults}
     assert (talk.faults, refused) == ([], {})
-    assert set(profile.driver.signals) - talk.read == UNSAID.get(profile.name, set())
+    assert set(profile.driver.signals) - talk.read == set()

@@ -15,18 +15,12 @@ from urc.model.driver import Argument, Command, Driver, FramingSpec, Poll, Trans
 from urc.model.flow import ExpectStep, IfStep, PromptStep, RepeatStep, SendStep, Step
 from urc.model.values import NOTHING, Value
 from urc.patterns import Pattern, example
+from urc.protocol.codec import CodecContext, Frame, NotWritable, Reader, Writer
 from urc.protocol.convert import BadValue
 from urc.protocol.decode import build_raw
-from urc.protocol.forms import (
-    CodecContext,
-    Frame,
-    NotWritable,
-    Reader,
-    Writer,
-    build_reader,
-    build_writer,
-)
-from urc.protocol.framing import Framing, FramingError, build_framing
+from urc.protocol.forms import build_reader, build_writer
+from urc.protocol.framing import build_framing
+from urc.protocol.framings.base import Framing, FramingError
 from urc.simulator.backwards import computed_fields
 from urc.simulator.echo import (
     correlated,

@@ -4,7 +4,7 @@ Pure.
 """
 
 from urc.patterns import Pattern, example
-from urc.protocol.forms import BadText, Frame, Reader
+from urc.protocol.codec import BadText, Frame, Reader
 
 __all__ = ["in_lines"]
 

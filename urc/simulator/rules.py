@@ -11,18 +11,11 @@ from urc.model.codec import Envelope, Payload, ReadSpec, traffic_of
 from urc.model.driver import TransportSpec
 from urc.model.profile import Reaction, SimulatorRule
 from urc.model.values import NOTHING
+from urc.protocol.codec import BadText, CodecContext, Frame, NotWritable, Reader, Writer
 from urc.protocol.convert import Unusable
-from urc.protocol.forms import (
-    BadText,
-    CodecContext,
-    Frame,
-    NotWritable,
-    Reader,
-    Writer,
-    build_reader,
-    build_writer,
-)
-from urc.protocol.framing import Framing, FramingError, build_framing
+from urc.protocol.forms import build_reader, build_writer
+from urc.protocol.framing import build_framing
+from urc.protocol.framings.base import Framing, FramingError
 from urc.protocol.gate import Counters
 from urc.protocol.topics import frame_of
 from urc.simulator.auto import Answer, Asked, AutoLine, Unanswered, numbered

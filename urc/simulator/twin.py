@@ -17,8 +17,9 @@ from urc.model.codec import Payload
 from urc.model.driver import Driver, TransportSpec
 from urc.model.profile import Profile, SimulatorRule
 from urc.model.values import NOTHING, Reading, Value
-from urc.protocol.forms import Frame
-from urc.protocol.framing import FrameFault, Framing, build_framing
+from urc.protocol.codec import Frame
+from urc.protocol.framing import build_framing
+from urc.protocol.framings.base import FrameFault, Framing
 from urc.protocol.topics import topic_of
 from urc.simulator.auto import AutoLine, AutoMessage, AutoRobot, Unanswered
 from urc.simulator.embodied import Embodied

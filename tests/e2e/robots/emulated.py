@@ -14,7 +14,7 @@ from tests.e2e.processes import ROOT, UrcProcess
 __all__ = ["CLIENTS", "WAIT_S", "ask", "emulate", "told"]
 
 CLIENTS = Path(__file__).parent / "clients"
-WAIT_S = 20.0
+WAIT_S = 60.0
 """How long a whole dialogue may take on a machine that is busy."""
 
 Start = Callable[..., UrcProcess]

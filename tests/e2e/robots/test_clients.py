@@ -5,6 +5,7 @@ the robot's protocol says, not with what URC says of it.
 """
 
 import asyncio
+import json
 import os
 import re
 import shutil
@@ -20,10 +21,11 @@ from gpsdclient.client import GPSDClient
 from PIL import Image
 
 from scripts.node import node_executable
+from tests.e2e.ports import free_port
 from tests.e2e.processes import UrcProcess
 from tests.e2e.robots.emulated import CLIENTS, WAIT_S, ask, emulate, told
 from tests.e2e.robots.lan import lan
-from tests.e2e.transports.programs import free_port, listens, program
+from tests.e2e.transports.programs import listens, program
 
 pytestmark = pytest.mark.anyio
 
@@ -74,8 +76,9 @@ async def test_roslib_drives_a_turtlebot(urc_process: Start) -> None:
     port = (await emulate(urc_process, "turtlebot4"))["ros"]
     node = node_executable()
     assert node
-    found = await told(node, str(CLIENTS / "turtlebot_drive.mjs"), str(port))
-    assert '"moved":0.0' in found
+    found = json.loads(await told(node, str(CLIENTS / "turtlebot_drive.mjs"), str(port)))
+    assert found["moved"] > 0.02
+    assert found["beams"] >= 16
 
 
 async def test_a_ground_station_drives_the_rover(urc_process: Start) -> None:

@@ -15,7 +15,7 @@ from urc.problems import UrcError
 from urc.protocol.topics import matches
 from urc.simulator.doors.base import Crowd, Guest, Listening, Place, converse
 from urc.transports.base import Setup, Subscription, Transport, TransportError
-from urc.transports.mqtt_options import from_setup
+from urc.transports.mqtt import from_setup
 
 __all__ = ["MqttDoor"]
 

@@ -10,7 +10,7 @@ from typing import Any
 
 from dashboard_client import DashboardClient
 
-WAIT_S = 15.0
+WAIT_S = 45.0
 
 
 def main() -> None:

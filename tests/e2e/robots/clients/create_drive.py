@@ -13,7 +13,7 @@ from typing import Any
 
 from pycreate2 import Create2
 
-WAIT_S = 15.0
+WAIT_S = 45.0
 
 
 def main() -> dict[str, Any]:

@@ -14,7 +14,7 @@ from typing import Any
 
 import roslibpy
 
-WAIT_S = 15.0
+WAIT_S = 45.0
 
 
 class Ears:

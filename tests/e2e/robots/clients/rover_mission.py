@@ -14,7 +14,7 @@ os.environ["MAVLINK20"] = "1"
 
 from pymavlink import mavutil  # reads the environment when it is imported
 
-WAIT_S = 15.0
+WAIT_S = 45.0
 HOLD = 4
 MANUAL = 0
 

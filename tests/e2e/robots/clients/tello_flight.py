@@ -13,7 +13,7 @@ from typing import Any
 
 from tello_asyncio import Tello
 
-WAIT_S = 15.0
+WAIT_S = 45.0
 
 
 async def main() -> dict[str, Any]:

@@ -1,7 +1,7 @@
 // A drive with roslib, as its examples show it. Prints one line of JSON. Argument: the port.
 import { Ros, Topic } from "roslib";
 
-const WAIT_MS = 15000;
+const WAIT_MS = 45000;
 const TICK_MS = 100;
 
 const ros = new Ros();
