@@ -1,4 +1,4 @@
-"""The event loop of processes that move robots: uvloop where it is installed (``urc[fast]``)."""
+"""The event loop of processes that move robots: uvloop where it is installed."""
 
 import asyncio
 import sys

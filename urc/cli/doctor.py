@@ -83,6 +83,7 @@ def _findings(port: int) -> Iterator[_Finding]:
     is_vendored = vendored() is not None
     text = "third-party modules for the browser" if is_vendored else _VENDOR_REMEDY
     yield _Finding("urc_vendor", is_vendored, text, is_required=False)
+    yield _precedence()
     yield _attempt("port", lambda: _try_port(port), is_required=False)
 
 
@@ -98,6 +99,16 @@ def _attempt(name: str, check: Callable[[], str], *, is_required: bool = True) -
         return _Finding(name, True, check(), is_required)
     except (UrcError, ImportError) as fault:  # what is not installed cannot be imported either
         return _Finding(name, False, str(fault), is_required)
+
+
+def _precedence() -> _Finding:
+    from urc.guard.precedence import why_not
+
+    refusal = why_not()
+    text = "the guard runs before ordinary programs"
+    if refusal:
+        text = f"the guard is a program like others ({refusal}); see docs/motion.md"
+    return _Finding("real time", not refusal, text, is_required=False)
 
 
 def _load_robots() -> str:

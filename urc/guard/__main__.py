@@ -16,6 +16,7 @@ from urc._loop import run
 from urc.guard import wire
 from urc.guard.host import FINISH_S, Host
 from urc.guard.pipe import Pipe
+from urc.guard.precedence import Precedence
 from urc.guard.process import DOOR
 
 __all__ = ["BEAT_S", "main"]
@@ -40,7 +41,7 @@ class _Clock:
         return self._loop.call_later(max(0.0, time_s - time.monotonic()), action)
 
 
-async def _guard(line: socket.socket) -> None:
+async def _guard(line: socket.socket, precedence: Precedence) -> None:
     loop = asyncio.get_running_loop()
     over = asyncio.Event()
     for name in ("SIGTERM", "SIGHUP"):
@@ -63,6 +64,7 @@ async def _guard(line: socket.socket) -> None:
 
     def beat() -> None:
         nonlocal due_s
+        precedence.look()
         late_s = loop.time() - due_s
         if not pipe.is_backed_up:
             pipe.post(wire.Beat(late_s))
@@ -97,7 +99,9 @@ def main() -> None:
     line = _line(sys.argv[1])
     gc.collect()
     gc.freeze()  # what is loaded by now stays: no need to look through it again
-    run(_guard(line))
+    precedence = Precedence()
+    precedence.ask()  # where it is refused, the guard is a process like others: see `urc doctor`
+    run(_guard(line, precedence))
 
 
 if __name__ == "__main__":

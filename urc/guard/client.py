@@ -19,7 +19,7 @@ from typing import Final
 
 from urc.guard import wire
 from urc.guard.pipe import Pipe
-from urc.guard.process import CAN_INHERIT, Door, Standing, launch, processors, reap, standing
+from urc.guard.process import CAN_INHERIT, Door, Standing, launch, reap, standing
 from urc.guard.side import Client, LineSpec, LocalGuard
 from urc.model.codec import Payload
 
@@ -39,7 +39,6 @@ _AT_ONCE: Final = 3
 _AGAIN_S: Final = 1.0
 """Guards that end at once are started anew so often right away, and then at this pace."""
 _FINISH_S: Final = 3.0
-_HAS_TWO: Final = processors() > 1
 _DIED: Final = "the guard of this line ended; it is started anew"
 
 log = logging.getLogger(__name__)
@@ -230,11 +229,6 @@ class Guard(Client):
         if self._pipe is not None:
             self._pipe.post(said)
 
-    def hint(self) -> None:
-        """Wake the guard for a tick that is about to come, where it has a processor of its own."""
-        if _HAS_TWO and self._pipe is not None:
-            self._pipe.nudge()
-
     def tick(self, control: str, data: Payload) -> None:
         """Renew the lease of `control`; `data` is its newest frame. Never waits."""
         held, pipe = self._held.get(control), self._pipe
@@ -243,6 +237,12 @@ class Guard(Client):
             held.may_move = True
             if pipe is not None:
                 pipe.post(wire.Tick(control, held.number, data, monotonic()), slot=control)
+
+    def rehearse(self, control: str, data: Payload) -> None:
+        """Let the guard go the way of a tick, and write nothing; what has to wait is left out."""
+        held, pipe = self._held.get(control), self._pipe
+        if held is not None and pipe is not None and not pipe.is_backed_up:
+            pipe.post(wire.Rehearsal(control, held.number, data, monotonic()))
 
     def _pass_renewed(self, said: wire.Renew) -> None:
         if self._pipe is not None:

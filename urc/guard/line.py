@@ -14,6 +14,7 @@ from collections.abc import Callable, Coroutine
 from typing import Any, Final
 
 from urc.guard import wire
+from urc.guard.double import Double
 from urc.guard.lane import Clock, Lane, Ring, why_broken
 from urc.guard.pipe import UNFIT
 from urc.guard.reins import Reins
@@ -73,6 +74,7 @@ class Line:
             told=lambda control, reason, number: self._told(control, reason, number),
             failed=self._stall,
         )
+        self._double = Double(transport, clock)
         self._offer: Callable[[bytes], bool] | None = getattr(transport, "offer", None)
         self._lane: Lane[int] = Lane(
             transport,
@@ -147,6 +149,12 @@ class Line:
         if self._acked:
             number, self._acked = self._acked, 0
             self._emit(wire.Sent(self.name, self._turn, number))
+
+    def rehearse(self, said: wire.Rehearsal) -> None:
+        """Go the way of a tick, and write nothing."""
+        terms = self.reins.moving(said.control)
+        if terms is not None and self._is_open:
+            self._double.tick(said.control, terms, said.number, said.data, said.at_s)
 
     def rescue(self) -> None:
         """Open the line by ourselves, because a stop is owed."""

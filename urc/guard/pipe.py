@@ -4,27 +4,18 @@ A message is its length in four bytes and then itself. Writing never waits: what
 take is kept, urgent things before others, and of what may be replaced only the newest. What is
 kept is bounded by whoever posts: replies by the credit of their lines, requests by what may be
 under way.
-
-An empty message is a *nudge*: another is about to come. Who is nudged wakes up while that is still
-being made, and stays awake for it, for `AWAKE_S` at most: waking up takes a process longer than
-everything that it then does with a tick.
 """
 
 import asyncio
-import os
 import socket
 import struct
 from collections import deque
 from collections.abc import Callable
-from time import monotonic
 from typing import Any
 
 import msgspec
 
-__all__ = ["AWAKE_S", "Pipe"]
-
-AWAKE_S = 0.0003
-"""Longest time for which one who was nudged stays awake."""
+__all__ = ["Pipe"]
 
 _HEAD = 4
 _put_head, _head_of = struct.Struct("<I").pack_into, struct.Struct("<I").unpack_from
@@ -33,8 +24,6 @@ _AT_ONCE = 64
 """Messages that are handled before others have their turn on the loop."""
 UNFIT = (TypeError, OverflowError, NotImplementedError, msgspec.MsgspecError)
 """What `post` raises for a message that cannot be passed on."""
-_NUDGE = bytes(_HEAD)
-_give_way: Callable[[], None] = getattr(os, "sched_yield", lambda: None)
 
 
 class Pipe:
@@ -62,13 +51,12 @@ class Pipe:
         """
         line.setblocking(False)
         self._line = line
-        self._send = line.send
+        self._send, self._receive = line.send, line.recv_into
         self._encode = encoder.encode_into
         self._decode = decoder.decode
         self._take = take
         self._settle = settle
         self._gone = gone
-        self._is_nudged = False
         self._loop = asyncio.get_running_loop()
         self._frame = bytearray(256)
         self._space = memoryview(bytearray(_READ_BYTES))
@@ -126,17 +114,6 @@ class Pipe:
             (self._urgent if is_urgent else self._queue).append(data)
         self._watch()
         return size
-
-    def nudge(self) -> None:
-        """Let the other side be awake for what is about to be posted; it costs both some time."""
-        if self.is_open and not self._is_writing:
-            try:
-                taken = self._send(_NUDGE)
-            except OSError:
-                return  # whatever it means, the message itself will meet it, too
-            if taken < _HEAD:
-                self._rest = _NUDGE[taken:]
-                self._watch()
 
     def drop(self, slot: str) -> None:
         """Forget what waits in a slot."""
@@ -199,23 +176,10 @@ class Pipe:
     def _readable(self) -> None:
         if self._is_behind or not self.is_open:
             return
-        self._is_nudged = False
-        self._receive()
-        if self._is_nudged:
-            self._await_it()
-
-    def _await_it(self) -> None:
-        """Stay awake for what was announced."""
-        until_s = monotonic() + AWAKE_S
-        while self._is_nudged and self.is_open and not self._receive() and monotonic() < until_s:
-            _give_way()  # on a busy machine, whoever is to post it may wait for this processor
-
-    def _receive(self) -> bool:
-        """Take what has come; return whether there was anything."""
         try:
-            count = self._line.recv_into(self._space)
+            count = self._receive(self._space)
         except (BlockingIOError, InterruptedError):
-            return False
+            return
         except OSError:
             count = 0
         if not count:
@@ -228,7 +192,6 @@ class Pipe:
             if done < count:
                 self._held += self._space[done:count]
                 self._look_behind()
-        return True
 
     def _read_held(self) -> None:
         done = self._handle(memoryview(bytes(self._held)) if _is_whole(self._held) else _NONE)
@@ -261,10 +224,8 @@ class Pipe:
             end = at + _HEAD + length
             if end > size:
                 break
-            self._is_nudged = not length
-            if length:
-                self.taken_bytes = length
-                self._take(self._decode(data[at + _HEAD : end]))
+            self.taken_bytes = length
+            self._take(self._decode(data[at + _HEAD : end]))
             at = end
         if at:
             self._settle()

@@ -10,7 +10,7 @@ import sys
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
-__all__ = ["CAN_INHERIT", "DOOR", "Door", "launch", "processors", "reap", "standing"]
+__all__ = ["CAN_INHERIT", "DOOR", "Door", "launch", "reap", "standing"]
 
 CAN_INHERIT: Final = os.name == "posix"
 """Whether this system can hand an open pipe to another process."""
@@ -117,12 +117,6 @@ def _started(place: str, **more: Any) -> "subprocess.Popen[bytes]":
     # -P: nothing is imported from the folder we happen to be in.
     command = [sys.executable, "-P", "-m", "urc.guard", place]
     return subprocess.Popen(command, **more)  # noqa: S603 - our own interpreter and module
-
-
-def processors() -> int:
-    """Return how many processors this process may use."""
-    allowed = getattr(os, "sched_getaffinity", None)  # not everywhere
-    return len(allowed(0)) if allowed is not None else os.cpu_count() or 1
 
 
 class Standing(NamedTuple):

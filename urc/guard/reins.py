@@ -98,6 +98,11 @@ class Reins:
         if now - at_s < mover.terms.lease_s:  # else it waited so long that it renews nothing
             mover.tick(data, min(at_s, now))
 
+    def moving(self, control: str) -> Terms | None:
+        """Return the terms under which `control` moves; None: it does not."""
+        mover = self._movers.get(control)
+        return mover.terms if mover is not None and mover.state == "moving" else None
+
     def renew(self, control: str, stop: Payload) -> None:
         """Stop `control` with `stop` from now on."""
         mover = self._movers.get(control)

@@ -85,8 +85,8 @@ class Client:
             held.may_move = True
             self._post(wire.Tick(control, held.number, data, self._now()))
 
-    def hint(self) -> None:
-        """Take note that a tick is about to come, where that saves time."""
+    def rehearse(self, control: str, data: Payload) -> None:
+        """Let the guard go the way of a tick, and write nothing, where it is another process."""
 
     def renew(self, control: str, stop: Payload) -> None:
         """Let `stop` be what stops `control` from now on; it arms nothing."""

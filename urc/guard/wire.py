@@ -28,6 +28,7 @@ __all__ = [
     "Owe",
     "Received",
     "Refused",
+    "Rehearsal",
     "Release",
     "Renew",
     "Send",
@@ -137,6 +138,15 @@ class Renew(msgspec.Struct, array_like=True, frozen=True, tag=11):
     stop: Payload
 
 
+class Rehearsal(msgspec.Struct, array_like=True, frozen=True, tag=12):
+    """Go the way of a `Tick`, and write nothing: the next one finds at hand what it needs."""
+
+    control: str
+    number: int
+    data: Payload
+    at_s: float
+
+
 class Opened(msgspec.Struct, array_like=True, frozen=True, tag=21):
     """A line is open."""
 
@@ -212,7 +222,9 @@ class Beat(msgspec.Struct, array_like=True, frozen=True, tag=29):
     """By how much its own timer was late."""
 
 
-ToGuard = Make | Open | Send | Close | Credit | Arm | Tick | Release | Renew | Stop | Owe
+ToGuard = (
+    Make | Open | Send | Close | Credit | Arm | Tick | Release | Renew | Stop | Owe | Rehearsal
+)
 FromGuard = Opened | OpenFailed | Received | Sent | Refused | Lost | Closed | Stopped | Beat
 
 

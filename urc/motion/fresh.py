@@ -47,7 +47,9 @@ class Freshness:
         self._issued.append(now)
         return self._number
 
-    def refusal(self, given: Input, epoch: int, now: float, of: str = "") -> str:
+    def refusal(
+        self, given: Input, epoch: int, now: float, of: str = "", *, counts: bool = True
+    ) -> str:
         """Return why an input is not taken, or "" and remember it.
 
         Args:
@@ -55,6 +57,7 @@ class Freshness:
             epoch: of the lease that holds now.
             now: the time.
             of: the control: the inputs of one may overtake those of another.
+            counts: False: it is not remembered.
         """
         if given.epoch != epoch:
             return f"it belongs to lease {given.epoch}, and this is {epoch}"
@@ -66,7 +69,8 @@ class Freshness:
         issued_at = self._issued[-1 - back]
         if now - issued_at > OLDEST_S:
             return f"it is {(now - issued_at) * 1000:.0f} ms old"
-        self._newest[of] = given.number
+        if counts:
+            self._newest[of] = given.number
         return ""
 
 

@@ -11,13 +11,13 @@ from pathlib import Path
 from typing import Final
 
 from urc.config.load import check
-from urc.problems import printable
+from urc.problems import Problem, printable
 from urc.runtime.catalog import built_in_catalog
 from urc.runtime.selftest import exercise
 from urc.runtime.shelves import TwoShelves
 from urc.shipped import shipped
 
-__all__ = ["examine", "examine_apart"]
+__all__ = ["examine", "examine_apart", "findings"]
 
 _MEMORY_BYTES: Final = 2 << 30
 _PROCESSOR_S: Final = 60
@@ -42,10 +42,24 @@ def examine(document: Path) -> list[str]:
     ]
     if outside:
         return outside
-    problems = [*checked.problems]
+    found = [*checked.problems]
     if checked.profile is not None:
-        problems += exercise(checked.profile).problems
-    return [problem.headline for problem in problems if problem.severity == "error"]
+        found += exercise(checked.profile).problems
+    return [problem.headline for problem in found if problem.severity == "error"]
+
+
+def findings(document: Path) -> list[Problem]:
+    """Return all that `urc validate` finds, warnings and tests included, worst first.
+
+    Args:
+        document: ``TOP/drivers/puppet/driver.yaml``, beside the packages that it needs.
+    """
+    top = document.resolve().parent.parent.parent
+    checked = check(document, built_in_catalog(), TwoShelves(shipped("widgets"), top / "widgets"))
+    found = [*checked.problems]
+    if checked.profile is not None:
+        found += exercise(checked.profile).problems
+    return sorted(found, key=lambda one: ("error", "warning").index(one.severity))
 
 
 def examine_apart(document: Path, total_s: float = _TOTAL_S) -> list[str]:

@@ -38,7 +38,7 @@ class GuardedMovers:
         """
         self._driver = driver
         self.client = client
-        self.hint, self.tick = client.hint, client.tick
+        self.tick, self.rehearse = client.tick, client.rehearse
         self._armed: dict[str, Terms] = {}
 
     @property

@@ -41,11 +41,11 @@ class Movers(Protocol):
     def arm(self, command: str, terms: Terms) -> None:
         """Take ticks of `command` from now on, under these terms."""
 
-    def hint(self) -> None:
-        """Take note that a tick is about to come, where that saves time."""
-
     def tick(self, command: str, data: Payload) -> None:
         """Renew the lease of `command`; `data` is its newest frame."""
+
+    def rehearse(self, command: str, data: Payload) -> None:
+        """Do what a tick takes, and write nothing."""
 
     def renew(self, command: str, stop: Payload) -> None:
         """Let `stop` be what stops `command` from now on; it arms nothing."""
@@ -90,6 +90,11 @@ class Control:
     needs_release: bool = False
     closed_epoch: int = -1
     """Lease in which it stopped by itself: it goes on in a later one only."""
+
+    @property
+    def can_rehearse(self) -> bool:
+        """Whether a frame of it may be made for nothing: it moves, and uses no number up."""
+        return self.course == "moving" and self.is_armed and self.is_lasting
 
     def rest(self) -> None:
         """Take note that it is to stand."""

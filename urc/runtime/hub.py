@@ -7,7 +7,7 @@ hub is used from one event loop; it has no task and no timer of its own.
 
 import asyncio
 from collections import deque
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from operator import itemgetter
@@ -100,7 +100,7 @@ class Subscription:
 
     def take(self) -> list[Sample]:
         """Return the newest sample of each signal changed since `seen`, and move `seen` up."""
-        samples = self._hub.changed_since(self.seen)
+        samples = [*self._hub.changed_since(self.seen)]
         self.seen = self._hub.revision
         return samples
 
@@ -163,8 +163,12 @@ class Hub:
         self.index = {name: place for place, name in enumerate(self.names)}
         self.revision = 0
         self.links: dict[str, LinkStatus] = {}
+        self.links_count = 0
+        """How often one of them changed."""
         self.progress: dict[str, Progress] = {}
         """Sequence → where it stands; those that were never run are missing."""
+        self.progress_count = 0
+        """How often that changed."""
         self.notes: deque[Note] = deque(maxlen=NOTES_KEPT)
         self.notes_count = 0
         """Notes ever made; the deque holds the last of them."""
@@ -174,7 +178,13 @@ class Hub:
         """Traffic is recorded while this is above 0."""
         self._latest: dict[str, Sample] = {}
         self._changed: dict[str, int] = {}
-        self._subscriptions: set[Subscription] = set()
+        self._batch: tuple[Sample, ...] = ()
+        self._batch_names: tuple[str, ...] = ()
+        self._batch_revision = 0
+        """Many readings that came together last, each of another signal, and the revision they
+        made. They are filed by signal when somebody asks for one, or when others come: a robot
+        that tells all it has in one message does so again and again."""
+        self._wakers: set[Callable[[], None]] = set()
         self._taps: set[Tap] = set()
         self._traffic_taps: set[Tap] = set()
 
@@ -182,26 +192,41 @@ class Hub:
         """Take readings; a repeated value counts as a change, because its age is new."""
         taken = samples if type(samples) is tuple else tuple(samples)
         revision = self.revision = self.revision + 1
-        latest, changed = self._latest, self._changed
         if len(taken) <= _FEW:
+            self._file()
+            latest, changed = self._latest, self._changed
             for sample in taken:
                 name = sample[0]
                 latest[name] = sample
                 changed[name] = revision
         else:
-            newest = dict(zip(map(_name_of, taken), taken, strict=True))
-            latest.update(newest)
-            changed.update(dict.fromkeys(newest, revision))
+            self._put_many(taken, revision)
         for tap in self._taps:
             tap.put(taken)
-        for subscription in self._subscriptions:
-            subscription.wake()
+        for wake in self._wakers:
+            wake()
+
+    def _put_many(self, taken: tuple[Sample, ...], revision: int) -> None:
+        names = tuple(map(_name_of, taken))
+        if names != self._batch_names:
+            self._file()
+            newest = dict(zip(names, taken, strict=True))
+            taken, names = tuple(newest.values()), tuple(newest)
+        self._batch, self._batch_names, self._batch_revision = taken, names, revision
+
+    def _file(self) -> None:
+        """Note of each signal what came of it last."""
+        if self._batch:
+            self._latest.update(zip(self._batch_names, self._batch, strict=True))
+            self._changed.update(dict.fromkeys(self._batch_names, self._batch_revision))
+            self._batch = self._batch_names = ()
 
     def set_link(self, status: LinkStatus) -> None:
         """Take the state of one transport."""
         if self.links.get(status.transport) == status:
             return
         self.links[status.transport] = status
+        self.links_count += 1
         self.revision += 1
         self._wake()
 
@@ -210,6 +235,7 @@ class Hub:
         if self.progress.get(progress.command) == progress:
             return
         self.progress[progress.command] = progress
+        self.progress_count += 1
         self.revision += 1
         self._wake()
 
@@ -233,10 +259,14 @@ class Hub:
 
     def latest(self, name: str) -> Sample | None:
         """Return the newest reading of a signal, or None when there was none."""
+        self._file()
         return self._latest.get(name)
 
-    def changed_since(self, revision: int) -> list[Sample]:
+    def changed_since(self, revision: int) -> Sequence[Sample]:
         """Return the newest reading of every signal that changed after `revision`."""
+        if self._batch and revision == self._batch_revision - 1 == self.revision - 1:
+            return self._batch
+        self._file()
         changed = self._changed
         return [sample for name, sample in self._latest.items() if changed[name] > revision]
 
@@ -244,11 +274,17 @@ class Hub:
     def subscribe(self) -> Iterator[Subscription]:
         """Give a reader its place for as long as the context lasts."""
         subscription = Subscription(self)
-        self._subscriptions.add(subscription)
-        try:
+        with self.heed(subscription.wake):
             yield subscription
+
+    @contextmanager
+    def heed(self, wake: Callable[[], None]) -> Iterator[None]:
+        """Call `wake` at each change for as long as the context lasts; it must return at once."""
+        self._wakers.add(wake)
+        try:
+            yield
         finally:
-            self._subscriptions.discard(subscription)
+            self._wakers.discard(wake)
 
     @contextmanager
     def tap(self, *, with_traffic: bool = False) -> Iterator[Tap]:
@@ -271,5 +307,5 @@ class Hub:
                 self.traffic_watchers -= 1
 
     def _wake(self) -> None:
-        for subscription in self._subscriptions:
-            subscription.wake()
+        for wake in self._wakers:
+            wake()

@@ -3,8 +3,6 @@
 The file may hold secrets, so nobody but its owner can read it.
 """
 
-import os
-import tempfile
 from contextlib import suppress
 from pathlib import Path
 from typing import Annotated, Final
@@ -12,6 +10,7 @@ from urllib.parse import quote
 
 import msgspec
 
+from urc.private_files import put_private
 from urc.problems import UrcError
 
 __all__ = ["Kept", "KeptFile"]
@@ -65,19 +64,7 @@ class KeptFile:
         """
         data = msgspec.json.format(msgspec.json.encode(kept, order="sorted"), indent=1) + b"\n"
         try:
-            self.file.parent.mkdir(parents=True, exist_ok=True)
-            # `mkstemp` makes files that only their owner can read.
-            number, name = tempfile.mkstemp(dir=self.file.parent, prefix=".", suffix=".new")
-            try:
-                with os.fdopen(number, "wb") as opened:
-                    opened.write(data)
-                    opened.flush()
-                    os.fsync(opened.fileno())
-                os.replace(name, self.file)
-            except BaseException:
-                with suppress(OSError):
-                    os.unlink(name)
-                raise
+            put_private(self.file, data)
         except OSError as error:
             raise UrcError(f"{self.file}: {error.strerror or error}") from None
 

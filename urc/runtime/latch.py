@@ -7,13 +7,11 @@ written by a thread of its own turn, and what could not be written is told, not 
 import asyncio
 import json
 import logging
-import os
-import tempfile
 from collections.abc import Callable
-from contextlib import suppress
 from pathlib import Path
 
 from urc.motion.lease import LeaseState
+from urc.private_files import put_private
 
 __all__ = ["LatchFile"]
 
@@ -97,25 +95,8 @@ class LatchFile:
 
     def _replace(self, state: LeaseState) -> None:
         """Put a whole new file in the place of the old one: a crash leaves one of the two."""
-        self._file.parent.mkdir(parents=True, exist_ok=True)
         text = json.dumps({"epoch": state.epoch, "latched_by": state.latched_by[:_LONGEST_NAME]})
-        handle, name = tempfile.mkstemp(prefix=".latch-", dir=self._file.parent)
-        try:
-            with os.fdopen(handle, "w", encoding="utf-8") as file:
-                file.write(text)
-                file.flush()
-                os.fsync(file.fileno())
-            os.replace(name, self._file)
-        except OSError:
-            with suppress(OSError):
-                os.unlink(name)
-            raise
-        if hasattr(os, "O_DIRECTORY"):
-            folder = os.open(self._file.parent, os.O_RDONLY | os.O_DIRECTORY)
-            try:
-                os.fsync(folder)
-            finally:
-                os.close(folder)
+        put_private(self._file, text.encode())
 
 
 def _untold(fault: str) -> None:

@@ -17,8 +17,8 @@ from urc.model.interface import WidgetUse
 from urc.model.profile import Profile, Setting
 from urc.model.values import Limits, Reading, Signal
 from urc.problems import UrcError, printable
+from urc.protocol.codec import CodecContext
 from urc.protocol.encode import build_encode
-from urc.protocol.forms import CodecContext
 from urc.protocol.framing import build_framing
 
 __all__ = ["manual"]

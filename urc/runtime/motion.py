@@ -66,8 +66,6 @@ class MotionDesk:
         }
         self._controls = {name: control_of(driver, one) for name, one in self._holds.items()}
         self._is_making = False
-        self.hint: Callable[[], None] = _nothing
-        """To be called, if at all, when a tick is about to come that will most likely be taken."""
         self._screens: dict[str, _Screen] = {}
         self._unconfirmed: set[str] = set()
         self.on_change: Callable[[LeaseState], None] = _ignore
@@ -98,7 +96,7 @@ class MotionDesk:
 
     def attach(self, frames: Frames, movers: Movers) -> None:
         """Take a session's engine and movers; a stop that is still owed goes out."""
-        self._frames, self._movers, self.hint = frames, movers, movers.hint
+        self._frames, self._movers = frames, movers
         frames.on_count, frames.on_ready = self._renew, self._ready
         if self._unconfirmed:
             self._movers.stop(self._stop_frames(self._holds))
@@ -106,7 +104,6 @@ class MotionDesk:
     def detach(self) -> None:
         """Take note that the session is over: its movers stop what moves, and nothing is armed."""
         self._frames = self._movers = None
-        self.hint = _nothing
         for control in self._controls.values():
             control.is_owed_again = False
             if control.is_armed:
@@ -187,24 +184,34 @@ class MotionDesk:
     # -- motion
 
     def tick(
-        self, client: str, command: str, arguments: Mapping[str, Reading], given: Input, now: float
+        self,
+        client: str,
+        command: str,
+        arguments: Mapping[str, Reading],
+        given: Input,
+        now: float,
+        *,
+        counts: bool = True,
     ) -> str:
-        """Take a tick of sampled input; return why it was refused, or ""."""
+        """Take a tick of sampled input; return why it was refused, or "".
+
+        One that does not count is a rehearsal: it goes the same way, and changes nothing.
+        """
         control, screen = self._controls.get(command), self._screens.get(client)
         if control is None or screen is None:
             return f"{command!r} is no held command of this robot"
         epoch = self.lease.state.epoch
         refusal = self.lease.refusal(client, given.epoch) or screen.freshness.refusal(
-            given, epoch, now, command
+            given, epoch, now, command, counts=counts
         )
-        if refusal:
+        if refusal or not (counts or control.can_rehearse):
             return refusal
         if control.needs_release or epoch <= control.closed_epoch:
             return LET_GO if control.needs_release else _TAKE_ANEW
         frames, movers = self._frames, self._movers
         if frames is None or movers is None:
             return _NO_ROBOT
-        if control.slew is not None:
+        if control.slew is not None and counts:
             arguments = control.limited(arguments, now)
         self._is_making = True  # its stop is made after it
         try:
@@ -215,17 +222,25 @@ class MotionDesk:
             elif not control.is_lasting:
                 self._renew_stops(control.line)
         except UrcError as error:
-            if control.is_armed:
-                movers.release(command)
-            self._close(control)
+            if counts:
+                self._abandon(command, control, movers)
             return str(error)
         finally:
             self._is_making = False
+        if not counts:
+            movers.rehearse(command, data)
+            return ""
         self.lease.touch(now)
         control.course = "moving"
         movers.tick(command, data)
         self.on_moved(screen.client, epoch, command, arguments, data, now)
         return ""
+
+    def _abandon(self, command: str, control: Control, movers: Movers) -> None:
+        """End a motion of which no frame can be made."""
+        if control.is_armed:
+            movers.release(command)
+        self._close(control)
 
     def release(self, client: str, command: str) -> None:
         """Take note that a control was let go; only its holder's word counts."""
@@ -355,10 +370,6 @@ class MotionDesk:
 
 def _ignore(state: LeaseState) -> None:
     """Nobody wants to know."""
-
-
-def _nothing() -> None:
-    """There is nobody to be told."""
 
 
 def _unseen(

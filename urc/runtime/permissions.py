@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from urc._phrases import joined, phrase
 from urc.config.load import Checked, check
 from urc.expressions import Template
 from urc.model.driver import TransportSpec
@@ -36,13 +37,16 @@ def permissions(document: Path, folder: Path, widgets: Sequence[str]) -> list[st
     lines = _of_profile(checked.profile) if checked.profile else []
     return [
         *lines,
-        *(f"has the browser show the page {url}" for url in checked.pages),
+        *(phrase("has the browser show the page {url}", url=url) for url in checked.pages),
         *(
-            f"widget {name}: a program in a frame of its own; it sees and gives what its cell is "
-            "bound to, and nothing else"
+            phrase(
+                "widget {name}: a program in a frame of its own; it sees and gives what its cell is"
+                " bound to, and nothing else",
+                name=name,
+            )
             for name in widgets
         ),
-    ] or ["nothing: it is a layout, with no connection of its own"]
+    ] or [phrase("nothing: it is a layout, with no connection of its own")]
 
 
 def _check_inside(checked: Checked, folder: Path) -> None:
@@ -54,26 +58,36 @@ def _check_inside(checked: Checked, folder: Path) -> None:
 
 
 def _of_profile(profile: Profile) -> list[str]:
-    lines = [_of_transport(spec, profile) for spec in profile.driver.transports.values()]
+    lines: list[str] = [_of_transport(spec, profile) for spec in profile.driver.transports.values()]
     for setting in profile.settings.values():
         if setting.type == "path":
-            lines.append(f"file: the one that the setting {setting.name} names")
+            lines.append(phrase("file: the one that the setting {name} names", name=setting.name))
         if setting.is_secret:
-            lines.append(f"secret: is given what the setting {setting.name} holds")
+            lines.append(
+                phrase("secret: is given what the setting {name} holds", name=setting.name)
+            )
     commands = profile.driver.commands
     moving = sorted(name for name, command in commands.items() if command.hold)
     if commands:
-        lines.append(f"commands: {', '.join(sorted(commands))}")
+        lines.append(phrase("commands: {names}", names=", ".join(sorted(commands))))
     if moving:
-        lines.append(f"moves the robot: {', '.join(moving)}")
+        lines.append(phrase("moves the robot: {names}", names=", ".join(moving)))
     return lines
 
 
 def _of_transport(spec: TransportSpec, profile: Profile) -> str:
     """Return the line of a connection: its type, and where each of its options comes from."""
-    options = [f"{name} {_told(value, profile)}" for name, value in sorted(spec.options.items())]
-    through = f" through {spec.via}" if spec.via else ""
-    return f"connects by {spec.type} ({spec.name}){through}: {', '.join(options) or 'no options'}"
+    options = [
+        joined(" ", (name, _told(value, profile))) for name, value in sorted(spec.options.items())
+    ]
+    names = {
+        "type": spec.type,
+        "name": spec.name,
+        "options": joined(", ", options) if options else phrase("no options"),
+    }
+    if spec.via:
+        return phrase("connects by {type} ({name}) through {via}: {options}", via=spec.via, **names)
+    return phrase("connects by {type} ({name}): {options}", **names)
 
 
 def _told(value: Any, profile: Profile) -> str:
@@ -81,13 +95,16 @@ def _told(value: Any, profile: Profile) -> str:
     if isinstance(value, Template):
         text = value.source
         used = [
-            f"{name} is {setting.default} by default"
+            phrase("{name} is {value} by default", name=name, value=setting.default)
             for name, setting in profile.settings.items()
             if name in value.settings and setting.default is not None and not setting.is_secret
         ]
-        return f"from the settings: {text}" + (f" ({', '.join(used)})" if used else "")
+        if not used:
+            return phrase("from the settings: {text}", text=text)
+        return phrase("from the settings: {text} ({used})", text=text, used=joined(", ", used))
     if isinstance(value, (list, tuple)):
-        return ", ".join(_told(one, profile) for one in value) or "none"
+        return joined(", ", [_told(one, profile) for one in value]) or phrase("none")
     if isinstance(value, dict):
-        return ", ".join(f"{name} {_told(one, profile)}" for name, one in value.items()) or "none"
-    return f"always {value}"
+        some = [joined(" ", (str(name), _told(one, profile))) for name, one in value.items()]
+        return joined(", ", some) or phrase("none")
+    return phrase("always {value}", value=value)

@@ -8,7 +8,8 @@ from typing import Final, NamedTuple
 
 from urc.model.codec import ReadSpec
 from urc.model.driver import Driver, Reply
-from urc.protocol.forms import BadText, CodecContext, Frame, build_reader
+from urc.protocol.codec import BadText, CodecContext, Frame
+from urc.protocol.forms import build_reader
 from urc.protocol.framing import build_framing
 from urc.runtime.trial import Trial
 

@@ -13,7 +13,8 @@ from urc.model.driver import Driver
 from urc.model.profile import Expected, Fed, State, pieces_of
 from urc.problems import UrcError
 from urc.protocol.events import Failed, Replied
-from urc.protocol.framing import FramingError, build_framing
+from urc.protocol.framing import build_framing
+from urc.protocol.framings.base import FramingError
 from urc.runtime.remedy import Remedy
 from urc.runtime.trial import Trial, encoded
 

@@ -75,7 +75,8 @@ class FakeMovers:
         self.ticked_s = float("-inf")
         """When the newest tick was taken."""
         self.is_up = True
-        self.hints = 0
+        self.rehearsed: list[Payload] = []
+        """Frames of ticks that were none."""
         self._clock = clock
         self._write = write
         self._movers: dict[str, Mover] = {}
@@ -94,15 +95,15 @@ class FakeMovers:
             mover = self._movers[command] = Mover(terms)
         mover.arm()
 
-    def hint(self) -> None:
-        """Count that a tick was announced."""
-        self.hints += 1
-
     def tick(self, command: str, data: Payload) -> None:
         """Renew the lease."""
         if self._movers[command].tick(data, self._clock.now()):
             self.ticked_s = self._clock.now()
         self.step()
+
+    def rehearse(self, command: str, data: Payload) -> None:
+        """Count it: nothing is written."""
+        self.rehearsed.append(data)
 
     def renew(self, command: str, stop: Payload) -> None:
         """Stop it with these bytes from now on."""

@@ -6,7 +6,8 @@ from urc.config.forms import FormContext, parse_read
 from urc.config.part import Findings, Part
 from urc.model.codec import ReadSpec
 from urc.problems import ProblemsError
-from urc.protocol.forms import CodecContext, Reader, build_reader
+from urc.protocol.codec import CodecContext, Reader
+from urc.protocol.forms import build_reader
 from urc.source import parse_document
 
 __all__ = ["read_spec", "reader_of"]

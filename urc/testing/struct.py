@@ -9,7 +9,8 @@ from urc.config.part import Findings, Part
 from urc.config.struct_numbers import parse_enums
 from urc.model.codec import ReadSpec, WriteSpec
 from urc.problems import to_text
-from urc.protocol.forms import CodecContext, Frame, Reader, Writer, build_reader, build_writer
+from urc.protocol.codec import CodecContext, Frame, Reader, Writer
+from urc.protocol.forms import build_reader, build_writer
 from urc.source import parse_document
 
 __all__ = ["frame", "reader", "struct_read", "struct_write", "writer"]

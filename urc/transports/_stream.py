@@ -159,6 +159,12 @@ class Stream(asyncio.BufferedProtocol):
         self._transport.write(data)
         return True
 
+    def touch(self) -> None:
+        """Go the way of `offer` with nothing: to write no byte to a stream sends nothing at all."""
+        if _CAN_WRITE and self._ended is None and not self._transport.get_write_buffer_size():
+            with suppress(OSError):  # the loop sees it, too
+                os.write(self._number, b"")
+
     def unsent(self) -> int:
         """Return the bytes handed over that the other side has not acknowledged."""
         # Asked before each motion: what is writable has nothing in its own buffer.

@@ -22,6 +22,7 @@ from urc.runtime.lateness import TOO_LATE_S, LoopWatch
 from urc.runtime.motion import MotionDesk
 from urc.runtime.trail import Trail
 from urc.web import wire_drive as wire
+from urc.web.rehearsal import Rehearsal
 from urc.web.seat import FLOOD, Drivable, Seat
 
 __all__ = ["BEAT_S", "Controls", "Drivable", "Seat"]
@@ -68,6 +69,7 @@ class Controls:
         """Of the newest lease."""
         self._beating: Alarm | None = None
         self._expiring: Alarm | None = None
+        self._rehearsal = Rehearsal(clock, lambda: self.desk)
         self.watch = LoopWatch(clock, self._held_up)
         """Runs while the robot is connected."""
         self._heed(file)
@@ -123,6 +125,7 @@ class Controls:
                     self._stopped(command, reason)
         finally:
             self.watch.end()
+            self._rehearsal.end()
             self._hub = None
             self.desk.detach()
             now = self._clock.now()
@@ -192,16 +195,16 @@ class Controls:
                     seat.hold_back(True)
                 return "one more"
         now = self._clock.now()
-        is_moving = now - seat.moved_at_s < PATIENCE_S and not seat.alarms
-        if is_moving:
-            self.desk.hint()  # first of all: what it wakes up is there when the rest is done
         try:
             tick = wire.decode_tick(data)
         except wire.NO_TICK:
             return "no tick"
         pace = seat.paces.get(tick.command)
+        is_moving = now - seat.moved_at_s < PATIENCE_S and not seat.alarms
         if is_moving and not seat.doubled and pace is not None and pace.take(now):
             self._tick(seat, tick, now)
+            if seat.moved_at_s == now:
+                self._rehearsal.take(seat.client.id, data, now)
             return "in time"
         self._thin(seat, tick)
         return "one more"
@@ -216,6 +219,7 @@ class Controls:
                     return
                 seat.forget(said.command)
                 seat.moved_s.pop(said.command, None)
+                self._rehearsal.end()
                 self.desk.release(seat.client.id, said.command)
             case wire.Stop():
                 if not seat.is_first("", said.number):
@@ -226,6 +230,7 @@ class Controls:
 
     def stop(self, by: str) -> None:
         """Stop and latch. Never refused."""
+        self._rehearsal.end()
         for seat in self._seats.values():
             for command in list(seat.alarms):
                 seat.forget(command)

@@ -6,7 +6,6 @@ import socket
 import msgspec
 import pytest
 
-from urc.guard import pipe
 from urc.guard.pipe import Pipe
 
 pytestmark = pytest.mark.anyio
@@ -109,55 +108,6 @@ async def test_others_have_their_turn(ends: tuple[End, End]) -> None:
     counting.cancel()
     assert b.got == list(range(2000))
     assert turns > 20
-
-
-async def test_one_who_is_nudged_is_awake_when_the_message_comes(
-    ends: tuple[End, End], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """It does not go to sleep before, and a nudge is no message."""
-    a, b = ends
-    waited = 0
-
-    def post() -> None:
-        nonlocal waited
-        waited += 1
-        a.pipe.post("tick")
-
-    monkeypatch.setattr(pipe, "AWAKE_S", WITHIN_S)
-    monkeypatch.setattr(pipe, "_give_way", post)
-    a.pipe.nudge()
-    await b.until(1)
-    assert (b.got, waited) == (["tick"], 1)
-
-
-async def test_one_who_is_nudged_for_nothing_goes_to_sleep(
-    ends: tuple[End, End], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """What comes later is taken all the same; several nudges are one."""
-    a, b = ends
-    monkeypatch.setattr(pipe, "AWAKE_S", 0.0)
-    for number in range(3):
-        a.pipe.nudge()
-        a.pipe.nudge()
-        await asyncio.sleep(0)
-        await asyncio.sleep(0)
-        a.pipe.post(number)
-    await b.until(3)
-    assert b.got == [0, 1, 2]
-
-
-async def test_a_nudge_never_cuts_a_message(ends: tuple[End, End]) -> None:
-    """It is left out where anything waits, and after the end."""
-    a, b = ends
-    a.pipe.post(FULL)
-    a.pipe.nudge()
-    a.pipe.post("last")
-    await b.until(2)
-    assert b.got == [FULL, "last"]
-    b.pipe.close()
-    a.pipe.nudge()
-    a.pipe.close()
-    a.pipe.nudge()
 
 
 async def test_end_of_the_other_side_is_told_once(ends: tuple[End, End]) -> None:

@@ -42,9 +42,6 @@ class Movers:
         self.terms: dict[str, Terms] = {}
         self.is_up = True
 
-    def hint(self) -> None:
-        """Nothing sleeps here."""
-
     def arm(self, command: str, terms: Terms) -> None:
         self.told.append(f"arm {command}")
         self.terms[command] = terms
@@ -52,6 +49,10 @@ class Movers:
     def tick(self, command: str, data: Payload) -> None:
         assert isinstance(data, bytes)
         self.told.append(data.decode())
+
+    def rehearse(self, command: str, data: Payload) -> None:
+        assert isinstance(data, bytes)
+        self.told.append(f"rehearse {data.decode()}")
 
     def renew(self, command: str, stop: Payload) -> None:
         assert isinstance(stop, bytes)

@@ -51,7 +51,7 @@ def test_a_failure_to_write_changes_nothing(
     def full(*_: object) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("urc.runtime.kept.os.fsync", full)
+    monkeypatch.setattr("os.fsync", full)
     with pytest.raises(UrcError, match="No space left on device"):
         file.save(Kept())
     assert file.load() == KEPT
