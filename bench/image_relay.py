@@ -15,7 +15,8 @@ from starlette.types import ASGIApp
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from bench.harness import Goal, Result, compare_all
-from bench.watching import cost_s
+from bench.watching import cost_s, ticking
+from urc._loop import run as run_loop
 from urc.model.interface import WidgetUse
 from urc.model.values import Signal
 from urc.testing.dashboard import FakeRobot, dashboard_profile
@@ -72,14 +73,14 @@ def run(*, full: bool) -> Sequence[Result]:
         [
             (
                 Goal("image relay / send_bytes for each page", BYTES_GOAL),
-                lambda: asyncio.run(_naive(images, is_json=False)),
+                lambda: run_loop(_naive(images, is_json=False)),
             ),
             (
                 Goal("image relay / base64 in JSON", JSON_GOAL),
-                lambda: asyncio.run(_naive(images, is_json=True)),
+                lambda: run_loop(_naive(images, is_json=True)),
             ),
         ],
-        lambda: asyncio.run(_urc(images)),
+        lambda: run_loop(_urc(images)),
         rounds=ROUNDS_IF_FULL if full else ROUNDS,
     )
 
@@ -103,9 +104,7 @@ async def _urc(images: int) -> float:
     app = build_app({"puppet": Robot(robot.profile, {}, robot.open)})
 
     async def play() -> None:
-        for _ in range(images):
-            robot.say("cam", IMAGE)
-            await asyncio.sleep(1 / RATE_HZ)
+        await ticking(lambda _: robot.say("cam", IMAGE), images, RATE_HZ)
 
     spent_s, tally = await cost_s(app, "/ws?robot=puppet", CLIENTS, ["cam"], play)
     return _each(spent_s, [size for _, size in tally], len(IMAGE))

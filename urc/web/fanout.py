@@ -1,23 +1,26 @@
 """One robot's readings to all who watch it: flushed at once, then at most once a display frame.
 
-Floor 5. Nothing is queued for anybody. A flush only wakes the clients; each takes, when its own
-line is free, everything newer than what it has already sent. Clients at the same place share one
-encoded text, so a frame is encoded once however many watch; one that fell behind gets the newest
-values merged into one frame, and is nobody else's problem.
+Floor 5. Nothing is queued for anybody. A flush writes the frame that all share to each client that
+waits for nothing else, and wakes the others: each of them takes, when its own line is free,
+everything newer than what it has already sent. A frame is encoded once however many watch; one that
+fell behind gets the newest values merged into one frame, and is nobody else's problem.
 """
 
-from dataclasses import dataclass, field
-from typing import NamedTuple, Protocol
+import asyncio
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 from urc.model.values import Sample
-from urc.runtime.clock import Clock, LoopClock
-from urc.runtime.hub import Hub, LinkStatus, Progress
+from urc.runtime.clock import Alarm, Clock, LoopClock
+from urc.runtime.hub import Hub
+from urc.web.crowd import NO_NUMBER, Crowd, Kernel, Known, Listener, Place
+from urc.web.line import Flow
 from urc.web.picture_shelf import PictureShelf, is_picture
-from urc.web.wire import encode_links, encode_log, encode_values
+from urc.web.wire import Indexes, encode_links, encode_log, encode_values
 from urc.web.wire_ask import encode_progress
 from urc.web.wire_picture import as_frame
 
-__all__ = ["FRAMES_PER_SECOND", "Fanout", "Known", "Listener", "Pacer", "Place"]
+__all__ = ["FRAMES_PER_SECOND", "Fanout", "Pacer"]
 
 FRAMES_PER_SECOND = 60.0
 LOG_LINES_FOR_NEWCOMERS = 50
@@ -25,50 +28,15 @@ SHARED_FOR_S = 0.005
 """How long an encoded frame may be handed out again: the ages in it are those of its encoding."""
 
 
-class Listener(Protocol):
-    """Somebody who wants to know that there is something new."""
-
-    def wake(self) -> None:
-        """Take a look, soon. Must return at once."""
-
-
-class Known(NamedTuple):
-    """How far somebody has got."""
-
-    revision: int = 0
-    """Hub revision up to which it has the values."""
-    links: int = 0
-    """Number of the link state it has."""
-    progress: int = 0
-    """Number of the state of the sequences it has."""
-    notes: int = 0
-    """Log lines it has, or was told it lost."""
-
-
 @dataclass(slots=True)
-class Place:
-    """One client's; those that have got equally far share what they know."""
-
-    known: Known = field(default_factory=Known)
-
-
-class _Frame(NamedTuple):
-    """An encoded frame, the revision it leads to, and when it was encoded."""
-
-    text: str
-    revision: int
-    time_s: float
-
-
-class _Taken(NamedTuple):
+class _Taken:
     """What everybody gets who knows equally much."""
 
-    before: Known
     after: Known
     messages: tuple[str, ...]
-    frames: bytes
-    """The same as WebSocket frames, one behind the other; empty until somebody wants them."""
     time_s: float
+    frames: bytes = b""
+    """The same as WebSocket frames, one behind the other; empty until somebody wants them."""
 
 
 class Pacer:
@@ -100,55 +68,123 @@ class Fanout:
         *,
         rate_hz: float = FRAMES_PER_SECOND,
         clock: Clock | None = None,
+        kernel: Kernel = Kernel(),  # noqa: B008 - it cannot be changed
     ) -> None:
         self.hub = hub
-        self.listeners: set[Listener] = set()
+        self._crowds: list[Crowd] = []
+        """One for each set of images that somebody shows."""
+        self._waiting: dict[Listener, None] = {}
+        """Those in no crowd."""
+        self._kernel = kernel
+        self._indexes = Indexes(hub.index)
         self._clock: Clock = clock or LoopClock()
         self._pacer = Pacer(rate_hz)
         self._head = 0
-        self._frames: dict[int, _Frame] = {}
         self._taken: dict[Known, _Taken] = {}
-        self._usual: _Taken | None = None
-        """What nearly everybody gets in the flush that is under way."""
-        self._is_flushing = False
+        self._due: Alarm | None = None
+        """The flush that is to come."""
+        self._broken: asyncio.Future[None] | None = None
         self._looked_at = -1
-        self._links: tuple[LinkStatus, ...] = ()
-        self._links_number = 0
         self._pictures = {name for name, signal in hub.signals.items() if is_picture(signal)}
         self.shelf = PictureShelf(hub, self._clock)
-        self._progress: tuple[Progress, ...] = ()
-        self._progress_number = 0
 
     async def run(self) -> None:
-        """Flush for ever; ends by being cancelled."""
-        with self.hub.subscribe() as subscription:
-            while True:
-                await subscription.changed()
-                delay_s = self._pacer.delay_s(self._clock.now())
-                if delay_s > 0:
-                    await self._clock.sleep(delay_s)
-                self._pacer.went(self._clock.now())
-                self.flush()
-                subscription.seen = self._head
+        """Flush for ever; ends by being cancelled, or with what a flush raised."""
+        self._broken = asyncio.get_running_loop().create_future()
+        try:
+            with self.hub.heed(self._changed):
+                if self.hub.revision:
+                    self._changed()
+                await self._broken
+        finally:
+            if self._due is not None:
+                self._due.cancel()
+
+    def _changed(self) -> None:
+        """Have a flush, as soon as may be, and after whatever the loop is at."""
+        if self._due is not None:
+            return
+        now_s = self._clock.now()
+        delay_s = self._pacer.delay_s(now_s)
+        if delay_s > 0:
+            self._due = self._clock.call_at(now_s + delay_s, self._ripe)
+        else:
+            self._due = asyncio.get_running_loop().call_soon(self._ripe)
+
+    def _ripe(self) -> None:
+        self._due = None
+        self._pacer.went(self._clock.now())
+        try:
+            self.flush()
+        except Exception as fault:  # the session's, which awaits `run`
+            if self._broken is not None and not self._broken.done():
+                self._broken.set_exception(fault)
 
     def flush(self) -> None:
-        """Forget the last frame and wake everybody."""
+        """Forget the last frame, and bring everybody up to date who is ready for it."""
         self._head = self.hub.revision
-        self._frames.clear()
         self._taken.clear()
-        self._is_flushing = True
-        for listener in self.listeners:
+        waiting = tuple(self._waiting)  # who falls out of a crowd has been given what is new
+        for crowd in tuple(self._crowds):
+            taken = self._shared_frames(crowd.known)
+            crowd.known = taken.after
+            if taken.frames:
+                crowd.send(taken.frames)
+            while (picture := self.shelf.take(crowd.looks)) is not None:
+                crowd.send_parts(picture.parts)
+        for listener in waiting:
             listener.wake()
-        self._is_flushing = False
-        self._usual = None
 
-    def newcomer(self) -> Place:
-        """Return the place of a client that knows nothing yet."""
-        return Place(Known(notes=max(0, self.hub.notes_count - LOG_LINES_FOR_NEWCOMERS)))
+    def end(self) -> None:
+        """Wake everybody: there is nothing more to come."""
+        for crowd in tuple(self._crowds):
+            for place in crowd.places:
+                self.stir(place)
+        self.flush()
+
+    def join(self, listener: Listener) -> Place:
+        """Let somebody know of each flush; return the place of one that knows nothing yet."""
+        self._waiting[listener] = None
+        known = Known(notes=max(0, self.hub.notes_count - LOG_LINES_FOR_NEWCOMERS))
+        return Place(known, listener=listener)
+
+    def leave(self, place: Place) -> None:
+        """Forget somebody."""
+        self.stir(place)
+        if place.listener is not None:
+            self._waiting.pop(place.listener, None)
+
+    def settle(self, place: Place) -> None:
+        """Write to somebody directly from now on, who is up to date and waits for nothing else.
+
+        One that lacks what others do not is woken once more, and may settle then.
+        """
+        if place.number == NO_NUMBER or place.crowd is not None:
+            return
+        same = [crowd for crowd in self._crowds if crowd.looks.names == place.looks.names]
+        if same and not same[0].fits(place):
+            return
+        crowd = same[0] if same else Crowd(place, self._kernel)
+        if not same:
+            self._crowds.append(crowd)
+        crowd.add(place)
+        if place.listener is not None:
+            self._waiting.pop(place.listener, None)
+
+    def stir(self, place: Place) -> None:
+        """Wake somebody again at each flush, and write nothing to it."""
+        crowd = place.crowd
+        if crowd is None:
+            return
+        crowd.remove(place)
+        if crowd.is_empty:
+            self._crowds.remove(crowd)
+        if place.listener is not None:
+            self._waiting[place.listener] = None
 
     def take(self, place: Place) -> tuple[str, ...]:
         """Return the messages that bring `place` up to date, and move it there."""
-        taken = self._shared(place)
+        taken = self._shared(place.known)
         place.known = taken.after
         return taken.messages
 
@@ -157,63 +193,55 @@ class Fanout:
 
         They are made once for all who know equally much.
         """
-        taken = self._usual
-        if taken is None or taken.before is not place.known:
-            taken = self._shared(place)
-            if taken.messages and not taken.frames:
-                frames = b"".join(as_frame(text.encode(), is_text=True) for text in taken.messages)
-                taken = self._taken[place.known] = taken._replace(frames=frames)
-            self._usual = taken if self._is_flushing else None
+        taken = self._shared_frames(place.known)
         place.known = taken.after
         return taken.frames
 
-    def _shared(self, place: Place) -> _Taken:
+    def catch_up(self, place: Place, flow: Flow) -> None:
+        """Write what is new on a line that is free, and images for as long as it is."""
+        frames = self.take_frames(place)
+        if frames:
+            flow.write(frames)
+        while place.looks.names and flow.is_free():
+            picture = self.shelf.take(place.looks)
+            if picture is None:
+                break
+            flow.write(picture.frame)
+
+    def _shared_frames(self, known: Known) -> _Taken:
+        taken = self._shared(known)
+        if taken.messages and not taken.frames:
+            texts = [as_frame(text.encode(), is_text=True) for text in taken.messages]
+            taken.frames = b"".join(texts)
+        return taken
+
+    def _shared(self, known: Known) -> _Taken:
         if self._looked_at != self.hub.revision:
-            self._look()
-        taken, now_s = self._taken.get(place.known), self._clock.now()
+            self._looked_at = self.hub.revision
+            self._taken.clear()
+        taken, now_s = self._taken.get(known), self._clock.now()
         if taken is None or now_s - taken.time_s > SHARED_FOR_S:
-            taken = self._taken[place.known] = self._make(place.known, now_s)
+            taken = self._taken[known] = self._make(known, now_s)
         return taken
 
     def _make(self, known: Known, now_s: float) -> _Taken:
-        messages = []
-        if known.links != self._links_number:
-            messages.append(encode_links(self._links, now_s))
-        values, revision = self._take_values(known.revision, now_s)
-        if values:
-            messages.append(values)
-        if self.hub.notes_count > known.notes:
-            messages.append(self._take_log(self.hub.notes_count - known.notes, now_s))
-        if known.progress != self._progress_number:
-            messages.append(encode_progress(self._progress))
-        after = Known(revision, self._links_number, self._progress_number, self.hub.notes_count)
-        return _Taken(known, after, tuple(messages), b"", now_s)
+        hub, messages = self.hub, []
+        revision = known.revision
+        if known.links != hub.links_count:
+            messages.append(encode_links(hub.links.values(), now_s))
+        if revision < self._head:  # what came since the last flush waits for the next one
+            samples = self._plain(hub.changed_since(revision))
+            revision = hub.revision
+            if samples:
+                messages.append(encode_values(samples, self._indexes, now_s))
+        if hub.notes_count > known.notes:
+            messages.append(self._take_log(hub.notes_count - known.notes, now_s))
+        if known.progress != hub.progress_count:
+            messages.append(encode_progress(tuple(hub.progress.values())))
+        after = Known(revision, hub.links_count, hub.progress_count, hub.notes_count)
+        return _Taken(after, tuple(messages), now_s)
 
-    def _look(self) -> None:
-        """Number what is not a value anew, when it has changed; once for all clients."""
-        self._looked_at = self.hub.revision
-        self._taken.clear()
-        links = tuple(self.hub.links.values())
-        if links != self._links:
-            self._links = links
-            self._links_number += 1
-        progress = tuple(self.hub.progress.values())
-        if progress != self._progress:
-            self._progress = progress
-            self._progress_number += 1
-
-    def _take_values(self, revision: int, now_s: float) -> tuple[str, int]:
-        """Return the frame with what is newer, and the revision it leads to."""
-        if revision >= self._head:
-            return "", revision  # what came since the last flush waits for the next one
-        frame = self._frames.get(revision)
-        if frame is None or now_s - frame.time_s > SHARED_FOR_S:
-            samples = self._plain(self.hub.changed_since(revision))
-            text = encode_values(samples, self.hub.index, now_s) if samples else ""
-            frame = self._frames[revision] = _Frame(text, self.hub.revision, now_s)
-        return frame.text, frame.revision
-
-    def _plain(self, samples: list[Sample]) -> list[Sample]:
+    def _plain(self, samples: Sequence[Sample]) -> Sequence[Sample]:
         """Return the readings without the images, which only go to those who show them."""
         if not self._pictures:
             return samples

@@ -11,7 +11,7 @@ from typing import NamedTuple
 from urc.model.values import Sample, Signal
 from urc.runtime.clock import Clock
 from urc.runtime.hub import Hub
-from urc.web.wire_picture import as_frame, encode_picture
+from urc.web.wire_picture import picture_head
 from urc.web.wire_text import milliseconds
 
 __all__ = ["Encoded", "Looks", "PictureShelf", "is_picture"]
@@ -22,15 +22,27 @@ some ten kilobytes is not worth making anew for a few milliseconds."""
 
 
 class Encoded(NamedTuple):
-    """An image on its way: the message, and the same as a whole WebSocket frame."""
+    """An image on its way."""
 
-    message: bytes
-    frame: bytes
+    parts: tuple[bytes, bytes]
+    """A whole WebSocket frame: what is before the image, and the image as it came."""
+    message_at: int
+    """Where the message begins in it."""
     sample: Sample
     """What was encoded."""
     number: int
     """Grows with each new image of any signal."""
     made_s: float
+
+    @property
+    def message(self) -> bytes:
+        """Return what the frame carries."""
+        return self.frame[self.message_at :]
+
+    @property
+    def frame(self) -> bytes:
+        """Return it in one piece."""
+        return b"".join(self.parts)
 
 
 @dataclass(slots=True)
@@ -47,6 +59,14 @@ class Looks:
         """Take what the page shows from now on; what it stops showing, it has to be sent anew."""
         self.names = tuple(dict.fromkeys(names))
         self.seen = {name: number for name, number in self.seen.items() if name in self.names}
+
+    def is_like(self, other: "Looks") -> bool:
+        """Return whether another one shows the same and has the same of it."""
+        return self.names == other.names and self.seen == other.seen
+
+    def copy(self) -> "Looks":
+        """Return another one that has got as far."""
+        return Looks(self.names, dict(self.seen), self.turn)
 
 
 def is_picture(signal: Signal | None) -> bool:
@@ -87,9 +107,8 @@ class PictureShelf:
             self._count += is_new
             number = self._count if known is None or is_new else known.number
             age_ms = milliseconds(now_s - sample.time_s)
-            message = encode_picture(
-                self._hub.index[name], sample.value, age_ms, milliseconds(now_s)
-            )
-            known = Encoded(message, as_frame(message), sample, number, now_s)
+            index, now_ms = self._hub.index[name], milliseconds(now_s)
+            head, at = picture_head(index, sample.value, age_ms, now_ms)
+            known = Encoded((head, sample.value), at, sample, number, now_s)
             self._encoded[name] = known
         return known

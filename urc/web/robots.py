@@ -289,7 +289,7 @@ class Station:
         finally:
             self._next = None
             live.ended.set()
-            live.fanout.flush()
+            live.fanout.end()
 
     async def _until_deserted(self) -> None:
         while True:

@@ -21,17 +21,19 @@ from uvicorn.server import ServerState
 from urc.problems import UrcError
 from urc.web.addresses import local_addresses
 from urc.web.connection import CONNECTIONS, REQUEST_S, Connection
+from urc.web.flow import SocketFlow
 from urc.web.frames import Frames, text_of
 from urc.web.wire import INBOUND_BYTES
 
 __all__ = ["reachable_urls", "serve"]
 
 SEND_BUFFER_BYTES = 64 * 1024
-UNSENT_BYTES = 16 * 1024
+UNSENT_BYTES = 8 * 1024
 HEADER_BYTES = 16 * 1024
 PING_EVERY_S = 5.0
 PING_TIMEOUT_S = 10.0
 GRACE_S = 2
+DATE_S = 1.0
 BACKLOG = 128
 
 
@@ -91,48 +93,35 @@ async def serve(
 
 
 class _Server(uvicorn.Server):
+    """uvicorn's server, told of its end instead of looking for it ten times a second."""
+
+    def __init__(self, config: uvicorn.Config) -> None:
+        super().__init__(config)
+        self._ending = asyncio.Event()
+
+    def end(self) -> None:
+        """Close in good order."""
+        self.should_exit = True
+        self._ending.set()
+
+    async def main_loop(self) -> None:
+        """Renew the date of the answers, until the end."""
+        while not await self.on_tick(0):
+            with contextlib.suppress(TimeoutError):
+                async with asyncio.timeout(DATE_S):
+                    await self._ending.wait()
+
     @contextlib.contextmanager
     def capture_signals(self) -> Iterator[None]:
         """Leave the signals to `_ending`: uvicorn's own handling raises them again at the end."""
         yield
 
 
-class _Flow:
-    """Lets a client wait until the kernel has taken everything, or cut the line."""
-
-    def __init__(self) -> None:
-        self.transport: asyncio.Transport | None = None
-        self.sink: Callable[[bytes], bool] | None = None
-        self.writable = asyncio.Event()
-        self.writable.set()
-
-    def is_free(self) -> bool:
-        return self.writable.is_set()
-
-    async def drained(self) -> None:
-        await self.writable.wait()
-
-    def write(self, frame: bytes) -> None:
-        if self.transport and not self.transport.is_closing():
-            self.transport.write(frame)
-
-    def listen(self, sink: Callable[[bytes], bool]) -> None:
-        self.sink = sink
-
-    def hold_back(self, is_held: bool) -> None:
-        if self.transport and not self.transport.is_closing():
-            (self.transport.pause_reading if is_held else self.transport.resume_reading)()
-
-    def abort(self) -> None:
-        if self.transport:
-            self.transport.abort()
-
-
 class _DashboardSocket(WebSocketsSansIOProtocol):
     """uvicorn's WebSocket, with nothing waiting in the process, and a word when the line is free.
 
     WARNING: only asyncio's own protocol methods and the constructor's arguments are used here, the
-    rest of the base class is uvicorn's business. The application finds the `_Flow` in
+    rest of the base class is uvicorn's business. The application finds the `SocketFlow` in
     ``scope["state"]["flow"]`` and must do without it on another server.
     """
 
@@ -143,7 +132,7 @@ class _DashboardSocket(WebSocketsSansIOProtocol):
         app_state: dict[str, Any],
         _loop: asyncio.AbstractEventLoop | None = None,
     ) -> None:
-        self._urc_flow = _Flow()
+        self._urc_flow = SocketFlow()
         self._urc_frames: Frames | None = None
         """None before the handshake, which is what comes first."""
         super().__init__(config, server_state, {**app_state, "flow": self._urc_flow}, _loop)
@@ -151,28 +140,27 @@ class _DashboardSocket(WebSocketsSansIOProtocol):
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """Take the transport, and let it pause us as soon as the kernel is full."""
         super().connection_made(transport)
-        self._urc_flow.transport = cast("asyncio.Transport", transport)
-        self._urc_flow.transport.set_write_buffer_limits(high=0)
+        self._urc_flow.made(cast("asyncio.Transport", transport))
 
     def connection_lost(self, exc: Exception | None) -> None:
         """Let a waiting writer go on, to learn that the line is gone."""
         super().connection_lost(exc)
-        self._urc_flow.writable.set()
+        self._urc_flow.lost()
 
     def data_received(self, data: bytes) -> None:
         """Pass a whole text on at once, if the client takes it; all else goes its usual way."""
         if self._urc_frames is None:
             self._urc_frames = Frames()
-            super().data_received(data)
+            self._urc_usual(data)
             return
         text = self._urc_frames.whole(data)
         sink = self._urc_flow.sink
         if sink is None:
-            super().data_received(data)
+            self._urc_usual(data)
         elif text is None:
             self._urc_several(data, self._urc_frames.spans, sink)
         elif not sink(text):
-            super().data_received(data)
+            self._urc_usual(data)
 
     def _urc_several(
         self, data: bytes, spans: Iterable[tuple[int, int]], sink: Callable[[bytes], bool]
@@ -184,17 +172,22 @@ class _DashboardSocket(WebSocketsSansIOProtocol):
                 break
             at = end
         if at < len(data):
-            super().data_received(data[at:])
+            self._urc_usual(data[at:])
+
+    def _urc_usual(self, data: bytes) -> None:
+        super().data_received(data)
+        if self._urc_flow.is_closing():  # it was a goodbye, which was answered
+            self._urc_flow.closing()
 
     def pause_writing(self) -> None:
         """Tell the client that the kernel is full."""
         super().pause_writing()
-        self._urc_flow.writable.clear()
+        self._urc_flow.pause()
 
     def resume_writing(self) -> None:
         """Tell the client that the kernel has taken everything."""
         super().resume_writing()
-        self._urc_flow.writable.set()
+        self._urc_flow.resume()
 
 
 def _listen(host: str, port: int) -> socket.socket:
@@ -256,30 +249,27 @@ async def _until_ready(server: uvicorn.Server, running: "asyncio.Future[None]") 
         await asyncio.wait((running,), timeout=0.01)
 
 
-async def _follow(server: uvicorn.Server, running: "asyncio.Future[None]") -> None:
+async def _follow(server: _Server, running: "asyncio.Future[None]") -> None:
     """Wait for the server's end; being cancelled ends it in good order first."""
     try:
         await asyncio.shield(running)
     except asyncio.CancelledError:
-        server.should_exit = True
+        server.end()
         await asyncio.wait((running,), timeout=GRACE_S + 1)
         running.cancel()
         raise
 
 
 @contextlib.contextmanager
-def _ending(server: uvicorn.Server) -> Iterator[None]:
+def _ending(server: _Server) -> Iterator[None]:
     """Let SIGINT and SIGTERM end the server while the context lasts, where they can be caught."""
     loop = asyncio.get_running_loop()
     caught: list[signal.Signals] = []
 
-    def end() -> None:
-        server.should_exit = True
-
     for number in (signal.SIGINT, signal.SIGTERM):
         # Not in a thread, and not on Windows: there the caller's own handling stays.
         with contextlib.suppress(NotImplementedError, RuntimeError, ValueError):
-            loop.add_signal_handler(number, end)
+            loop.add_signal_handler(number, server.end)
             caught.append(number)
     try:
         yield

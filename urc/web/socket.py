@@ -20,9 +20,9 @@ from urc.model.values import NOTHING, Reading
 from urc.runtime.session import CommandFailed
 from urc.web import wire
 from urc.web.controls import Seat
-from urc.web.fanout import Place
+from urc.web.crowd import Place
+from urc.web.fanout import Fanout
 from urc.web.line import Allowance, Flow, Guest, Line
-from urc.web.picture_shelf import Looks
 from urc.web.robots import (
     HELD,
     Live,
@@ -69,8 +69,8 @@ class Client:
         self._news = asyncio.Event()
         self._answers: deque[str] = deque()
         self._pong = ""
-        self._looks = Looks()
         self._place = Place()
+        self._fanout: Fanout | None = None
         self._idle: Live | None = None  # set while the writer waits for news
         self._is_listening = False
         self._closing: tuple[int, str] | None = None
@@ -80,24 +80,30 @@ class Client:
         self.bad_messages = 0
 
     def wake(self) -> None:
-        """Take what is new; called by the fan-out at each flush.
+        """Take what is new; called by the fan-out at each flush until this is settled again.
 
         A line that is free is written to at once: the turns of a task cost more than the frame.
         """
         live, flow = self._idle, self._flow
         if live is None or flow is None or self._news.is_set() or not flow.is_free():
-            self._news.set()
+            self._stir()
             return
-        frames = live.fanout.take_frames(self._place)
-        if frames:
-            flow.write(frames)
-        while self._looks.names and flow.is_free():
-            picture = live.fanout.shelf.take(self._looks)
-            if picture is None:
-                break
-            flow.write(picture.frame)
-        if live.ended.is_set() or (self._looks.names and not flow.is_free()):
-            self._news.set()  # the end; or the newest, once the line is free
+        live.fanout.catch_up(self._place, flow)
+        if live.ended.is_set() or not flow.is_free():
+            self._stir()  # the end; or the newest, once the line is free
+        else:
+            self._settle(live, flow)
+
+    def _settle(self, live: Live, flow: Flow) -> None:
+        """Let the fan-out write by itself while there is nothing else to do."""
+        self._place.number, self._place.finish = flow.direct(self._stir), flow.write
+        live.fanout.settle(self._place)
+
+    def _stir(self) -> None:
+        """Let the writer look; until it has, the fan-out wakes this client and writes nothing."""
+        if self._fanout is not None:
+            self._fanout.stir(self._place)
+        self._news.set()
 
     async def serve(self) -> None:
         """Be this client from the accepted socket to its end."""
@@ -131,10 +137,11 @@ class Client:
         await self._converse(live, first)
 
     async def _converse(self, live: Live, first: Message | None) -> None:
-        live.fanout.listeners.add(self)
+        self._fanout = live.fanout
+        self._place = live.fanout.join(self)
         controls = self._station.controls
         try:
-            self._seat = controls.sit(self._guest.place, self._guest.role, self._news.set)
+            self._seat = controls.sit(self._guest.place, self._guest.role, self._stir)
             self._station.consent.welcome(self._seat)
             async with asyncio.TaskGroup() as group:
                 writing = group.create_task(self._write(live))
@@ -153,7 +160,7 @@ class Client:
         finally:
             if self._seat is not None:
                 controls.rise(self._seat)
-            live.fanout.listeners.discard(self)
+            live.fanout.leave(self._place)
 
     async def _refuse(self, code: int, reason: str) -> None:
         try:
@@ -168,18 +175,14 @@ class Client:
         profile = self._station.robot.profile
         hello = wire.encode_hello(profile, live.number, self._station.clock.now())
         await self._line.send_text(hello)
-        self._place = live.fanout.newcomer()
         while True:
             # Only what is taken after the line is free is the newest.
             if self._flow:
                 async with asyncio.timeout(STALL_S):
                     await self._flow.drained()
             self._news.clear()
-            for text in (
-                *live.fanout.take(self._place),
-                *self._take_controls(),
-                *self._take_answers(),
-            ):
+            told = self._station.controls.take(self._seat) if self._seat else []
+            for text in (*live.fanout.take(self._place), *told, *self._take_answers()):
                 async with asyncio.timeout(STALL_S):
                     await self._line.send_text(text)
             # One image, then whatever else is new: nothing waits behind a second one.
@@ -191,17 +194,19 @@ class Client:
                 await self._line.close(*self._closing)
                 return
             self._idle = live
+            if self._flow and self._flow.is_free() and not self._news.is_set():
+                self._settle(live, self._flow)
             await self._news.wait()
             self._idle = None
 
     async def _send_picture(self, live: Live) -> bool:
         """Send the newest image that the page has not got; return whether there is one."""
-        if not self._looks.names:
+        if not self._place.looks.names:
             return False
         async with asyncio.timeout(STALL_S):
             if self._flow:
                 await self._flow.drained()
-            picture = live.fanout.shelf.take(self._looks)
+            picture = live.fanout.shelf.take(self._place.looks)
             if picture is None:
                 return False
             if self._flow:
@@ -209,9 +214,6 @@ class Client:
             else:
                 await self._line.send_bytes(picture.message)
         return True
-
-    def _take_controls(self) -> list[str]:
-        return self._station.controls.take(self._seat) if self._seat is not None else []
 
     def _take_answers(self) -> list[str]:
         answers = list(self._answers)
@@ -272,14 +274,14 @@ class Client:
         elif isinstance(asked, Drive):
             self._hear(asked)
         elif isinstance(asked, Show):
-            self._looks.show(asked.signals)
-            self._news.set()
+            self._stir()
+            self._place.looks.show(asked.signals)
         elif isinstance(asked, (Agree, Prepare, Steer)):
             self._advise(asked, live)
         elif isinstance(asked, wire.Ping):
             if math.isfinite(asked.c):
                 self._pong = wire.encode_pong(asked, now_s, time())
-                self._news.set()
+                self._stir()
         else:
             self._start(asked, live, group)
 
@@ -316,7 +318,7 @@ class Client:
 
     def _answer(self, text: str) -> None:
         self._answers.append(text)
-        self._news.set()
+        self._stir()
 
     def _start(self, asked: wire.Run, live: Live, group: asyncio.TaskGroup) -> None:
         if len(self._commands) + len(self._answers) >= COMMANDS_AT_ONCE:

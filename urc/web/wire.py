@@ -53,6 +53,7 @@ __all__ = [
     "INBOUND_BYTES",
     "BadMessage",
     "Inbound",
+    "Indexes",
     "Ping",
     "Run",
     "decode",
@@ -68,7 +69,7 @@ __all__ = [
 VERSION = 1
 INBOUND_BYTES = 64 * 1024
 """Longest message taken from a page."""
-_AS_THEY_ARE = (float, bool, type(None))
+_AS_THEY_ARE = frozenset((float, bool, type(None)))
 _EXACT = 2**53 - 1  # beyond it a browser's numbers skip integers
 
 CLOSE_BAD_MESSAGES = 4400
@@ -113,10 +114,10 @@ class _Hello(Outbound, tag="hello", omit_defaults=False, frozen=True):
 
 class _Values(Outbound, tag="v", frozen=True):
     n: int
-    i: list[int]
-    v: list[object]
-    a: list[int]
-    s: list[str] | None = None
+    i: Sequence[int]
+    v: Sequence[object]
+    a: Sequence[int]
+    s: Sequence[str] | None = None
 
 
 class _Link(msgspec.Struct, frozen=True):
@@ -214,18 +215,36 @@ def encode_hello(profile: Profile, session: str, now_s: float) -> str:
     )
 
 
-def encode_values(samples: Sequence[Sample], index: Mapping[str, int], now_s: float) -> str:
+class Indexes:
+    """Which number each name has; mostly those are asked for that were asked for last."""
+
+    def __init__(self, index: Mapping[str, int]) -> None:
+        self._index = index
+        self._names: tuple[str, ...] = ()
+        self._found: list[int] = []
+
+    def of(self, names: tuple[str, ...]) -> list[int]:
+        """Return the numbers; the list must not be changed."""
+        if names != self._names:
+            self._names, self._found = names, [*map(self._index.__getitem__, names)]
+        return self._found
+
+
+def encode_values(samples: Sequence[Sample], indexes: Indexes, now_s: float) -> str:
     """Return one frame with the newest reading of each changed signal."""
     names, values, times, alarms = zip(*samples, strict=True)
-    # What came together is equally old.
-    ages = {time_s: max(0, milliseconds(now_s - time_s)) for time_s in set(times)}
+    if times.count(times[0]) == len(times):  # what came together is equally old
+        ages = [max(0, milliseconds(now_s - times[0]))] * len(times)
+    else:
+        ages = [max(0, milliseconds(now_s - time_s)) for time_s in times]
+    are_as_they_are = _AS_THEY_ARE.issuperset(map(type, values))
     return encoded(
         _Values(
             n=milliseconds(now_s),
-            i=[*map(index.__getitem__, names)],
-            v=[each if type(each) in _AS_THEY_ARE else _plain(each) for each in values],
-            a=[*map(ages.__getitem__, times)],
-            s=list(alarms) if any(alarms) else None,
+            i=indexes.of(names),
+            v=values if are_as_they_are else [*map(_plain, values)],
+            a=ages,
+            s=alarms if any(alarms) else None,
         )
     )
 

@@ -15,7 +15,7 @@ from typing import Annotated
 
 import msgspec
 
-__all__ = ["Show", "as_frame", "encode_picture", "media_type"]
+__all__ = ["Show", "as_frame", "encode_picture", "media_type", "picture_head"]
 
 _PICTURE = 1
 _HEADER = struct.Struct(">BBHId")
@@ -60,18 +60,30 @@ def encode_picture(index: int, data: bytes, age_ms: int, now_ms: int) -> bytes:
         age_ms: how old it is now.
         now_ms: the server's clock.
     """
+    return _header(index, data, age_ms, now_ms) + data
+
+
+def picture_head(index: int, data: bytes, age_ms: int, now_ms: int) -> tuple[bytes, int]:
+    """Return what is before the image in one WebSocket frame, and where the message begins."""
+    header = _header(index, data, age_ms, now_ms)
+    head = _head(len(header) + len(data), _FINAL_BINARY)
+    return head + header, len(head)
+
+
+def _header(index: int, data: bytes, age_ms: int, now_ms: int) -> bytes:
     kind = media_type(data).encode("ascii")
     age_ms = min(max(0, age_ms), _OLDEST_MS)
-    return _HEADER.pack(_PICTURE, len(kind), index, age_ms, now_ms) + kind + data
+    return _HEADER.pack(_PICTURE, len(kind), index, age_ms, now_ms) + kind
 
 
 def as_frame(message: bytes, *, is_text: bool = False) -> bytes:
     """Return a message as one WebSocket frame, ready for any client's line."""
-    size, first = len(message), _FINAL_TEXT if is_text else _FINAL_BINARY
+    return _head(len(message), _FINAL_TEXT if is_text else _FINAL_BINARY) + message
+
+
+def _head(size: int, first: int) -> bytes:
     if size < 126:
-        head = struct.pack(">BB", first, size)
-    elif size < 1 << 16:
-        head = struct.pack(">BBH", first, 126, size)
-    else:
-        head = struct.pack(">BBQ", first, 127, size)
-    return head + message
+        return struct.pack(">BB", first, size)
+    if size < 1 << 16:
+        return struct.pack(">BBH", first, 126, size)
+    return struct.pack(">BBQ", first, 127, size)

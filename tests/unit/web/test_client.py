@@ -16,6 +16,7 @@ from urc.runtime.session import CommandFailed
 from urc.runtime.trail import Trail
 from urc.testing.clock import FakeClock, settle
 from urc.testing.dashboard import FakeRobot, dashboard_profile
+from urc.web.crowd import NO_NUMBER
 from urc.web.robots import Robot, Station
 from urc.web.socket import BAD_MESSAGES, MESSAGES_PER_S, TICKS_PER_S, Allowance, Client
 from urc.web.wire import CLOSE_TOO_FAST
@@ -53,6 +54,9 @@ class FakeLine:
             self.sent.append(json.loads(frame[frame.index(b"{") :]))
         else:
             self.frames.append(frame)
+
+    def direct(self, busy: Callable[[], None]) -> int:
+        return NO_NUMBER
 
     async def close(self, code: int = 1000, reason: str | None = None) -> None:
         self.closed = (code, reason)
@@ -252,7 +256,7 @@ async def test_the_end_of_the_session_is_told_to_the_page() -> None:
     async with scene() as it:
         live = await it.station.live()
         live.ended.set()
-        live.fanout.flush()
+        live.fanout.end()
         await settle()
         assert it.line.closed == (4500, "the robot's session ended")
 

@@ -168,23 +168,6 @@ async def test_a_tick_that_waits_unread_and_is_none_is_told() -> None:
         assert not ann.pending
 
 
-async def test_whoever_writes_is_told_of_a_tick_before_it_is_read() -> None:
-    """While it moves, and only then: being awake in vain costs time."""
-    async with scene() as it:
-        ann = it.sit()
-        tick = b'{"t":"tick","command":"drive","epoch":1,"number":1,"echo":1}'
-        assert it.controls.offer(ann, tick) == "one more"
-        assert it.movers.hints == 0, "nobody drives"
-        it.say(ann, "take")
-        it.tick(ann, 0.5)
-        await it.clock.advance(0.05)
-        it.controls.offer(ann, tick)
-        assert it.movers.hints == 1
-        await it.clock.advance(0.5)
-        it.controls.offer(ann, tick)
-        assert it.movers.hints == 1, "it has stopped"
-
-
 async def test_what_waits_is_forgotten_by_a_release_a_stop_and_a_page_that_goes() -> None:
     """A thinned tick that comes after the hand has gone would move the robot again."""
     async with scene() as it:

@@ -8,7 +8,8 @@ import pytest
 from urc.model.values import Sample, Signal
 from urc.runtime.hub import Hub, Note
 from urc.testing.clock import FakeClock, settle
-from urc.web.fanout import Fanout, Known, Pacer, Place
+from urc.web.crowd import Known, Place
+from urc.web.fanout import Fanout, Pacer
 
 pytestmark = pytest.mark.anyio
 
@@ -18,11 +19,10 @@ class Watcher:
 
     def __init__(self, fanout: Fanout) -> None:
         self.fanout = fanout
-        self.place = fanout.newcomer()
+        self.place = fanout.join(self)
         self.woken = 0
         self.is_stuck = False
         self.texts: list[str] = []
-        fanout.listeners.add(self)
 
     def wake(self) -> None:
         self.woken += 1
@@ -115,7 +115,7 @@ def test_lines_of_the_log_are_never_lost_silently() -> None:
     """Numbers run on, so a client that missed more than is kept can say how many."""
     clock = FakeClock()
     hub, fanout = robot(clock)
-    place = fanout.newcomer()
+    place = Place()
     for number in range(700):
         hub.note(Note(clock.now(), "info", "wire", f"line {number}"))
     fanout.flush()
@@ -131,7 +131,7 @@ def test_a_newcomer_gets_the_last_lines_of_the_log() -> None:
     hub, fanout = robot(clock)
     for number in range(80):
         hub.note(Note(clock.now(), "info", "wire", f"line {number}"))
-    log = json.loads(fanout.take(fanout.newcomer())[0])
+    log = json.loads(fanout.take(Watcher(fanout).place)[0])
     assert (log["first"], len(log["lines"])) == (30, 50)
 
 

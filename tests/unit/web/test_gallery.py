@@ -151,6 +151,18 @@ def test_a_page_shows_each_state_of_the_widgets_that_it_names(client: TestClient
     assert client.get("/widgets/value/widget.yaml").status_code == 404
 
 
+def test_what_a_widget_is_for_is_told_in_the_readers_language(client: TestClient) -> None:
+    """Its examples, too, as far as most widgets have them; the rest is marked as English."""
+    german = {"accept-language": "de"}
+    page = client.get("/widgets/plot/", headers=german).text
+    assert '<p class="urc-gallery-summary">Zeichnet Zahlen der letzten Minuten' in page
+    assert ">veraltet</h2>" in page
+    listed = client.get("/widgets", headers=german).text
+    assert "Zeigt, wo der Roboter ist" in listed
+    assert "Shows where the robot is" not in listed
+    assert 'class="urc-card-summary" lang="en">Shows where' in client.get("/widgets").text
+
+
 @pytest.mark.parametrize(
     "path", ["/widgets/nothing/", "/widgets/value+nothing/", "/widgets/..%2fx/", "/widgets/+/"]
 )

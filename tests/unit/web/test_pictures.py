@@ -13,6 +13,7 @@ from urc.runtime.hub import Hub
 from urc.testing.clock import FakeClock, settle
 from urc.testing.dashboard import FakeRobot, dashboard_profile
 from urc.web import wire
+from urc.web.crowd import Place
 from urc.web.demos import colour_bars
 from urc.web.fanout import Fanout
 from urc.web.picture_shelf import SHARED_FOR_S, Looks, PictureShelf
@@ -149,7 +150,7 @@ def test_images_are_no_part_of_the_frames_of_values() -> None:
     clock = FakeClock()
     hub = Hub({"a": Signal("a"), "left": Signal("left", "image")})
     fanout = Fanout(hub, clock=clock)
-    place = fanout.newcomer()
+    place = Place()
     hub.put([Sample("a", 1.0, clock.now()), Sample("left", JPEG, clock.now())])
     fanout.flush()
     (frame,) = (json.loads(text) for text in fanout.take(place) if '"t":"v"' in text)

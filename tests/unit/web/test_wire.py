@@ -17,14 +17,17 @@ from urc.web import wire
 def test_a_frame_holds_indexes_values_and_ages() -> None:
     """Names are told once; frames carry indexes only, and alarms only when there are any."""
     samples = [Sample("b", 7, 9.5), Sample("a", True, 9.999)]
-    text = wire.encode_values(samples, {"a": 0, "b": 1}, 10.0)
+    text = wire.encode_values(samples, wire.Indexes({"a": 0, "b": 1}), 10.0)
     assert json.loads(text) == {"t": "v", "n": 10000, "i": [1, 0], "v": [7, True], "a": [500, 1]}
 
 
 def test_alarms_stand_beside_their_values() -> None:
     """One alarm in a frame brings the list for all of its values."""
     samples = [Sample("a", 1, 1.0, "low"), Sample("b", 2, 1.0)]
-    assert json.loads(wire.encode_values(samples, {"a": 0, "b": 1}, 1.0))["s"] == ["low", ""]
+    assert json.loads(wire.encode_values(samples, wire.Indexes({"a": 0, "b": 1}), 1.0))["s"] == [
+        "low",
+        "",
+    ]
 
 
 @pytest.mark.parametrize(
@@ -47,7 +50,7 @@ def test_alarms_stand_beside_their_values() -> None:
 def test_values_arrive_as_a_browser_can_hold_them(value: object, shown: object) -> None:
     """Integers beyond a browser's, huge texts, broken text and NaN never break a frame."""
     sample = Sample("a", value, 1.0)  # type: ignore[arg-type]
-    assert json.loads(wire.encode_values([sample], {"a": 0}, 1.0))["v"] == [shown]
+    assert json.loads(wire.encode_values([sample], wire.Indexes({"a": 0}), 1.0))["v"] == [shown]
 
 
 def test_hello_says_what_each_signal_means_and_where_it_comes_from() -> None:
@@ -101,7 +104,7 @@ def test_values_of_many_parts() -> None:
         Sample("picture", b"\xff" * 40000, 1.0),
     ]
     index = {"cells": 0, "pose": 1, "picture": 2}
-    assert json.loads(wire.encode_values(samples, index, 1.5))["v"] == [
+    assert json.loads(wire.encode_values(samples, wire.Indexes(index), 1.5))["v"] == [
         [3.9, None, str(2**60)],
         {"x": [1, {"y": {"bytes": 3}}], "3": "z"},
         {"bytes": 40000},

@@ -22,6 +22,7 @@
 import { takesKeys, takesText } from "./keys.js";
 import { feel } from "./haptics.js";
 import { argumentsOf } from "./output.js";
+import { hurryMoves } from "./prompt.js";
 
 /** Every kind of hand: what lets go of all. @type {Hand["kind"][]} */
 export const ANY = ["pointer", "keys", "pad", "stay"];
@@ -84,6 +85,8 @@ export class Grip {
     el.style.touchAction = "none";
     el.style.userSelect = "none";
     el.addEventListener("pointerdown", (event) => this.down(event), options);
+    // Where buttons can be pressed within it, nothing may lie over them.
+    if (!this.spec.isFree && !el.querySelector("button, a, input, [tabindex]")) hurryMoves(el);
     // The raw event comes before the frame's, in secure contexts; where there is none, the other does.
     el.addEventListener("pointerrawupdate", (event) => this.move(/** @type {PointerEvent} */ (event)), options);
     el.addEventListener("pointermove", (event) => this.move(event), options);
