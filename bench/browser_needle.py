@@ -37,14 +37,15 @@ READY = "() => document.querySelector('.gauge')?.dataset.state === 'live'"
 # The scale is 270 degrees, from -135 on, for 10000 tenths of milliseconds.
 WATCH = """
 async (seconds) => {
-  const needle = document.querySelector(".gauge-needle");
+  const needle = document.querySelector(".gauge-needle polygon");
   const figure = document.querySelector(".gauge-text");
   const found = [];
   const endMs = performance.now() + seconds * 1000;
   const channel = new MessageChannel();
   channel.port1.onmessage = () => {
-    const { a, b } = new DOMMatrix(getComputedStyle(needle).transform);
-    const degrees = Math.atan2(b, a) * 180 / Math.PI;
+    const { points } = needle; // the two in the middle are its tip
+    const [x, y] = [points[1].x + points[2].x, points[1].y + points[2].y];
+    const degrees = Math.atan2(x, -y) * 180 / Math.PI;
     const said = Number(figure.textContent.replace(/[^0-9]/g, "")) / 10;
     found.push([performance.now(), (degrees + 135) / 270 * 1000, said]);
   };

@@ -15,9 +15,9 @@ from bench.engine_text import driver_of
 from bench.harness import Goal, Result, compare
 from urc.model.framing import ChecksumSpec, CrcSpec, FrameLayout, Window
 from urc.model.values import Sample
+from urc.protocol.codec import Frame
 from urc.protocol.engine import Engine
 from urc.protocol.events import Samples
-from urc.protocol.forms import Frame
 from urc.protocol.frame import Seal
 from urc.protocol.messages import WARM_AFTER
 from urc.testing.struct import reader, writer

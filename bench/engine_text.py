@@ -20,7 +20,7 @@ from urc.model.driver import Driver
 from urc.model.values import Sample
 from urc.protocol.asking import Builder
 from urc.protocol.encode import build_check
-from urc.protocol.fast_read import Taken
+from urc.protocol.fast_value import Taken
 from urc.protocol.known import Known
 from urc.protocol.messages import WARM_AFTER, Messages
 from urc.protocol.readings import Readings

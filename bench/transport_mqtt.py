@@ -19,7 +19,7 @@ from paho.mqtt.enums import CallbackAPIVersion
 from bench.harness import Goal, Result, compare
 from urc.model.codec import Envelope
 from urc.transports.base import Setup, Subscription
-from urc.transports.mqtt_options import from_setup
+from urc.transports.mqtt import from_setup
 
 ROUND_TRIP = Goal("mqtt: round trip / paho's", 1.3)
 THROUGH = Goal("mqtt: time for 2000 messages there and back / paho's", 1.25)

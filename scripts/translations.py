@@ -3,9 +3,9 @@
     python -m scripts.translations            update translations/*.po and compile them
     python -m scripts.translations --check    exit 1 when a catalogue is behind, or has gaps
 
-Sources are the page templates, the widgets' templates, modules and titles, and the page's own
-modules: whatever stands in ``t("...")`` or ``ctx.t("...")`` is a message. The catalogues are
-gettext's PO files, so any translation program opens them.
+Sources are the page templates, the widgets' templates, modules, titles and summaries, and the
+page's own modules: whatever stands in ``t("...")`` or ``ctx.t("...")`` is a message. The
+catalogues are gettext's PO files, so any translation program opens them.
 """
 
 import argparse
@@ -24,7 +24,9 @@ from babel.messages.pofile import read_po, write_po
 ROOT = Path(__file__).resolve().parents[1]
 FOLDER = ROOT / "urc" / "web" / "translations"
 TAGS = ("de", "fr", "it")
-KEYWORDS: dict[str, None] = dict.fromkeys(("t", "mark", "words.t", "ctx.t", "this.t", "this.ctx.t"))
+KEYWORDS: dict[str, None] = dict.fromkeys(
+    ("t", "mark", "phrase", "words.t", "ctx.t", "this.t", "this.ctx.t")
+)
 OPTIONS = {"parse_template_string": True}
 IDLE_HEADERS = tuple(
     f'"{name}'
@@ -41,7 +43,9 @@ def sources() -> Iterator[tuple[str, Path]]:
         ("widgets/*/*.j2", "jinja2"),
         ("widgets/*/*.js", "javascript"),
         ("urc/web/static/*.js", "javascript"),
-        ("urc/web/*.py", "python"),
+        ("urc/web/**/*.py", "python"),
+        ("urc/runtime/permissions.py", "python"),
+        ("urc/packages/*.py", "python"),
     ):
         for path in sorted(ROOT.glob(pattern)):
             yield method, path
@@ -58,8 +62,9 @@ def messages() -> dict[str, list[str]]:
                     if one and place not in found.setdefault(one, []):
                         found[one].append(place)
     for path in sorted(ROOT.glob("widgets/*/widget.yaml")):
-        title = yaml.safe_load(path.read_text("utf-8"))["title"]
-        found.setdefault(title, []).append(path.relative_to(ROOT).as_posix())
+        said = yaml.safe_load(path.read_text("utf-8"))
+        for text in (said["title"], said["summary"]):
+            found.setdefault(text, []).append(path.relative_to(ROOT).as_posix())
     return found
 
 

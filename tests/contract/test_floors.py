@@ -20,7 +20,7 @@ FLOORS = {
     "guard": 3.5,  # a landing: it stands on transports and motion, and sessions stand on it
     "config": 3, "protocol": 3, "transports": 3, "packages": 3, "motion": 3,
     "model": 2,
-    "source": 1, "registry": 1, "shipped": 1, "expressions": 1, "patterns": 1,
+    "source": 1, "registry": 1, "shipped": 1, "private_files": 1, "expressions": 1, "patterns": 1,
     "problems": -1,  # the ground: every error of ours is an UrcError, so all may stand on it
 }  # fmt: skip
 

@@ -13,14 +13,8 @@ from urc.config.load import Shelf, check
 from urc.expressions import ExpressionError
 from urc.model.driver import Driver
 from urc.problems import to_text
-from urc.protocol.forms import (
-    BadText,
-    CodecContext,
-    Frame,
-    NotWritable,
-    build_reader,
-    build_writer,
-)
+from urc.protocol.codec import BadText, CodecContext, Frame, NotWritable
+from urc.protocol.forms import build_reader, build_writer
 from urc.runtime.catalog import built_in_catalog
 
 ROOT = Path(__file__).resolve().parents[2]

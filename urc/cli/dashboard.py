@@ -1,5 +1,6 @@
 """What `urc serve` and `urc demo` share: profiles → robots of the dashboard → a running server."""
 
+import asyncio
 import gc
 import time
 from collections.abc import AsyncIterator, Callable, Mapping, Sequence
@@ -10,6 +11,7 @@ from pathlib import Path
 
 from urc._folders import data_folder
 from urc.cli.failures import Misuse
+from urc.cli.faults import Faulty
 from urc.cli.output import complain
 from urc.cli.running import run_loop
 from urc.model.profile import Profile
@@ -68,6 +70,7 @@ def run_dashboard(
     on_ready: Callable[[str], None],
     given: SettingsOf = _nothing,
     is_dev: bool = False,
+    faults: Sequence[str] = (),
 ) -> int:
     """Serve the dashboard until a signal ends it, which is fine: return 0.
 
@@ -78,41 +81,48 @@ def run_dashboard(
         on_ready: called once with the address.
         given: the settings of a profile that were given at the start.
         is_dev: whether there are dev pages, and documents are read again when they are saved.
+        faults: what goes wrong with emulated robots, as ``loss=5%`` or ``tello:loss=5%``.
 
     Raises:
-        UrcError: a port that cannot be had, two robots of one name.
+        UrcError: a port that cannot be had, two robots of one name, a fault that none can have.
     """
     names = [profile.name for profile in profiles]
     for name in names:
         if names.count(name) > 1:
             raise Misuse(f"two robots are named {name!r}; a name must be unique")
-    work = _serve(profiles, place, is_simulated, on_ready, given, is_dev)
+    faulty = Faulty() if is_simulated else None
+    work = _serve(profiles, place, faulty, on_ready, given, is_dev, faults)
     return run_loop(work, code_when_ended=0, is_fast=True)
 
 
 async def _serve(
     profiles: Sequence[Profile],
     place: Place,
-    is_simulated: bool,
+    faulty: Faulty | None,
     on_ready: Callable[[str], None],
     given: SettingsOf,
     is_dev: bool,
+    faults: Sequence[str],
 ) -> int:
     async with AsyncExitStack() as stack:
-        workshop = workshop_of(place, given, is_simulated=is_simulated)
+        workshop = workshop_of(place, given, faulty)
         garage = Garage(workshop)
         robots: dict[str, Robot] = {}
         for profile in profiles:
             robot = _first(garage, profile)
-            if is_simulated:
+            if faulty is not None:
                 # Emulated from the start, whether somebody looks at it or not.
                 twin = Twin(robot.profile, robot.settings)
+                stack.enter_context(faulty.watch(profile.name, twin))
                 redirected = await stack.enter_async_context(
                     stand_in(robot.profile, robot.settings, twin)
                 )
-                robot = _robot(_motion(place), False, redirected, robot.settings)
+                robot = _robot(_motion(place), None, redirected, robot.settings)
                 robot = replace(robot, glimpse=partial(_seen, twin))
             robots[profile.name] = robot
+        if faulty is not None:
+            faulty.begin(faults)
+            await stack.enter_async_context(_listening(faulty))
         remade = {name: partial(garage.robot, name) for name in robots} if is_dev else None
         app = build_app(
             robots,
@@ -129,14 +139,25 @@ async def _serve(
     return 0
 
 
+@asynccontextmanager
+async def _listening(faulty: Faulty) -> AsyncIterator[None]:
+    """Obey what is typed about faults, for as long as the context lasts."""
+    task = asyncio.create_task(faulty.listen())
+    try:
+        yield
+    finally:
+        task.cancel()
+        await asyncio.gather(task, return_exceptions=True)
+
+
 def workshop_of(
-    place: Place, given: SettingsOf = _nothing, *, is_simulated: bool = False
+    place: Place, given: SettingsOf = _nothing, faulty: Faulty | None = None
 ) -> Workshop:
-    """Return what makes the robots of a dashboard while it runs."""
+    """Return what makes the robots of a dashboard while it runs; `faulty`: they are emulated."""
     return Workshop(
         place.data or data_folder(),
-        make=partial(_robot, _motion(place), is_simulated),
-        tried=partial(_session, "none", is_simulated),
+        make=partial(_robot, _motion(place), faulty),
+        tried=partial(_session, "none", faulty),
         given=given,
         shows_installed=place.shows_installed,
         is_open=place.is_managed,
@@ -157,11 +178,11 @@ def _first(garage: Garage, profile: Profile) -> Robot:
 
 
 def _robot(
-    motion: Motion, is_simulated: bool, profile: Profile, values: Mapping[str, Value]
+    motion: Motion, faulty: Faulty | None, profile: Profile, values: Mapping[str, Value]
 ) -> Robot:
     """Return a robot whose session is opened when somebody looks at it."""
-    settings = _complete(profile, values) if is_simulated else values
-    opened = partial(_session, motion, is_simulated, profile, settings)
+    settings = values if faulty is None else _complete(profile, values)
+    opened = partial(_session, motion, faulty, profile, settings)
     return Robot(profile, settings, opened)
 
 
@@ -173,15 +194,17 @@ def _seen(twin: Twin) -> Glimpse:
 
 @asynccontextmanager
 async def _session(
-    motion: Motion, is_simulated: bool, profile: Profile, values: Mapping[str, Value]
+    motion: Motion, faulty: Faulty | None, profile: Profile, values: Mapping[str, Value]
 ) -> AsyncIterator[Session]:
     """Open a session with a robot, or with its twin, which lives as long as the session."""
     transports = built_in_catalog().transports
     async with AsyncExitStack() as stack:
         settings = values
-        if is_simulated:
+        if faulty is not None:
             settings = _complete(profile, values)
-            profile = await stack.enter_async_context(stand_in(profile, settings))
+            twin = Twin(profile, settings)
+            stack.enter_context(faulty.watch(profile.name, twin))
+            profile = await stack.enter_async_context(stand_in(profile, settings, twin))
         yield await stack.enter_async_context(Session(profile, settings, transports, motion=motion))
 
 

@@ -11,6 +11,7 @@ from contextlib import suppress
 
 from urc.cli.arguments import add_dev, add_host, add_port, is_loopback
 from urc.cli.failures import Misuse
+from urc.cli.faults import add_faults
 from urc.problems import UrcError
 from urc.shipped import shipped
 
@@ -19,11 +20,12 @@ USUAL_PORT = 8080
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add where to listen, and whether a browser is opened."""
+    """Add where to listen, what goes wrong, and whether a browser is opened."""
     add_host(parser)
     add_port(parser)
     parser.set_defaults(port=None)
     add_dev(parser)
+    add_faults(parser, has_names=True)
     parser.add_argument("--no-browser", action="store_true", help="print the address only")
 
 
@@ -52,6 +54,7 @@ def run(arguments: argparse.Namespace) -> int:
         is_simulated=True,
         on_ready=announce,
         is_dev=arguments.dev,
+        faults=arguments.faults,
     )
 
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from urc.cli.arguments import add_dev, add_host, add_port, add_settings, is_loopback, load
 from urc.cli.failures import Misuse
+from urc.cli.faults import add_faults
 from urc.cli.output import complain
 
 if TYPE_CHECKING:
@@ -39,6 +40,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--simulate", action="store_true", help="emulate the robots instead of connecting"
     )
+    add_faults(parser, has_names=True)
     add_dev(parser)
     parser.add_argument(
         "--installed",
@@ -88,6 +90,8 @@ def run(arguments: argparse.Namespace) -> int:
 
     if arguments.dev and not is_loopback(arguments.host):
         raise Misuse(f"--dev shows all traffic and is for this machine alone, not {arguments.host}")
+    if arguments.faults and not arguments.simulate:
+        raise Misuse("--fault is for emulated robots: add --simulate")
     if arguments.tiles and not arguments.tiles.is_dir():
         raise Misuse(f"--tiles names a folder of map pictures; {arguments.tiles} is none")
     profiles = [load(word) for word in arguments.profiles]
@@ -126,6 +130,7 @@ def run(arguments: argparse.Namespace) -> int:
         on_ready=_print_address,
         given=given,
         is_dev=arguments.dev,
+        faults=arguments.faults,
     )
 
 

@@ -3,15 +3,13 @@
 import argparse
 import asyncio
 import logging
-import sys
 import time
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Final
 
 from urc.cli.arguments import add_host, add_profile, load
-from urc.cli.failures import Misuse
+from urc.cli.faults import Faulty, add_faults
 from urc.cli.output import complain
-from urc.problems import UrcError
 
 if TYPE_CHECKING:
     from urc.model.profile import Profile
@@ -35,15 +33,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the profile and the address."""
     add_profile(parser)
     add_host(parser)
-    parser.add_argument(
-        "--fault",
-        action="append",
-        default=[],
-        metavar="FAULT",
-        help="something that goes wrong, such as delay=200ms, loss=5%%, silent, noise=2x,"
-        " dropout=SIGNAL, stuck=SIGNAL, low-battery; may be given several times, and changed by"
-        " lines on standard input: 'fault loss=10%%', 'mend', 'faults'",
-    )
+    add_faults(parser, has_names=False)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -58,19 +48,16 @@ def run(arguments: argparse.Namespace) -> int:
     # What only a real robot needs to be told, nobody must fill in for its twin.
     settings = sample_settings(profile.settings) | values
     settings |= {name: 0 for name in missing if profile.settings[name].type == "port"}
-    twin = Twin(profile, settings)
-    for text in arguments.fault:
-        try:
-            twin.inject(text, time.time())
-        except UrcError as error:
-            raise Misuse(f"--fault: {error}") from None
-    return run_loop(_simulate(profile, settings, arguments.host, twin), code_when_ended=0)
+    twin, faulty = Twin(profile, settings), Faulty()
+    with faulty.watch(profile.name, twin):
+        faulty.begin(arguments.faults)
+        work = _simulate(profile, settings, arguments.host, twin, faulty)
+        return run_loop(work, code_when_ended=0)
 
 
 async def _simulate(
-    profile: "Profile", settings: Mapping[str, "Value"], host: str, twin: "Twin"
+    profile: "Profile", settings: Mapping[str, "Value"], host: str, twin: "Twin", faulty: Faulty
 ) -> int:
-    from urc.cli.typed import typed_lines
     from urc.simulator.server import serve
 
     log, complaints = logging.getLogger(_SOURCE), Complaints(complain)
@@ -82,31 +69,13 @@ async def _simulate(
         async with serve(profile, settings, host, twin=twin) as listening:
             for name, place in listening.items():
                 print(f"listening {name} {place.text}", flush=True)
-            async for line in typed_lines(sys.stdin):
-                _obey(line, twin)
+            await faulty.listen()
             await asyncio.Event().wait()
     finally:
         log.removeHandler(complaints)
         log.level, log.propagate = before
         complaints.finish()
     return 0
-
-
-def _obey(line: str, twin: "Twin") -> None:
-    """Do what a typed line says about faults, and tell what is wrong now."""
-    verb, _, rest = line.strip().partition(" ")
-    try:
-        if verb == "fault" and rest:
-            twin.inject(rest, time.time())
-        elif verb == "mend" and not rest:
-            twin.mend()
-        elif line.strip() not in ("", "faults"):
-            raise UrcError(f"{line.strip()[:60]!r} means nothing; write fault …, mend or faults")
-    except UrcError as error:
-        complain(str(error))
-        return
-    if verb:
-        print(f"faults: {', '.join(twin.faults) or 'none'}", flush=True)
 
 
 class Complaints(logging.Handler):

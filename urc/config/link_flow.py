@@ -5,7 +5,7 @@ from typing import Protocol
 
 from urc.config.part import Findings, Part
 from urc.config.suggest import did_you_mean
-from urc.config.values import check_within, fit_argument, fit_hint
+from urc.config.values import check_within, fit_argument, fit_hint, known_argument
 from urc.expressions import COUNTERS, Template
 from urc.model.codec import ReadSpec, WriteSpec
 from urc.model.driver import Argument, Command, Driver, Poll, Reply
@@ -70,15 +70,8 @@ def link_command(linker: Linker, part: Part, command: Command) -> None:
 def _link_slew(findings: Findings, slew: Mapping[str, Part], command: Command) -> None:
     """Check that what may grow so fast are numbers that may have any value between two others."""
     for name, inner in slew.items():
-        argument = command.arguments.get(name)
+        argument = known_argument(name, inner, command, findings)
         if argument is None:
-            findings.error(
-                inner,
-                "unknown-argument",
-                f"command {command.name!r} has no argument {name!r}",
-                key=True,
-                hint=did_you_mean(name, command.arguments, "arguments"),
-            )
             continue
         kind = argument.of if argument.type == "array" else argument.type
         if kind not in ("integer", "number") or argument.choices:
@@ -220,16 +213,8 @@ def link_arguments(
         at: key that a missing one is reported at, or the last key of `part` itself.
     """
     for name, inner in given.items():
-        argument = command.arguments.get(name)
-        if argument is None:
-            findings.error(
-                inner,
-                "unknown-argument",
-                f"command {command.name!r} has no argument {name!r}",
-                key=True,
-                hint=did_you_mean(name, command.arguments, "arguments"),
-            )
-        elif not (isinstance(inner.data, str) and "{{" in inner.data):
+        argument = known_argument(name, inner, command, findings)
+        if argument is not None and not (isinstance(inner.data, str) and "{{" in inner.data):
             _check_value(inner, argument, findings)  # a step's template is known when it runs
     missing = [
         name

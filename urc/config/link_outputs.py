@@ -2,6 +2,7 @@
 
 from urc.config.part import Findings, Part
 from urc.config.suggest import did_you_mean, listed
+from urc.config.values import known_argument
 from urc.model.driver import Command, Driver
 from urc.model.interface import Given
 from urc.model.widget import Port, Widget
@@ -84,14 +85,7 @@ def _check_targets(part: Part, command: Command, findings: Findings) -> None:
     named = [(inner, inner.data, False) for inner in part.named("args").values()]
     named += [(inner, name, True) for name, inner in part.named("set").items()]
     for inner, name, is_key in named:
-        if name not in command.arguments:
-            findings.error(
-                inner,
-                "unknown-argument",
-                f"command {command.name!r} has no argument {name!r}",
-                key=is_key,
-                hint=did_you_mean(name, command.arguments, "arguments"),
-            )
+        known_argument(name, inner, command, findings, key=is_key)
 
 
 def _check_complete(

@@ -6,7 +6,7 @@ from typing import Final
 from urc.config.parse_profile import setting_value
 from urc.config.part import Findings, Part
 from urc.config.suggest import did_you_mean
-from urc.config.values import check_within, fit, fit_argument, fit_hint
+from urc.config.values import check_within, fit, fit_argument, fit_hint, known_argument
 from urc.model.driver import Command, Driver
 from urc.model.profile import DialogueStep, DocumentTest, Expected, Setting, State
 from urc.model.values import Limits, Signal, Value
@@ -308,17 +308,8 @@ def _check_run(
 def _check_argument(
     name: str, part: Part, command: Command, findings: Findings, *, may_fail: bool
 ) -> None:
-    argument = command.arguments.get(name)
-    if argument is None:
-        findings.error(
-            part,
-            "unknown-argument",
-            f"command {command.name!r} has no argument {name!r}",
-            key=True,
-            hint=did_you_mean(name, command.arguments, "arguments"),
-        )
-        return
-    if may_fail:
+    argument = known_argument(name, part, command, findings)
+    if argument is None or may_fail:
         return  # a test about a failure may give what is refused
     try:
         elements = fit_argument(part.data, argument.type, argument.of, argument.size)

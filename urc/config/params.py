@@ -6,7 +6,7 @@ They are filled in while the documents are loaded. What an operator fills in are
 from collections.abc import Mapping
 from typing import Any, Final
 
-from urc.config.each import report_unquoted
+from urc.config.each_copies import report_unquoted
 from urc.config.fill import Budget, TooMuch, fill
 from urc.config.merge import Tree, count_nodes
 from urc.config.part import Findings, Part

@@ -174,15 +174,6 @@ def _argument(part: Part, findings: Findings) -> Argument:
     kind = part.text("type", "number")
     of = element_of(part, kind, findings)
     low, high = check_range(part, of, findings)
-    if part.name in ("settings", "pi"):
-        what = "the settings" if part.name == "settings" else "the number"
-        findings.error(
-            part,
-            "bad-name",
-            f"an argument cannot be called {part.name!r}",
-            key=True,
-            hint=f"templates find {what} under that name",
-        )
     choices = [_fitting(inner, of, findings) for inner in part.listed("choices")]
     default_part = part.get("default")
     default: Reading = None
@@ -193,14 +184,7 @@ def _argument(part: Part, findings: Findings) -> Argument:
             if choices and one not in choices:
                 text = "the default is not one of the choices"
                 findings.error(default_part, "unknown-word", text)
-    if of != "string" and "allow_control" in part.data:
-        findings.error(
-            part,
-            "misplaced-key",
-            f"'allow_control' means nothing for {kind}",
-            at="allow_control",
-            key=True,
-        )
+    _check_argument(part, kind, of, findings)
     argument = Argument(
         name=part.name,
         type=kind,  # type: ignore[arg-type]  # the schema's enum is this Literal
@@ -217,6 +201,27 @@ def _argument(part: Part, findings: Findings) -> Argument:
         size=part.integer("size"),
     )
     return parse_choice_questions(part, argument, findings)
+
+
+def _check_argument(part: Part, kind: str, of: str, findings: Findings) -> None:
+    """Report a name that templates have already, and what means nothing for its type."""
+    if part.name in ("settings", "pi"):
+        what = "the settings" if part.name == "settings" else "the number"
+        findings.error(
+            part,
+            "bad-name",
+            f"an argument cannot be called {part.name!r}",
+            key=True,
+            hint=f"templates find {what} under that name",
+        )
+    if of != "string" and "allow_control" in part.data:
+        findings.error(
+            part,
+            "misplaced-key",
+            f"'allow_control' means nothing for {kind}",
+            at="allow_control",
+            key=True,
+        )
 
 
 def _default(inner: Part, argument: Part, kind: str, findings: Findings) -> Reading:

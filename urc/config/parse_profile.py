@@ -25,19 +25,7 @@ def parse_setting(part: Part, findings: Findings) -> Setting:
         part, _VALUE_TYPES.get(kind, "string") if kind != "port" else kind, findings
     )
     choices = tuple(str(inner.data) for inner in part.listed("choices"))
-    if kind == "choice" and not choices:
-        findings.error(
-            part, "missing-key", "'choices' is missing from a setting of type choice", key=True
-        )
-    if kind != "choice" and choices:
-        findings.error(
-            part,
-            "misplaced-key",
-            f"'choices' means nothing for {kind}",
-            at="choices",
-            key=True,
-            hint="write 'type: choice'",
-        )
+    _check_choices(part, kind, choices, findings)
     is_secret = part.flag("secret", default=False)
     default_part = part.get("default")
     if is_secret and default_part is not None:
@@ -64,6 +52,23 @@ def parse_setting(part: Part, findings: Findings) -> Setting:
     if default_part is not None:
         check_within(setting.default, low, high, default_part, findings)
     return setting
+
+
+def _check_choices(part: Part, kind: str, choices: tuple[str, ...], findings: Findings) -> None:
+    """Report a setting of type choice without any, and choices of another type."""
+    if kind == "choice" and not choices:
+        findings.error(
+            part, "missing-key", "'choices' is missing from a setting of type choice", key=True
+        )
+    if kind != "choice" and choices:
+        findings.error(
+            part,
+            "misplaced-key",
+            f"'choices' means nothing for {kind}",
+            at="choices",
+            key=True,
+            hint="write 'type: choice'",
+        )
 
 
 def setting_value(part: Part, kind: str, choices: tuple[str, ...], findings: Findings) -> Value:

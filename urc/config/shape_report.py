@@ -3,7 +3,7 @@
 Imported only for a document that is broken: `jsonschema` costs 80 ms.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from itertools import islice
 from typing import Any, Final, NamedTuple
 
@@ -13,6 +13,7 @@ from jsonschema.validators import extend
 from referencing import Registry, Resource
 from referencing.jsonschema import DRAFT202012
 
+from urc.config.shape_hints import example_of, key_hint, mapping_hint, type_hint
 from urc.config.suggest import did_you_mean, listed
 from urc.problems import Problem
 from urc.source import Document, Path
@@ -45,30 +46,6 @@ _EXPECTED: Final = {
     "array": "a list",
     "null": "null",
 }
-_DELIMITERS: Final = ("LF", "CR", "CRLF", "NUL", "ETX")
-_OTHER_WORDS: Final = {
-    "interval": ("every",),
-    "period": ("every",),
-    "rate": ("every",),
-    "on": ("from", "to"),
-    "transport": ("from", "to"),
-    "widget": ("use",),
-    "arguments": ("args",),
-    "terminator": ("tx", "rx"),
-    "delimiter": ("tx", "rx"),
-    "pattern": ("regex", "match"),
-    "value": ("default",),
-    "start": ("first",),
-    "begin": ("first", "start"),
-    "loop": ("repeat",),
-    "count": ("times",),
-    "sleep": ("wait",),
-    "delay": ("wait",),
-    "description": ("text",),
-    "message": ("text",),
-    "license": ("licence",),
-}
-"""What other tools call a key → what it is called here."""
 
 
 def report(
@@ -136,26 +113,16 @@ def _unknown_keys(document: Document, path: Path, error: _Error) -> list[Problem
             (*path, key),
             "unknown-key",
             f"{_cut(key)} is not a key of {_noun(error.schema)}",
-            hint=_key_hint(key, known),
+            hint=key_hint(key, known),
             key=True,
         )
         for key in islice((key for key in error.value if key not in known), _PROBLEMS_MOST)
     ]
 
 
-def _key_hint(key: str, known: Mapping[str, Any]) -> str:
-    name, colon, _ = key.partition(":")
-    if colon and name in known:
-        return f"put a space behind the colon: '{name}: '"
-    others = [word for word in _OTHER_WORDS.get(key, ()) if word in known]
-    if others:
-        return f"it is called '{others[0]}' here"
-    return did_you_mean(key, known, "keys")
-
-
 def _missing_keys(document: Document, path: Path, error: _Error) -> list[Problem]:
     known = error.schema.get("properties", {})
-    misspelt = [_key_hint(key, known) for key in error.value if known and key not in known]
+    misspelt = [key_hint(key, known) for key in error.value if known and key not in known]
     missing = [
         f"'{name}'"
         for name in error.limit
@@ -170,19 +137,10 @@ def _missing_keys(document: Document, path: Path, error: _Error) -> list[Problem
             path,
             "missing-key",
             f"{names} {verb} missing from {_noun(error.schema)}",
-            hint=_example_of(error.schema, missing[0].strip("'")),
+            hint=example_of(error.schema, missing[0].strip("'")),
             key=True,
         )
     ]
-
-
-def _example_of(schema: Mapping[str, Any], key: str) -> str:
-    inner = schema.get("properties", {}).get(key, {})
-    examples = inner.get("examples") or ()
-    if not examples or isinstance(examples[0], (dict, list)):
-        return ""
-    text = str(examples[0])
-    return f"for example '{key}: " + (f'"{text}"' if "{" in text else text) + "'"
 
 
 def _wrong_name(document: Document, path: Path, error: _Error) -> list[Problem]:
@@ -212,72 +170,10 @@ def _wrong_type(document: Document, path: Path, error: _Error) -> list[Problem]:
     else:
         wanted = " or ".join(_EXPECTED[name] for name in types)
     message = f"expected {wanted}, found {_found(error.value)}"
-    hint = _type_hint(document, path, error.value, types, is_duration=title == "duration")
-    if isinstance(error.value, str) and "object" in types and not _is_filled_in(document, path):
-        hint = _mapping_hint(error.value, error.schema) or hint
+    hint = type_hint(document, path, error.value, types, is_duration=title == "duration")
+    if isinstance(error.value, str) and "object" in types:
+        hint = mapping_hint(document, path, error.value, error.schema) or hint
     return [document.problem(path, "wrong-type", message, hint=hint)]
-
-
-def _mapping_hint(text: str, schema: Mapping[str, Any]) -> str:
-    """Return the first example of a mapping, with `text` in it where it is a delimiter."""
-    example = next((one for one in schema.get("examples", ()) if isinstance(one, dict)), None)
-    if example is None or any(isinstance(one, (dict, list)) for one in example.values()):
-        return ""
-    if {"tx", "rx"} <= example.keys() and text.upper() in _DELIMITERS:
-        example = {**example, "tx": text.upper(), "rx": text.upper()}
-    pairs = (f"{key}: {_quoted(value)}" for key, value in example.items())
-    return f"write its keys, such as {{ {', '.join(pairs)} }}"
-
-
-def _quoted(value: object) -> str:
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    return f'"{value}"' if isinstance(value, str) and not value.isalnum() else str(value)
-
-
-def _type_hint(
-    document: Document, path: Path, value: object, types: Sequence[str], *, is_duration: bool
-) -> str:
-    if value is None:
-        return "give it a value, or leave the key out"
-    if is_duration and isinstance(value, (int, float)) and not isinstance(value, bool):
-        return f"write the unit: {value}s, or {value}ms"
-    if "string" in types and isinstance(value, (bool, int, float)):
-        return f'quote it: "{_written(document, path) or value}"'
-    if isinstance(value, str):
-        if _is_filled_in(document, path):
-            return 'a text with names in braces becomes a value only when it is one name: "{i}"'
-        if {"integer", "number"} & set(types) and _looks_like_number(value):
-            return f"take the quotes away: {value}"
-        if "boolean" in types:
-            return "yes, no, on and off are text in YAML 1.2; write true or false"
-        if "object" in types:
-            return "indent its keys below it, or write { key: value }"
-    if "array" in types:
-        return "write a list: '- ' before each item, or [a, b]"
-    return ""
-
-
-def _written(document: Document, path: Path) -> str:
-    """Return a scalar as it stands in the text."""
-    mark = document.at(path)
-    if mark is None or mark.span.line != mark.span.end_line:
-        return ""
-    lines = document.source_of(path).lines
-    return lines[mark.span.line - 1][mark.span.column - 1 : mark.span.end_column - 1]
-
-
-def _is_filled_in(document: Document, path: Path) -> bool:
-    mark = document.at(path)
-    return mark is not None and mark.written is not None
-
-
-def _looks_like_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
 
 
 def _wrong_word(document: Document, path: Path, error: _Error) -> list[Problem]:

@@ -3,6 +3,8 @@
 from typing import Any, Final
 
 from urc.config.part import Findings, Part
+from urc.config.suggest import did_you_mean
+from urc.model.driver import Argument, Command
 from urc.model.values import Reading, Value
 
 __all__ = [
@@ -14,6 +16,7 @@ __all__ = [
     "fit_hint",
     "fraction_of",
     "given",
+    "known_argument",
     "shown",
 ]
 
@@ -136,3 +139,19 @@ def check_within(
         findings.error(part, "out-of-range", f"{value:g} is below min {low:g}")
     elif high is not None and value > high:
         findings.error(part, "out-of-range", f"{value:g} is above max {high:g}")
+
+
+def known_argument(
+    name: str, part: Part, command: Command, findings: Findings, *, key: bool = True
+) -> Argument | None:
+    """Return the argument of that name, or report at `part`, or its key, that there is none."""
+    argument = command.arguments.get(name)
+    if argument is None:
+        findings.error(
+            part,
+            "unknown-argument",
+            f"command {command.name!r} has no argument {name!r}",
+            key=key,
+            hint=did_you_mean(name, command.arguments, "arguments"),
+        )
+    return argument

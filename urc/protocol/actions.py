@@ -24,10 +24,10 @@ from urc.model.flow import (
 from urc.model.values import Value
 from urc.protocol.answer import Answer, Ear, Matcher
 from urc.protocol.asking import Builder
+from urc.protocol.codec import Frame, NotWritable
 from urc.protocol.encode import BadArgument
 from urc.protocol.events import Samples
 from urc.protocol.exchange import Ask, Exchange, LineEvent, expires_at
-from urc.protocol.forms import Frame, NotWritable
 from urc.protocol.gate import Counters
 from urc.protocol.reins import Reins
 from urc.protocol.steps import Action, Program, Runner

@@ -11,9 +11,9 @@ from typing import Final, NamedTuple, Protocol
 from urc.expressions import ExpressionError, Template, text_of
 from urc.model.codec import traffic_of
 from urc.patterns import Pattern
-from urc.protocol.fast_read import FastRead, Taken
-from urc.protocol.forms import BadItem, BadText, Frame, Reader
-from urc.protocol.framing import Framing
+from urc.protocol.codec import BadItem, BadText, Frame, Reader
+from urc.protocol.fast_value import FastRead, Taken
+from urc.protocol.framings.base import Framing
 from urc.protocol.readings import Decode
 
 __all__ = ["Answer", "Ear", "Fields", "Heard", "Listening", "Matcher", "Offer", "Quick", "shown"]

@@ -14,10 +14,12 @@ from urc.model.values import NOTHING
 from urc.patterns import Pattern
 from urc.protocol.answer import Answer, Matcher, Quick
 from urc.protocol.bounds import queue_limit_s
+from urc.protocol.codec import CodecContext, Frame
 from urc.protocol.encode import build_encode
 from urc.protocol.exchange import Ask
-from urc.protocol.fast_read import Taken, build_fast_read, prefix_of
-from urc.protocol.forms import CodecContext, Frame, build_reader
+from urc.protocol.fast_read import build_fast_read, prefix_of
+from urc.protocol.fast_value import Taken
+from urc.protocol.forms import build_reader
 from urc.protocol.framing import build_framing
 from urc.protocol.gate import RANKS, Bucket
 from urc.protocol.known import Known

@@ -211,7 +211,7 @@ def _salter(salt: Salt) -> Callable[[bytes | bytearray], bytes | None] | None:
         found = None if number is None else salt.table.get(number)
         if found is not None or (number is not None and salt.otherwise == "pass"):
             return found
-        # A frame without a code is dropped without a word: see `urc.protocol.framing.SKIPPED`.
+        # A frame without a code is dropped without a word: see `SKIPPED`.
         code = "" if salt.otherwise == "skip" and number is not None else "no-salt"
         raise BadFrame(code, f"the salt of the checksum's table has no row {number}")
 

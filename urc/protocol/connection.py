@@ -11,7 +11,8 @@ from urc.protocol.answer import Matcher
 from urc.protocol.events import Close, Fault
 from urc.protocol.exchange import Ended, Exchange, Leaving, LineEvent, Outcome
 from urc.protocol.flights import Flights
-from urc.protocol.framing import Framing, build_framing
+from urc.protocol.framing import build_framing
+from urc.protocol.framings.base import Framing
 from urc.protocol.gate import Counters
 from urc.protocol.inbox import Inbox
 from urc.protocol.outbox import Outbox

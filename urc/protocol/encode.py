@@ -12,8 +12,9 @@ from urc.model.codec import Payload, WriteSpec
 from urc.model.driver import MOST_ELEMENTS, Argument, Command
 from urc.model.values import NOTHING, Reading, Value
 from urc.problems import UrcError, printable
-from urc.protocol.forms import CodecContext, NotWritable, build_writer
-from urc.protocol.framing import Framing, FramingError
+from urc.protocol.codec import CodecContext, NotWritable
+from urc.protocol.forms import build_writer
+from urc.protocol.framings.base import Framing, FramingError
 from urc.protocol.generate import after_a_while
 
 __all__ = ["BadArgument", "Encode", "build_check", "build_encode", "check_arguments"]

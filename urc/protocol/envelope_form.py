@@ -9,7 +9,8 @@ from typing import Any, Final, cast
 
 from urc.expressions import Template, text_of
 from urc.model.codec import Envelope, Payload, WriteSpec
-from urc.protocol.forms import CodecContext, Frame, Writer, build_writer
+from urc.protocol.codec import CodecContext, Frame, Writer
+from urc.protocol.forms import build_writer
 from urc.protocol.json_text_form import JsonWriter, filled
 
 __all__ = ["EnvelopeWriter"]

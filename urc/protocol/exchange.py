@@ -14,7 +14,7 @@ from urc.model.values import NOTHING, Reading
 from urc.protocol.answer import Answer, Heard, Quick
 from urc.protocol.encode import Encode
 from urc.protocol.events import Event, Failed, Replied, Request
-from urc.protocol.framing import Framing
+from urc.protocol.framings.base import Framing
 from urc.protocol.gate import REALTIME, Bucket
 
 __all__ = [

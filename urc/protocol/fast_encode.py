@@ -13,7 +13,8 @@ from urc.expressions import Template, spelt
 from urc.model.codec import Payload
 from urc.model.driver import Argument
 from urc.model.values import Reading
-from urc.protocol.framing import DelimiterFraming, Framing
+from urc.protocol.framings.base import Framing
+from urc.protocol.framings.delimited import DelimiterFraming
 from urc.protocol.generate import function_of
 
 __all__ = ["build_fast_check", "build_fast_encode", "build_fast_write"]

@@ -11,7 +11,7 @@ from msgspec import UNSET, DecodeError
 
 from urc.model.codec import ReadSpec
 from urc.model.values import Sample
-from urc.protocol.fast_read import FastRead, Slow, Value, finish, of_json_type, value_of
+from urc.protocol.fast_value import FastRead, Slow, Value, finish, of_json_type, value_of
 from urc.protocol.generate import function_of
 from urc.protocol.json_types import Plan, Want
 from urc.protocol.readings import Readings

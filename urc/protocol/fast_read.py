@@ -5,60 +5,19 @@ there, a value of its signal, within its range. At anything else it turns to the
 which read the frame again; they are also the oracle of its tests.
 """
 
-from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Final, NamedTuple, cast
+from typing import TYPE_CHECKING, cast
 
-from urc.model.codec import Payload, ReadSpec
+from urc.model.codec import ReadSpec
 from urc.model.text import FieldKind, Hole
-from urc.model.values import Sample, Signal
 from urc.patterns import Pattern, is_plain_group, literal_prefix
-from urc.protocol.convert import divisor_of
-from urc.protocol.forms import Reader
-from urc.protocol.generate import function_of
+from urc.protocol.codec import Reader
+from urc.protocol.fast_value import FastRead, Slow, Value, finish, value_of
 from urc.protocol.readings import Readings
 
 if TYPE_CHECKING:
     from urc.protocol.json_paths import JsonReader
 
-__all__ = [
-    "FastRead",
-    "Slow",
-    "Taken",
-    "Value",
-    "build_fast_read",
-    "finish",
-    "of_json_type",
-    "prefix_of",
-    "value_of",
-]
-
-Taken = tuple[list[Sample], Sequence[str]]
-Slow = Callable[[Payload, float], "Taken | None"]
-"""A frame and the time → samples and refused values, or None for another frame."""
-FastRead = Callable[[bytes, float], "Taken | None"]
-"""The same, of bytes alone."""
-
-
-_WHOLE: Final = "(type({r}) is int and -9223372036854775808 <= {r} <= 9223372036854775807)"
-_JSON_TYPES: Final = {
-    "number": "(type({r}) is float or " + _WHOLE + ")",
-    "integer": _WHOLE,
-    "string": "type({r}) is str",
-}
-
-
-class Value(NamedTuple):
-    """How one field becomes a sample, in source text."""
-
-    signal: Signal
-    convert: str
-    """Expression over the raw text; "" for text as it is."""
-    checks: tuple[str, ...]
-    """What must hold of the value, over ``{v}``."""
-    raw_checks: tuple[str, ...] = ()
-    """What must hold of the raw text, over ``{r}``."""
-    is_finite: bool = True
-    """Whether `checks` refuse what is infinite or no number."""
+__all__ = ["build_fast_read", "prefix_of"]
 
 
 def build_fast_read(
@@ -129,11 +88,6 @@ def _of_regex(pattern: Pattern, encoding: str, readings: Readings, slow: Slow) -
     return finish(list(values.values()), raws, lines, readings, scope, slow)
 
 
-def of_json_type(type_name: str, raw: str) -> str:
-    """Return the check that a raw value is one of the type, and no larger than it may be."""
-    return _JSON_TYPES[type_name].format(r=raw)
-
-
 def _of_pattern(
     holes: tuple[Hole, ...], tail: str, encoding: str, readings: Readings, slow: Slow
 ) -> FastRead | None:
@@ -194,118 +148,3 @@ def _words(holes: tuple[Hole, ...], tail: str) -> list[str | Hole] | None:
 def _skipped(kind: FieldKind, raw: str) -> str:
     """Return what must be tried of a field that nobody wants, so that other frames are told."""
     return {"integer": f"int({raw})", "number": f"float({raw})"}.get(kind, f"{raw}[0]")
-
-
-def value_of(signal: Signal, kind: str, is_plain: bool) -> Value | None:
-    """Return how raw text of a field becomes a value of `signal`; None when that is not simple."""
-    conversion = signal.conversion
-    if signal.deadband or signal.debounce_s:
-        return None
-    if conversion.base or conversion.not_available or conversion.points or conversion.states:
-        return None
-    raw_checks = () if is_plain else ("{r}.isascii()", "'_' not in {r}")
-    if signal.states or signal.type not in ("integer", "number", "string"):
-        return None
-    if signal.type == "string":
-        if kind not in ("text", "word", "json"):
-            return None
-        return Value(signal, "", (), ("{r}",) if kind == "word" else ())
-    if signal.type == "integer" and conversion.polynomial:
-        return None
-    if kind == "json":
-        expression = "{r}"
-    elif kind == "word" or (signal.type == "integer" and kind == "number"):
-        return None
-    else:
-        cast_to = "int" if "integer" in (kind, signal.type) else "float"
-        expression = f"{cast_to}({{r}})"
-    if conversion.polynomial:
-        scaled = _scaled(conversion.polynomial, expression)
-        if scaled is None:
-            return None
-        expression = scaled
-    low, high = signal.min, signal.max
-    checks: tuple[str, ...] = ()
-    if low is not None and high is not None:
-        checks = (f"{low!r} <= {{v}} <= {high!r}",)
-    elif low is not None:
-        checks = (f"{low!r} <= {{v}}",)
-    elif high is not None:
-        checks = (f"{{v}} <= {high!r}",)
-    is_finite = signal.type == "integer" or (low is not None and high is not None)
-    return Value(signal, expression, checks, raw_checks, is_finite)
-
-
-def _scaled(coefficients: tuple[float, ...], number: str) -> str | None:
-    """Return the same arithmetic as `urc.protocol.convert` has for a scale and an offset."""
-    if len(coefficients) != 2:
-        return None
-    offset, scale = coefficients
-    divisor = divisor_of(scale)
-    if not divisor:
-        return f"{number} * {scale!r} + {offset!r}" if offset else f"{number} * {scale!r}"
-    shift = offset * divisor
-    if shift != round(shift):
-        return None  # the closures know whether that is only a matter of rounding
-    return f"({number} + {round(shift)}) / {divisor}" if shift else f"{number} / {divisor}"
-
-
-def finish(
-    values: Sequence[Value],
-    raws: Sequence[str],
-    lines: list[str],
-    readings: Readings,
-    scope: Mapping[str, object],
-    slow: Slow,
-    skipped: Sequence[str] = (),
-) -> FastRead:
-    """Add the conversions, their checks and the samples to `lines`, and make the function."""
-    names: dict[str, Any] = {
-        **scope, "slow": slow, "float": float, "int": int, "new": tuple.__new__, "Sample": Sample,
-        "TypeError": TypeError, "ValueError": ValueError, "OverflowError": OverflowError,
-        "IndexError": IndexError,
-    }  # fmt: skip
-    tried = [f"        {one}" for one in skipped]
-    names_of_values: list[str] = []
-    for place, one in enumerate(values):
-        is_as_it_is = one.convert in ("", "{r}") and raws[place].isidentifier()
-        names_of_values.append(raws[place] if is_as_it_is else f"v{place}")
-        if not is_as_it_is:
-            tried.append(f"        v{place} = {(one.convert or '{r}').format(r=raws[place])}")
-    open_ended = [
-        name for name, one in zip(names_of_values, values, strict=True) if not one.is_finite
-    ]
-    if open_ended:
-        # Nothing times infinity or not-a-number is zero.
-        tried.append(f"        is_finite = ({' + '.join(open_ended)}) * 0 == 0")
-    if tried:
-        failures = "(IndexError, OverflowError, TypeError, ValueError)"
-        lines += [
-            "    try:",
-            *tried,
-            f"    except {failures}:",
-            "        return slow(payload, now)",
-        ]
-    checks = ["is_finite"] if open_ended else []
-    for place, (one, raw) in enumerate(zip(values, raws, strict=True)):
-        checks += [check.format(r=raw) for check in one.raw_checks]
-        checks += [check.format(v=names_of_values[place]) for check in one.checks]
-        if not one.convert:
-            checks.append(f"{names_of_values[place]} is not None")
-    if checks:
-        lines += [f"    if not ({' and '.join(checks)}):", "        return slow(payload, now)"]
-    samples = []
-    for place, one in enumerate(values):
-        name, alarm, value = one.signal.name, "''", names_of_values[place]
-        if readings.judges(name):
-            names["alarm"] = readings.alarm
-            alarm = f"alarm({name!r}, {value}, now)"
-        samples.append(f"new(Sample, ({name!r}, {value}, now, {alarm}))")
-    lines.append(f"    samples = [{', '.join(samples)}]")
-    if any(readings.keeps(one.signal.name) for one in values):
-        names["follow"] = readings.follow
-        lines += ["    refused = []", "    follow(samples, refused, now)"]
-        lines.append("    return samples, refused")
-    else:
-        lines.append("    return samples, ()")
-    return function_of("read", "payload, now", lines, names)

@@ -9,8 +9,8 @@ from typing import cast
 
 from urc.model.binary import Item
 from urc.model.codec import ReadSpec
-from urc.protocol.fast_read import FastRead, Slow, Value, finish, of_json_type, value_of
-from urc.protocol.forms import BadItem
+from urc.protocol.codec import BadItem
+from urc.protocol.fast_value import FastRead, Slow, Value, finish, of_json_type, value_of
 from urc.protocol.readings import Readings
 from urc.protocol.struct_lines import BUILTINS, Lines
 from urc.protocol.struct_source import add_fixed

@@ -10,9 +10,9 @@ from collections.abc import Mapping
 from urc.expressions import ExpressionError
 from urc.model.values import Reading, Sample
 from urc.protocol.answer import Ear, Fields, Offer, shown
+from urc.protocol.codec import Frame
 from urc.protocol.exchange import Exchange
-from urc.protocol.forms import Frame
-from urc.protocol.framing import Framing
+from urc.protocol.framings.base import Framing
 from urc.protocol.word import Word
 
 __all__ = ["Flight", "Flights"]

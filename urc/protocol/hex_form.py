@@ -7,7 +7,7 @@ from typing import Any, cast
 from urc.expressions import Template
 from urc.model.binary import number_of
 from urc.model.codec import Payload, WriteSpec
-from urc.protocol.forms import CodecContext, Frame, NotWritable
+from urc.protocol.codec import CodecContext, Frame, NotWritable
 from urc.protocol.struct_value import number_reader
 
 __all__ = ["BytesWriter"]

@@ -9,14 +9,15 @@ from urc.model.driver import TransportSpec
 from urc.model.values import Sample
 from urc.patterns import Pattern
 from urc.protocol.answer import Ear, Fields, Heard, Matcher, Offer, Quick
+from urc.protocol.codec import BadText, Frame
 from urc.protocol.events import Fault, Samples, Send
 from urc.protocol.exchange import LineEvent
 from urc.protocol.flights import Flight
-from urc.protocol.forms import BadText, Frame
-from urc.protocol.framing import Decoder, Framing, Stream, StreamDecoder
+from urc.protocol.framings.base import Decoder, Framing, StreamDecoder
 from urc.protocol.messages import Messages
 from urc.protocol.reacting import Collector, Replies
 from urc.protocol.secrets import Secrets
+from urc.protocol.stream import Stream
 
 __all__ = ["Inbox"]
 

@@ -15,7 +15,7 @@ import msgspec
 
 from urc.model.codec import Envelope, Payload, ReadSpec
 from urc.model.text import JsonPath
-from urc.protocol.forms import CodecContext, Frame, NotWritable
+from urc.protocol.codec import CodecContext, Frame, NotWritable
 from urc.protocol.json_types import build_pick, plan_of
 
 __all__ = ["JsonReader"]

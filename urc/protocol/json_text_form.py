@@ -6,7 +6,7 @@ from typing import Any
 
 from urc.expressions import Template
 from urc.model.codec import Envelope, Payload, WriteSpec
-from urc.protocol.forms import BadText, CodecContext, Frame, NotWritable
+from urc.protocol.codec import BadText, CodecContext, Frame, NotWritable
 from urc.protocol.texts import counter_in
 
 __all__ = ["JsonWriter", "filled", "matches"]

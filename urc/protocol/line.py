@@ -21,12 +21,12 @@ from urc.model.driver import TransportSpec
 from urc.model.values import Reading
 from urc.protocol.answer import Ear, Heard, Matcher
 from urc.protocol.answering import Answering
+from urc.protocol.codec import Frame
 from urc.protocol.encode import BadArgument
 from urc.protocol.events import Fault, Open, Send
 from urc.protocol.exchange import DONE, Asked, Ended, Exchange, LineEvent, Outcome
 from urc.protocol.flights import Flight
-from urc.protocol.forms import Frame
-from urc.protocol.framing import FrameFault
+from urc.protocol.framings.base import FrameFault
 from urc.protocol.outbox import counted
 from urc.protocol.times import soonest
 

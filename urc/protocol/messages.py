@@ -9,8 +9,8 @@ from typing import Final
 
 from urc.model.codec import Payload
 from urc.protocol.answer import Matcher
-from urc.protocol.fast_read import FastRead, Taken
-from urc.protocol.forms import Frame
+from urc.protocol.codec import Frame
+from urc.protocol.fast_value import FastRead, Taken
 
 __all__ = ["WARM_AFTER", "Messages"]
 

@@ -10,8 +10,8 @@ from typing import Final, cast
 
 from urc.model.codec import Payload, ReadSpec
 from urc.model.text import FieldKind, Hole
+from urc.protocol.codec import CodecContext, Frame, NotWritable
 from urc.protocol.convert import spelt
-from urc.protocol.forms import CodecContext, Frame, NotWritable
 from urc.protocol.texts import encoded, field_text
 
 __all__ = ["CASTS", "PatternReader", "pattern_source"]

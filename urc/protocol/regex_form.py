@@ -5,7 +5,7 @@ from typing import cast
 
 from urc.model.codec import Payload, ReadSpec
 from urc.patterns import Pattern, example
-from urc.protocol.forms import CodecContext, Frame, NotWritable
+from urc.protocol.codec import CodecContext, Frame, NotWritable
 from urc.protocol.texts import encoded, field_text
 
 __all__ = ["RegexReader"]

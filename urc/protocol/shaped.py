@@ -7,8 +7,8 @@ from collections.abc import Mapping
 
 from urc.expressions import ExpressionError
 from urc.model.codec import Payload, ReadSpec
+from urc.protocol.codec import CodecContext, Frame, NotWritable, Reader
 from urc.protocol.convert import BadValue, Unusable, build_conversion, build_inverse
-from urc.protocol.forms import CodecContext, Frame, NotWritable, Reader
 
 __all__ = ["ShapedReader"]
 

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from typing import cast
 
 from urc.model.codec import Payload, ReadSpec
-from urc.protocol.forms import CodecContext, Frame, NotWritable
+from urc.protocol.codec import CodecContext, Frame, NotWritable
 from urc.protocol.texts import encoded, field_text, written_differently
 
 __all__ = ["KeyvalueReader", "SplitReader"]

@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping
 from typing import Any, Final
 
 from urc.model.binary import Extent, Item, Number, packed_size
-from urc.protocol.forms import BadItem, NotWritable
+from urc.protocol.codec import BadItem, NotWritable
 from urc.protocol.struct_value import (
     checked_raw,
     meaning_of,

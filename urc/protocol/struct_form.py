@@ -6,7 +6,7 @@ from typing import cast
 from urc.expressions import ExpressionError
 from urc.model.binary import Item, names_of
 from urc.model.codec import Payload, ReadSpec, WriteSpec
-from urc.protocol.forms import BadText, CodecContext, Frame, NotWritable
+from urc.protocol.codec import BadText, CodecContext, Frame, NotWritable
 from urc.protocol.struct_source import generate_read
 from urc.protocol.struct_source_write import generate_write
 from urc.protocol.struct_write import build_write_steps, write_frame

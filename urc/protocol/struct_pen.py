@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 from urc.expressions import ExpressionError, Template
 from urc.model.binary import Item, Number
-from urc.protocol.forms import NotWritable
+from urc.protocol.codec import NotWritable
 from urc.protocol.struct_value import number_reader, number_writer, raw_of
 
 __all__ = ["GAP", "LARGEST_FRAME", "Gap", "Pen", "Scope", "evaluate", "solved"]

@@ -14,7 +14,7 @@ from typing import Any
 
 from urc.expressions import ExpressionError, Template
 from urc.model.binary import FRAME_NAMES, Extent, Item, Switch, joined_name, least_size
-from urc.protocol.forms import BadItem
+from urc.protocol.codec import BadItem
 from urc.protocol.struct_coded import (
     FAULT,
     OtherFrame,

@@ -8,7 +8,7 @@ the oracle: tests hold both to the same result for the same bytes.
 from collections.abc import Callable, Mapping
 
 from urc.model.binary import Item
-from urc.protocol.forms import BadItem, Frame
+from urc.protocol.codec import BadItem, Frame
 from urc.protocol.struct_lines import Lines
 from urc.protocol.struct_read import FAULT, OtherFrame, build_step, const_of
 from urc.protocol.struct_runs import Leaf, Run, runs_of

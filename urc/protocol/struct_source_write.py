@@ -10,7 +10,7 @@ from typing import Any
 
 from urc.expressions import ExpressionError
 from urc.model.binary import Item, derived_sizes
-from urc.protocol.forms import NotWritable
+from urc.protocol.codec import NotWritable
 from urc.protocol.struct_lines import Lines
 from urc.protocol.struct_read import const_of
 from urc.protocol.struct_runs import Leaf, Run, runs_of

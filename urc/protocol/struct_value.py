@@ -9,7 +9,7 @@ from collections.abc import Callable
 from typing import Any
 
 from urc.model.binary import Item, Number
-from urc.protocol.forms import BadItem, NotWritable
+from urc.protocol.codec import BadItem, NotWritable
 
 __all__ = [
     "bytes_of_text",

@@ -21,7 +21,7 @@ from urc.model.binary import (
     least_size,
     names_of,
 )
-from urc.protocol.forms import NotWritable
+from urc.protocol.codec import NotWritable
 from urc.protocol.struct_coded import coded_writer, packed_writer
 from urc.protocol.struct_pen import GAP, LARGEST_FRAME, Gap, Pen, Scope, evaluate, solved
 from urc.protocol.struct_read import bit_parts, const_of

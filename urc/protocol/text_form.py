@@ -7,7 +7,7 @@ from typing import NamedTuple, cast
 
 from urc.expressions import Template, split_template, text_of
 from urc.model.codec import Payload, WriteSpec
-from urc.protocol.forms import BadText, CodecContext, Frame, NotWritable
+from urc.protocol.codec import BadText, CodecContext, Frame, NotWritable
 from urc.protocol.texts import counter_in
 
 __all__ = ["TextWriter"]

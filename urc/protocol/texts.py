@@ -3,8 +3,8 @@
 import re
 from collections.abc import Mapping
 
+from urc.protocol.codec import NotWritable
 from urc.protocol.convert import spelt
-from urc.protocol.forms import NotWritable
 
 __all__ = ["counter_in", "encoded", "field_text", "written_differently"]
 

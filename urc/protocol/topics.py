@@ -13,7 +13,7 @@ from urc.model.driver import Driver, Reply
 from urc.model.flow import ExpectStep, all_steps
 from urc.model.values import Value
 from urc.problems import UrcError
-from urc.protocol.forms import CodecContext, Frame, NotWritable, Reader
+from urc.protocol.codec import CodecContext, Frame, NotWritable, Reader
 
 __all__ = ["TopicReader", "frame_of", "listened", "matches", "topic_of"]
 

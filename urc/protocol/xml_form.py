@@ -10,7 +10,7 @@ from xml.etree import ElementTree
 
 from urc.model.codec import Payload, ReadSpec
 from urc.model.text import XmlPath, XmlStep
-from urc.protocol.forms import CodecContext, Frame, NotWritable
+from urc.protocol.codec import CodecContext, Frame, NotWritable
 from urc.protocol.texts import encoded, field_text, written_differently
 
 __all__ = ["XmlReader"]

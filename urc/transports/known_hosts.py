@@ -4,15 +4,13 @@ The file has the form of OpenSSH's ``known_hosts``. Nothing is ever added to it 
 which runs when a person has said so (``urc trust``).
 """
 
-import os
-import tempfile
-from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
 
 import asyncssh
 
 from urc._folders import data_folder
+from urc.private_files import put_private
 from urc.transports.base import TransportError
 
 __all__ = ["DEFAULT_PORT", "HostKeys", "Known", "fingerprint", "own_file", "remember"]
@@ -126,19 +124,7 @@ def _read(file: Path, host: str, port: int, *, is_asked_for: bool) -> Known:
 
 def _write(file: Path, text: str) -> None:
     """Replace the file as a whole, readable by its owner alone."""
-    file.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
-    # mkstemp makes it 0600.
-    descriptor, name = tempfile.mkstemp(dir=file.parent, prefix=f".{file.name}.")
-    try:
-        with os.fdopen(descriptor, "w", encoding="utf-8", newline="\n") as new:
-            new.write(text)
-            new.flush()
-            os.fsync(new.fileno())
-        Path(name).replace(file)
-    except BaseException:
-        with suppress(OSError):
-            Path(name).unlink()
-        raise
+    put_private(file, text.encode(), folder_mode=0o700)
 
 
 def _why(fault: Exception) -> str:

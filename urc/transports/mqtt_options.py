@@ -1,7 +1,6 @@
 """The options of an MQTT transport, read; and how a body becomes bytes. Needs no MQTT library."""
 
 from collections.abc import Mapping
-from importlib.util import find_spec
 from typing import NamedTuple
 
 import msgspec
@@ -9,11 +8,9 @@ import msgspec
 from urc.transports import _options
 from urc.transports._faults import place_of
 from urc.transports._tls import Tls
-from urc.transports.base import Setup, Transport, TransportError
-from urc.transports.web_dial import Dialer
-from urc.transports.web_place import WebPlace
+from urc.transports.base import Setup, TransportError
 
-__all__ = ["Options", "Topic", "Will", "body_bytes", "from_setup", "read_options"]
+__all__ = ["Options", "Topic", "Will", "body_bytes", "read_options"]
 
 DEFAULT_PORT, DEFAULT_TLS_PORT = 1883, 8883
 
@@ -55,21 +52,6 @@ class Options(NamedTuple):
     def where(self) -> str:
         """Host and port as people write them."""
         return place_of(self.host, self.port)
-
-
-def from_setup(setup: Setup) -> Transport:
-    """Make a transport out of a document's options; see docs/transports/mqtt.md.
-
-    Raises:
-        TransportError: an option is missing or not usable, or the library is not there.
-    """
-    options = read_options(setup)
-    if find_spec("paho") is None:
-        raise TransportError("mqtt needs the package paho-mqtt: pip install 'urc[mqtt]'")
-    from urc.transports.mqtt import MqttTransport  # imports paho
-
-    place = WebPlace(options.tls is not None, options.host, options.port, "")
-    return MqttTransport(options, Dialer(place, tls=options.tls, via=setup.via))
 
 
 def read_options(setup: Setup) -> Options:

@@ -19,6 +19,10 @@ __all__ = ["Through", "Wire", "why_lost"]
 _READ_BYTES = 65536
 UNTAKEN_BYTES = 8_388_608
 """What a server may make us say without taking any of it: more than it lets a channel send."""
+_LAST_TURNS = 10
+"""Turns of the loop that asyncssh has for the last bytes before it is told that no more come. It
+reads some packets in tasks, and whoever refuses us often closes right behind the packet that tells
+why: told of the end before such a task is done, it would know no reason."""
 
 
 def why_lost(exc: Exception | None) -> str:
@@ -106,15 +110,13 @@ class Wire(asyncio.BufferedProtocol):
             self._transport.abort()
 
     def eof_received(self) -> bool:
-        """Pass it on; then the socket is closed."""
-        self._inner.eof_received()
-        return False
+        """Pass it on, once what came before is read; then the socket is closed."""
+        self._at_last(self._no_more_comes)
+        return True  # stay open until then
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """Pass it on, and let go of who waits."""
-        self.end(why_lost(exc))
-        self._inner.connection_lost(exc)
-        self._gone.set()
+        """Pass it on, once what came before is read, and let go of who waits."""
+        self._at_last(self._lost, exc)
 
     def pause_writing(self) -> None:
         """The kernel is full."""
@@ -123,6 +125,26 @@ class Wire(asyncio.BufferedProtocol):
     def resume_writing(self) -> None:
         """The kernel has taken everything."""
         self._room.set()
+
+    # -- the end
+
+    def _at_last(self, act: Callable[..., None], *words: Any, turns: int = _LAST_TURNS) -> None:
+        """Call `act` some turns of the loop from now: of two, the first one first."""
+        loop = asyncio.get_running_loop()
+        if turns:
+            loop.call_soon(lambda: self._at_last(act, *words, turns=turns - 1))
+        else:
+            act(*words)
+
+    def _no_more_comes(self) -> None:
+        self._inner.eof_received()
+        self.end(HUNG_UP)  # unless asyncssh knew better: what breaks from here on follows from it
+        self._transport.close()
+
+    def _lost(self, exc: Exception | None) -> None:
+        self.end(why_lost(exc))
+        self._inner.connection_lost(exc)
+        self._gone.set()
 
 
 class Through:

@@ -15,7 +15,7 @@ TRANSPORTS = Table(
         "http": "urc.transports.http:from_setup",
         "websocket": "urc.transports.websocket:from_setup",
         "rosbridge": "urc.transports.rosbridge:from_setup",
-        "mqtt": "urc.transports.mqtt_options:from_setup",
+        "mqtt": "urc.transports.mqtt:from_setup",
     },
 )
 """Each row's factory takes a `urc.transports.base.Setup` and returns a `Transport`."""

@@ -29,13 +29,13 @@ from urc.runtime.trail import Trail
 from urc.shipped import vendored
 from urc.web import wire, words
 from urc.web.api_document import DOCUMENT, document
-from urc.web.assets import STATIC, Assets, folder_assets, import_map, script
+from urc.web.assets import Assets, import_map
 from urc.web.card import Cards
 from urc.web.dev.routes import Dev, dev_url, no_dev_routes
 from urc.web.dev.secrets import secret_texts
 from urc.web.dev.start import DevStart, no_dev_start
 from urc.web.dev.watch import Remake
-from urc.web.files import tile
+from urc.web.file_routes import FileRoutes
 from urc.web.fleet import Fleet
 from urc.web.foreign import OURS, Border
 from urc.web.foreign_frame import Frames
@@ -89,7 +89,6 @@ def build_app(
     Raises:
         UrcError: two robots bring different widgets of one name.
     """
-    vendor = vendored()
     audit = AuditLog(data / "audit.sqlite") if data else None
     fleet = Fleet(
         robots,
@@ -99,12 +98,9 @@ def build_app(
     )
     routes = _Routes(
         fleet=fleet,
-        modules=import_map(vendor),
-        static=folder_assets(STATIC),
-        vendor=folder_assets(vendor) if vendor else Assets(),
+        modules=import_map(vendored()),
         ways=Ways(has_managers=workshop is not None, has_dev=remake is not None),
         audit=audit,
-        tiles=tiles,
         border=Border.of(trusted),
     )
 
@@ -117,7 +113,8 @@ def build_app(
     if remake is not None:
         dev = Dev(fleet.stations, remake, renew, is_here)
         routes.dev_start = DevStart(fleet, remake, renew, routes.ways, is_here)
-    return _Dashboard(routes, frozenset(allowed_hosts), dev)
+    files = FileRoutes(vendored(), tiles, routes.widget_files)
+    return _Dashboard(routes, files, frozenset(allowed_hosts), dev)
 
 
 def _latch(data: Path | None, robot: Robot) -> LatchFile | None:
@@ -136,7 +133,7 @@ class _Dashboard(Starlette):
     """Starlette with the page policy outermost, so that its own error answers pass through it."""
 
     def __init__(
-        self, routes: "_Routes", allowed_hosts: frozenset[str], dev: Dev | None = None
+        self, routes: "_Routes", files: FileRoutes, allowed_hosts: frozenset[str], dev: Dev | None
     ) -> None:
         self._allowed_hosts = allowed_hosts
         routes.dev = dev
@@ -147,7 +144,7 @@ class _Dashboard(Starlette):
             border=routes.border,
             ways=routes.ways,
         )
-        frames = Frames(routes.modules, routes.has_widget)
+        frames = Frames(routes.modules, files.has_widget)
         super().__init__(
             routes=[
                 Route("/", routes.menu),
@@ -157,18 +154,11 @@ class _Dashboard(Starlette):
                 Route(DOCUMENT, document),
                 Route("/api/v1/robots/{name}/stop", routes.stop, methods=["POST"]),
                 Route("/api/v1/robots/{name}/timeline", routes.timeline),
-                Route("/favicon.ico", routes.favicon),
-                Route("/app.webmanifest", routes.manifest),
-                Route("/sw.js", routes.worker),
-                Route("/words/{tag}.js", routes.words),
-                Route("/static/{file:path}", routes.static_file),
-                Route("/vendor/{file:path}", routes.vendor_file),
                 *routes.manage_routes(),
                 *gallery.routes(),
-                Route("/widgets/{file:path}", routes.widget_file),
+                *files.routes(),
                 Route("/frames/{widget}", frames.frame),
                 *Linked(lambda: routes.robots).routes(),
-                Route("/tiles/{z:int}/{x:int}/{y:int}.{kind}", routes.tile),
                 WebSocketRoute("/ws", routes.socket),
                 WebSocketRoute("/ws/spare", routes.spare),
                 *(dev.routes() if dev else no_dev_routes()),
@@ -188,11 +178,8 @@ class _Dashboard(Starlette):
 class _Routes:
     fleet: Fleet
     modules: Mapping[str, object]
-    static: Assets
-    vendor: Assets
     ways: Ways
     audit: AuditLog | None = None
-    tiles: Path | None = None
     border: Border = field(default_factory=Border)
     manager: Manager | None = None
     dev: Dev | None = None
@@ -225,6 +212,10 @@ class _Routes:
         ]
         brought = [widget for one in profiles for widget in one.widgets.values()]
         return [*filter(None, beside), *brought]
+
+    def widget_files(self) -> tuple[Assets, ...]:
+        """Return what pages load of widgets: those of the robots, then those that are looked at."""
+        return self.fleet.widgets, self.gallery.assets
 
     def renew(self, name: str, robot: Robot, latch: LatchFile | None) -> None:
         """Go on with another version of a robot; raise `UrcError` when its widgets clash."""
@@ -311,46 +302,6 @@ class _Routes:
         if name not in self.stations:
             return JSONResponse({"error": "no robot of that name is served here"}, 404, _PAGE)
         return await timeline(request, self.audit, name, is_here=is_here(request))
-
-    async def favicon(self, request: Request) -> Response:
-        return self.static.respond("favicon.svg", request)
-
-    async def manifest(self, request: Request) -> Response:
-        return self.static.respond("app.webmanifest", request)
-
-    async def worker(self, request: Request) -> Response:
-        """Serve the service worker from the root: it may only look after what lies below it."""
-        return self.static.respond("sw.js", request)
-
-    async def words(self, request: Request) -> Response:
-        """Serve what pages say, in one language, as a module."""
-        tag = request.path_params["tag"]
-        if tag not in words.LANGUAGES:
-            raise HTTPException(404)
-        return script(words.module(tag), request)
-
-    async def static_file(self, request: Request) -> Response:
-        return self.static.respond(request.path_params["file"], request)
-
-    async def vendor_file(self, request: Request) -> Response:
-        return self.vendor.respond(request.path_params["file"], request)
-
-    async def tile(self, request: Request) -> Response:
-        """Serve a square of a map, where a folder with tiles was given."""
-        if self.tiles is None:
-            raise HTTPException(404)
-        return tile(self.tiles, **request.path_params, request=request)
-
-    def has_widget(self, name: str) -> bool:
-        """Return whether pages load files of a widget of that name."""
-        module = f"{name}/widget.js"
-        return module in self.fleet.widgets.files or module in self.gallery.assets.files
-
-    async def widget_file(self, request: Request) -> Response:
-        file = request.path_params["file"]
-        mine = self.fleet.widgets
-        table = mine if file in mine.files else self.gallery.assets
-        return table.respond(file, request)
 
     async def socket(self, websocket: WebSocket) -> None:
         station = await self._accepted(websocket)

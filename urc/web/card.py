@@ -13,7 +13,7 @@ from starlette.routing import Route
 
 from urc.model.driver import Driver
 from urc.model.values import Reading, Signal
-from urc.web.pages import spoken
+from urc.web.cells import spoken
 from urc.web.robots import Station
 from urc.web.wire_picture import media_type
 from urc.web.words import t

@@ -43,6 +43,14 @@ class Border:
         home = shipped("widgets")
         return widget.name not in OURS or widget.folder.resolve() != (home / widget.name).resolve()
 
+    def styles(self, widgets: Iterable[Widget]) -> tuple[str, ...]:
+        """Return the URLs of the widgets' style sheets, for a page.
+
+        That of a foreign widget is not among them: it could change the whole page.
+        """
+        mine = dict.fromkeys(one.name for one in widgets if not self.is_foreign(one))
+        return tuple(f"/widgets/{quote(name)}/widget.css" for name in mine)
+
 
 def frame_url(widget: Widget) -> str:
     """Return where the frame of a foreign widget is."""

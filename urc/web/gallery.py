@@ -20,14 +20,23 @@ from urc.problems import UrcError
 from urc.runtime.changes import Watched
 from urc.shipped import shipped
 from urc.web.assets import Assets, widget_assets
+from urc.web.cells import Cell, widget_cell
 from urc.web.demos import DemoState, demo_states
 from urc.web.foreign import Border
 from urc.web.menu import Nav, Ways
-from urc.web.pages import Cell, Head, render, widget_cell, with_words
+from urc.web.pages import Head, render, with_words
 from urc.web.words import t
 
 __all__ = ["DemoPage", "Gallery", "GalleryPage"]
 
+
+def mark(text: str) -> str:
+    """Return the text; pages say it by `t`, and the catalogues must have it."""
+    return text
+
+
+EXAMPLES = (mark("normal"), mark("stale"), mark("gone"), mark("none"), mark("hostile"))
+"""Names of states that most widgets have; others are called as their authors call them."""
 SEPARATOR = "+"
 MOST_AT_ONCE = 16
 """Widgets on one page."""
@@ -60,6 +69,8 @@ class Exhibit:
 
     widget: str
     state: str
+    label: str
+    """What the state is called, in the reader's language where most widgets have it."""
     title: str
     cell: Cell
     news: str
@@ -130,16 +141,11 @@ class Gallery:
             states = [(one, await asyncio.to_thread(demo_states, one)) for one in widgets]
         except UrcError as error:
             raise HTTPException(409, f"{error}") from error
-        styles = tuple(
-            f"/widgets/{quote(one.name)}/widget.css"
-            for one in widgets
-            if not self._border.is_foreign(one)
-        )
         single = widgets[0] if len(widgets) == 1 else None
         page = DemoPage(
             head=replace(
                 self._head(request, t(single.title) if single else t("Widgets")),
-                widget_styles=styles,
+                widget_styles=self._border.styles(widgets),
             ),
             title=t(single.title) if single else ", ".join(t(one.title) for one in widgets),
             summary=single.summary if single else "",
@@ -201,7 +207,8 @@ def _exhibits(
     for widget, shown in states:
         for state in shown:
             cell = widget_cell(index, state.use, state.profile, border)
-            yield Exhibit(widget.name, state.name, widget.title, cell, state.news)
+            label = t(state.name) if state.name in EXAMPLES else state.name
+            yield Exhibit(widget.name, state.name, label, widget.title, cell, state.news)
             index += 1
 
 

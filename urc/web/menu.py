@@ -10,8 +10,9 @@ from urllib.parse import quote
 
 from urc.model.profile import Setting
 from urc.model.values import Value
+from urc.web.cells import spoken
 from urc.web.fleet import Broken
-from urc.web.pages import Head, render, spoken
+from urc.web.pages import Head, render
 from urc.web.robots import Robot, missing_settings
 from urc.web.words import t
 

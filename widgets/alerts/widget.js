@@ -2,7 +2,7 @@
 /** @typedef {import("../../urc/web/static/types.js").Context} Context */
 /** @typedef {import("../../urc/web/static/types.js").Instance} Instance */
 /** @typedef {import("../../urc/web/static/types.js").Alert} Alert */
-import { ALARMS, attribute, isStill, part, write } from "urc/kit";
+import { ALARMS, attribute, button, isStill, part, write } from "urc/kit";
 import { Book } from "./book.js";
 import { hush, say, tone } from "./voice.js";
 
@@ -76,8 +76,8 @@ export default {
       words.className = "alerts-words";
       const more = document.createElement("span");
       more.className = "alerts-more";
-      const seen = button("alerts-seen", t("Acknowledge"), () => book.acknowledge(name));
-      const later = button("alerts-later", t("Put off {minutes} min", { minutes: shelveMs / 60_000 }), () =>
+      const seen = deed("alerts-seen urc-act", t("Acknowledge"), () => book.acknowledge(name));
+      const later = deed("alerts-later urc-act", t("Put off {minutes} min", { minutes: shelveMs / 60_000 }), () =>
         book.shelve(name, Date.now() + shelveMs));
       item.append(words, more, seen, later);
       return item;
@@ -106,17 +106,13 @@ export default {
      * @param {string} text
      * @param {() => void} act
      */
-    function button(name, text, act) {
-      const made = document.createElement("button");
-      made.type = "button";
-      made.className = name;
-      made.textContent = text;
-      made.addEventListener("click", () => {
+    function deed(name, text, act) {
+      const press = () => {
         act();
         hush();
         look();
-      }, { signal });
-      return made;
+      };
+      return button(name, text, press, { signal });
     }
 
     mute?.addEventListener("click", () => {

@@ -2,8 +2,9 @@
 /** @typedef {import("../../urc/web/static/types.js").Context} Context */
 /** @typedef {import("../../urc/web/static/types.js").Instance} Instance */
 /** @typedef {import("../../urc/web/static/types.js").Signal} Signal */
-import { attribute, fit, format, noteOf, number, part, style, tell, write } from "urc/kit";
-import { bands, digitsOf, ends, share, ticks } from "urc/scale";
+import { attribute, fit, format, number, part, style } from "urc/kit";
+import { Meter } from "urc/meter";
+import { bands, digitsOf, share, ticks } from "urc/scale";
 
 const TICKS = 4;
 
@@ -13,62 +14,32 @@ export default {
    * @returns {Instance}
    */
   mount(ctx) {
-    const { el, options, t } = ctx;
-    const root = part(el, ".bar");
-    const meter = part(el, ".bar-meter");
+    const { el, options } = ctx;
     const fill = part(el, ".bar-fill");
     const target = part(el, ".bar-target");
     const readout = part(el, ".bar-number");
-    const text = part(el, ".bar-text");
-    const unit = part(el, ".bar-unit");
-    const note = part(el, ".bar-note");
     const extremes = options["extremes"] === true ? new Extremes(part(el, ".bar-extremes")) : null;
-    /** What the scale was drawn for. @type {Signal | null} */
-    let drawn = null;
-    let shownIn = "";
-    /** @type {[number, number]} */
-    let scale = [0, 1];
     let origin = 0;
+    const meter = new Meter(ctx, "bar", (signal, scale, factor) => {
+      const start = options["origin"];
+      origin = share(typeof start === "number" ? start : scale[0], ...scale);
+      style(meter.root, "--bar-origin", String(origin));
+      drawScale(el, signal, scale, factor);
+    });
 
     return {
       update({ value, target: wanted }) {
         if (!value) return;
-        const { symbol, factor } = ctx.unit("value");
-        const known = number(value);
-        if (value.signal !== drawn || symbol !== shownIn) {
-          [drawn, shownIn] = [value.signal, symbol];
-          scale = ends(value.signal, options);
-          const start = options["origin"];
-          origin = share(typeof start === "number" ? start : scale[0], ...scale);
-          style(root, "--bar-origin", String(origin));
-          drawScale(el, value.signal, scale, factor);
-          attribute(meter, "aria-valuemin", format(factor(scale[0])));
-          attribute(meter, "aria-valuemax", format(factor(scale[1])));
-        }
-        const place = known === null ? origin : share(known, ...scale);
-        attribute(root, "data-state", value.state);
-        attribute(root, "data-alarm", value.alarm);
-        attribute(root, "data-known", known === null ? "no" : "yes");
+        const known = meter.show(value);
+        const place = known === null ? origin : share(known, ...meter.scale);
         // On the part that shows it: a property of the root would be handed down to all parts.
         style(fill, "--bar-from", Math.min(origin, place).toFixed(4));
         style(fill, "--bar-long", Math.abs(place - origin).toFixed(4));
         if (known !== null) extremes?.add(place);
         const aim = number(wanted);
         attribute(target, "hidden", aim === null ? "" : null);
-        if (aim !== null) style(target, "--bar-target", share(aim, ...scale).toFixed(4));
-
-        const digits = options["precision"] ?? value.signal.precision;
-        const figure = format(known === null ? null : factor(known), typeof digits === "number" ? digits : undefined);
-        fit(readout, "--bar-characters", figure.length + symbol.length / 2);
-        write(text, figure);
-        write(unit, known === null ? "" : symbol);
-        const said = noteOf(value, t);
-        write(note, said);
-        const spoken = said ? `${figure} ${symbol}, ${said.replace(/[▲◆] /g, "")}` : `${figure} ${symbol}`;
-        tell(meter, {
-          "aria-valuenow": format(factor(known ?? scale[0])),
-          "aria-valuetext": known === null ? t("unknown") : spoken,
-        });
+        if (aim !== null) style(target, "--bar-target", share(aim, ...meter.scale).toFixed(4));
+        fit(readout, "--bar-characters", meter.characters);
       },
     };
   },

@@ -5,7 +5,7 @@
 /** @typedef {import("../../urc/web/static/types.js").Outlet} Outlet */
 /** @typedef {import("../../urc/web/static/types.js").Reading} Reading */
 /** @typedef {import("./frame.js").Fit} Fit */
-import { DASH, attribute, board, many, noteOf, part, write } from "urc/kit";
+import { DASH, attribute, board, button, many, noteOf, part, write } from "urc/kit";
 import { Rate, ageText, fileName, lookOf, place } from "./frame.js";
 import { Newest } from "./newest.js";
 
@@ -80,14 +80,9 @@ class Camera {
    * @param {() => void} press
    */
   addButton(sign, name, press) {
-    const button = document.createElement("button");
-    button.type = "button";
-    button.className = "camera-button";
-    button.textContent = sign;
-    if (name) button.setAttribute("aria-label", name);
-    button.addEventListener("click", press, { signal: this.signal });
-    this.tools.append(button);
-    return button;
+    const made = button("camera-button urc-view-button", sign, press, { signal: this.signal, label: name });
+    this.tools.append(made);
+    return made;
   }
 
   addSnapshot() {

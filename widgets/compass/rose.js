@@ -9,6 +9,20 @@ const LETTERS = ["N", "E", "S", "W"];
 /** Of the tape: units a degree, so that 120 degrees are seen. */
 export const PER_DEGREE = 200 / 120;
 
+/** The needle that points straight up. */
+const NEEDLE = /** @type {const} */ ([[0, -52], [24, 36], [0, 22], [-24, 36]]);
+
+/**
+ * Return the points of the needle, as they are written into a polygon.
+ *
+ * @param {number} degrees clockwise from straight up
+ */
+export function needle(degrees) {
+  const radians = (degrees * Math.PI) / 180;
+  const [sin, cos] = [Math.sin(radians), Math.cos(radians)];
+  return NEEDLE.map(([x, y]) => `${(x * cos - y * sin).toFixed(2)},${(x * sin + y * cos).toFixed(2)}`).join(" ");
+}
+
 /**
  * @param {SVGElement} ticks
  * @param {SVGElement} letters

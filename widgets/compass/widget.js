@@ -5,7 +5,7 @@
 import { attribute, clamp, drawing, noteOf, number, part, style, write } from "urc/kit";
 import { angleOf, bearing, bearingOf, figures, point, turn } from "./bearing.js";
 import { Choice } from "./choice.js";
-import { PER_DEGREE, drawRose, drawStrip } from "./rose.js";
+import { PER_DEGREE, drawRose, drawStrip, needle } from "./rose.js";
 
 /** What an angle means in axes: clockwise from north, or counter-clockwise from east. */
 const CONVENTIONS = { bearing: "bearing", NED: "bearing", FRD: "bearing", ENU: "yaw", FLU: "yaw" };
@@ -79,7 +79,7 @@ class Rose {
     this.isVehicleUp = isVehicleUp;
     this.rose = drawing(el, ".compass-rose");
     this.letters = drawRose(drawing(el, ".compass-ticks"), drawing(el, ".compass-letters"));
-    this.needle = part(el, ".compass-needle");
+    this.needle = drawing(el, ".compass-needle polygon");
     this.marks = [drawing(el, ".compass-course"), drawing(el, ".compass-target")];
     this.up = 0;
   }
@@ -95,7 +95,7 @@ class Rose {
       style(this.rose, "transform", `rotate(${(-heading).toFixed(2)}deg)`);
       for (const letter of this.letters) style(letter, "transform", `rotate(${heading.toFixed(2)}deg)`);
     }
-    if (heading !== null) style(this.needle, "transform", `rotate(${(heading - this.up).toFixed(2)}deg)`);
+    if (heading !== null) attribute(this.needle, "points", needle(heading - this.up));
     this.marks.forEach((mark, place) => {
       const degrees = others[place] ?? null;
       attribute(mark, "visibility", degrees === null ? "hidden" : "visible");

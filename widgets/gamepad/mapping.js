@@ -13,8 +13,9 @@
  * @property {"left" | "right" | "slower" | "faster"} [button]
  */
 import { STANDARD, movedAxis, withAxis, withButton } from "urc/padmap";
-import { part, t, write } from "urc/kit";
+import { button, part, t, write } from "urc/kit";
 
+const LEARN = "gamepad-learn urc-pad-act";
 /** @type {Part[]} */
 const PARTS = [
   { text: t("Left stick, sideways"), how: t("push it to the right"), axis: 0 },
@@ -54,22 +55,14 @@ export class Mapping {
       const name = document.createElement("span");
       name.textContent = `${one.text}: `;
       const place = document.createElement("span");
-      const button = document.createElement("button");
-      button.type = "button";
-      button.className = "gamepad-learn";
-      button.setAttribute("aria-label", `${t("Change")}: ${one.text}`);
-      button.addEventListener("click", () => this.learn(one), { signal });
-      row.append(name, place, button);
+      const learn = button(LEARN, "", () => this.learn(one), { signal, label: `${t("Change")}: ${one.text}` });
+      row.append(name, place, learn);
       this.list.append(row);
       this.places.push(place);
-      this.buttons.push(button);
+      this.buttons.push(learn);
     }
-    const reset = document.createElement("button");
-    reset.type = "button";
-    reset.className = "gamepad-learn";
-    reset.textContent = t("As the browser says");
-    reset.addEventListener("click", () => this.view && this.ctx.pads.setMap(this.view.id, null), { signal });
-    this.list.append(reset);
+    const forget = () => this.view && this.ctx.pads.setMap(this.view.id, null);
+    this.list.append(button(LEARN, t("As the browser says"), forget, { signal }));
   }
 
   /** @param {Part} one */

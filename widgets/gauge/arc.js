@@ -28,6 +28,20 @@ export function place(degrees, radius) {
   return `${x.toFixed(2)} ${y.toFixed(2)}`;
 }
 
+/** The needle that points straight up. */
+const NEEDLE = /** @type {const} */ ([[-4, 0], [-1.5, -74], [1.5, -74], [4, 0]]);
+
+/**
+ * Return the points of the needle, as they are written into a polygon.
+ *
+ * @param {number} degrees clockwise from straight up
+ */
+export function needle(degrees) {
+  const radians = (degrees * Math.PI) / 180;
+  const [sin, cos] = [Math.sin(radians), Math.cos(radians)];
+  return NEEDLE.map(([x, y]) => `${(x * cos - y * sin).toFixed(2)},${(x * sin + y * cos).toFixed(2)}`).join(" ");
+}
+
 /**
  * Return the path of an arc between two shares of the scale.
  *

@@ -2,9 +2,10 @@
 /** @typedef {import("../../urc/web/static/types.js").Context} Context */
 /** @typedef {import("../../urc/web/static/types.js").Instance} Instance */
 /** @typedef {import("../../urc/web/static/types.js").Signal} Signal */
-import { attribute, drawing, format, noteOf, number, part, style, svg, tell, write } from "urc/kit";
-import { bands, digitsOf, ends, share, ticks } from "urc/scale";
-import { angle, arc, dashes, place } from "./arc.js";
+import { attribute, drawing, format, number, style, svg } from "urc/kit";
+import { Meter } from "urc/meter";
+import { bands, digitsOf, share, ticks } from "urc/scale";
+import { angle, arc, dashes, needle, place } from "./arc.js";
 
 const TICKS = 6;
 
@@ -14,65 +15,27 @@ export default {
    * @returns {Instance}
    */
   mount(ctx) {
-    const { el, options, t } = ctx;
-    const root = part(el, ".gauge");
-    const meter = part(el, ".gauge-meter");
-    const needle = part(el, ".gauge-needle");
+    const { el, options } = ctx;
+    const pointer = drawing(el, ".gauge-needle polygon");
     const target = drawing(el, ".gauge-target");
-    const text = part(el, ".gauge-text");
-    const unit = part(el, ".gauge-unit");
-    const note = part(el, ".gauge-note");
     const extremes = options["extremes"] === true ? new Extremes(drawing(el, ".gauge-extremes")) : null;
-    /** What the scale was drawn for. @type {Signal | null} */
-    let drawn = null;
-    let shownIn = "";
-    /** @type {[number, number]} */
-    let scale = [0, 1];
+    const meter = new Meter(ctx, "gauge", (signal, scale, factor) => drawScale(el, signal, scale, factor));
 
     return {
       update({ value, target: wanted }) {
         if (!value) return;
-        const { symbol, factor } = ctx.unit("value");
-        const known = number(value);
-        if (value.signal !== drawn || symbol !== shownIn) {
-          [drawn, shownIn] = [value.signal, symbol];
-          scale = ends(value.signal, options);
-          drawScale(el, value.signal, scale, factor);
-          attribute(meter, "aria-valuemin", format(factor(scale[0])));
-          attribute(meter, "aria-valuemax", format(factor(scale[1])));
-        }
-        attribute(root, "data-state", value.state);
-        attribute(root, "data-alarm", value.alarm);
-        attribute(root, "data-known", known === null ? "no" : "yes");
+        const known = meter.show(value);
         if (known !== null) {
-          style(needle, "transform", `rotate(${angle(share(known, ...scale)).toFixed(2)}deg)`);
-          extremes?.add(share(known, ...scale));
+          attribute(pointer, "points", needle(angle(share(known, ...meter.scale))));
+          extremes?.add(share(known, ...meter.scale));
         }
         const aim = number(wanted);
         attribute(target, "visibility", aim === null ? "hidden" : "visible");
-        if (aim !== null) style(target, "transform", `rotate(${angle(share(aim, ...scale)).toFixed(2)}deg)`);
-        const digits = options["precision"] ?? value.signal.precision;
-        const figure = format(known === null ? null : factor(known), typeof digits === "number" ? digits : undefined);
-        write(text, figure);
-        write(unit, known === null ? "" : symbol);
-        const said = noteOf(value, t);
-        write(note, said);
-        tell(meter, {
-          "aria-valuenow": format(factor(known ?? scale[0])),
-          "aria-valuetext": known === null ? t("unknown") : spoken(`${figure} ${symbol}`, said),
-        });
+        if (aim !== null) style(target, "transform", `rotate(${angle(share(aim, ...meter.scale)).toFixed(2)}deg)`);
       },
     };
   },
 };
-
-/**
- * @param {string} value
- * @param {string} said
- */
-function spoken(value, said) {
-  return said ? `${value}, ${said.replace(/[▲◆] /g, "")}` : value;
-}
 
 /**
  * @param {HTMLElement} el

@@ -1,7 +1,7 @@
 // @ts-check
 /** @typedef {import("../../urc/web/static/types.js").Context} Context */
 /** @typedef {import("../../urc/web/static/types.js").Instance} Instance */
-import { attribute, part, write } from "urc/kit";
+import { attribute, button, part, write } from "urc/kit";
 
 const LATE_MS = 10_000;
 const SHORTEST_S = 5;
@@ -48,13 +48,7 @@ class Shown {
    * @param {AbortSignal} signal
    */
   addButton(top, signal) {
-    const button = document.createElement("button");
-    button.type = "button";
-    button.className = "iframe-reload";
-    button.textContent = "↻";
-    button.setAttribute("aria-label", this.t("Load the page again"));
-    button.addEventListener("click", () => this.load(), { signal });
-    top.append(button);
+    top.append(button("iframe-reload", "↻", () => this.load(), { signal, label: this.t("Load the page again") }));
   }
 
   isInside() {

@@ -112,7 +112,7 @@ export default {
       const buttons = Object.entries(words).map(([wish, text]) => {
         const made = document.createElement("button");
         made.type = "button";
-        made.className = "link-verb";
+        made.className = "link-verb urc-act";
         made.textContent = text;
         made.hidden = true;
         made.addEventListener("click", () => drive(/** @type {Wish} */ (wish)), { signal });

@@ -7,7 +7,7 @@
  * @typedef {import("./geo.js").Place} Place
  * @typedef {import("../../urc/web/static/types.js").Outlet} Outlet
  */
-import { attribute, write } from "urc/kit";
+import { attribute, button, write } from "urc/kit";
 import { distance, distanceText, isInside, lengthOf, placeText } from "./geo.js";
 
 /** A way of more places is no way that a finger has drawn. */
@@ -60,12 +60,7 @@ export class Choice {
    * @param {AbortSignal} signal
    */
   button(text, press, signal) {
-    const made = document.createElement("button");
-    made.type = "button";
-    made.className = "map-button";
-    made.textContent = text;
-    made.addEventListener("click", press, { signal });
-    return made;
+    return button("map-button", text, press, { signal });
   }
 
   /**

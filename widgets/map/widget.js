@@ -5,7 +5,7 @@
 /** @typedef {import("../../urc/web/static/types.js").Reading} Reading */
 /** @typedef {import("./geo.js").Place} Place */
 /** @typedef {typeof import("leaflet")} Leaflet */
-import { DASH, attribute, colours, isStill, noteOf, number, part, style, svg, write } from "urc/kit";
+import { DASH, attribute, button, colours, isStill, noteOf, number, part, style, svg, write } from "urc/kit";
 import { Choice } from "./choose.js";
 import { Trail, bearingOf, isInside, placeOf, placeText, placesOf, readFix } from "./geo.js";
 import { Grid } from "./grid.js";
@@ -131,20 +131,15 @@ class Chart {
   addButtons(hasWay) {
     const row = document.createElement("div");
     row.className = "map-tools";
-    const button = (/** @type {string} */ sign, /** @type {string} */ name, /** @type {() => void} */ press) => {
-      const made = document.createElement("button");
-      made.type = "button";
-      made.className = "map-button";
-      made.textContent = sign;
-      made.setAttribute("aria-label", name);
-      made.addEventListener("click", press, { signal: this.signal });
+    const add = (/** @type {string} */ sign, /** @type {string} */ name, /** @type {() => void} */ press) => {
+      const made = button("map-button", sign, press, { signal: this.signal, label: name });
       row.append(made);
       return made;
     };
-    button("+", this.t("Closer"), () => this.map.zoomIn());
-    button("−", this.t("Further away"), () => this.map.zoomOut());
-    this.follower = button("◎", this.t("Follow the robot"), () => this.follow(!this.isFollowing));
-    if (hasWay) this.wayButton = button("⤳", this.t("Draw a way"), () => this.toggleWay());
+    add("+", this.t("Closer"), () => this.map.zoomIn());
+    add("−", this.t("Further away"), () => this.map.zoomOut());
+    this.follower = add("◎", this.t("Follow the robot"), () => this.follow(!this.isFollowing));
+    if (hasWay) this.wayButton = add("⤳", this.t("Draw a way"), () => this.toggleWay());
     part(this.root, ".map-frame").append(row);
     this.follow(true);
   }

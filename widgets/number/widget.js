@@ -1,8 +1,8 @@
 // @ts-check
 /** @typedef {import("../../urc/web/static/types.js").Context} Context */
 /** @typedef {import("../../urc/web/static/types.js").Instance} Instance */
-import { Setpoint } from "urc/giving";
-import { attribute, part, write } from "urc/kit";
+import { Setpoint, SetpointFace } from "urc/giving";
+import { attribute, part } from "urc/kit";
 import { numberOf } from "./typed.js";
 
 const KEYS = new Set(["ArrowUp", "ArrowDown", "PageUp", "PageDown"]);
@@ -14,9 +14,7 @@ export default {
    */
   mount({ ...ctx }) {
     const { el, signal, t } = ctx;
-    const root = part(el, ".number");
-    const text = part(el, ".number-text");
-    const note = part(el, ".number-note");
+    const face = new SetpointFace(el, "number");
     const field = el.querySelector(".number-field");
     const argument = Object.values(ctx.command("change")?.arguments ?? {})[0];
     const setpoint = new Setpoint(ctx, show);
@@ -32,16 +30,8 @@ export default {
     let fault = "";
 
     function show() {
-      attribute(root, "data-state", setpoint.state?.state ?? "none");
-      attribute(root, "data-alarm", setpoint.state?.alarm ?? "");
-      attribute(root, "data-phase", setpoint.giver.phase);
-      attribute(root, "data-wish", setpoint.wishState);
-      write(text, setpoint.text(setpoint.shown));
-      write(note, [fault, setpoint.note()].filter(Boolean).join(" · "));
-      if (!field) return;
-      attribute(field, "aria-invalid", fault ? "true" : null);
-      const isLocked = String(!setpoint.giver.isReady);
-      for (const button of root.querySelectorAll("button")) attribute(button, "aria-disabled", isLocked);
+      face.show(setpoint, fault);
+      if (field) attribute(field, "aria-invalid", fault ? "true" : null);
     }
 
     /** @param {string} why */
@@ -68,7 +58,7 @@ export default {
     }
 
     if (field instanceof HTMLInputElement) {
-      part(root, ".number-row").addEventListener("submit", (event) => {
+      part(el, ".number-row").addEventListener("submit", (event) => {
         event.preventDefault();
         const typed = numberOf(field.value, bounds);
         fault = "fault" in typed ? words(typed.fault) : "";
@@ -88,8 +78,8 @@ export default {
         step(event.key);
         field.value = setpoint.last === null ? "" : String(setpoint.last);
       }, { signal });
-      part(root, ".number-less").addEventListener("click", () => step("ArrowDown"), { signal });
-      part(root, ".number-more").addEventListener("click", () => step("ArrowUp"), { signal });
+      part(el, ".number-less").addEventListener("click", () => step("ArrowDown"), { signal });
+      part(el, ".number-more").addEventListener("click", () => step("ArrowUp"), { signal });
     }
     return {
       update({ state }, { change }) {

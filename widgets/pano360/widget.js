@@ -6,7 +6,7 @@
 /** @typedef {import("./look.js").Pose} Pose */
 /** @typedef {import("./look.js").View} View */
 /** @typedef {import("./stage.js").Stage} Stage */
-import { DASH, attribute, noteOf, part, write } from "urc/kit";
+import { DASH, attribute, button, noteOf, part, write } from "urc/kit";
 import { MOST_XMP, bearing, firstView, poseOf, tilted, turned } from "./look.js";
 import { flat, sphere } from "./stage.js";
 
@@ -80,7 +80,7 @@ class Panorama {
     this.outcome = "";
     /** @type {Reading | undefined} */
     this.reading = undefined;
-    stage.canvas.className = "pano360-picture";
+    stage.canvas.className = "pano360-picture urc-view-picture";
     stage.canvas.setAttribute("aria-hidden", "true");
     this.face.append(stage.canvas);
     this.resize();
@@ -206,14 +206,9 @@ class Panorama {
    * @param {() => void} press
    */
   addButton(text, name, press) {
-    const button = document.createElement("button");
-    button.type = "button";
-    button.className = "pano360-button";
-    button.textContent = text;
-    if (name) button.setAttribute("aria-label", name);
-    button.addEventListener("click", press, { signal: this.signal });
-    this.tools.append(button);
-    return button;
+    const made = button("pano360-button urc-view-button", text, press, { signal: this.signal, label: name });
+    this.tools.append(made);
+    return made;
   }
 
   /** Browsers tell how they are tilted on safe pages only, and some want to be asked by a tap. */

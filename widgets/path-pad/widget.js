@@ -3,6 +3,7 @@
 /** @typedef {import("../../urc/web/static/types.js").Instance} Instance */
 /** @typedef {import("../../urc/web/static/types.js").Reading} Reading */
 /** @typedef {import("../../urc/web/static/stroke.js").Point} Point */
+import { grasp } from "urc/giving";
 import { attribute, clamp, drawing, format, number, part, svg, write } from "urc/kit";
 import { DIRECTIONS, pointed } from "urc/motion";
 import { fitted, lengthOf } from "urc/stroke";
@@ -68,7 +69,6 @@ class PathPad {
     this.points = [];
     /** @type {[number, number] | null} */
     this.cursor = null;
-    this.pointerId = -1;
     /** @type {(right: number, down: number) => Point} */
     this.toPoint = () => [0, 0];
     this.isBusy = false;
@@ -78,16 +78,14 @@ class PathPad {
   listen() {
     const { field, ctx } = this;
     const options = { signal: ctx.signal };
-    field.addEventListener("pointerdown", (event) => this.down(event), options);
-    field.addEventListener("pointermove", (event) => this.move(event), options);
-    field.addEventListener("pointerup", (event) => this.up(event), options);
-    for (const name of ["pointercancel", "lostpointercapture"]) {
-      field.addEventListener(name, () => this.cancel(), options);
-    }
-    for (const name of ["blur", "pagehide", "resize", "urc-let-go"]) {
-      addEventListener(name, () => this.cancel(), options);
-    }
-    field.addEventListener("touchstart", (event) => event.preventDefault(), { ...options, passive: false });
+    grasp(field, {
+      take: (event) => this.down(event),
+      move: (event) => this.move(event),
+      release: () => this.up(),
+      cancel: () => this.cancel(),
+      isDrawing: true,
+      signal: ctx.signal,
+    });
     field.addEventListener("keydown", (event) => this.key(event), options);
     this.go.addEventListener("click", () => void this.send(), options);
     this.undo.addEventListener("click", () => this.keep(this.strokes.slice(0, -1)), options);
@@ -96,7 +94,7 @@ class PathPad {
 
   /** @param {PointerEvent} event */
   down(event) {
-    if (event.button !== 0 || this.pointerId >= 0 || this.isBusy) return;
+    if (this.isBusy) return false;
     const { left, top, width, height } = this.face.getBoundingClientRect();
     const scale = (Math.min(width, height) * EDGE) / FACE || 1;
     const [middleX, middleY] = [left + width / 2, top + height / 2];
@@ -104,16 +102,14 @@ class PathPad {
       clamp((middleY - down) / scale, -1, 1),
       clamp((middleX - right) / scale, -1, 1),
     ];
-    this.pointerId = event.pointerId;
     this.stroke = [this.toPoint(event.clientX, event.clientY)];
     this.outcome = "";
-    this.field.setPointerCapture(event.pointerId);
     this.draw();
+    return true;
   }
 
   /** Also what lay between two frames, where the browser keeps it. @param {PointerEvent} event */
   move(event) {
-    if (event.pointerId !== this.pointerId) return;
     const all = event.getCoalescedEvents?.() ?? [];
     for (const one of all.length > 0 ? all : [event]) {
       if (this.stroke.length < MOST_RAW) this.stroke.push(this.toPoint(one.clientX, one.clientY));
@@ -121,10 +117,7 @@ class PathPad {
     this.draw();
   }
 
-  /** @param {PointerEvent} event */
-  up(event) {
-    if (event.pointerId !== this.pointerId) return;
-    this.pointerId = -1; // so that losing the capture, which follows, cancels nothing
+  up() {
     const { stroke } = this;
     this.stroke = [];
     this.keep([...this.strokes, stroke]);
@@ -132,8 +125,6 @@ class PathPad {
 
   /** What was taken from the hand was not meant. */
   cancel() {
-    if (this.pointerId < 0) return;
-    this.pointerId = -1;
     this.stroke = [];
     this.draw();
   }

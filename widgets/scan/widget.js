@@ -93,7 +93,7 @@ class Scan {
   addButton(signal) {
     const button = document.createElement("button");
     button.type = "button";
-    button.className = "scan-view";
+    button.className = "scan-view urc-scene-view";
     const label = () => {
       write(button, this.t(NAMES[this.view]));
       attribute(button, "aria-label", this.t("View: {name}. Change it.", { name: this.t(NAMES[this.view]) }));

@@ -94,7 +94,7 @@ class Scene {
   addButton() {
     const button = document.createElement("button");
     button.type = "button";
-    button.className = "scene3d-view";
+    button.className = "scene3d-view urc-scene-view";
     const label = () => {
       const name = this.t(NAMES[this.stage?.view ?? "orbit"]);
       write(button, name);

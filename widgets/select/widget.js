@@ -120,7 +120,7 @@ class Select {
 
   list() {
     const list = document.createElement("select");
-    list.className = "select-list";
+    list.className = "select-list urc-act";
     list.setAttribute("aria-labelledby", `${this.root.dataset["uid"]}-title`);
     list.setAttribute("aria-describedby", `${this.root.dataset["uid"]}-note`);
     const none = new Option("—", "-1");

@@ -2,6 +2,7 @@
 /** @typedef {import("../../urc/web/static/types.js").Context} Context */
 /** @typedef {import("../../urc/web/static/types.js").Instance} Instance */
 /** @typedef {import("../../urc/web/static/types.js").Value} Value */
+import { grasp } from "urc/giving";
 import { attribute, drawing, format, part, write } from "urc/kit";
 import { DIRECTIONS, pointed } from "urc/motion";
 import { cutTo, polar } from "urc/stroke";
@@ -25,7 +26,7 @@ export default {
     return {
       update(_, { go }) {
         pad.reason = go?.reason ?? ctx.t("no command is bound to this pad");
-        if (pad.reason) pad.cancel();
+        if (pad.reason) pad.hold?.drop();
         pad.isAnswered = go?.isAnswered ?? false;
         pad.draw();
       },
@@ -58,7 +59,8 @@ class VectorPad {
     this.at = null;
     /** @type {[number, number] | null} */
     this.last = null;
-    this.pointerId = -1;
+    /** What the pointer has hold of. @type {import("../../urc/web/static/grasp.js").Grasp | null} */
+    this.hold = null;
     /** @type {[number, number]} */
     this.start = [0, 0];
     this.scale = 1;
@@ -72,16 +74,14 @@ class VectorPad {
   listen() {
     const { field, ctx } = this;
     const options = { signal: ctx.signal };
-    field.addEventListener("pointerdown", (event) => this.down(event), options);
-    field.addEventListener("pointermove", (event) => this.move(event), options);
-    field.addEventListener("pointerup", (event) => this.up(event), options);
-    for (const name of ["pointercancel", "lostpointercapture"]) {
-      field.addEventListener(name, () => this.cancel(), options);
-    }
-    for (const name of ["blur", "pagehide", "resize", "urc-let-go"]) {
-      addEventListener(name, () => this.cancel(), options);
-    }
-    field.addEventListener("touchstart", (event) => event.preventDefault(), { ...options, passive: false });
+    this.hold = grasp(field, {
+      take: (event) => this.down(event),
+      move: (event) => this.move(event),
+      release: (event) => this.up(event),
+      cancel: () => this.set(null),
+      isDrawing: true,
+      signal: ctx.signal,
+    });
     field.addEventListener("keydown", (event) => this.key(event), options);
     this.go.addEventListener("click", () => void this.send(), options);
     this.clear.addEventListener("click", () => this.set(null), options);
@@ -89,19 +89,17 @@ class VectorPad {
 
   /** @param {PointerEvent} event */
   down(event) {
-    if (event.button !== 0 || this.pointerId >= 0 || this.reason || this.isBusy) return;
+    if (this.reason || this.isBusy) return false;
     const { left, top, width, height } = this.face.getBoundingClientRect();
     this.scale = (Math.min(width, height) * RIM) / FACE || 1;
     this.middle = [left + width / 2, top + height / 2];
-    this.pointerId = event.pointerId;
     this.start = [event.clientX, event.clientY];
     this.isTap = true;
-    this.field.setPointerCapture(event.pointerId);
+    return true;
   }
 
   /** Drawn from where it was touched: nothing jumps. @param {PointerEvent} event */
   move(event) {
-    if (event.pointerId !== this.pointerId) return;
     const [right, down] = [event.clientX - this.start[0], event.clientY - this.start[1]];
     if (this.isTap && Math.hypot(right, down) < TAP) return;
     this.isTap = false;
@@ -110,20 +108,12 @@ class VectorPad {
 
   /** @param {PointerEvent} event */
   up(event) {
-    if (event.pointerId !== this.pointerId) return;
-    this.pointerId = -1; // so that losing the capture, which follows, cancels nothing
     if (this.isTap) {
       const [across, along] = [event.clientX - this.middle[0], event.clientY - this.middle[1]];
       this.set([-along / this.scale, -across / this.scale]);
     } else if (this.isSentByRelease) {
       void this.send();
     }
-  }
-
-  cancel() {
-    if (this.pointerId < 0) return;
-    this.pointerId = -1;
-    this.set(null);
   }
 
   /** @param {KeyboardEvent} event */

@@ -8,7 +8,8 @@ from urc.config.parse_framing import parse_framing
 from urc.config.part import Findings, Part
 from urc.model.driver import FramingSpec
 from urc.problems import to_text
-from urc.protocol.framing import FRAMINGS, Framing, build_framing
+from urc.protocol.framing import FRAMINGS, build_framing
+from urc.protocol.framings.base import Framing
 from urc.registry import Catalog, Table
 from urc.source import parse_document
 

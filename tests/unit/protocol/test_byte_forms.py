@@ -11,7 +11,8 @@ from urc.config import form_bytes, form_hex, form_json_text
 from urc.config.forms import FormContext
 from urc.config.part import Findings, Part
 from urc.expressions import ExpressionError
-from urc.protocol.forms import CodecContext, Frame, NotWritable, Writer, build_writer
+from urc.protocol.codec import CodecContext, Frame, NotWritable, Writer
+from urc.protocol.forms import build_writer
 from urc.source import parse_document
 
 FORMS = {"hex": form_hex, "bytes": form_bytes, "json": form_json_text}

@@ -12,10 +12,12 @@ from urc.model.codec import Payload
 from urc.model.driver import Argument, Command, FramingSpec
 from urc.model.values import Conversion, Limits, Signal
 from urc.protocol.answer import Matcher
+from urc.protocol.codec import CodecContext, Frame
 from urc.protocol.encode import BadArgument, build_check, build_encode, check_arguments
 from urc.protocol.fast_encode import build_fast_encode
-from urc.protocol.fast_read import Taken, build_fast_read, prefix_of
-from urc.protocol.forms import CodecContext, Frame, build_reader
+from urc.protocol.fast_read import build_fast_read, prefix_of
+from urc.protocol.fast_value import Taken
+from urc.protocol.forms import build_reader
 from urc.protocol.framing import build_framing
 from urc.protocol.generate import WARM_AFTER as WARM_CALLS
 from urc.protocol.messages import WARM_AFTER, Messages

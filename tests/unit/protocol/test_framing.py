@@ -5,7 +5,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from urc.model.driver import FramingSpec
-from urc.protocol.framing import FrameFault, Framing, FramingError, build_framing
+from urc.protocol.framing import build_framing
+from urc.protocol.framings.base import FrameFault, Framing, FramingError
 
 
 def framing(tx: bytes = b"\n", rx: bytes = b"\n", limit: int = 16) -> Framing:

@@ -7,8 +7,8 @@ import pytest
 
 from tests.unit.protocol.framing_samples import MAVLINK, NMEA, UBX, framing
 from urc.protocol import checksums
-from urc.protocol.framing import Credit, Stream
 from urc.protocol.framings import searched
+from urc.protocol.stream import Credit, Stream
 
 SIZE = 1 << 14
 

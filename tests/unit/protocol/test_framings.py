@@ -19,13 +19,9 @@ from tests.unit.protocol.framing_samples import (
     spec,
     wire,
 )
-from urc.protocol.framing import (
-    Decoder,
-    FrameFault,
-    FramingError,
-    Stream,
-    build_framing,
-)
+from urc.protocol.framing import build_framing
+from urc.protocol.framings.base import Decoder, FrameFault, FramingError
+from urc.protocol.stream import Stream
 from urc.testing.framing import feed_three_ways
 
 EACH = pytest.mark.parametrize("sample", SAMPLES, ids=[one.name for one in SAMPLES])

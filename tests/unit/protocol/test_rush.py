@@ -12,9 +12,11 @@ from tests.dialogue import Dialogue
 from tests.effort import examples
 from urc.model.values import Sample, Signal
 from urc.protocol.answer import Matcher
+from urc.protocol.codec import CodecContext, Frame
 from urc.protocol.events import Event, Samples
-from urc.protocol.fast_read import Taken, build_fast_read
-from urc.protocol.forms import CodecContext, Frame, build_reader
+from urc.protocol.fast_read import build_fast_read
+from urc.protocol.fast_value import Taken
+from urc.protocol.forms import build_reader
 from urc.protocol.generate import function_of
 from urc.protocol.readings import Readings
 from urc.testing.reading import read_spec

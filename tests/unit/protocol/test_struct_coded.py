@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 
 from tests.dialogue import Dialogue
-from urc.protocol.forms import NotWritable
+from urc.protocol.codec import NotWritable
 from urc.testing.struct import frame, reader, writer
 
 TLV = """

@@ -12,7 +12,7 @@ from tests.effort import examples
 from urc.expressions import compile_expression
 from urc.model.binary import Extent, Item, Number, Switch, joined_name, number_of
 from urc.model.codec import Envelope, ReadSpec
-from urc.protocol.forms import BadItem, CodecContext, Frame, NotWritable
+from urc.protocol.codec import BadItem, CodecContext, Frame, NotWritable
 from urc.protocol.struct_form import StructReader
 from urc.protocol.struct_read import build_steps, read_frame
 from urc.protocol.struct_source import generate_read

@@ -10,7 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.effort import examples
-from urc.protocol.forms import BadText, CodecContext, Frame, NotWritable, build_reader
+from urc.protocol.codec import BadText, CodecContext, Frame, NotWritable
+from urc.protocol.forms import build_reader
 from urc.protocol.json_paths import JsonReader
 from urc.testing.reading import read_spec, reader_of
 

@@ -33,6 +33,9 @@ class Line(asyncio.Transport):
     def abort(self) -> None:
         self.is_cut = True
 
+    def close(self) -> None:
+        self.is_cut = True
+
 
 class Polite(asyncio.Protocol):
     """Answers everything with as much."""
@@ -67,3 +70,14 @@ async def test_answers_that_are_taken_do_not() -> None:
     wire = asked(line := Line(kernel=float("inf")), 1000)
     assert not line.is_cut
     assert wire.fault == ""
+
+
+async def test_what_breaks_after_the_end_is_not_the_reason() -> None:
+    """An answer that was under way meets a line that the server has closed."""
+    wire = asked(Line(kernel=float("inf")), 1)
+    assert wire.eof_received(), "it stays open until all is read"
+    wire.connection_lost(BrokenPipeError(32, "Broken pipe"))
+    assert wire.fault == "", "what came before is read first"
+    async with asyncio.timeout(10):
+        await wire.gone()
+    assert wire.fault == "the robot closed the line"

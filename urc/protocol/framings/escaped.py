@@ -13,19 +13,18 @@ from typing import NamedTuple, cast
 from urc.model.driver import FramingSpec
 from urc.model.framing import EscapeSpec, FrameLayout
 from urc.protocol.frame import BadFrame, LengthField, Seal
-from urc.protocol.framing import (
+from urc.protocol.framings.base import (
     SKIPPED,
-    Credit,
     Decoder,
-    DelimiterDecoder,
     FrameFault,
     FramingError,
     Open,
-    Stream,
     StreamDecoder,
     sealed,
 )
+from urc.protocol.framings.delimited import DelimiterDecoder
 from urc.protocol.framings.searched import BracketsDecoder
+from urc.protocol.stream import Credit, Stream
 from urc.protocol.stuffing import Stuffing, Unstuffer
 
 __all__ = ["EscapedFraming"]
@@ -257,15 +256,7 @@ class _LengthDecoder(StreamDecoder):
 
     def _to_start(self) -> FrameFault | None:
         """Go to the next start bytes, or to what may become them."""
-        stream, start = self._stream, self._start
-        if not start or stream.data.startswith(start, stream.at):
-            return None
-        found = stream.data.find(start, stream.at)
-        if found < 0:
-            found = max(stream.at, len(stream.data) - len(start) + 1)
-            while not start.startswith(stream.data[found:]):
-                found += 1
-        gone = found - stream.at
+        gone = self._before(self._start)
         self._credit.earn(gone)
         return self._skip(gone) if gone else None
 

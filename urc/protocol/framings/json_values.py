@@ -11,15 +11,15 @@ from typing import Final, NamedTuple, cast
 
 from urc.model.driver import FramingSpec
 from urc.protocol.frame import BadFrame, Seal
-from urc.protocol.framing import (
+from urc.protocol.framings.base import (
     Decoder,
     FrameFault,
     FramingError,
-    Stream,
     StreamDecoder,
     seal_of,
     sealed,
 )
+from urc.protocol.stream import Stream
 
 __all__ = ["JsonFraming"]
 

@@ -12,17 +12,16 @@ from typing import NamedTuple
 from urc.model.driver import FramingSpec
 from urc.model.framing import FrameLayout
 from urc.protocol.frame import BadFrame, Seal
-from urc.protocol.framing import (
+from urc.protocol.framings.base import (
     SKIPPED,
-    Credit,
     Decoder,
     FrameFault,
     Framing,
-    Stream,
     StreamDecoder,
     seal_of,
     sealed,
 )
+from urc.protocol.stream import Credit, Stream
 
 __all__ = ["MeasuredFraming"]
 
@@ -36,10 +35,6 @@ class MeasuredFraming(NamedTuple):
     @classmethod
     def from_spec(cls, spec: FramingSpec) -> Framing:
         """Return the framing for the option ``layout``."""
-        if "escape" in spec.options:
-            from urc.protocol.framings.escaped import EscapedFraming
-
-            return EscapedFraming.from_spec(spec)
         return cls(seal_of(spec) or Seal(FrameLayout()), spec.max_bytes)
 
     def encode(self, payload: bytes) -> bytes:
@@ -145,12 +140,8 @@ class _MeasuredDecoder(StreamDecoder):
         stream, start = self._stream, self._start
         if not start or stream.data.startswith(start, stream.at):
             return None
-        found = stream.data.find(start, stream.at)
-        if found < 0:
-            found = max(stream.at, len(stream.data) - len(start) + 1)
-            while not start.startswith(stream.data[found:]):
-                found += 1
-        return self._leave(found - stream.at) if found > stream.at else None
+        gone = self._before(start)
+        return self._leave(gone) if gone else None
 
     def _frame(self, frame: bytes) -> bytes | FrameFault | None:
         """Return the payload, a fault, or None when the frame was none of the first in its run."""

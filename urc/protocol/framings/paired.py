@@ -2,7 +2,8 @@
 
 from typing import NamedTuple
 
-from urc.protocol.framing import Decoder, Framing, Stream
+from urc.protocol.framings.base import Decoder, Framing
+from urc.protocol.stream import Stream
 
 __all__ = ["TwoFramings"]
 

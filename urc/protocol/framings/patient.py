@@ -10,14 +10,9 @@ texts are torn by them.
 import re
 from typing import Final, NamedTuple
 
-from urc.protocol.framing import (
-    SKIPPED,
-    Decoder,
-    DelimiterFraming,
-    FrameFault,
-    Framing,
-    Stream,
-)
+from urc.protocol.framings.base import SKIPPED, Decoder, FrameFault, Framing
+from urc.protocol.framings.delimited import DelimiterFraming
+from urc.protocol.stream import Stream
 
 __all__ = ["PatientFraming"]
 

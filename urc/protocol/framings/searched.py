@@ -7,18 +7,18 @@ from typing import Any, Final, NamedTuple, cast
 from urc.model.driver import FramingSpec
 from urc.model.framing import FrameLayout
 from urc.protocol.frame import BadFrame, Seal
-from urc.protocol.framing import (
+from urc.protocol.framings.base import (
     Decoder,
-    DelimiterDecoder,
     FrameFault,
     Framing,
     FramingError,
     Open,
-    Stream,
     StreamDecoder,
     seal_of,
     sealed,
 )
+from urc.protocol.framings.delimited import DelimiterDecoder
+from urc.protocol.stream import Stream
 
 __all__ = ["BracketsDecoder", "BracketsFraming", "RegexFraming"]
 
@@ -178,10 +178,6 @@ class BracketsFraming(NamedTuple):
     @classmethod
     def from_spec(cls, spec: FramingSpec) -> Framing:
         """Return the framing for the option ``layout``, with its start and end."""
-        if "escape" in spec.options:
-            from urc.protocol.framings.escaped import EscapedFraming
-
-            return EscapedFraming.from_spec(spec)
         return cls(seal_of(spec) or Seal(FrameLayout()), spec.max_bytes)
 
     def encode(self, payload: bytes) -> bytes:
@@ -251,15 +247,10 @@ class BracketsDecoder(StreamDecoder):
                 return fault
 
     def _to_open(self) -> FrameFault | None:
-        stream, data, mark = self._stream, self._stream.data, self._open
-        found = data.find(mark, stream.at)
-        if found >= 0:
-            self._searched = len(mark)
-        else:
-            found = max(stream.at, len(data) - len(mark) + 1)
-            while not mark.startswith(data[found:]):
-                found += 1
-        return self._skip(found - stream.at) if found > stream.at else None
+        gone = self._before(self._open)
+        if len(self._stream) >= gone + len(self._open):
+            self._searched = len(self._open)
+        return self._skip(gone) if gone else None
 
     def _overflow(self) -> FrameFault | None:
         """Go on at the newest opening mark, the only one that may still be closed in time."""

@@ -4,14 +4,8 @@ from typing import NamedTuple, cast
 
 from urc.model.driver import FramingSpec
 from urc.protocol.frame import BadFrame, Seal
-from urc.protocol.framing import (
-    Decoder,
-    FrameFault,
-    Stream,
-    StreamDecoder,
-    seal_of,
-    sealed,
-)
+from urc.protocol.framings.base import Decoder, FrameFault, StreamDecoder, seal_of, sealed
+from urc.protocol.stream import Stream
 
 __all__ = ["DatagramFraming", "IdleFraming"]
 

@@ -9,14 +9,9 @@ from typing import Final, NamedTuple
 
 from urc.model.driver import FramingSpec
 from urc.protocol.frame import BadFrame, Seal
-from urc.protocol.framing import (
-    Decoder,
-    DelimiterDecoder,
-    FramingError,
-    Stream,
-    seal_of,
-    sealed,
-)
+from urc.protocol.framings.base import Decoder, FramingError, seal_of, sealed
+from urc.protocol.framings.delimited import DelimiterDecoder
+from urc.protocol.stream import Stream
 
 __all__ = ["CobsFraming", "SlipFraming"]
 

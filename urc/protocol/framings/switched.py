@@ -9,16 +9,16 @@ import re
 from typing import NamedTuple, cast
 
 from urc.model.driver import FramingSpec
-from urc.protocol.framing import (
+from urc.protocol.framing import build_framing
+from urc.protocol.framings.base import (
     SKIPPED,
     Decoder,
     FrameFault,
     Framing,
     FramingError,
-    Stream,
     StreamDecoder,
-    build_framing,
 )
+from urc.protocol.stream import Stream
 
 __all__ = ["SwitchFraming"]
 

@@ -25,9 +25,9 @@ from urc.model.flow import (
     all_steps,
 )
 from urc.problems import UrcError
+from urc.protocol.codec import CodecContext
 from urc.protocol.commands import questions
 from urc.protocol.encode import build_encode, check_arguments
-from urc.protocol.forms import CodecContext
 from urc.protocol.framing import build_framing
 from urc.protocol.gate import Counters
 

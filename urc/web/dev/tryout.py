@@ -17,8 +17,10 @@ from urc.model.flow import ExpectStep, all_steps
 from urc.patterns import Pattern
 from urc.problems import UrcError
 from urc.protocol.answer import Answer, Ear, Matcher
-from urc.protocol.forms import BadItem, BadText, CodecContext, Frame, build_reader
-from urc.protocol.framing import FrameFault, build_framing
+from urc.protocol.codec import BadItem, BadText, CodecContext, Frame
+from urc.protocol.forms import build_reader
+from urc.protocol.framing import build_framing
+from urc.protocol.framings.base import FrameFault
 from urc.protocol.readings import Readings
 from urc.protocol.topics import frame_of, topic_of
 

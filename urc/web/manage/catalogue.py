@@ -9,8 +9,12 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Final
 
+import msgspec
+
 from urc.packages.index import Entry, search
-from urc.packages.names import Key, PackageError
+from urc.packages.install import withdrawn_lines
+from urc.packages.lock import Lock
+from urc.packages.names import Key, PackageError, parse_key
 from urc.packages.repositories import Repositories, Repository
 from urc.web.daemon import in_daemon
 from urc.web.manage.wire import Place
@@ -73,9 +77,14 @@ class Catalogue:
         return search(entries, words.split())
 
     def versions(self, key: Key) -> list[Entry]:
-        """Return all versions of a package, the newest first."""
-        some = [entry for entry, _ in self.found.get(key, ())]
+        """Return all versions of a package that are offered, the newest first."""
+        some = [entry for entry, _ in self.found.get(key, ()) if not entry.why_withdrawn]
         return sorted(some, key=lambda entry: entry.number, reverse=True)
+
+    def withdrawn(self, lock: Lock) -> list[str]:
+        """Return for people what was withdrawn of an installed package, one line each."""
+        keys = map(parse_key, lock.packages)
+        return withdrawn_lines(lock, [one for key in keys for one, _ in self.found.get(key, ())])
 
     def origin(self, entry: Entry) -> str:
         """Return the address of the repository that has it."""
@@ -106,7 +115,8 @@ class Catalogue:
         url, is_plain = repository.name, repository.name.startswith("http:")
         try:
             index = repository.refresh()
-            return Place(url, index.name, len(index.packages), "", False, is_plain), index.packages
+            place = Place(url, index.name, len(index.packages), "", False, is_plain)
+            return msgspec.structs.replace(place, keeper=repository.keeper), index.packages
         except PackageError as error:
             said.append(str(error))
         try:

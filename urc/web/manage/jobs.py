@@ -12,6 +12,7 @@ from itertools import count
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
+from urc._phrases import phrase
 from urc.packages.index import Entry
 from urc.packages.install import origin_lines, plan_file, plan_wish
 from urc.packages.lock import Lock
@@ -26,11 +27,13 @@ from urc.runtime.permissions import permissions
 from urc.web.daemon import in_daemon
 from urc.web.manage.given import source_at
 from urc.web.manage.wire import JobNews, JobState
+from urc.web.phrases import spoken
 
 __all__ = ["Busy", "Job", "Jobs", "Wanted"]
 
 _WIRE_MOST: Final = 100
 """Lines of what changes on the wire that are told."""
+_INSTALLING: Final = phrase("installing")
 _LEFT_MOST: Final = 4
 """Threads that may still hang at a server after somebody gave up."""
 
@@ -59,7 +62,7 @@ class Job:
     number: int
     title: str
     state: JobState = "working"
-    line: str = "asking the repositories"
+    line: str = phrase("asking the repositories")
     done: int = 0
     of: int = 0
     notes: list[str] = field(default_factory=list)
@@ -75,7 +78,7 @@ class Job:
             self.number,
             self.title,
             self.state,
-            printable(self.line),
+            printable(spoken(self.line)),
             self.done,
             self.of,
             is_update=changes is not None,
@@ -104,13 +107,13 @@ class _Watched:
 
     def entries(self) -> tuple[Entry, ...]:
         self._check()
-        self._job.line = f"asking {self._source.name}"
+        self._job.line = phrase("asking {place}", place=self._source.name)
         return self._source.entries()
 
     def fetch(self, entry: Entry) -> bytes:
         self._check()
         self._job.done += 1
-        self._job.line = f"fetching {entry} ({entry.size} bytes)"
+        self._job.line = phrase("fetching {package} ({size} bytes)", package=entry, size=entry.size)
         data = self._source.fetch(entry)
         self._check()
         return data
@@ -164,13 +167,14 @@ class Jobs:
         planned = job.planned
         if job.state != "asks" or planned is None:
             raise Busy("there is nothing to agree to: begin again")
-        job.state, job.line = "working", "installing"
+        job.state, job.line = "working", _INSTALLING
         try:
             await asyncio.to_thread(self._install, planned)
         except (UrcError, OSError) as error:
             job.state, job.line = "failed", _line(error)
         else:
-            job.state, job.line = "done", f"installed {planned.plan.lock}"
+            job.state = "done"
+            job.line = phrase("installed {package}", package=planned.plan.lock)
         job.planned = planned._replace(plan=planned.plan._replace(archives={}))
         return job
 
@@ -183,9 +187,10 @@ class Jobs:
     def give_up(self, number: int) -> Job:
         """End a job that has changed nothing yet; raise `Busy` when it is another one."""
         job = self._asked(number)
-        if job.state in ("working", "asks") and job.line != "installing":
+        if job.state in ("working", "asks") and job.line != _INSTALLING:
             job.is_given_up = True
-            job.state, job.line, job.planned = "cancelled", "given up; nothing has changed", None
+            job.state, job.planned = "cancelled", None
+            job.line = phrase("given up; nothing has changed")
             if self._task is not None:
                 self._task.cancel()
         return job
@@ -212,7 +217,7 @@ class Jobs:
                 job.state, job.line = "failed", _line(error)
         else:
             if not job.is_given_up:
-                job.state, job.line = "asks", "read what it may do"
+                job.state, job.line = "asks", phrase("read what it may do")
 
     def _ended(self, thread: "asyncio.Future[_Planned]") -> None:
         self._left -= 1
@@ -226,7 +231,7 @@ class Jobs:
         if job.is_given_up:
             raise PackageError("given up")
         job.of = job.done
-        job.line = "reading what it may do"
+        job.line = phrase("reading what it may do")
         old = what if isinstance(what, Lock) else None
         with self._store.changing() as change:
             folder = change.stage(plan)
@@ -266,7 +271,7 @@ class Jobs:
 
 
 def _clean(lines: Iterable[str]) -> tuple[str, ...]:
-    return tuple(map(printable, lines))
+    return tuple(printable(spoken(line)) for line in lines)
 
 
 def _line(error: Exception) -> str:

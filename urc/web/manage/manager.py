@@ -14,13 +14,14 @@ from urc.packages.lock import Lock
 from urc.packages.names import Key, PackageError, Wish, parse_wish
 from urc.packages.repositories import Repository
 from urc.packages.sources import Source
-from urc.problems import UrcError
+from urc.problems import UrcError, printable
 from urc.web.daemon import in_daemon
 from urc.web.fleet import Broken, Fleet
 from urc.web.garage import Garage
 from urc.web.manage.catalogue import Catalogue
 from urc.web.manage.jobs import Busy, Job, Jobs
 from urc.web.manage.wire import MOST_HITS, Available, Installed, Shelf
+from urc.web.phrases import spoken
 from urc.web.robots import Robot
 
 __all__ = ["Manager"]
@@ -323,6 +324,7 @@ class Manager:
             settings_url=f"{page}settings" if is_served else "",
             fits=self._fits(name) if key.kind == "interface" else (),
             fault=fault or (broken.fault if broken else ""),
+            withdrawn=tuple(printable(spoken(line)) for line in self.catalogue.withdrawn(lock)),
         )
 
     def _fits(self, interface: str) -> tuple[str, ...]:

@@ -111,6 +111,8 @@ class Place(Message, frozen=True):
     """What it said before is used."""
     is_plain: bool
     """It is reached without encryption."""
+    keeper: str = ""
+    """Who signs its index, with the fingerprint of the key; "" for nobody."""
 
 
 class Installed(Message, frozen=True):
@@ -136,6 +138,8 @@ class Installed(Message, frozen=True):
     """Of an interface: titles of the robots that offer it."""
     fault: str
     """Why it cannot be used; "" when it can."""
+    withdrawn: tuple[str, ...] = ()
+    """What its repository offers no more, of it and of what came along, and why; one line each."""
 
 
 class Available(Message, frozen=True):

@@ -13,7 +13,7 @@
  * @property {(run: number) => void} began the command is under way
  * @property {() => void} close
  */
-import { slide } from "./giving.js";
+import { slide } from "./slide.js";
 import { t } from "./words.js";
 
 /** How long a question stands, and how long one about a hazard. */

@@ -8,6 +8,7 @@
  * @typedef {"good" | "connecting" | "caution" | "bad"} Sign
  */
 
+import { write } from "./kit.js";
 import { t } from "./words.js";
 
 const CAUTION_MS = 100;
@@ -30,10 +31,10 @@ export class Badge {
   frame(store, socket) {
     const [sign, text] = summary(store, socket.failures > 0);
     if (this.el.dataset["state"] !== sign) this.el.dataset["state"] = sign;
-    if (this.text.textContent !== text) this.text.textContent = text;
+    write(this.text, text);
     const [quality, figure] = tripOf(socket.tripMs);
     if (this.trip.dataset["trip"] !== quality) this.trip.dataset["trip"] = quality;
-    if (this.trip.textContent !== figure) this.trip.textContent = figure;
+    write(this.trip, figure);
   }
 }
 

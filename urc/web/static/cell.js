@@ -42,10 +42,10 @@
 import { Budget } from "./budget.js";
 import { contextOf } from "./context.js";
 import { t } from "./kit.js";
+import { PICTURES } from "./store.js";
 
 /** A widget that has not come up by then says so. */
 const LOADING_MS = 5000;
-const PICTURES = new Set(["image", "blob"]);
 
 /** @type {readonly string[]} */
 const NONE = Object.freeze([]);

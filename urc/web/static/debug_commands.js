@@ -3,7 +3,7 @@
  * All commands, with a form each. A form is made when it is opened first: a hundred of them would
  * cost a phone a second.
  *
- * @typedef {import("./dev_commands.js").Argument} Argument
+ * @typedef {import("./fields.js").Argument} Argument
  * @typedef {import("./cell.js").Doors} HostDoors
  * @typedef {Pick<HostDoors, "run" | "input" | "asks">} Doors
  * @typedef {import("./types.js").Value} Value
@@ -24,7 +24,7 @@
 import { t } from "urc/kit";
 import { questionsOf } from "./asks.js";
 import { element, visible, wordsOf } from "./dev_bytes.js";
-import { button, field } from "./dev_commands.js";
+import { button, field, valuesOf } from "./fields.js";
 
 export class DebugCommands {
   /**
@@ -67,16 +67,7 @@ export class DebugCommands {
     fields.append(...inputs.map(({ label, argument }) => withHelp(label, argument)));
     const result = element("div", "dev-result");
     result.setAttribute("role", "status");
-    /** @type {Given} */
-    const given = () => {
-      /** @type {Record<string, any>} */
-      const values = {};
-      for (const { argument, read } of inputs) {
-        const value = read();
-        if (value !== undefined) values[argument.name] = value;
-      }
-      return values;
-    };
+    const given = () => valuesOf(inputs);
     if (command.description) form.append(element("p", "dev-quiet", command.description));
     for (const text of command.requires) form.append(element("p", "dev-quiet", `◇ ${text}`));
     form.append(fields, command.leaseMs > 0 ? this.holdButton(command, given, result) : sendButton(), result);

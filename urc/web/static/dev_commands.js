@@ -6,17 +6,7 @@
  * @typedef {import("./types.js").Value} Value
  * @typedef {import("./dev_try.js").Line} Line
  *
- * @typedef {object} Argument
- * @property {string} name
- * @property {string} type
- * @property {string} of
- * @property {string} title
- * @property {string} unit
- * @property {number | null} min
- * @property {number | null} max
- * @property {Value[]} choices
- * @property {unknown} default
- * @property {boolean} required
+ * @typedef {import("./fields.js").Argument} Argument
  *
  * @typedef {object} Command
  * @property {string} name
@@ -43,6 +33,7 @@
  * @property {(command: string, args: Record<string, unknown>, isConfirmed: boolean) => Promise<Record<string, unknown>>} run
  */
 import { bytesOf, element, hexOf, listElement, sizeText, textOf, visible, wordsOf } from "./dev_bytes.js";
+import { button, field, valuesOf } from "./fields.js";
 
 export class Commands {
   /**
@@ -85,15 +76,7 @@ export class Commands {
     buttons.append(preview);
     const result = element("div", "dev-result");
     result.setAttribute("role", "status");
-    const given = () => {
-      /** @type {Record<string, unknown>} */
-      const values = {};
-      for (const { argument, read } of inputs) {
-        const value = read();
-        if (value !== undefined) values[argument.name] = value;
-      }
-      return values;
-    };
+    const given = () => valuesOf(inputs);
     if (command.held) {
       buttons.append(element("p", "dev-quiet", "It moves the robot while it is held: it is given on the interface."));
     } else {
@@ -197,72 +180,4 @@ export class Commands {
 function about(command) {
   const words = [command.title, command.steps ? `${command.steps} steps` : `on ${command.transport}`];
   return [...words, command.held ? "held" : ""].filter(Boolean).join(" · ");
-}
-
-/**
- * @param {string} text
- * @param {"submit" | "button"} type
- */
-export function button(text, type) {
-  const el = document.createElement("button");
-  el.className = "urc-button";
-  el.type = type;
-  el.textContent = text;
-  return el;
-}
-
-/**
- * @param {Argument} argument
- * @returns {{argument: Argument, label: HTMLElement, read: () => unknown}}
- */
-export function field(argument) {
-  const label = element("label", "dev-field");
-  label.append(caption(argument));
-  const choices = argument.type === "boolean" ? [true, false] : argument.choices;
-  if (choices.length > 0 && argument.type !== "array") {
-    const select = document.createElement("select");
-    select.className = "dev-input";
-    if (!argument.required) select.append(new Option(`default: ${String(argument.default)}`, ""));
-    choices.forEach((choice, place) => select.append(new Option(String(choice), String(place))));
-    label.append(select);
-    return { argument, label, read: () => (select.value === "" ? undefined : choices[Number(select.value)]) };
-  }
-  const input = document.createElement("input");
-  input.className = "dev-input";
-  input.autocomplete = "off";
-  input.spellcheck = false;
-  if (argument.type === "number" || argument.type === "integer") input.inputMode = "decimal";
-  if (argument.default !== null) input.placeholder = JSON.stringify(argument.default);
-  if (argument.type === "array") input.placeholder ||= "[1, 2, 3]";
-  label.append(input);
-  return { argument, label, read: () => typed(argument, input.value) };
-}
-
-/** @param {Argument} argument */
-function caption(argument) {
-  const { min, max } = argument;
-  const range = min !== null && max !== null ? `${min} to ${max}` : min !== null ? `from ${min}` : max !== null ? `to ${max}` : "";
-  const kind = argument.type === "array" ? `list of ${argument.of}` : argument.type;
-  const words = [kind, range, argument.unit, argument.required ? "" : "optional"].filter(Boolean);
-  return `${argument.name} (${words.join(", ")})`;
-}
-
-/**
- * Return what was written, as its type; what is none goes to the server as it is, which says so.
- *
- * @param {Argument} argument
- * @param {string} text
- */
-function typed(argument, text) {
-  if (text === "" && (argument.type !== "string" || !argument.required)) return undefined;
-  if (argument.type === "string") return text;
-  if (argument.type === "array") {
-    try {
-      return JSON.parse(text.trim().startsWith("[") ? text : `[${text}]`);
-    } catch {
-      return text;
-    }
-  }
-  const number = Number(text);
-  return text.trim() !== "" && Number.isFinite(number) ? number : text;
 }

@@ -136,6 +136,7 @@ export class Host {
 
   /** Names of the images that can be seen now, each once, in a steady order. */
   pictures() {
+    if (!this.store.hasPictures) return [];
     const names = new Set();
     for (const cell of this.cells.values()) {
       for (const name of cell.pictures(this.store)) names.add(name);

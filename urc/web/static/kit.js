@@ -177,6 +177,24 @@ export function svg(name, attributes = {}) {
 }
 
 /**
+ * Make a button.
+ *
+ * @param {string} className
+ * @param {string} text
+ * @param {() => void} press
+ * @param {{signal: AbortSignal, label?: string}} more `label` is its name where `text` is only a sign
+ */
+export function button(className, text, press, { signal, label = "" }) {
+  const made = document.createElement("button");
+  made.type = "button";
+  made.className = className;
+  made.textContent = text;
+  if (label) made.setAttribute("aria-label", label);
+  made.addEventListener("click", press, { signal });
+  return made;
+}
+
+/**
  * @param {number} value
  * @param {number} least
  * @param {number} most

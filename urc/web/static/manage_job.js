@@ -175,10 +175,10 @@ function heading(text) {
   return made("h3", { class: "urc-row-title" }, text);
 }
 
-/** @param {string[]} lines what the server says of documents, in English */
+/** @param {string[]} lines what the server says of documents */
 function list(lines) {
   if (lines.length === 0) return null;
-  return made("ul", { class: "urc-list", lang: "en" }, ...lines.map((one) => made("li", {}, one)));
+  return made("ul", { class: "urc-list" }, ...lines.map((one) => made("li", {}, one)));
 }
 
 /** @param {Job} job */

@@ -24,6 +24,7 @@
  * @property {string} fault
  * @property {boolean} isKept
  * @property {boolean} isPlain
+ * @property {string} keeper
  *
  * @typedef {object} Known what all packages have
  * @property {string} package
@@ -42,6 +43,7 @@
  * @property {string} settingsUrl
  * @property {string[]} fits
  * @property {string} fault
+ * @property {string[]} withdrawn
  * @typedef {Known & Has} Installed
  *
  * @typedef {object} Offer
@@ -117,6 +119,7 @@ export function installedRow(one, act, remove) {
     line(one.summary, ""),
     about(one),
     line(one.fault && `▲ ${one.fault}`, "urc-bad"),
+    ...one.withdrawn.map((text) => made("p", { class: "urc-bad" }, `▲ ${text}`)),
     line(one.fits.length ? t("offered on: {names}", { names: one.fits.join(", ") }) : ""),
     line(one.kind === "interface" && !one.fits.length ? t("◆ fits none of the robots here") : "", "urc-caution"),
     line(one.brings.length ? t("came with: {names}", { names: one.brings.join(", ") }) : ""),
@@ -177,6 +180,7 @@ export function placeRow(one, act) {
     line(one.name ? one.url : ""),
     line(state, kind),
     line(one.fault),
+    line(one.keeper ? t("its index is signed by {name}", { name: one.keeper }) : ""),
     line(one.isPlain ? t("not encrypted: who is in between can change what it says") : ""),
     act && made(
       "div",

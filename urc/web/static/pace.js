@@ -10,7 +10,7 @@
 /** The widgets' share of a frame: styles, layout and painting included; the rest is for hands. */
 export const SHARE_MS = 8;
 /** In so many frames each widget has its turn, however slow the device is. */
-export const LONGEST_TURN = 6;
+export const LONGEST_TURN = 10;
 const FASTER = 1.1;
 const SLOWER = 0.75;
 

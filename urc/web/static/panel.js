@@ -13,7 +13,7 @@ import { ageText } from "./store.js";
 import { said, t } from "./words.js";
 
 const LINES_KEPT = 200;
-const WIDE = "(width >= 68.75rem)"; // the same as in robot.css
+const WIDE = "(width >= 68.75rem)"; // the same as in steer.css
 
 /** @type {Record<Link["state"], string>} */
 const STATES = {

@@ -7,7 +7,8 @@
  * @typedef {import("./types.js").Outlet} Outlet
  * @typedef {import("./types.js").Reading} Reading
  */
-import { boundsOf, Giver, keyed, snapped } from "./giving.js";
+import { boundsOf, keyed, snapped } from "./bounds.js";
+import { Giver } from "./giver.js";
 import { format, noteOf, number } from "./kit.js";
 import { Wish } from "./wish.js";
 

@@ -14,7 +14,9 @@
 const FIRST_WAIT_MS = 250;
 const LONGEST_WAIT_MS = 5000;
 const PING_EVERY_MS = 1000;
-const PONG_WITHIN_MS = 3000;
+/** So many ticks in a row may find no answer: three seconds, of a page that runs. A page that was
+ * held up has had one tick only, however long that was, and then reads what has come meanwhile. */
+const SILENT_TICKS = 3;
 
 export class Socket {
   /**
@@ -42,6 +44,8 @@ export class Socket {
     this.isWanted = false;
     /** When the ping that waits for its answer was sent; 0 when none waits. */
     this.pingedMs = 0;
+    /** Ticks since then. */
+    this.silent = 0;
     /** @type {number | undefined} */
     this.retry = undefined;
     /** @type {number | undefined} */
@@ -86,6 +90,7 @@ export class Socket {
     this.line = line;
     line.binaryType = "arraybuffer";
     this.pingedMs = performance.now(); // an opening that hangs is given up like a missing pong
+    this.silent = 0;
     clearInterval(this.beat);
     this.beat = window.setInterval(() => this.tick(), PING_EVERY_MS);
     line.addEventListener("message", (event) => {
@@ -123,15 +128,17 @@ export class Socket {
   }
 
   tick() {
-    if (this.pingedMs && performance.now() - this.pingedMs > PONG_WITHIN_MS) {
-      this.lose("no answer");
-    } else if (this.isUp && !this.pingedMs) {
-      this.ping();
+    if (!this.pingedMs) {
+      if (this.isUp) this.ping();
+      return;
     }
+    this.silent += 1;
+    if (this.silent >= SILENT_TICKS) this.lose("no answer");
   }
 
   ping() {
     this.pingedMs = performance.now();
+    this.silent = 0;
     this.send({ t: "ping", c: this.pingedMs });
   }
 

@@ -39,6 +39,8 @@ const SHORT_TRIP_MS = 250;
 const LONG_LAG_MS = 1000;
 /** A signal of which nothing was declared. @type {Signal} */
 const UNKNOWN = { name: "", type: "string" };
+/** Types of signals that are images, or may be. */
+export const PICTURES = new Set(["image", "blob"]);
 
 export class Store {
   constructor() {
@@ -60,6 +62,8 @@ export class Store {
     this.serial = 0;
     /** Grows when the server says anew what the signals mean. */
     this.edition = 0;
+    /** Whether any of them is an image: else nobody has to look for some in each frame. */
+    this.hasPictures = false;
     this.skewMs = Infinity;
     this.skewSetMs = 0;
     this.units = new Units();
@@ -76,6 +80,7 @@ export class Store {
   hello(hello, nowMs) {
     this.signals = new Map(hello.signals.map((signal) => [signal.name, signal]));
     this.names = hello.signals.map((signal) => signal.name);
+    this.hasPictures = hello.signals.some(({ type }) => PICTURES.has(type));
     this.edition += 1;
     this.links = new Map();
     this.downMs = new Map();

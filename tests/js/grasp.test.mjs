@@ -1,0 +1,109 @@
+// One pointer that has hold of an element: `node --import ./tests/js/page.mjs --test tests/js/`.
+import assert from "node:assert/strict";
+import { test } from "node:test";
+import { grasp } from "urc/giving";
+
+/** An element that gets the events of pointers, as far as `grasp` looks at them. */
+class Element extends EventTarget {
+  captured = [];
+
+  setPointerCapture(pointerId) {
+    this.captured.push(pointerId);
+  }
+
+  /** @returns {boolean} whether the browser may do with it what it does otherwise */
+  get(type, pointerId = 1, more = {}) {
+    return this.dispatchEvent(Object.assign(new Event(type, { cancelable: true }), { pointerId, button: 0, ...more }));
+  }
+}
+
+/** Take hold of a new element; `said` is what was told. */
+function held({ takes = true, ...more } = {}) {
+  const el = new Element();
+  const said = [];
+  const end = new AbortController();
+  const hold = grasp(el, {
+    take: () => (said.push("take"), takes),
+    move: () => said.push("move"),
+    release: () => said.push("release"),
+    cancel: () => said.push("cancel"),
+    signal: end.signal,
+    ...more,
+  });
+  return { el, said, hold, end };
+}
+
+// The page, whose events break off what is drawn.
+const page = new EventTarget();
+globalThis.addEventListener = page.addEventListener.bind(page);
+
+test("a pointer takes hold, moves and is let go", () => {
+  const { el, said } = held();
+  for (const type of ["pointerdown", "pointermove", "pointerup", "lostpointercapture"]) el.get(type);
+  assert.deepEqual(said, ["take", "move", "release"]);
+  assert.deepEqual(el.captured, [1]);
+});
+
+test("a second pointer means nothing while the first one holds", () => {
+  const { el, said } = held();
+  el.get("pointerdown", 1);
+  for (const type of ["pointerdown", "pointermove", "pointerup"]) el.get(type, 2);
+  assert.deepEqual(said, ["take"]);
+  el.get("pointerup", 1);
+  assert.deepEqual(said, ["take", "release"]);
+});
+
+test("what is refused is not held", () => {
+  const { el, said } = held({ takes: false });
+  el.get("pointerdown");
+  el.get("pointermove");
+  assert.deepEqual(said, ["take"]);
+  assert.deepEqual(el.captured, []);
+});
+
+test("another button of a mouse takes no hold", () => {
+  const { el, said } = held();
+  el.get("pointerdown", 1, { button: 2 });
+  assert.deepEqual(said, []);
+});
+
+test("a pointer that is taken away is told once", () => {
+  const { el, said, hold } = held();
+  el.get("pointerdown");
+  el.get("pointercancel");
+  el.get("lostpointercapture");
+  hold.drop();
+  assert.deepEqual(said, ["take", "cancel"]);
+});
+
+test("it can be taken away, and taken hold of again", () => {
+  const { el, said, hold } = held();
+  el.get("pointerdown", 1);
+  hold.drop();
+  el.get("pointermove", 1);
+  el.get("pointerdown", 2);
+  assert.deepEqual(said, ["take", "cancel", "take"]);
+});
+
+test("nothing is heard after the end", () => {
+  const { el, said, end } = held();
+  end.abort();
+  el.get("pointerdown");
+  assert.deepEqual(said, []);
+});
+
+test("what is drawn is lost with the page's focus, and a touch begins nothing else", () => {
+  const { el, said } = held({ isDrawing: true });
+  el.get("pointerdown");
+  page.dispatchEvent(new Event("blur"));
+  assert.deepEqual(said, ["take", "cancel"]);
+  assert.equal(el.get("touchstart"), false);
+});
+
+test("what is not drawn stays held while the page loses its focus", () => {
+  const { el, said } = held();
+  el.get("pointerdown");
+  page.dispatchEvent(new Event("blur"));
+  assert.deepEqual(said, ["take"]);
+  assert.equal(el.get("touchstart"), true);
+});

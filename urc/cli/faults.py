@@ -1,0 +1,149 @@
+"""Faults on demand of emulated robots: given at the start, and by lines that somebody types."""
+
+import argparse
+import sys
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from typing import TYPE_CHECKING
+
+from urc.cli.failures import Misuse
+from urc.cli.output import complain
+from urc.cli.typed import typed_lines
+from urc.config.suggest import did_you_mean
+from urc.problems import UrcError
+
+if TYPE_CHECKING:
+    from urc.simulator.twin import Twin
+
+__all__ = ["Faulty", "add_faults"]
+
+
+def add_faults(parser: argparse.ArgumentParser, *, has_names: bool) -> None:
+    """Add what goes wrong from the start; `has_names` where there may be several robots."""
+    which = " with emulated robots: FAULT with all, ROBOT:FAULT with one," if has_names else ","
+    name = "tello:" if has_names else ""
+    parser.add_argument(
+        "--fault",
+        dest="faults",
+        action="append",
+        default=[],
+        metavar="FAULT",
+        help=f"something that goes wrong{which} such as delay=200ms, loss=5%%, silent, noise=2x,"
+        " dropout=SIGNAL, stuck=SIGNAL, low-battery; may be given several times, and changed by"
+        f" lines on standard input: 'fault {name}loss=10%%', 'mend', 'faults'",
+    )
+
+
+class Faulty:
+    """The emulated robots of one process, and what is wrong with them on demand.
+
+    A robot may be emulated anew while the process runs, as when its settings change: what is wrong
+    with it stays.
+    """
+
+    def __init__(self, now: Callable[[], float] = time.time) -> None:
+        """Begin with no robot.
+
+        Args:
+            now: seconds since the epoch.
+        """
+        self._now = now
+        self._twins: dict[str, list[Twin]] = {}
+        self._wrong: dict[str, dict[str, str]] = {}
+        """Robot → faults as they were written, for the next time that it is emulated."""
+
+    @contextmanager
+    def watch(self, name: str, twin: "Twin") -> Iterator[None]:
+        """Let a robot have its faults for as long as the context lasts."""
+        twins = self._twins.setdefault(name, [])
+        for text in self._wrong.get(name, {}).values():
+            with suppress(UrcError):  # another version of it need not have that signal
+                twin.inject(text, self._now())
+        twins.append(twin)
+        try:
+            yield
+        finally:
+            twins.remove(twin)
+
+    def begin(self, texts: Sequence[str]) -> None:
+        """Let what was asked for on the command line go wrong; raise `Misuse` if it cannot."""
+        for text in texts:
+            try:
+                self.inject(text)
+            except UrcError as error:
+                raise Misuse(f"--fault: {error}") from None
+
+    def inject(self, text: str) -> None:
+        """Let something go wrong from now on: ``loss=5%``, or ``tello:loss=5%``.
+
+        Without a name it is for every robot that can have it.
+
+        Raises:
+            UrcError: there is no such robot or fault, or no robot here can have it; one line.
+        """
+        from urc.simulator.faults import parse_fault
+
+        robot, colon, fault = text.strip().rpartition(":")
+        names = self._named(robot) if colon else [*self._twins]
+        said = parse_fault(fault)
+        refusals = []
+        for name in names:
+            try:
+                for twin in self._twins[name]:
+                    twin.inject(fault, self._now())
+            except UrcError as error:
+                refusals.append(error)
+            else:
+                self._wrong.setdefault(name, {})[f"{said.name} {said.signal}"] = said.text
+        if refusals and len(refusals) == len(names):
+            raise refusals[0]
+
+    def mend(self, robot: str = "") -> None:
+        """Let nothing be wrong any more, with one robot or with all.
+
+        Raises:
+            UrcError: there is no such robot; one line.
+        """
+        for name in self._named(robot) if robot else [*self._twins]:
+            self._wrong.pop(name, None)
+            for twin in self._twins[name]:
+                twin.mend()
+
+    def _named(self, robot: str) -> list[str]:
+        if robot in self._twins:
+            return [robot]
+        hint = did_you_mean(robot, self._twins, "robots")
+        raise UrcError(f"no robot {robot!r} is emulated here" + (f"; {hint}" if hint else ""))
+
+    def __str__(self) -> str:
+        """Return what is wrong, for people."""
+        found = []
+        for name, twins in self._twins.items():
+            faults = ", ".join(twins[0].faults if twins else self._wrong.get(name, {}).values())
+            if faults:
+                found.append(faults if len(self._twins) == 1 else f"{name}: {faults}")
+        return f"faults: {'; '.join(found) or 'none'}"
+
+    def obey(self, line: str) -> None:
+        """Do what a typed line says about faults, and tell what is wrong now."""
+        verb, _, rest = line.strip().partition(" ")
+        try:
+            if verb == "fault" and rest:
+                self.inject(rest)
+            elif verb == "mend":
+                self.mend(rest.strip())
+            elif line.strip() not in ("", "faults"):
+                raise UrcError(
+                    f"{line.strip()[:60]!r} means nothing; write fault …, mend or faults"
+                )
+        except UrcError as error:
+            complain(str(error))
+            return
+        if verb:
+            print(self, flush=True)
+
+    async def listen(self) -> None:
+        """Obey all lines on standard input, until it ends."""
+        async for line in typed_lines(sys.stdin):
+            self.obey(line)

@@ -1,0 +1,123 @@
+"""What to do about a document of the wrong shape: the hint behind a finding's message.
+
+Floor 3. Only for `urc.config.shape_report`.
+"""
+
+from collections.abc import Mapping, Sequence
+from typing import Any, Final
+
+from urc.config.suggest import did_you_mean
+from urc.source import Document, Path
+
+__all__ = ["example_of", "key_hint", "mapping_hint", "type_hint"]
+
+_DELIMITERS: Final = ("LF", "CR", "CRLF", "NUL", "ETX")
+_OTHER_WORDS: Final = {
+    "interval": ("every",),
+    "period": ("every",),
+    "rate": ("every",),
+    "on": ("from", "to"),
+    "transport": ("from", "to"),
+    "widget": ("use",),
+    "arguments": ("args",),
+    "terminator": ("tx", "rx"),
+    "delimiter": ("tx", "rx"),
+    "pattern": ("regex", "match"),
+    "value": ("default",),
+    "start": ("first",),
+    "begin": ("first", "start"),
+    "loop": ("repeat",),
+    "count": ("times",),
+    "sleep": ("wait",),
+    "delay": ("wait",),
+    "description": ("text",),
+    "message": ("text",),
+    "license": ("licence",),
+}
+"""What other tools call a key → what it is called here."""
+
+
+def key_hint(key: str, known: Mapping[str, Any]) -> str:
+    """Return what a key that is unknown may have been meant to be."""
+    name, colon, _ = key.partition(":")
+    if colon and name in known:
+        return f"put a space behind the colon: '{name}: '"
+    others = [word for word in _OTHER_WORDS.get(key, ()) if word in known]
+    if others:
+        return f"it is called '{others[0]}' here"
+    return did_you_mean(key, known, "keys")
+
+
+def example_of(schema: Mapping[str, Any], key: str) -> str:
+    """Return how a key that is missing could be written; "" where the schema shows nothing."""
+    inner = schema.get("properties", {}).get(key, {})
+    examples = inner.get("examples") or ()
+    if not examples or isinstance(examples[0], (dict, list)):
+        return ""
+    text = str(examples[0])
+    return f"for example '{key}: " + (f'"{text}"' if "{" in text else text) + "'"
+
+
+def mapping_hint(document: Document, path: Path, text: str, schema: Mapping[str, Any]) -> str:
+    """Return the first example of a mapping, with `text` in it where it is a delimiter."""
+    if _is_filled_in(document, path):
+        return ""
+    example = next((one for one in schema.get("examples", ()) if isinstance(one, dict)), None)
+    if example is None or any(isinstance(one, (dict, list)) for one in example.values()):
+        return ""
+    if {"tx", "rx"} <= example.keys() and text.upper() in _DELIMITERS:
+        example = {**example, "tx": text.upper(), "rx": text.upper()}
+    pairs = (f"{key}: {_quoted(value)}" for key, value in example.items())
+    return f"write its keys, such as {{ {', '.join(pairs)} }}"
+
+
+def _quoted(value: object) -> str:
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    return f'"{value}"' if isinstance(value, str) and not value.isalnum() else str(value)
+
+
+def type_hint(
+    document: Document, path: Path, value: object, types: Sequence[str], *, is_duration: bool
+) -> str:
+    """Return how a value of a wrong type could be one of `types`; "" where nobody can tell."""
+    if value is None:
+        return "give it a value, or leave the key out"
+    if is_duration and isinstance(value, (int, float)) and not isinstance(value, bool):
+        return f"write the unit: {value}s, or {value}ms"
+    if "string" in types and isinstance(value, (bool, int, float)):
+        return f'quote it: "{_written(document, path) or value}"'
+    if isinstance(value, str):
+        if _is_filled_in(document, path):
+            return 'a text with names in braces becomes a value only when it is one name: "{i}"'
+        if {"integer", "number"} & set(types) and _looks_like_number(value):
+            return f"take the quotes away: {value}"
+        if "boolean" in types:
+            return "yes, no, on and off are text in YAML 1.2; write true or false"
+        if "object" in types:
+            return "indent its keys below it, or write { key: value }"
+    if "array" in types:
+        return "write a list: '- ' before each item, or [a, b]"
+    return ""
+
+
+def _written(document: Document, path: Path) -> str:
+    """Return a scalar as it stands in the text."""
+    mark = document.at(path)
+    if mark is None or mark.span.line != mark.span.end_line:
+        return ""
+    lines = document.source_of(path).lines
+    return lines[mark.span.line - 1][mark.span.column - 1 : mark.span.end_column - 1]
+
+
+def _is_filled_in(document: Document, path: Path) -> bool:
+    mark = document.at(path)
+    return mark is not None and mark.written is not None
+
+
+def _looks_like_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True

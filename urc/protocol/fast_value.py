@@ -1,0 +1,178 @@
+"""What the functions made for one kind of frame share: how a raw field becomes a sample.
+
+Floor 3. Source text, put together once when an engine is built: the conversions of the fields,
+their checks, and the samples. At anything else than a value of its signal, within its range, the
+function turns to the closures (`Slow`), which read the frame again.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Final, NamedTuple
+
+from urc.model.codec import Payload
+from urc.model.values import Sample, Signal
+from urc.protocol.convert import divisor_of
+from urc.protocol.generate import function_of
+from urc.protocol.readings import Readings
+
+__all__ = ["FastRead", "Slow", "Taken", "Value", "finish", "of_json_type", "value_of"]
+
+Taken = tuple[list[Sample], Sequence[str]]
+Slow = Callable[[Payload, float], "Taken | None"]
+"""A frame and the time → samples and refused values, or None for another frame."""
+FastRead = Callable[[bytes, float], "Taken | None"]
+"""The same, of bytes alone."""
+
+_GIVE_UP: Final = "        return slow(payload, now)"
+_WHOLE: Final = "(type({r}) is int and -9223372036854775808 <= {r} <= 9223372036854775807)"
+_JSON_TYPES: Final = {
+    "number": "(type({r}) is float or " + _WHOLE + ")",
+    "integer": _WHOLE,
+    "string": "type({r}) is str",
+}
+
+
+class Value(NamedTuple):
+    """How one field becomes a sample, in source text."""
+
+    signal: Signal
+    convert: str
+    """Expression over the raw text; "" for text as it is."""
+    checks: tuple[str, ...]
+    """What must hold of the value, over ``{v}``."""
+    raw_checks: tuple[str, ...] = ()
+    """What must hold of the raw text, over ``{r}``."""
+    is_finite: bool = True
+    """Whether `checks` refuse what is infinite or no number."""
+
+
+def of_json_type(type_name: str, raw: str) -> str:
+    """Return the check that a raw value is one of the type, and no larger than it may be."""
+    return _JSON_TYPES[type_name].format(r=raw)
+
+
+def value_of(signal: Signal, kind: str, is_plain: bool) -> Value | None:
+    """Return how raw text of a field becomes a value of `signal`; None when that is not simple."""
+    conversion = signal.conversion
+    if signal.deadband or signal.debounce_s:
+        return None
+    if conversion.base or conversion.not_available or conversion.points or conversion.states:
+        return None
+    raw_checks = () if is_plain else ("{r}.isascii()", "'_' not in {r}")
+    if signal.states or signal.type not in ("integer", "number", "string"):
+        return None
+    if signal.type == "string":
+        if kind not in ("text", "word", "json"):
+            return None
+        return Value(signal, "", (), ("{r}",) if kind == "word" else ())
+    if signal.type == "integer" and conversion.polynomial:
+        return None
+    if kind == "json":
+        expression = "{r}"
+    elif kind == "word" or (signal.type == "integer" and kind == "number"):
+        return None
+    else:
+        cast_to = "int" if "integer" in (kind, signal.type) else "float"
+        expression = f"{cast_to}({{r}})"
+    if conversion.polynomial:
+        scaled = _scaled(conversion.polynomial, expression)
+        if scaled is None:
+            return None
+        expression = scaled
+    low, high = signal.min, signal.max
+    checks: tuple[str, ...] = ()
+    if low is not None and high is not None:
+        checks = (f"{low!r} <= {{v}} <= {high!r}",)
+    elif low is not None:
+        checks = (f"{low!r} <= {{v}}",)
+    elif high is not None:
+        checks = (f"{{v}} <= {high!r}",)
+    is_finite = signal.type == "integer" or (low is not None and high is not None)
+    return Value(signal, expression, checks, raw_checks, is_finite)
+
+
+def _scaled(coefficients: tuple[float, ...], number: str) -> str | None:
+    """Return the same arithmetic as `urc.protocol.convert` has for a scale and an offset."""
+    if len(coefficients) != 2:
+        return None
+    offset, scale = coefficients
+    divisor = divisor_of(scale)
+    if not divisor:
+        return f"{number} * {scale!r} + {offset!r}" if offset else f"{number} * {scale!r}"
+    shift = offset * divisor
+    if shift != round(shift):
+        return None  # the closures know whether that is only a matter of rounding
+    return f"({number} + {round(shift)}) / {divisor}" if shift else f"{number} / {divisor}"
+
+
+def finish(
+    values: Sequence[Value],
+    raws: Sequence[str],
+    lines: list[str],
+    readings: Readings,
+    scope: Mapping[str, object],
+    slow: Slow,
+    skipped: Sequence[str] = (),
+) -> FastRead:
+    """Add the conversions, their checks and the samples to `lines`, and make the function."""
+    names: dict[str, Any] = {
+        **scope, "slow": slow, "float": float, "int": int, "new": tuple.__new__, "Sample": Sample,
+        "TypeError": TypeError, "ValueError": ValueError, "OverflowError": OverflowError,
+        "IndexError": IndexError,
+    }  # fmt: skip
+    shown = [
+        raw if one.convert in ("", "{r}") and raw.isidentifier() else f"v{place}"
+        for place, (one, raw) in enumerate(zip(values, raws, strict=True))
+    ]
+    tried = [f"        {one}" for one in (*skipped, *_conversions(values, raws, shown))]
+    if tried:
+        failures = "(IndexError, OverflowError, TypeError, ValueError)"
+        lines += ["    try:", *tried, f"    except {failures}:", _GIVE_UP]
+    checks = _checks(values, raws, shown)
+    if checks:
+        lines += [f"    if not ({' and '.join(checks)}):", _GIVE_UP]
+    lines += _samples(values, shown, readings, names)
+    return function_of("read", "payload, now", lines, names)
+
+
+def _conversions(values: Sequence[Value], raws: Sequence[str], shown: Sequence[str]) -> list[str]:
+    """Return what makes the values out of raw texts, and may fail."""
+    lines = [
+        f"{name} = {(one.convert or '{r}').format(r=raw)}"
+        for one, raw, name in zip(values, raws, shown, strict=True)
+        if name != raw
+    ]
+    open_ended = [name for one, name in zip(values, shown, strict=True) if not one.is_finite]
+    if open_ended:
+        # Nothing times infinity or not-a-number is zero.
+        lines.append(f"is_finite = ({' + '.join(open_ended)}) * 0 == 0")
+    return lines
+
+
+def _checks(values: Sequence[Value], raws: Sequence[str], shown: Sequence[str]) -> list[str]:
+    """Return what must hold of them."""
+    checks = [] if all(one.is_finite for one in values) else ["is_finite"]
+    for one, raw, name in zip(values, raws, shown, strict=True):
+        checks += [check.format(r=raw) for check in one.raw_checks]
+        checks += [check.format(v=name) for check in one.checks]
+        if not one.convert:
+            checks.append(f"{name} is not None")
+    return checks
+
+
+def _samples(
+    values: Sequence[Value], shown: Sequence[str], readings: Readings, names: dict[str, Any]
+) -> list[str]:
+    """Return the lines that make and return the samples; `names` gets what they call."""
+    samples = []
+    for one, value in zip(values, shown, strict=True):
+        name, alarm = one.signal.name, "''"
+        if readings.judges(name):
+            names["alarm"] = readings.alarm
+            alarm = f"alarm({name!r}, {value}, now)"
+        samples.append(f"new(Sample, ({name!r}, {value}, now, {alarm}))")
+    lines = [f"    samples = [{', '.join(samples)}]"]
+    if not any(readings.keeps(one.signal.name) for one in values):
+        return [*lines, "    return samples, ()"]
+    names["follow"] = readings.follow
+    return [*lines, "    refused = []", "    follow(samples, refused, now)",
+            "    return samples, refused"]  # fmt: skip

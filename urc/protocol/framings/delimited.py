@@ -1,0 +1,173 @@
+"""Frames that end with fixed bytes: ``delimiter``."""
+
+from typing import NamedTuple, cast
+
+from urc.model.driver import FramingSpec
+from urc.protocol.frame import BadFrame, Seal
+from urc.protocol.framings.base import (
+    Decoder,
+    FrameFault,
+    FramingError,
+    Open,
+    StreamDecoder,
+    seal_of,
+    sealed,
+)
+from urc.protocol.stream import Credit, Stream
+
+__all__ = ["DelimiterDecoder", "DelimiterFraming"]
+
+
+class DelimiterFraming(NamedTuple):
+    """Frames that end with fixed bytes; sent and received delimiters may differ."""
+
+    tx: bytes
+    rx: bytes
+    max_bytes: int
+    seal: Seal | None = None
+
+    @classmethod
+    def from_spec(cls, spec: FramingSpec) -> "DelimiterFraming":
+        """Return the framing for options ``tx`` and ``rx``, both bytes."""
+        tx, rx = cast("bytes", spec.options["tx"]), cast("bytes", spec.options["rx"])
+        return cls(tx, rx, spec.max_bytes, seal_of(spec))
+
+    def encode(self, payload: bytes) -> bytes:
+        """Return the bytes of one frame, or raise `FramingError`."""
+        frame = payload if self.seal is None else sealed(self.seal, payload, self.max_bytes)
+        if self.tx and self.tx in frame:
+            raise FramingError(
+                f"{payload!r} contains the delimiter {self.tx!r}: it would be two frames"
+            )
+        return frame + self.tx
+
+    def decoder(self, stream: Stream | None = None) -> Decoder:
+        """Return a fresh decoder."""
+        return DelimiterDecoder(
+            stream, self.rx, self.max_bytes, None if self.seal is None else self.seal.open
+        )
+
+    def reversed(self) -> "DelimiterFraming":
+        """Return the same framing seen from the other end of the line."""
+        return self._replace(tx=self.rx, rx=self.tx)
+
+
+class DelimiterDecoder(StreamDecoder):
+    """Remembers how far it has searched, so a frame that drips in costs linear time.
+
+    A frame that is too long is dropped as a whole, reported once, and the stream goes on behind the
+    next delimiter.
+    """
+
+    def __init__(
+        self,
+        stream: Stream | None,
+        delimiter: bytes,
+        max_bytes: int,
+        opened: Open | None = None,
+        *,
+        skips_empty: bool = False,
+    ) -> None:
+        super().__init__(stream, max_bytes)
+        self._delimiter = delimiter
+        self._open = opened
+        self._skips_empty = skips_empty
+        self._searched = 0
+        """How many bytes of the stream are known to have no delimiter."""
+        self._is_skipping = False
+        self._credit: Credit | None = None
+        """Of a case of a `switch`: there a frame that is too long costs its first byte only."""
+
+    def restart(self) -> None:
+        """Let a frame of a `switch` begin here."""
+        super().restart()
+        self._searched = 0
+        self._credit = self._credit or Credit()
+
+    def next(self, now: float = 0.0) -> bytes | FrameFault | None:
+        """Return one frame or fault, or None when there is none yet."""
+        stream, delimiter = self._stream, self._delimiter
+        while stream.at < len(stream.data):
+            start = stream.at
+            most = len(stream.data)
+            if self._credit is not None:
+                most = min(most, start + self._max_bytes + len(delimiter))
+            end = stream.data.find(delimiter, start + self._searched, most)
+            if end < 0:
+                return self._wait(self._credit)
+            stream.at = end + len(delimiter)
+            self._searched = 0
+            if self._credit is not None:
+                self._credit.earn(stream.at - start)
+            if self._is_skipping:
+                self._is_skipping = False
+            elif end - start > self._max_bytes:
+                return self._too_long()
+            elif end > start or not self._skips_empty:
+                frame = self._opened(bytes(stream.data[start:end]))
+                if frame is not None:
+                    return frame
+        return None
+
+    def whole(self, data: bytes) -> bytes | None:
+        """Return the payload of a single frame, unless it needs a closer look."""
+        stream, end = self._stream, data.find(self._delimiter)
+        if end + len(self._delimiter) != len(data) or not 0 <= end <= self._max_bytes:
+            return None
+        if stream.at != len(stream.data) or self._credit or self._is_skipping:
+            return None
+        if self._open is None:
+            return data[:end] if end or not self._skips_empty else None
+        try:
+            return self._open(data[:end])
+        except BadFrame:
+            return None  # it is told by `next`
+
+    def ahead(self) -> list[bytes]:
+        """Return whole frames, unless they are unwrapped, skipped or too long."""
+        stream, delimiter = self._stream, self._delimiter
+        if self._open or self._credit or self._is_skipping or self._skips_empty:
+            return []
+        first = stream.data.find(delimiter, stream.at + self._searched)
+        if first < 0 or stream.data.find(delimiter, first + len(delimiter)) < 0:
+            return []
+        frames = bytes(memoryview(stream.data)[stream.at :]).split(delimiter)
+        frames.pop()
+        return frames if max(map(len, frames)) <= self._max_bytes else []
+
+    def skip(self, count: int, size: int) -> None:
+        """Take frames, and the delimiters behind them."""
+        if count:
+            self._stream.at += size + count * len(self._delimiter)
+            self._searched = 0
+
+    def _opened(self, frame: bytes) -> bytes | FrameFault | None:
+        if self._open is None:
+            return frame
+        try:
+            return self._open(frame)
+        except BadFrame as error:
+            return self._refused(error)
+
+    def _wait(self, credit: Credit | None) -> FrameFault | None:
+        """Keep what may yet become a frame."""
+        stream, keep = self._stream, len(self._delimiter) - 1
+        fault = None
+        if credit is not None and len(stream) >= self._max_bytes + len(self._delimiter):
+            stream.at += 1 if credit.spend(self._max_bytes) else self._max_bytes
+            self._searched = 0
+            return self._too_long()
+        if len(stream) > self._max_bytes + len(self._delimiter) and not self._is_skipping:
+            self._is_skipping = True
+            fault = self._too_long()
+        if self._is_skipping:
+            # Only what may be the beginning of a delimiter is still of interest.
+            stream.at = max(stream.at, len(stream.data) - keep)
+        self._searched = max(0, len(stream) - keep)
+        return fault
+
+    def _too_long(self) -> FrameFault:
+        return FrameFault(
+            "frame-too-long",
+            f"a frame has more than {self._max_bytes} bytes without {self._delimiter!r}; dropped",
+        )

@@ -1,0 +1,392 @@
+"""Robots that talk through an MQTT broker, version 5 or 3.1.1.
+
+Theory of operation. The protocol is paho's, the connection is ours: each `open` dials a socket, as
+all transports do, and gives it to a new paho client, which is thrown away with it. So no message of
+an earlier connection can be said late; paho alone would keep those that want an acknowledgement,
+and send them again. Nothing of it runs in a thread.
+
+The session is always a clean one. With a last will the broker publishes it whenever the line ends,
+also when it is ended here: a stop that is sent once too often does no harm.
+"""
+
+import asyncio
+import logging
+import socket
+from contextlib import suppress
+from typing import Any
+
+from paho.mqtt.client import MQTT_CLEAN_START_FIRST_ONLY, Client, MQTTMessage
+from paho.mqtt.enums import CallbackAPIVersion, MQTTErrorCode, MQTTProtocolVersion
+from paho.mqtt.packettypes import PacketTypes
+from paho.mqtt.properties import Properties
+from paho.mqtt.reasoncodes import ReasonCode
+
+from urc.model.codec import Envelope, Payload
+from urc.transports._faults import CLOSED, HUNG_UP, broke, late, reason
+from urc.transports.base import ConnectFailed, PeerClosed, TransportError
+from urc.transports.mqtt_options import Options, body_bytes
+from urc.transports.topics import Inbox
+from urc.transports.web_dial import Dialer
+
+__all__ = ["MqttTransport"]
+
+KEEPALIVE_S = 5
+"""A broker that is asked after this silence, and says nothing for as long again, is gone."""
+MAX_BYTES = 16 * 1024 * 1024
+"""Largest message that is taken."""
+MAX_UNACKNOWLEDGED = 256
+"""Messages that wait for the broker to acknowledge them."""
+MAX_HALF = 64
+"""Messages of quality of service 2 that may be half delivered."""
+MAX_UNTAKEN = 4096
+"""Packets that wait for the kernel to take them: the line's own, and acknowledgements."""
+_CHECK_S = 1.0
+_READ_BYTES = 65536
+_PACKETS_A_TURN = 64
+"""How many are read before others have their turn on the loop."""
+_WITH_WILL = "Disconnect with will message"
+
+log = logging.getLogger(__name__)
+
+
+class MqttTransport:
+    """One connection to a broker, opened as often as it is needed."""
+
+    def __init__(self, options: Options, dialer: Dialer) -> None:
+        """Prepare a line to where `dialer` leads; nothing is opened yet."""
+        self._options = options
+        self._dialer = dialer
+        self._session: _Session | None = None
+
+    @property
+    def address(self) -> str:
+        """Where it leads, for people: ``mqtt 192.168.1.5:1883``."""
+        return f"mqtt {self._options.where}"
+
+    async def open(self, timeout_s: float) -> None:
+        """Connect, log in and subscribe, or raise `ConnectFailed` within `timeout_s` seconds."""
+        await self.close()
+        where = self._options.where
+        try:
+            async with asyncio.timeout(timeout_s):
+                self._session = await self._begin(timeout_s)
+        except TimeoutError as fault:
+            raise ConnectFailed(late(where, timeout_s)) from fault
+        except OSError as fault:
+            raise ConnectFailed(broke(fault)) from fault
+        finally:
+            if self._session is None:
+                await self._dialer.close()
+
+    async def receive(self) -> Envelope:
+        """Return the next message; raise `PeerClosed` when no more will come."""
+        if self._session is None:
+            raise PeerClosed(CLOSED)
+        return await self._session.inbox.take()
+
+    async def send(self, data: Payload) -> None:
+        """Publish a message; return once the kernel has it.
+
+        Raises:
+            PeerClosed: the line broke.
+            TransportError: it is nothing that MQTT can send.
+        """
+        if self._session is None:
+            raise PeerClosed(CLOSED)
+        if not isinstance(data, Envelope):
+            raise TransportError("mqtt carries messages, not bytes; use publish")
+        if data.verb != "publish":
+            raise TransportError(f"mqtt cannot {data.verb}; it can publish")
+        await self._session.publish(data)
+
+    async def close(self) -> None:
+        """Close at once, with all that is unsent. Never raises, may be called twice."""
+        session, self._session = self._session, None
+        if session is not None:
+            session.end()
+        await self._dialer.close()
+
+    def unsent(self) -> int:
+        """Return the bytes handed over that have not left this machine for good."""
+        return 0 if self._session is None else self._dialer.unsent(self._session.line)
+
+    async def abort(self) -> None:
+        """Close at once; what the broker has not got by now it never gets. Never raises."""
+        session, self._session = self._session, None
+        if session is not None:
+            await self._dialer.reset(session.line)
+            session.end(has_farewell=False)
+        await self.close()
+
+    async def _begin(self, timeout_s: float) -> "_Session":
+        line = await self._dialer.plug(timeout_s)
+        try:
+            session = _Session(self._options, line)
+        except BaseException:
+            line.close()
+            raise
+        try:
+            await session.begin()
+        except BaseException:
+            session.end()
+            raise
+        return session
+
+
+class _Session:
+    """One open connection and the paho client that serves it."""
+
+    def __init__(self, options: Options, line: socket.socket) -> None:
+        self.inbox = Inbox()
+        self._options = options
+        self.line = line
+        self._loop = asyncio.get_running_loop()
+        self._answered: asyncio.Future[str] = self._loop.create_future()
+        """What the broker says to the log-in: "" or why not."""
+        self._granted: dict[int | None, asyncio.Future[list[ReasonCode]]] = {}
+        self._seen = 0
+        self._writable: asyncio.Future[None] | None = None
+        """Done when the kernel takes more; None while nobody waits for it."""
+        self._check: asyncio.TimerHandle | None = None
+        self._client = self._make()
+
+    def _make(self) -> "_Client":
+        options = self._options
+        client = _Client(options, self.line)
+        client.max_inflight_messages_set(MAX_UNACKNOWLEDGED)
+        client.max_queued_messages_set(MAX_UNACKNOWLEDGED)
+        if options.username:
+            client.username_pw_set(options.username, options.password)
+        if options.will is not None:
+            will = options.will
+            client.will_set(will.topic, will.payload, will.qos, will.retain)
+        client.on_connect = self._on_connect
+        client.on_disconnect = self._on_disconnect
+        client.on_subscribe = self._on_subscribe
+        client.on_message = self._on_message
+        client.on_socket_close = lambda _client, _data, line: self._forget(line)
+        return client
+
+    async def begin(self) -> None:
+        """Log in and subscribe; raise `ConnectFailed` with the broker's own reason."""
+        options = self._options
+        self._client.start()
+        self._loop.add_reader(self.line, self._readable)
+        self._check = self._loop.call_later(_CHECK_S, self._tick)
+        refused = await self._answered
+        if refused:
+            raise ConnectFailed(f"{options.where} refuses the connection ({refused})")
+        if not options.subscriptions:
+            return
+        _, number = self._client.subscribe([(one.topic, one.qos) for one in options.subscriptions])
+        granted: asyncio.Future[list[ReasonCode]] = self._loop.create_future()
+        self._granted[number] = granted
+        for one, code in zip(options.subscriptions, await granted, strict=False):
+            if code.is_failure:
+                raise ConnectFailed(
+                    f"{options.where} refuses the topic {one.topic!r} ({_low(code)})"
+                )
+
+    async def publish(self, envelope: Envelope) -> None:
+        """Hand one message to the kernel."""
+        self._raise_if_ended()
+        attributes = envelope.attributes
+        topic, qos = attributes.get("topic"), attributes.get("qos") or 0
+        if not isinstance(topic, str) or not topic or qos not in (0, 1, 2):
+            raise TransportError(f"mqtt cannot publish to {topic!r} with qos {qos!r}")
+        try:
+            done = self._client.publish(
+                topic, body_bytes(envelope.body), int(qos), attributes.get("retain") is True
+            )
+        except (ValueError, UnicodeEncodeError) as problem:
+            raise TransportError(f"mqtt cannot publish to {topic!r} ({problem})") from problem
+        if done.rc == MQTTErrorCode.MQTT_ERR_QUEUE_SIZE:
+            text = f"the broker has not acknowledged {MAX_UNACKNOWLEDGED} messages; none is taken"
+            raise TransportError(text)
+        while self._client.want_write() and self.inbox.ended is None:
+            await self._until_writable()
+            if self.inbox.ended is None:
+                self._client.loop_write()
+        self._raise_if_ended()
+
+    def end(self, *, has_farewell: bool = True) -> None:
+        """Close at once. The broker publishes the will, if there is one.
+
+        Args:
+            has_farewell: say good-bye; that pushes what is unsent before it.
+        """
+        is_open = self.inbox.ended is None
+        self.inbox.end(CLOSED)
+        if self._check is not None:
+            self._check.cancel()
+        client = self._client
+        client.on_disconnect = None
+        if has_farewell and is_open and client.is_connected():
+            with suppress(OSError, ValueError):
+                if self._options.will is None:
+                    client.disconnect()
+                elif self._options.is_v5:
+                    client.disconnect(ReasonCode(PacketTypes.DISCONNECT, _WITH_WILL))
+        self._forget(self.line)
+        client.drop()
+
+    def _raise_if_ended(self) -> None:
+        if self.inbox.ended is not None:
+            raise PeerClosed(self.inbox.ended)
+
+    def _forget(self, line: Any) -> None:
+        """Do not watch a socket that is about to be closed."""
+        if line.fileno() >= 0:
+            self._loop.remove_reader(line)
+            self._loop.remove_writer(line)
+        self._release()
+
+    async def _until_writable(self) -> None:
+        """Wait until the kernel takes more, or the line has ended."""
+        if self._writable is None:
+            self._writable = self._loop.create_future()
+            self._loop.add_writer(self.line, self._drained)
+        await asyncio.shield(self._writable)
+
+    # -- called by the loop
+
+    def _drained(self) -> None:
+        self._loop.remove_writer(self.line)
+        self._release()
+
+    def _release(self) -> None:
+        writable, self._writable = self._writable, None
+        if writable is not None and not writable.done():
+            writable.set_result(None)
+
+    def _readable(self) -> None:
+        """Let paho read what is there; it takes one packet a call and does not say whether."""
+        try:
+            for _ in range(_PACKETS_A_TURN):
+                before = self._seen
+                self._client.loop_read()
+                if excess := self._client.excess():
+                    self._lose(excess)
+                    return
+                if self._seen == before:
+                    return
+        except Exception as fault:  # paho checks little of what arrives
+            self._lose(f"what the broker sent is not understood ({reason(fault)})")
+
+    def _tick(self) -> None:
+        """Ask the broker whether it is there, and give up one that has not answered."""
+        self._check = self._loop.call_later(_CHECK_S, self._tick)
+        self._client.loop_misc()
+
+    # -- called by paho
+
+    def _on_connect(
+        self, client: Client, data: object, flags: object, code: ReasonCode, properties: object
+    ) -> None:
+        self._seen += 1
+        if not self._answered.done():
+            self._answered.set_result(_low(code) if code.is_failure else "")
+
+    def _on_subscribe(
+        self, client: Client, data: object, number: int, codes: list[ReasonCode], properties: object
+    ) -> None:
+        self._seen += 1
+        granted = self._granted.pop(number, None)
+        if granted is not None and not granted.done():
+            granted.set_result(codes)
+
+    def _on_message(self, client: Client, data: object, message: MQTTMessage) -> None:
+        self._seen += 1
+        topic = message.topic
+        attributes = {"topic": topic, "retain": message.retain, "qos": message.qos}
+        envelope = Envelope("message", attributes, message.payload)
+        self.inbox.message(topic, envelope, len(topic) + len(message.payload))
+
+    def _on_disconnect(
+        self, client: Client, data: object, flags: Any, code: ReasonCode, properties: object
+    ) -> None:
+        if flags.is_disconnect_packet_from_server:
+            self._lose(f"{HUNG_UP} ({_low(code)})")
+        elif code == "Keep alive timeout":
+            self._lose(f"the broker has not answered for {2 * KEEPALIVE_S} s")
+        else:
+            self._lose(HUNG_UP)
+
+    def _lose(self, reason: str) -> None:
+        """Tell everybody who waits that the line is over."""
+        self.inbox.end(reason)
+        self._forget(self.line)
+        if not self._answered.done():
+            self._answered.set_result(reason)
+        for granted in self._granted.values():
+            if not granted.done():
+                granted.set_exception(ConnectFailed(reason))
+        self._granted.clear()
+
+
+class _Client(Client):
+    """paho's protocol on a socket that is given, not on one that it makes."""
+
+    def __init__(self, options: Options, line: socket.socket) -> None:
+        version = MQTTProtocolVersion.MQTTv5 if options.is_v5 else MQTTProtocolVersion.MQTTv311
+        super().__init__(
+            CallbackAPIVersion.VERSION2,
+            client_id=options.client_id,
+            clean_session=None if options.is_v5 else True,
+            protocol=version,
+            reconnect_on_failure=False,
+        )
+        self._options = options
+        self._given = line
+
+    def start(self) -> None:
+        """Send the log-in."""
+        options = self._options
+        properties: Properties | None = None
+        if options.is_v5:
+            properties = Properties(PacketTypes.CONNECT)  # type: ignore[no-untyped-call]
+            properties.MaximumPacketSize = MAX_BYTES
+            properties.ReceiveMaximum = MAX_HALF
+        self.connect_async(
+            options.host,
+            options.port,
+            KEEPALIVE_S,
+            clean_start=True if options.is_v5 else MQTT_CLEAN_START_FIRST_ONLY,
+            properties=properties,
+        )
+        self.reconnect()
+
+    def drop(self) -> None:
+        """Close the socket, whatever paho thinks of it."""
+        self._sock_close()
+        self._given.close()
+
+    def excess(self) -> str:
+        """Return what there is too much of, "" when there is nothing; paho has no bounds."""
+        if self._in_packet["remaining_length"] > MAX_BYTES:
+            return f"the broker sent a message of more than {MAX_BYTES} bytes"
+        if len(self._out_packet) > MAX_UNTAKEN:
+            return f"the broker takes none of {MAX_UNTAKEN} acknowledgements"
+        half = self._in_messages
+        if half and (
+            len(half) > MAX_HALF or sum(len(one.payload) for one in half.values()) > MAX_BYTES
+        ):
+            return "the broker begins to deliver messages, and ends none of them"
+        return ""
+
+    def _create_socket(self) -> Any:
+        return self._given
+
+    def _sock_recv(self, bufsize: int) -> bytes:
+        """Read some of a message: paho wants the whole, and room would be made for all it claims.
+
+        Raises:
+            BlockingIOError: it claims more than may be, see `excess`; none of it is read.
+        """
+        if bufsize > MAX_BYTES:
+            raise BlockingIOError
+        return super()._sock_recv(min(bufsize, _READ_BYTES))
+
+
+def _low(code: ReasonCode) -> str:
+    return str(code).lower()

@@ -1,0 +1,86 @@
+// @ts-check
+/**
+ * Numbers that a hand sets: their bounds, their steps, and where keys lead. Pure.
+ *
+ * @typedef {import("./types.js").Argument} Argument
+ */
+
+/**
+ * What stands between two values of a control.
+ *
+ * @param {Argument | undefined} argument
+ * @param {{step?: unknown, min?: unknown, max?: unknown, unit?: unknown, precision?: unknown}} options
+ * @returns {{min: number, max: number, step: number, digits: number, unit: string}}
+ */
+export function boundsOf(argument, options) {
+  const pick = (/** @type {unknown} */ own, /** @type {number | null | undefined} */ theirs, /** @type {number} */ none) =>
+    typeof own === "number" ? own : (theirs ?? none);
+  const theirs = argument ?? { min: null, max: null };
+  // An option may narrow what the command takes, and never widen it.
+  const min = Math.max(pick(options.min, theirs.min, 0), theirs.min ?? -Infinity);
+  const max = Math.min(pick(options.max, theirs.max, 100), theirs.max ?? Infinity);
+  const isWhole = argument?.type === "integer";
+  const usual = isWhole ? Math.max(1, Math.round((max - min) / 100)) : niceStep((max - min) / 100);
+  const step = typeof options.step === "number" && options.step > 0 ? options.step : usual;
+  const digits = typeof options.precision === "number" ? options.precision : digitsOf(step);
+  const unit = typeof options.unit === "string" ? options.unit : (argument?.unit ?? "");
+  return { min, max: Math.max(min, max), step, digits: isWhole ? 0 : digits, unit };
+}
+
+/**
+ * Return the nearest value on the grid of steps, within the bounds.
+ *
+ * @param {number} value
+ * @param {{min: number, max: number, step: number}} bounds
+ */
+export function snapped(value, { min, max, step }) {
+  const near = min + Math.round((value - min) / step) * step;
+  const inside = Math.min(max, Math.max(min, near));
+  return Number(inside.toFixed(10));
+}
+
+/**
+ * Return where a key of a slider leads; null for a key that means nothing here.
+ *
+ * @param {string} key
+ * @param {number} value
+ * @param {{min: number, max: number, step: number}} bounds
+ * @returns {number | null}
+ */
+export function keyed(key, value, bounds) {
+  const { min, max, step } = bounds;
+  switch (key) {
+    case "ArrowRight":
+    case "ArrowUp":
+      return snapped(value + step, bounds);
+    case "ArrowLeft":
+    case "ArrowDown":
+      return snapped(value - step, bounds);
+    case "PageUp":
+      return snapped(value + Math.max(step, (max - min) / 10), bounds);
+    case "PageDown":
+      return snapped(value - Math.max(step, (max - min) / 10), bounds);
+    case "Home":
+      return min;
+    case "End":
+      return max;
+    default:
+      return null;
+  }
+}
+
+/** @param {number} step the next 1, 2 or 5 of a decade above */
+function niceStep(step) {
+  if (!(step > 0) || !Number.isFinite(step)) return 1;
+  const decade = 10 ** Math.floor(Math.log10(step));
+  const share = step / decade;
+  const nice = share <= 1 ? 1 : share <= 2 ? 2 : share <= 5 ? 5 : 10;
+  return Number((nice * decade).toPrecision(3));
+}
+
+/** @param {number} step */
+function digitsOf(step) {
+  const text = String(step);
+  if (text.includes("e-")) return Number(text.split("e-")[1]);
+  return text.split(".")[1]?.length ?? 0;
+}
