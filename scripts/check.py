@@ -57,13 +57,15 @@ TESTS = (
     Step(
         "tests e2e",
         (
-            *(PYTHON, "-m", "pytest", "tests/e2e", "--ignore=tests/e2e/motion"),
-            *("-n", "3", "--dist", "loadgroup"),
+            *(PYTHON, "-m", "pytest", "tests/e2e", "-m", "not alone"),
+            *("-n", "4", "--dist", "loadgroup"),
         ),
         timeout_s=700,
     ),
-    # Alone: they measure how soon a robot stops.
-    Step("tests motion", (PYTHON, "-m", "pytest", "tests/e2e/motion"), timeout_s=420),
+    # They measure how soon a robot stops.
+    Step(
+        "tests motion", (PYTHON, "-m", "pytest", "tests/e2e/motion", "-m", "alone"), timeout_s=420
+    ),
 )
 
 

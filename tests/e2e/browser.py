@@ -21,6 +21,10 @@ SIZES: dict[Size, tuple[int, int]] = {
     "desktop": (1440, 900),
 }
 
+PLAIN_HOST = "plain.local"
+"""Another name of this machine: over it a page comes as from a local network, without a secure
+context."""
+
 # Containers have neither a sandbox nor a GPU; the rest keeps the browser off the network.
 FLAGS = (
     "--no-sandbox",
@@ -32,12 +36,13 @@ FLAGS = (
     "--disable-background-networking",
     "--disable-component-update",
     "--disable-sync",
+    f"--host-resolver-rules=MAP {PLAIN_HOST} 127.0.0.1",
 )
 
 # uPlot asks Intl for the browser's language; without one given it is "en-US@posix", which throws.
 LOCALE = "en-GB"
 
-PAGE_TIMEOUT_MS = 15_000
+PAGE_TIMEOUT_MS = 30_000
 
 # Runs before any script of the page: the policy's own report is the only sure sign of a violation.
 WATCH_POLICY = """

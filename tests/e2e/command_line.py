@@ -38,7 +38,7 @@ commands:
     send: "speed {{ speed }}"
   ask:
     send: "speed?"
-    reply: { regex: '^(?P<speed>\\d+)$', errors: ['^ERR'], timeout: 500ms }
+    reply: { regex: '^(?P<speed>\\d+)$', errors: ['^ERR'], timeout: 20s }
 messages:
   said: { regex: '^s (?P<speed>\\d+)$' }
 simulator:
@@ -50,12 +50,6 @@ simulator:
 
 def at(port: int | str) -> tuple[str, ...]:
     return "--set", "host=127.0.0.1", "--set", f"port={port}"
-
-
-def free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
 
 
 def run(

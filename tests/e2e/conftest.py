@@ -4,7 +4,8 @@ from collections.abc import AsyncIterator, Callable, Iterator
 from pathlib import Path
 
 import pytest
-from playwright.async_api import Browser, BrowserContext, Page
+from playwright.async_api import Browser, BrowserContext, Page, expect
+from xdist.remote import Producer
 
 from tests.e2e.browser import (
     LOCALE,
@@ -18,6 +19,23 @@ from tests.e2e.browser import (
 )
 from tests.e2e.command_line import BOT
 from tests.e2e.processes import UrcProcess
+from tests.e2e.together import Together
+from tests.e2e.unhurried import unhurried
+
+expect.set_options(timeout=PAGE_TIMEOUT_MS)
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Producer) -> Together | None:
+    """Keep what belongs together in one process."""
+    return Together(config, log) if config.getvalue("dist") == "loadgroup" else None
+
+
+@pytest.fixture(scope="session", autouse=True)
+def no_hurry() -> Iterator[None]:
+    """Let no pause of this machine end a gesture, but where its lease does."""
+    with unhurried():
+        yield
 
 
 @pytest.fixture(scope="session")

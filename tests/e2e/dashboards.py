@@ -12,7 +12,7 @@ from urc.testing.dashboard import FakeRobot
 from urc.web.app import Robot, build_app, serve
 from urc.web.connection import CONNECTIONS, REQUEST_S
 
-WAIT_S = 10.0
+WAIT_S = 30.0
 
 
 @asynccontextmanager

@@ -26,6 +26,7 @@ transports:
     host: 127.0.0.1
     port: PORT
     framing: { type: delimiter, tx: CRLF, rx: CRLF }
+    timeouts: { reply: 20s }
     on_connect:
       - { send: "LOGIN {{ settings.password }}", redact: true }
       - { expect: '^WELCOME$' }

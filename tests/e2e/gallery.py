@@ -13,8 +13,8 @@ from urc.shipped import shipped
 from urc.web.demos import DemoState, demo_states
 
 __all__ = [
-    *("CELL_SIZES", "FAULTS", "HIGH", "MOST_DIFFERENT", "ONLY", "PICTURES", "THEMES"),
-    *("coarse", "difference", "groups", "keep", "kept", "settled", "show", "states_of"),
+    *("CELL_SIZES", "FAULTS", "HIGH", "MOST_DIFFERENT", "ONLY", "PICTURES", "SETTLE_MS", "SHOTS"),
+    *("THEMES", "coarse", "difference", "groups", "keep", "kept", "settled", "show", "states_of"),
 ]
 
 THEMES = ("dark", "light", "sunlight", "night")

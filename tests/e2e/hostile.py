@@ -4,6 +4,8 @@ import asyncio
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager, suppress
 
+from tests.e2e.ports import free_port
+
 __all__ = ["HOSTILE", "Robot", "closes", "drips", "good", "robot_on"]
 
 Behave = Callable[[asyncio.StreamReader, asyncio.StreamWriter], Awaitable[None]]
@@ -77,15 +79,14 @@ class Robot:
 
     def __init__(self, behave: Behave) -> None:
         self.behave = behave
-        self.port = 0
+        self.port = free_port()
         self.connections = 0
         self._server: asyncio.Server | None = None
         self._tasks: dict[asyncio.Task[None], asyncio.StreamWriter] = {}
 
     async def start(self) -> None:
-        """Listen; after the first time, on the same port again."""
+        """Listen, each time on the same port."""
         self._server = await asyncio.start_server(self._accept, "127.0.0.1", self.port)
-        self.port = self._server.sockets[0].getsockname()[1]
 
     async def kill(self) -> None:
         """Stop listening and cut every connection, as a power failure would."""

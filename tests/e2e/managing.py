@@ -36,7 +36,7 @@ __all__ = [
 
 GOT: dict[str, tuple[str, ...]] = {"bare": (), "full": ("drivers/rover", "interfaces/wide")}
 """Name of a data folder → what was installed into it."""
-WAIT_S = 10.0
+WAIT_S = 30.0
 GONE = "(gone)"
 """Is heard when a line to the rover ends."""
 

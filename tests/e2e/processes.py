@@ -14,8 +14,8 @@ from typing import IO
 from anyio import to_thread
 
 ROOT = Path(__file__).resolve().parents[2]
-READY_TIMEOUT_S = 20.0
-EXIT_TIMEOUT_S = 20.0
+READY_TIMEOUT_S = 40.0
+EXIT_TIMEOUT_S = 40.0
 
 
 class UrcProcess:

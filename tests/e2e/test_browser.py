@@ -9,6 +9,7 @@ from playwright.async_api import Page, Route
 
 from tests.e2e.browser import PageFaults
 from tests.e2e.conftest import PageMaker
+from tests.e2e.dashboards import until
 from urc.shipped import vendored
 
 pytestmark = pytest.mark.anyio
@@ -82,7 +83,6 @@ async def test_a_page_that_complains_is_noticed(new_page: PageMaker, body: str, 
     new_page.allow(page, lambda text: True)
     async with page.expect_event("load"):
         await serve(page, body)
-    await page.evaluate("new Promise((done) => requestAnimationFrame(() => setTimeout(done)))")
-    assert any(fault in text for text in faults.unexpected()), faults.found
+    await until(lambda: any(fault in text for text in faults.unexpected()))
     faults.allow(lambda text: True)
     assert faults.unexpected() == []

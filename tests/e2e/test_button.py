@@ -39,6 +39,7 @@ transports:
     host: 127.0.0.1
     port: PORT
     framing: { type: delimiter, tx: CRLF, rx: CRLF }
+    timeouts: { reply: 20s }
 commands:
   ring: { title: Ring the bell, send: "RING 1", reply: { regex: '^OK$', errors: ['^ERR.*'] } }
 widgets:
@@ -299,7 +300,7 @@ async def test_a_command_that_must_be_held_is_given_by_no_tap(new_page: PageMake
         url = address.replace("http://", "ws://") + "ws?robot=puppet"
         async with connect(url, origin=Origin(origin), compression=None) as line:
             await line.send(json.dumps({"t": "run", "id": 1, "command": "ring"}))
-            async with asyncio.timeout(10):
+            async with asyncio.timeout(30):
                 while (reply := json.loads(await line.recv()))["t"] != "reply":
                     pass
         assert (reply["ok"], reply["code"], reply["message"]) == (False, "refused", HELD)

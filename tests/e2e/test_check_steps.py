@@ -1,13 +1,18 @@
 """The steps of `./dev test` as processes: how they end, and that nothing outlives them."""
 
 import os
+import re
+import subprocess
 import sys
 import time
 from pathlib import Path
 
 import pytest
 
-from scripts.check import Step, run
+from scripts.check import TESTS, Step, run
+from tests.e2e.together import TOGETHER
+
+HERE = Path(__file__).parent
 
 SLEEP = "import time; time.sleep(60)"
 
@@ -52,3 +57,17 @@ def test_nothing_outlives_a_step(tmp_path: Path, ending: str) -> None:
             except BlockingIOError:
                 assert time.monotonic() < deadline, "the child of the step still lives"
                 time.sleep(0.05)
+
+
+def test_modules_that_belong_together_are_run_by_one_process() -> None:
+    """As the step says it; a group that nobody keeps is a fault that shows now and then only."""
+    assert sorted(TOGETHER) == sorted({file.stem for file in HERE.rglob("*.py")} & {*TOGETHER})
+    (command,) = (step.command for step in TESTS if "loadgroup" in step.command)
+    several = command[command.index("-n") :]
+    done = subprocess.run(
+        [*command[:3], str(HERE / "test_editor.py"), "-k", "shipped", "-v", *several],
+        cwd=HERE.parents[1], capture_output=True, text=True, timeout=100, check=True,
+    )  # fmt: skip
+    ran = re.findall(r"^\[(gw\d+)\].* PASSED", done.stdout, re.MULTILINE)
+    assert len(ran) > 2
+    assert len(set(ran)) == 1

@@ -23,7 +23,7 @@ from urc.testing.dashboard import FakeRobot, dashboard_profile
 
 pytestmark = pytest.mark.anyio
 
-FRAME_MS = 20_000
+FRAME_MS = 60_000
 """A widget that does not ship with URC lives in a frame, which takes a browser some time."""
 
 SENT = [(words, block) for words, block in answers() if words[:2] == ["urc", "send"]]

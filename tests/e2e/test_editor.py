@@ -19,7 +19,7 @@ from scripts.node import node_executable
 from urc.config.shape import KINDS, read_schema
 
 ROOT = Path(__file__).resolve().parents[2]
-TIMEOUT_S = 45.0
+TIMEOUT_S = 100.0
 
 ROBOT = """\
 # yaml-language-server: $schema=../schemas/robot.schema.json
@@ -124,7 +124,7 @@ CAPABILITIES = {
 }
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def server() -> Iterator[LanguageServer]:
     node = node_executable()
     assert node is not None
@@ -140,12 +140,15 @@ def server() -> Iterator[LanguageServer]:
 
 
 class Opened:
-    """A document as the editor has it; it need not be on the disk."""
+    """A document as the editor has it, each of its own name; it need not be on the disk."""
+
+    _count = 0
 
     def __init__(self, server: LanguageServer, text: str) -> None:
+        Opened._count += 1
         self.server = server
         self.lines = text.splitlines()
-        self.address = (ROOT / "robots" / "editor.yaml").as_uri()
+        self.address = (ROOT / "robots" / f"editor-{Opened._count}.yaml").as_uri()
         document = {"uri": self.address, "languageId": "yaml", "version": 1, "text": text}
         server.tell("textDocument/didOpen", textDocument=document)
 

@@ -12,6 +12,7 @@ from contextlib import asynccontextmanager
 import pytest
 
 from tests.e2e.hostile import HOSTILE, closes, drips, good, robot_on
+from tests.e2e.ports import free_port
 from urc.model.driver import Backoff, Timeouts
 from urc.model.profile import Profile
 from urc.problems import UrcError
@@ -27,13 +28,18 @@ pytestmark = pytest.mark.anyio
 MEMORY_LIMIT = 4 * 1024 * 1024
 """Bytes that one hostile robot may make Python allocate, at most, at any time."""
 QUICK = Timeouts(connect_s=2.0, reply_s=0.2)
+"""For robots that do not answer."""
+PATIENT = Timeouts(connect_s=10.0, reply_s=10.0)
+"""For those that do, whatever holds this machine up."""
 QUICKLY = Backoff(initial_s=0.05, max_s=0.2)
 WAIT_S = 20.0
 
 
-def quick_profile(*, is_per_request: bool = False, every_s: float | None = 0.1) -> Profile:
+def quick_profile(
+    *, is_per_request: bool = False, every_s: float | None = 0.1, timeouts: Timeouts = PATIENT
+) -> Profile:
     return line_profile(
-        is_per_request=is_per_request, every_s=every_s, timeouts=QUICK, backoff=QUICKLY
+        is_per_request=is_per_request, every_s=every_s, timeouts=timeouts, backoff=QUICKLY
     )
 
 
@@ -51,6 +57,21 @@ async def until(session: Session, is_so: Callable[[], bool]) -> None:
             while not is_so():
                 subscription.take()
                 await subscription.changed()
+
+
+async def answer(session: Session) -> object:
+    """Return what the robot answers, which a busy machine may hold up for longer than it has."""
+    async with asyncio.timeout(WAIT_S):
+        while True:
+            with contextlib.suppress(CommandFailed):
+                return (await session.command("ask")).values
+            await asyncio.sleep(0.05)
+
+
+def has_failed(session: Session) -> bool:
+    """Return whether anything went wrong on the line."""
+    link = session.hub.links["wire"]
+    return link.faults + link.attempts > 0
 
 
 def state_of(session: Session) -> str:
@@ -84,7 +105,7 @@ async def test_hostile_robot_costs_bounded_memory_and_is_survived(
     name: str, is_per_request: bool
 ) -> None:
     """It is counted and shown; the loop stays alive, and the good robot after it is read."""
-    profile = quick_profile(is_per_request=is_per_request)
+    profile = quick_profile(is_per_request=is_per_request, timeouts=QUICK)
     async with robot_on(HOSTILE[name]) as robot, connected(profile, robot.port) as session:
         tracemalloc.start()
         try:
@@ -93,16 +114,15 @@ async def test_hostile_robot_costs_bounded_memory_and_is_survived(
             _, peak = tracemalloc.get_traced_memory()
         finally:
             tracemalloc.stop()
-        link = session.hub.links["wire"]
-        assert link.state != "live"
-        assert link.faults + link.attempts > 0
+        assert state_of(session) != "live"
+        await until(session, lambda: has_failed(session))
         assert peak < MEMORY_LIMIT
         assert len(session.hub.notes) < 60
         robot.behave = good
         await robot.kill()
         await robot.start()
         await until(session, lambda: state_of(session) == "live")
-        assert (await session.command("ask")).values == {"battery": 42}
+        assert await answer(session) == {"battery": 42}
 
 
 async def test_hostile_robot_does_not_hold_up_a_good_one() -> None:
@@ -164,9 +184,7 @@ async def test_emulated_robot_answers_a_session(is_per_request: bool) -> None:
 @pytest.mark.needs("socat")
 async def test_program_of_others_is_read_though_it_never_closes() -> None:
     """socat takes a connection, reads a line, answers a number, and keeps the line open."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = probe.getsockname()[1]
+    port = free_port()
     process = await asyncio.create_subprocess_exec(
         "socat",
         f"TCP-LISTEN:{port},bind=127.0.0.1,reuseaddr,fork",
@@ -206,11 +224,12 @@ async def test_flood_is_not_read_further_than_the_buffer() -> None:
 
     async with robot_on(flood) as robot:
         line = TcpTransport("127.0.0.1", robot.port)
-        await line.open(2)
-        before = -1
-        while sent != before:  # until both kernels are full
+        await line.open(20.0)
+        before, same = 0, 0
+        while same < 5:  # until both kernels are full: nothing goes in several turns of the loop
+            same = same + 1 if sent == before > 0 else 0
             before = sent
-            await asyncio.sleep(0.2)
+            await asyncio.sleep(0.05)
         data = await line.receive()
         assert len(data) == READ_AHEAD_BYTES
         await line.close()
@@ -220,7 +239,7 @@ async def test_send_waits_for_a_robot_that_does_not_read() -> None:
     """More than the kernel takes is waited for, and closing ends the wait."""
     async with robot_on(HOSTILE["deaf"]) as robot:
         line = TcpTransport("127.0.0.1", robot.port)
-        await line.open(2)
+        await line.open(20.0)
 
         async def send_much() -> None:
             for _ in range(1000):
@@ -244,7 +263,7 @@ async def test_bytes_before_the_end_are_received_before_the_end() -> None:
 
     async with robot_on(answers_and_closes) as robot:
         line = TcpTransport("127.0.0.1", robot.port)
-        await line.open(2)
+        await line.open(20.0)
         await asyncio.sleep(0.1)
         assert await line.receive() == b"42\n"
         for _ in range(2):
@@ -275,7 +294,7 @@ async def test_every_address_of_a_name_is_tried() -> None:
     """A name may lead to an IPv6 address first, where the robot does not listen."""
     async with robot_on(good) as robot:
         line = TcpTransport("localhost", robot.port)
-        await line.open(2)
+        await line.open(20.0)
         await line.send(b"?\n")
         assert await line.receive() == b"42\n"
         await line.close()
@@ -308,13 +327,13 @@ async def test_robot_that_does_not_answer_the_call_is_given_up() -> None:
 # -- the emulated robot's own door
 
 
-async def converse(port: int, data: bytes) -> bytes:
-    """Say `data` and return all that is answered until the robot closes, or half a second."""
+async def converse(port: int, data: bytes, *, within_s: float = WAIT_S) -> bytes:
+    """Say `data` and return all that is answered until the robot closes, or `within_s`."""
     reader, writer = await asyncio.open_connection("127.0.0.1", port)
     answer = b""
     with contextlib.suppress(TimeoutError, ConnectionError):
         writer.write(data)
-        async with asyncio.timeout(0.5):
+        async with asyncio.timeout(within_s):
             while piece := await reader.read(4096):
                 answer += piece
     writer.close()
@@ -331,8 +350,8 @@ async def test_emulated_robot_survives_its_clients() -> None:
         host, port = listening["wire"].host, listening["wire"].port
         assert host == "127.0.0.1"
         ask = b"Give me the battery %\n"
-        assert await converse(port, bytes(range(256)) * 100) == b""
-        assert await converse(port, b"x" * 1_000_000) == b""
+        assert await converse(port, bytes(range(256)) * 100, within_s=0.5) == b""
+        assert await converse(port, b"x" * 1_000_000, within_s=0.5) == b""
         assert await converse(port, ask + ask) == b"7\n"
         crowd = [await asyncio.open_connection("127.0.0.1", port) for _ in range(100)]
         assert await converse(port, ask) == b"7\n"

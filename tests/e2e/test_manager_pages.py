@@ -35,7 +35,7 @@ from urc.runtime.kept import KeptFile
 from urc.runtime.opened import open_document
 from urc.web.words import LANGUAGES
 
-pytestmark = [pytest.mark.anyio, pytest.mark.xdist_group("manager pages")]
+pytestmark = pytest.mark.anyio
 
 expect.set_options(timeout=PAGE_TIMEOUT_MS)
 RUNS = pytest.mark.parametrize("is_on", [True, False], ids=["on", "off"])

@@ -16,7 +16,8 @@ from urc.runtime.examine import examine, examine_apart
 
 LOOK = "widgets:\n  battery: { use: dial, bind: { level: battery } }\n"
 TEST = 'tests:\n  - { name: it is heard, feed: { wire: "42\\n" }, expect: { battery: 42 } }\n'
-DRIVER = DOCUMENTS["driver"] + LOOK + TEST
+UNUSED = "  key: { type: string, secret: true }\n"
+DRIVER = DOCUMENTS["driver"].replace(UNUSED, "") + LOOK + TEST
 
 
 class Lab:
@@ -91,7 +92,8 @@ def test_what_one_publishes_another_installs_updates_and_undoes(
     key = anna.does("repo", "key", "new", "Anna").partition(",")[0]
     assert key.startswith("Anna (SHA256:")
     assert anna.does("repo", "key", "show") == f"{key}\n"
-    told = anna.does("publish", *lab.writes("1.0.0"), *lab.to)
+    made = ("--source", "https://git.example/puppet", "--commit", "0123abc")
+    told = anna.does("publish", *lab.writes("1.0.0"), *lab.to, *made)
     assert told == (
         f"published widgets/dial 1.0.0, signed by {key}\n"
         f"published drivers/puppet 1.0.0, signed by {key}\n"
@@ -107,7 +109,10 @@ def test_what_one_publishes_another_installs_updates_and_undoes(
     assert f"drivers/puppet 1.0.0 is signed by {key}, and not by {other}" in told
     fingerprint = key.partition("(")[2].rstrip(")")
     told = ben.does("install", "puppet", "--yes", "--signed-by", fingerprint)
-    assert f"from {lab.url}, signed by {key}, a key seen for the first time" in told
+    assert (
+        f"from {lab.url}, signed by {key}, a key seen for the first time;"
+        " made from https://git.example/puppet at 0123abc by urc "
+    ) in told
     assert ben.does("list", "--updates") == ""
     assert ben.does("update") == "drivers/puppet 1.0.0 is up to date\n"
 
@@ -128,6 +133,7 @@ def test_what_one_publishes_another_installs_updates_and_undoes(
         "updated drivers/puppet to 1.1.0; 'urc update --back drivers/puppet' goes back",
     ):
         assert line in told
+    _is_withdrawn(lab, anna, ben, people("dora"))
     lab.end()  # the way back needs nobody
     told = ben.does("update", "--back", "puppet")
     assert told == "drivers/puppet is 1.0.0 again, as before the update to 1.1.0\n"
@@ -141,6 +147,29 @@ def test_what_one_publishes_another_installs_updates_and_undoes(
     again = str(lab.token.parent / "again.urcof")
     cleo.does("bundle", "puppet", "--to", again)
     assert Path(again).read_bytes() == Path(bundle).read_bytes()
+
+
+def _is_withdrawn(lab: Lab, keeper: Person, owner: Person, other: Person) -> None:
+    """The owner is told why, others get the version before, or it by name."""
+    why = "It beeps too loud."
+    version = (str(lab.folder), "drivers/puppet", "1.1.0")
+    assert "needs --why" in keeper.does("repo", "withdraw", *version, code=2)
+    assert "'1.2.0'" not in keeper.refuses("repo", "withdraw", *version[:2], "1.2.0", "--why", why)
+    keeper.does("repo", "withdraw", *version, "--why", why)
+    assert owner.does("list", "--updates") == ""
+    assert owner.does("list") == (
+        "drivers/puppet 1.1.0  with widgets/dial 1.1.0\n"
+        f"  ▲ drivers/puppet 1.1.0 was withdrawn: {why}\n"
+    )
+    other.does("repo", "add", lab.url)
+    told = other.refuses("install", "puppet@1.1.0", "--yes")
+    assert f"drivers/puppet 1.1.0 was withdrawn: {why}; --withdrawn takes it all the same" in told
+    assert "installed drivers/puppet 1.0.0" in other.does("install", "puppet", "--yes")
+    told = other.does("install", "puppet@1.1.0", "--yes", "--withdrawn")
+    assert f"; WITHDRAWN: {why}" in told
+    keeper.does("repo", "restore", *version)
+    assert other.does("search", "puppet") == "drivers/puppet 1.1.0  The driver puppet.\n"
+    assert "withdrawn" not in other.does("list")
 
 
 def test_what_is_wrong_is_refused_in_one_line(
@@ -168,7 +197,11 @@ def test_what_is_wrong_is_refused_in_one_line(
     assert "test 'it is heard'" in told
     assert str(lab.folder) not in told
     car = str(write_package(lab.home, "driver", "car"))
-    assert "the token 'x' may publish" in anna.refuses("publish", car, *lab.to)
+    told = anna.refuses("publish", car, *lab.to)
+    assert "warning unused-setting settings.key:" in told
+    assert "; --allow-warnings publishes it all the same" in told
+    told = anna.refuses("publish", car, *lab.to, "--allow-warnings")
+    assert "the token 'x' may publish" in told
     (lab.home / "widgets/dial/notes.txt").write_text("more")
     assert "listed with other bytes" in anna.refuses("publish", dial, *lab.to)
     (lab.home / "widgets/dial/notes.py").write_text("more")

@@ -65,6 +65,34 @@ async def test_faults_are_given_at_the_start_and_changed_by_typed_lines() -> Non
         await process.wait()
 
 
+@pytest.mark.anyio
+async def test_a_dashboard_has_faults_from_the_start_and_by_typed_lines(tmp_path: Path) -> None:
+    """`urc serve --simulate`, as `urc demo`: the robot is named, since there may be several."""
+    process = await asyncio.create_subprocess_exec(
+        *URC,
+        *("serve", PUPPET, "--simulate", "--port", "0", "--data-dir", str(tmp_path)),
+        *("--fault", "puppet:delay=400ms"),
+        cwd=ROOT,
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+    )
+    assert process.stdin is not None
+    assert process.stdout is not None
+    assert process.stderr is not None
+    try:
+        async with asyncio.timeout(WAIT_S):
+            assert (await process.stdout.readline()).startswith(b"dashboard http://")
+            process.stdin.write(b"faults\nfault tello:silent\nmend puppet\n")
+            assert await process.stdout.readline() == b"faults: delay=400ms\n"
+            error = await process.stderr.readline()
+            assert error.startswith(b"no robot 'tello' is emulated here")
+            assert await process.stdout.readline() == b"faults: none\n"
+    finally:
+        process.terminate()
+        await process.wait()
+
+
 def test_an_unknown_fault_is_wrong_use() -> None:
     """One line, before anything listens."""
     done = subprocess.run(

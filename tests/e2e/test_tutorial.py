@@ -14,8 +14,8 @@ import pytest
 from playwright.async_api import Page
 
 from tests.documentation import TUTORIAL, Block, blocks
-from tests.e2e.command_line import free_port
 from tests.e2e.conftest import PageMaker
+from tests.e2e.ports import free_port
 from tests.e2e.processes import ROOT
 
 pytestmark = pytest.mark.anyio

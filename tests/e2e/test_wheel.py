@@ -13,7 +13,7 @@ import urc
 
 ROOT = Path(__file__).resolve().parents[2]
 PIP = (sys.executable, "-m", "pip", "--disable-pip-version-check", "--quiet")
-TIMEOUT_S = 80
+TIMEOUT_S = 100
 
 
 def run(*command: str | Path, cwd: Path) -> str:

@@ -19,8 +19,9 @@ from urc.web.app import Robot, build_app, serve
 
 SEND = WriteSpec("text", {})
 LEASE_S = 0.25
-CALM_LEASE_S = 1.0
-"""For tests that are not about the lease: a browser on a busy machine pauses for some ticks."""
+CALM_LEASE_S = 120.0
+"""For tests that are not about the lease: no pause of a busy machine ends a gesture. No document
+may have one so long; see `unhurried`."""
 
 
 def number(name: str, least: float = -1.0, most: float = 1.0) -> Argument:
@@ -124,7 +125,7 @@ async def driven(
 
 
 def calmly_driven(data: Path | None = None) -> AbstractAsyncContextManager[tuple[Wire, str]]:
-    """Serve a robot as `driven` does, with the longest lease."""
+    """Serve a robot as `driven` does, for tests that are not about the lease."""
     return driven(data, Wire(lease_s=CALM_LEASE_S))
 
 
@@ -165,6 +166,13 @@ async def push(page: Page, selector: str = LEFT, right: float = 0, up: float = 6
 async def fire(page: Page, script: str) -> None:
     """Let something happen in the page."""
     await page.evaluate(script)
+
+
+async def drawn(page: Page) -> None:
+    """Wait until the page has drawn a frame that began after this."""
+    await page.evaluate(
+        "new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))"
+    )
 
 
 class Fingers:

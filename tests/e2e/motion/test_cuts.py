@@ -9,6 +9,7 @@ from urc.testing.rig_cuts import Cut, CutRig
 from urc.testing.rig_kinds import KINDS
 
 pytestmark = [
+    pytest.mark.alone,
     pytest.mark.needs("tun"),
     pytest.mark.needs("mosquitto"),
     pytest.mark.needs("sshd"),

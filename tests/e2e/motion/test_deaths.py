@@ -13,7 +13,10 @@ LANES = 20
 AT_ONCE = ("close", "kill", "reset", "kick")
 """Deaths of which the server hears; the others it learns by silence."""
 
-pytestmark = pytest.mark.skipif("sys.platform != 'linux'", reason="the rig is for Linux")
+pytestmark = [
+    pytest.mark.alone,
+    pytest.mark.skipif("sys.platform != 'linux'", reason="the rig is for Linux"),
+]
 
 
 @pytest.fixture(scope="module")

@@ -27,7 +27,10 @@ WAIT_S = 20.0
 ROOM_BYTES = 2_000_000
 MOST_BOUTS = 4
 
-pytestmark = pytest.mark.skipif("sys.platform != 'linux'", reason="the rig is for Linux")
+pytestmark = [
+    pytest.mark.alone,
+    pytest.mark.skipif("sys.platform != 'linux'", reason="the rig is for Linux"),
+]
 
 
 @pytest.fixture(scope="module")

@@ -23,6 +23,7 @@ from urc.testing.rig import Heard, Program, Robots
 
 pytestmark = [
     pytest.mark.anyio,
+    pytest.mark.alone,
     pytest.mark.skipif(sys.platform != "linux", reason="the rig is for Linux alone"),
 ]
 

@@ -12,6 +12,7 @@ from tests.e2e.browser import LOCALE, PAGE_TIMEOUT_MS, SIZES, running_browser
 from tests.e2e.conftest import PageMaker
 from tests.e2e.dashboards import until
 from tests.e2e.motion.driving import (
+    CALM_LEASE_S,
     LEASE_S,
     LEFT,
     RIGHT,
@@ -19,6 +20,7 @@ from tests.e2e.motion.driving import (
     Wire,
     calmly_driven,
     centre,
+    drawn,
     driven,
     fingers_on,
     fire,
@@ -49,14 +51,14 @@ async def stays_still(robot: Wire) -> None:
 
 async def test_a_held_stick_moves_and_letting_go_stops(new_page: PageMaker) -> None:
     """It moves as far as it is pushed, for as long as it is held; then there is silence."""
-    async with driven() as (robot, address):
+    async with calmly_driven() as (robot, address):
         page = await opened(new_page, address)
         await push(page)
         await robot.until_moving()
         assert 0 < robot.values("drive")["speed"] <= 2
         count = len(robot.line.written)
-        await asyncio.sleep(2 * LEASE_S)
-        assert len(moved(robot.after(count))) >= 5, "a hand at rest still holds"
+        # A hand at rest still holds.
+        await until(lambda: len(moved(robot.after(count))) >= 5)
         await page.mouse.up()
         await robot.until_stopped()
         await stays_still(robot)
@@ -90,7 +92,7 @@ def has_moved(robot: Wire, count: int) -> bool:
 
 async def test_a_new_gesture_moves_again_after_each_of_them(new_page: PageMaker) -> None:
     """Whoever let go without wanting to, just takes hold again."""
-    async with driven() as (robot, address):
+    async with calmly_driven() as (robot, address):
         page = await opened(new_page, address)
         for _ in range(3):
             await push(page)
@@ -105,7 +107,7 @@ async def test_a_new_gesture_moves_again_after_each_of_them(new_page: PageMaker)
 
 async def test_two_sticks_and_a_button_move_at_once_by_touch(new_page: PageMaker) -> None:
     """Three fingers: two axes of one command, and another command; each is let go by itself."""
-    async with driven() as (robot, address):
+    async with calmly_driven() as (robot, address):
         page = await opened(new_page, address, "tablet")
         hands = await fingers_on(page)
         places = [await centre(page, selector) for selector in (LEFT, RIGHT, UP)]
@@ -143,7 +145,7 @@ async def test_two_sticks_and_a_button_move_at_once_by_touch(new_page: PageMaker
 
 async def test_arrow_keys_hold_a_stick_that_has_the_focus(new_page: PageMaker) -> None:
     """Pressed it runs, let go it stops; a key that repeats is one press."""
-    async with driven() as (robot, address):
+    async with calmly_driven() as (robot, address):
         page = await opened(new_page, address)
         await page.focus(LEFT)
         await page.keyboard.down("ArrowUp")
@@ -172,10 +174,8 @@ async def test_a_gamepad_moves_only_while_its_shoulder_button_is_held(
 ) -> None:
     """Pressed with the stick at rest, it holds; off its centre the press does not count."""
     use = Wire().profile.slots["left"]
-    async with driven(robot=Wire(use._replace(options={**use.options, "pad": "left"}))) as (
-        robot,
-        address,
-    ):
+    use = use._replace(options={**use.options, "pad": "left"})
+    async with driven(robot=Wire(use, lease_s=CALM_LEASE_S)) as (robot, address):
         page = await opened(new_page, address)
         await fire(page, PAD + "window.pad.axes[1] = -0.5;")
         await stays_still(robot)
@@ -184,7 +184,7 @@ async def test_a_gamepad_moves_only_while_its_shoulder_button_is_held(
         await fire(page, "window.pad.axes[1] = 0")
         await stays_still(robot)
         await fire(page, "window.pad.buttons[4].pressed = false")
-        await asyncio.sleep(0.1)
+        await drawn(page)  # once in each frame it is looked at
         await fire(page, "window.pad.buttons[4].pressed = true")
         await until(lambda: robot.values("drive") == {"speed": 0, "turn": 0})
         await fire(page, "window.pad.axes[1] = -0.5")
@@ -291,7 +291,7 @@ async def test_a_renderer_that_stands_still_stops_within_the_lease() -> None:
 
 async def test_ticks_are_skipped_while_the_socket_is_full(new_page: PageMaker) -> None:
     """What would wait behind other bytes is not sent at all; the newest goes when it is free."""
-    async with driven() as (robot, address):
+    async with calmly_driven() as (robot, address):
         page = await opened(new_page, address)
         await fire(
             page,

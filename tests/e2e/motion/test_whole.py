@@ -15,6 +15,7 @@ from playwright.async_api import Page
 from tests.e2e.conftest import PageMaker
 from tests.e2e.dashboards import until, until_text
 from tests.e2e.motion.driving import STOP, fresh, push
+from tests.e2e.ports import free_port
 from tests.e2e.processes import UrcProcess
 
 pytestmark = pytest.mark.anyio
@@ -54,7 +55,7 @@ class Rover:
         self.lines: list[str] = []
         self._writers: set[asyncio.StreamWriter] = set()
         self._server: asyncio.Server | None = None
-        self._port = 0
+        self._port = free_port()
 
     async def talk(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         """Serve one connection."""
@@ -68,15 +69,10 @@ class Rover:
             self._writers.discard(writer)
             writer.close()
 
-    async def come(self, port: int = 0) -> int:
-        """Listen; return the port."""
-        self._server = await asyncio.start_server(self.talk, "127.0.0.1", port)
-        self._port = int(self._server.sockets[0].getsockname()[1])
+    async def come(self) -> int:
+        """Listen, each time on the same port; return it."""
+        self._server = await asyncio.start_server(self.talk, "127.0.0.1", self._port)
         return self._port
-
-    async def come_back(self) -> None:
-        """Listen where it did before."""
-        await self.come(self._port)
 
     async def leave(self) -> None:
         """Hang up, and listen no more."""
@@ -232,7 +228,7 @@ async def test_a_stop_while_the_robot_is_away_is_the_first_thing_that_it_hears(
         await page.click(STOP)
         await until_text(page, "[data-stop-note]", "▲ NO LINK, latched")
         assert robot.lines == []
-        await robot.come_back()
+        await robot.come()
         await until_text(page, "[data-stop-note]", "✓ sent ✓ confirmed ✓ latched")
         await until(lambda: bool(robot.lines))
         assert robot.lines == [STOPPED]

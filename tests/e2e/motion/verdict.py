@@ -5,7 +5,7 @@ from typing import Protocol
 
 __all__ = ["MOST_EXCUSED", "judged"]
 
-MOST_EXCUSED = 2.0
+MOST_EXCUSED = 4.0
 """Trials that may say nothing because this machine itself was late, for each that is wanted; they
 are not counted as good, and tried again."""
 

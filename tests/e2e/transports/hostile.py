@@ -1,6 +1,7 @@
 """Servers that lie, flood and drip: the far end of a line as an attacker would make it."""
 
 import asyncio
+import socket
 import tracemalloc
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
 from contextlib import asynccontextmanager, contextmanager, suppress
@@ -18,8 +19,12 @@ Talk = Callable[[asyncio.StreamReader, asyncio.StreamWriter], Awaitable[None]]
 
 
 @asynccontextmanager
-async def liar(talk: Talk) -> AsyncIterator[int]:
-    """Run a server that treats each client with `talk`; give its port."""
+async def liar(talk: Talk, *, window: int | None = None) -> AsyncIterator[int]:
+    """Run a server that treats each client with `talk`; give its port.
+
+    `window`: bytes that the system holds in either direction, about. By default it is megabytes,
+    which cost a client a long time to fill, or to go over, in small packets.
+    """
     tasks: set[asyncio.Task[None]] = set()
 
     async def meet(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
@@ -33,7 +38,11 @@ async def liar(talk: Talk) -> AsyncIterator[int]:
             tasks.discard(task)
             writer.transport.abort()
 
-    server = await asyncio.start_server(meet, "127.0.0.1", 0)
+    listener = socket.create_server(("127.0.0.1", 0))
+    if window is not None:
+        listener.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, window)
+        listener.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, window)
+    server = await asyncio.start_server(meet, sock=listener)
     try:
         yield server.sockets[0].getsockname()[1]
     finally:

@@ -11,7 +11,7 @@ from contextlib import asynccontextmanager
 
 __all__ = ["nothing_left"]
 
-SETTLED_WITHIN_S = 5.0
+SETTLED_WITHIN_S = 20.0
 """The other side of a socket in this process, and a thread that was told to end, take a moment."""
 
 

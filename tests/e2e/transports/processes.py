@@ -3,23 +3,15 @@
 import asyncio
 import os
 import signal
-import socket
 import subprocess
 import time
 from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 
-__all__ = ["Server", "free_port"]
+__all__ = ["Server"]
 
-READY_WITHIN_S = 10.0
-
-
-def free_port() -> int:
-    """Return a port of loopback on which nobody listens."""
-    with socket.socket() as one:
-        one.bind(("127.0.0.1", 0))
-        return int(one.getsockname()[1])
+READY_WITHIN_S = 30.0
 
 
 class Server:
@@ -57,11 +49,19 @@ class Server:
             return subprocess.Popen(self._command, stdin=subprocess.DEVNULL, stdout=log, stderr=log)
 
     def kill(self) -> None:
-        """End it and all that it has started, without a word."""
-        self.signal(signal.SIGKILL)
-        if self._process is not None:
-            self._process.wait(timeout=READY_WITHIN_S)
-            self._process = None
+        """End it and all that it has started, without a word; nobody listens any more then."""
+        if self._process is None:
+            return
+        process, self._process = self._process, None
+        pids = family(process.pid)
+        for pid in pids:
+            with suppress(ProcessLookupError):
+                os.kill(pid, signal.SIGKILL)
+        process.wait(timeout=READY_WITHIN_S)
+        until = time.monotonic() + READY_WITHIN_S
+        while any(map(_is_alive, pids)):
+            assert time.monotonic() < until, f"one of {pids} outlives its end"
+            time.sleep(0.005)
 
     def stop(self) -> None:
         """Freeze it with all that it has started: connections stay, nobody answers."""
@@ -74,6 +74,15 @@ class Server:
         for pid in family(self._process.pid):
             with suppress(ProcessLookupError):
                 os.kill(pid, number)
+
+
+def _is_alive(pid: int) -> bool:
+    """Return whether a process runs; one that is dead and not yet buried has closed all it had."""
+    try:
+        state = Path(f"/proc/{pid}/stat").read_text("utf-8").rpartition(")")[2].split()[0]
+    except (FileNotFoundError, ProcessLookupError):
+        return False
+    return state not in "ZX"
 
 
 def family(pid: int) -> list[int]:

@@ -14,7 +14,7 @@ from urc.transports.ssh import SshTransport, from_setup
 
 __all__ = ["OPEN_S", "end_of", "hears", "line_to", "public_folder", "refusal"]
 
-OPEN_S = 10.0
+OPEN_S = 20.0
 
 
 def public_folder(factory: pytest.TempPathFactory) -> Path:

@@ -9,7 +9,8 @@ import shutil
 import subprocess
 from pathlib import Path
 
-from tests.e2e.transports.processes import Server, free_port
+from tests.e2e.ports import free_port
+from tests.e2e.transports.processes import Server
 
 __all__ = ["PASSWORD", "USER", "Sshd"]
 

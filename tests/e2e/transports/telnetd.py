@@ -3,7 +3,8 @@
 import shutil
 from pathlib import Path
 
-from tests.e2e.transports.processes import Server, free_port
+from tests.e2e.ports import free_port
+from tests.e2e.transports.processes import Server
 
 __all__ = ["ROBOT", "Telnetd"]
 

@@ -27,7 +27,7 @@ pytestmark = [
     pytest.mark.needs("socat"),
 ]
 
-WAIT_S = 20.0
+WAIT_S = 40.0
 
 PROFILE = r"""
 urc: 1
@@ -60,9 +60,9 @@ transports:
     framing: { type: delimiter, tx: CR, rx: CRLF }
     reconnect: { initial: 100ms, max: 500ms }
     on_connect:
-      - { expect: '^robot ready$', timeout: 5s }
+      - { expect: '^robot ready$', timeout: 20s }
       - { send: hello }
-      - { expect: '^(> )*heard hello$' }
+      - { expect: '^(> )*heard hello$', timeout: 20s }
 
 signals:
   battery: { type: integer, unit: "%", min: 0, max: 100 }
@@ -71,15 +71,15 @@ polls:
   - every: 200ms
     to: console
     send: battery
-    reply: { regex: '^(> )*battery (?P<battery>\d+)$' }
+    reply: { regex: '^(> )*battery (?P<battery>\d+)$', timeout: 20s }
 
 commands:
   say:
     to: console
     args: { word: { type: string } }
     send: "say-{{ word }}"
-    reply: { regex: '^(> )*heard say-(?P<_word>\S+)$' }
-  wave: { to: console, send: wave, reply: { regex: '^(> )*heard wave$' } }
+    reply: { regex: '^(> )*heard say-(?P<_word>\S+)$', timeout: 20s }
+  wave: { to: console, send: wave, reply: { regex: '^(> )*heard wave$', timeout: 20s } }
 
 widgets:
   battery: { use: battery, bind: { level: battery } }

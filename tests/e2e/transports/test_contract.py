@@ -37,10 +37,12 @@ PEERS = {
 }
 """Kind of transport (a variant after a space) → class of its `Peer`."""
 
-OPEN_S = 3.0
-LATE_S = 1.0
+OPEN_S = 15.0
+REFUSED_S = 2.0
+"""Where a robot is waited for, it costs this time until it is known not to be there."""
+LATE_S = 10.0
 """What a transport may take beyond its time, on a busy machine."""
-VANISHED_WITHIN_S = 20.0
+VANISHED_WITHIN_S = 40.0
 """When a robot that is sent to and gone without a word must be known to be gone."""
 MEMORY_LIMIT = 8 * 1024 * 1024
 """Bytes that a flood, or a robot that takes nothing, may make Python allocate, both sides."""
@@ -193,7 +195,7 @@ async def test_robot_that_is_not_there_is_told_by_opening(kind: str) -> None:
     async with robot(kind, "refuses") as (_, transport):
         for _ in range(2):
             with pytest.raises(ConnectFailed) as told:
-                await within(OPEN_S + LATE_S, transport.open(OPEN_S))
+                await within(REFUSED_S + LATE_S, transport.open(REFUSED_S))
             clear(told.value)
 
 

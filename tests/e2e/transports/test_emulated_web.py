@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from scripts.node import node_executable
+from tests.e2e.ports import free_port
 from tests.e2e.transports.leaks import nothing_left
-from tests.e2e.transports.programs import free_port
 from urc.runtime.scripting import CommandFailed, ConnectedRobot, connect, load
 from urc.simulator.server import serve
 

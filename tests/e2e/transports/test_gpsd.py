@@ -10,7 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.e2e.transports.programs import free_port, listens, program
+from tests.e2e.ports import free_port
+from tests.e2e.transports.programs import listens, program
 from urc.runtime.scripting import connect
 
 pytestmark = [pytest.mark.anyio, pytest.mark.needs("gpsd")]
@@ -74,7 +75,7 @@ async def receiver(port: int) -> None:
 
 async def test_gps_service_tells_where_we_are(tmp_path: Path) -> None:
     """The stream begins when it is asked for, and other classes of messages are left alone."""
-    port, feed = free_port(), free_port(socket.SOCK_DGRAM)
+    port, feed = free_port(), free_port()
     profile = tmp_path / "gps.yaml"
     profile.write_text(PROFILE)
     gpsd = shutil.which("gpsd") or "/usr/sbin/gpsd"

@@ -10,7 +10,7 @@ import pytest
 from tests.e2e.transports.hostile import WAIT_S, Talk, bounded, ended, liar, turn_deaf, until
 from tests.e2e.transports.leaks import nothing_left
 from urc.transports.base import ConnectFailed, Setup, Subscription, Transport
-from urc.transports.mqtt_options import from_setup
+from urc.transports.mqtt import from_setup
 
 pytestmark = pytest.mark.anyio
 
@@ -47,13 +47,13 @@ def broker(then: Talk) -> Talk:
 
 
 @asynccontextmanager
-async def line(port: int) -> AsyncIterator[Transport]:
+async def line(port: int, within_s: float = 20.0) -> AsyncIterator[Transport]:
     """Open a line, and see to it that nothing of it is left."""
     async with nothing_left():
         options = {"host": "127.0.0.1", "port": port, "version": "3.1.1"}
         transport = from_setup(Setup("wire", options, (Subscription("cells/+", {}),)))
         try:
-            await transport.open(3.0)
+            await transport.open(within_s)
             yield transport
         finally:
             await transport.close()
@@ -64,6 +64,13 @@ async def ended_untaken(transport: Transport) -> str:
     """Wait for the end of the line, without taking anything before; return why."""
     await until(lambda: transport._session.inbox.ended)  # type: ignore[attr-defined]
     return await ended(transport)
+
+
+async def pong(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+    """Say that the broker is there whenever it is asked, until the client has gone."""
+    while data := await reader.read(1000):
+        if b"\xc0\x00" in data:
+            writer.write(b"\xd0\x00")
 
 
 async def flood(writer: asyncio.StreamWriter, piece: bytes) -> None:
@@ -92,7 +99,7 @@ async def test_acknowledgements_that_nobody_takes_end_the_line() -> None:
         turn_deaf(writer)
         await flood(writer, published(b"c", b"", qos=1) * 10_000)
 
-    async with liar(broker(talk)) as port, line(port) as transport:
+    async with liar(broker(talk), window=4096) as port, line(port) as transport:
         with bounded(30_000_000):
             assert "acknowledgements" in await ended_untaken(transport)
 
@@ -102,11 +109,12 @@ async def test_long_names_of_topics_are_counted() -> None:
     sent = asyncio.Event()
 
     async def talk(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        answering = asyncio.create_task(pong(reader, writer))
         for number in range(3000):
             writer.write(published(b"%05d" % number + b"x" * 60_000, b""))
             await writer.drain()
         sent.set()
-        await reader.read()
+        await answering
 
     async with liar(broker(talk)) as port, line(port) as transport:
         with bounded(60_000_000):
@@ -148,5 +156,5 @@ async def test_broker_that_grants_nothing_and_talks_is_given_up() -> None:
 
     async with liar(talk) as port:
         with bounded(30_000_000), pytest.raises(ConnectFailed):
-            async with line(port):
+            async with line(port, within_s=2.0):
                 pass

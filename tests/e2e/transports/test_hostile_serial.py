@@ -26,7 +26,7 @@ async def refusal(said: bytes, *, is_deaf: bool, most_bytes: int) -> str:
             if not is_deaf and listening.done():
                 return
 
-    async with liar(talk) as port, nothing_left():
+    async with liar(talk, window=16384) as port, nothing_left():
         transport = from_setup(Setup("wire", {"port": f"rfc2217://127.0.0.1:{port}"}))
         with bounded(most_bytes), pytest.raises(ConnectFailed) as raised:
             await transport.open(1.0)

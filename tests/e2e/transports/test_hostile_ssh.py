@@ -60,7 +60,7 @@ async def line(port: int, **options: object) -> AsyncIterator[Transport]:
     given = {"host": "127.0.0.1", "port": port, "username": "me", "host_key": key, "pty": False}
     transport = from_setup(Setup("jump", given | options))
     try:
-        await transport.open(5.0)
+        await transport.open(20.0)
         yield transport
     finally:
         await transport.close()
@@ -155,7 +155,7 @@ async def test_options_without_end_and_no_ear_fill_nothing(storm: bytes) -> None
 
     async with liar(talk) as port, nothing_left():
         transport = telnet_from_setup(Setup("wire", {"host": "127.0.0.1", "port": port}))
-        await transport.open(3.0)
+        await transport.open(20.0)
         with bounded(20_000_000), suppress(TimeoutError, PeerClosed):
             async with asyncio.timeout(1.5):
                 await transport.receive()

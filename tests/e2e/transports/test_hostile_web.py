@@ -48,7 +48,7 @@ async def line(
     async with nothing_left():
         transport = factory(Setup("robot", {"url": url, **options}, subscriptions))
         try:
-            await transport.open(3.0)
+            await transport.open(20.0)
             yield transport
         finally:
             await transport.close()
@@ -319,5 +319,5 @@ async def test_refusal_is_told_in_one_line(reason: bytes, told: str) -> None:
     async with liar(talk) as port:
         transport = websocket.from_setup(Setup("robot", {"url": f"ws://127.0.0.1:{port}/"}))
         with pytest.raises(TransportError, match=told) as raised:
-            await transport.open(3.0)
+            await transport.open(20.0)
         assert str(raised.value).isprintable()

@@ -8,9 +8,10 @@ from pathlib import Path
 
 import pytest
 
+from tests.e2e.ports import free_port
 from tests.e2e.transports.authority import Authority
 from tests.e2e.transports.leaks import nothing_left
-from tests.e2e.transports.programs import free_port, listens, program
+from tests.e2e.transports.programs import listens, program
 from urc.config.load import load_profile
 from urc.model.codec import Envelope
 from urc.problems import UrcError
@@ -18,8 +19,8 @@ from urc.runtime.catalog import built_in_catalog
 from urc.runtime.session import Session
 from urc.simulator.server import serve as serve_robot
 from urc.transports.base import ConnectFailed, PeerClosed, Setup, Subscription, TransportError
-from urc.transports.mqtt import MqttTransport
-from urc.transports.mqtt_options import from_setup
+from urc.transports.mqtt import from_setup
+from urc.transports.mqtt_client import MqttTransport
 
 pytestmark = [
     pytest.mark.anyio,
@@ -27,7 +28,7 @@ pytestmark = [
     pytest.mark.needs("mosquitto-clients"),
 ]
 
-WAIT_S = 10.0
+WAIT_S = 20.0
 READY = "ears/ready"
 VERSIONS = pytest.mark.parametrize("version", [5, "3.1.1"])
 LAMP = """
@@ -141,7 +142,7 @@ async def test_other_clients_hear_and_are_heard(tmp_path: Path, version: object)
         await publish(port, "cells/1/volts", "3.7", "-r")
         topics = (Subscription("cells/+/volts", {"qos": 1}), Subscription("log/#"))
         transport = line(port, *topics, version=version)
-        await transport.open(3.0)
+        await transport.open(20.0)
         kept = await heard(transport)
         assert kept.attributes["topic"] == "cells/1/volts"
         assert (kept.attributes["retain"], kept.body) == (True, b"3.7")
@@ -166,7 +167,7 @@ async def test_broker_publishes_the_will_however_the_line_ends(
     async with nothing_left(), broker(tmp_path) as port, ears(port, "rover/stop") as reader:
         will = {"topic": "rover/stop", "payload": "halt"}
         transport = line(port, version=version, will=will)
-        await transport.open(3.0)
+        await transport.open(20.0)
         if end == "cut":
             assert transport._session is not None
             transport._session.line.shutdown(2)
@@ -181,7 +182,7 @@ async def test_nothing_is_said_late(tmp_path: Path, version: object) -> None:
     async with nothing_left():
         transport = line(port, version=version)
         async with broker(tmp_path, port=port):
-            await transport.open(3.0)
+            await transport.open(20.0)
             await transport.send(said("drive", b"1", qos=1))
         with pytest.raises(PeerClosed):
             await heard(transport)
@@ -191,7 +192,7 @@ async def test_nothing_is_said_late(tmp_path: Path, version: object) -> None:
         with pytest.raises(ConnectFailed, match="nothing listens"):
             await transport.open(1.0)
         async with broker(tmp_path, port=port), ears(port, "#") as reader:
-            await transport.open(3.0)
+            await transport.open(20.0)
             await transport.send(said("drive", b"stop", qos=1))
             assert await reader.next() == "drive stop"
             await transport.close()
@@ -201,7 +202,7 @@ async def test_late_subscriber_sees_nothing_of_what_was_driven(tmp_path: Path) -
     """Nothing is kept by the broker unless the document says retain."""
     async with nothing_left(), broker(tmp_path) as port:
         transport = line(port)
-        await transport.open(3.0)
+        await transport.open(20.0)
         await transport.send(said("drive", b"1"))
         await transport.send(said("state", b"on", retain=True))
         async with ears(port, "drive", "state") as reader:
@@ -221,10 +222,10 @@ async def test_broker_that_refuses_says_why(tmp_path: Path, version: object) -> 
     async with nothing_left(), broker(tmp_path, f"password_file {passwords}") as port:
         transport = line(port, version=version, username="lab", password="wrong")  # noqa: S106
         with pytest.raises(ConnectFailed) as told:
-            await transport.open(3.0)
+            await transport.open(20.0)
         assert str(told.value) == (f"127.0.0.1:{port} refuses the connection (not authorized)")
         transport = line(port, version=version, username="lab", password="secret")  # noqa: S106
-        await transport.open(3.0)
+        await transport.open(20.0)
         await transport.close()
 
 
@@ -235,12 +236,12 @@ async def test_line_with_tls_talks_to_a_broker_that_it_trusts_alone(tmp_path: Pa
     settings = ("allow_anonymous true", f"certfile {own.cert}", f"keyfile {own.key}")
     async with nothing_left(), broker(tmp_path, *settings) as port:
         transport = line(port, Subscription("state"), tls={"ca": authority.file})
-        await transport.open(3.0)
+        await transport.open(20.0)
         await transport.send(said("state", b"on" * 50_000))
         assert (await heard(transport)).body == b"on" * 50_000
         await transport.close()
         with pytest.raises(ConnectFailed) as told:
-            await line(port, tls=True).open(3.0)
+            await line(port, tls=True).open(20.0)
         assert "certificate" in str(told.value)
 
 

@@ -14,8 +14,9 @@ import pytest
 from websockets.asyncio.client import connect
 from websockets.asyncio.server import ServerConnection, serve
 
+from tests.e2e.ports import free_port
 from tests.e2e.transports.leaks import nothing_left
-from tests.e2e.transports.programs import free_port, listens, program
+from tests.e2e.transports.programs import listens, program
 from urc.config.load import load_profile
 from urc.model.codec import Envelope
 from urc.model.profile import Profile
@@ -27,7 +28,7 @@ from urc.transports.rosbridge import from_setup
 
 pytestmark = pytest.mark.anyio
 
-WAIT_S = 10.0
+WAIT_S = 20.0
 CLIENTS = Path(__file__).parent / "clients"
 ROVER = """
 urc: 1
@@ -128,7 +129,7 @@ async def test_line_subscribes_each_topic_once_and_asks_which_there_are() -> Non
     )
     async with nothing_left(), bridge() as robot:
         transport = line(robot.port, *topics, ros=2)
-        await transport.open(3.0)
+        await transport.open(20.0)
         asked, imu, camera = await robot.hears(3)
         assert asked["service"] == "/rosapi/topics"
         assert imu["type"] == "sensor_msgs/msg/Imu"
@@ -142,7 +143,7 @@ async def test_topic_is_advertised_once_a_connection_and_nothing_is_said_late() 
     twist = Envelope("publish", {"topic": "/cmd_vel", "type": "geometry_msgs/Twist"}, {"x": 1})
     async with nothing_left(), bridge() as robot:
         transport = line(robot.port)
-        await transport.open(3.0)
+        await transport.open(20.0)
         for _ in range(2):
             await transport.send(twist)
         assert [one["op"] for one in await robot.hears(3)] == ["advertise", "publish", "publish"]
@@ -153,7 +154,7 @@ async def test_topic_is_advertised_once_a_connection_and_nothing_is_said_late() 
             with pytest.raises(TransportError):
                 await transport.send(twist)
         robot.said.clear()
-        await transport.open(3.0)
+        await transport.open(20.0)
         await transport.send(Envelope("call", {"service": "/last", "id": 1}))
         assert [one["op"] for one in await robot.hears(1)] == ["call_service"]
         await transport.close()
@@ -163,7 +164,7 @@ async def test_answers_find_their_questions(caplog: pytest.LogCaptureFixture) ->
     """Calls by their id, with why not; goals with feedback; nonsense is counted and survived."""
     async with nothing_left(), bridge() as robot:
         transport = line(robot.port)
-        await transport.open(3.0)
+        await transport.open(20.0)
         await transport.send(Envelope("call", {"service": "/a", "id": 5}, {"x": float("nan")}))
         await transport.send(Envelope("call", {"service": "/b", "id": 6}, {}))
         first, second = await robot.hears(2)
@@ -207,7 +208,7 @@ async def test_topics_that_nobody_publishes_are_told_once(
     async with nothing_left(), bridge() as robot:
         transport = line(robot.port, Subscription("/odom"), Subscription("/lidar"))
         for count in (3, 6):
-            await transport.open(3.0)
+            await transport.open(20.0)
             asked = (await robot.hears(count))[-3]
             values = {"topics": ["/odom"], "types": ["nav_msgs/Odometry"]}
             await robot.say({"op": "service_response", "id": asked["id"], "values": values})
@@ -222,7 +223,7 @@ async def test_slow_taker_gets_the_newest() -> None:
     """The bridge is never held up; of one topic the oldest go, of the other none."""
     async with nothing_left(), bridge() as robot:
         transport = line(robot.port, Subscription("/fast"), Subscription("/rare"))
-        await transport.open(3.0)
+        await transport.open(20.0)
         await robot.hears(3)
         await robot.say({"op": "publish", "topic": "/rare", "msg": {"n": -1}})
         for number in range(2000):
@@ -306,7 +307,7 @@ async def test_twist_reaches_a_real_ros_master_and_odometry_comes_back(
                 )
                 topics = (Subscription("/odom", {"type": "nav_msgs/Odometry"}),)
                 transport = line(bridge_port, *topics)
-                await transport.open(3.0)
+                await transport.open(20.0)
                 twist = {"linear": {"x": 0.25}, "angular": {"z": -0.5}}
                 kind = "geometry_msgs/Twist"
                 await transport.send(

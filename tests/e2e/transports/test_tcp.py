@@ -8,10 +8,11 @@ from pathlib import Path
 
 import pytest
 
+from tests.e2e.ports import free_port
 from tests.e2e.transports.authority import Authority, Pair
 from tests.e2e.transports.leaks import nothing_left
 from tests.e2e.transports.packets import Loss
-from tests.e2e.transports.programs import free_port, listens, program
+from tests.e2e.transports.programs import listens, program
 from urc.runtime.catalog import built_in_catalog
 from urc.runtime.session import Session
 from urc.simulator.stand_in import stand_in
@@ -22,7 +23,7 @@ from urc.transports.tcp import TcpTransport, from_setup
 
 pytestmark = [pytest.mark.anyio, pytest.mark.needs("socat")]
 
-WAIT_S = 10.0
+WAIT_S = 20.0
 
 
 @pytest.fixture
@@ -60,13 +61,13 @@ async def says_back(transport: TcpTransport | TcpListener, data: bytes) -> None:
 
 async def hears_something(transport: TcpTransport | TcpListener) -> None:
     """Open and receive: with TLS 1.3 the other side refuses after the handshake."""
-    await transport.open(5.0)
+    await transport.open(20.0)
     await asyncio.wait_for(transport.receive(), WAIT_S)
 
 
 async def refusal(transport: TcpTransport) -> str:
     with pytest.raises(ConnectFailed) as told:
-        await transport.open(5.0)
+        await transport.open(20.0)
     return str(told.value)
 
 
@@ -75,7 +76,7 @@ async def test_line_is_encrypted(authority: Authority) -> None:
     async with secret_echo(authority.sign("127.0.0.1")) as port, nothing_left():
         transport = line(port, {"ca": authority.file})
         for _ in range(2):
-            await transport.open(5.0)
+            await transport.open(20.0)
             await says_back(transport, b"Give me the battery %\n")
             await says_back(transport, bytes(range(256)) * 4096)
             await transport.close()
@@ -89,7 +90,7 @@ async def test_certificate_of_an_unknown_authority_is_refused(authority: Authori
         other = Authority(Path(authority.file).parent)
         assert await refusal(line(port, {"ca": other.file})) == told
         transport = line(port, {"verify": False})
-        await transport.open(5.0)
+        await transport.open(20.0)
         await says_back(transport, b"hello")
         await transport.close()
 
@@ -108,7 +109,7 @@ async def test_certificate_must_be_for_the_name(authority: Authority) -> None:
         place = f"127.0.0.1:{port}"
         assert told == f"the certificate of {place} is not for '127.0.0.1'; see tls.server_name"
         transport = line(port, {"ca": authority.file, "server_name": "arm-7.lab.example"})
-        await transport.open(5.0)
+        await transport.open(20.0)
         await says_back(transport, b"hello")
         await transport.close()
 
@@ -141,7 +142,7 @@ async def test_robot_may_ask_for_our_certificate(authority: Authority) -> None:
     async with secret_echo(authority.sign("127.0.0.1"), more) as port:
         key = Path(own.key).read_text("ascii")
         transport = line(port, {"ca": authority.file, "cert": own.cert, "key": key})
-        await transport.open(5.0)
+        await transport.open(20.0)
         await says_back(transport, b"hello")
         await transport.close()
         bare = line(port, {"ca": authority.file})
@@ -184,7 +185,7 @@ async def test_robot_connects_to_us() -> None:
         expected = f"no robot has connected to 127.0.0.1:{transport.port} within 0.2 s"
         assert str(told.value) == expected
         async with program("socat", f"TCP:127.0.0.1:{transport.port}", "PIPE"):
-            await transport.open(5.0)
+            await transport.open(20.0)
             await says_back(transport, b"hello")
             await transport.close()
 
@@ -196,13 +197,13 @@ async def test_newer_robot_takes_the_place_of_the_older() -> None:
         with pytest.raises(ConnectFailed):
             await transport.open(0.05)
         _, older = await asyncio.open_connection("127.0.0.1", transport.port)
-        await transport.open(5.0)
+        await transport.open(20.0)
         reader, newer = await asyncio.open_connection("127.0.0.1", transport.port)
         with pytest.raises(PeerClosed) as told:
             await asyncio.wait_for(transport.receive(), WAIT_S)
         assert str(told.value).startswith("another robot took its place (127.0.0.1:")
         await transport.close()
-        await transport.open(5.0)
+        await transport.open(20.0)
         newer.write(b"it is me")
         assert await asyncio.wait_for(transport.receive(), WAIT_S) == b"it is me"
         await transport.send(b"welcome")
@@ -222,7 +223,7 @@ async def test_only_the_robots_host_is_let_in() -> None:
         await transport.open(0.3)
     assert await asyncio.wait_for(stranger[0].read(1), WAIT_S) == b""
     robot = await asyncio.open_connection("127.0.0.1", transport.port, local_addr=("127.0.0.2", 0))
-    await transport.open(5.0)
+    await transport.open(20.0)
     await transport.close()
     for _, writer in (stranger, robot):
         writer.close()
@@ -265,7 +266,7 @@ async def test_robot_connects_to_us_with_tls(authority: Authority) -> None:
     transport = listener(tls={"cert": own.cert, "key": own.key, "ca": authority.file})
     where = f"OPENSSL:127.0.0.1:{transport.port},cafile={authority.file},retry=20,interval=0.1"
     async with program("socat", f"{where},cert={robots.cert},key={robots.key}", "PIPE"):
-        await transport.open(5.0)
+        await transport.open(20.0)
         await says_back(transport, b"hello")
         await transport.close()
     stranger = f"OPENSSL:127.0.0.1:{transport.port},verify=0,retry=20,interval=0.1"
@@ -295,7 +296,7 @@ async def test_unsent_bytes_are_counted_and_can_be_forgotten() -> None:
         robot.bind(("127.0.0.1", 0))
         robot.listen()
         transport = TcpTransport("127.0.0.1", robot.getsockname()[1])
-        await transport.open(5.0)
+        await transport.open(20.0)
         assert transport.unsent() == 0
         connection, _ = robot.accept()
         with connection:
@@ -317,11 +318,11 @@ async def test_quiet_line_that_is_cut_is_told() -> None:
     async with program("socat", f"TCP-LISTEN:{port},bind=127.0.0.1", "PIPE"):
         await listens(port)
         transport = TcpTransport("127.0.0.1", port)
-        await transport.open(5.0)
+        await transport.open(20.0)
         try:
             await loss.begin()
             with pytest.raises(PeerClosed) as told:
-                await asyncio.wait_for(transport.receive(), 13.0)
+                await asyncio.wait_for(transport.receive(), 2 * WAIT_S)
             assert str(told.value) == "the line broke (connection timed out)"
         finally:
             await loss.end()
@@ -353,7 +354,7 @@ async def test_line_goes_through_another_transport(authority: Authority) -> None
         options = {"host": "arm.inside", "port": 443, "tls": {"ca": authority.file}}
         transport = from_setup(Setup("wire", options, via=relay))
         assert isinstance(transport, TcpTransport)
-        await transport.open(5.0)
+        await transport.open(20.0)
         assert relay.asked == [("arm.inside", 443)]
         await says_back(transport, b"hello")
         await transport.close()

@@ -15,7 +15,7 @@ from urc.transports.telnet import from_setup
 
 pytestmark = pytest.mark.anyio
 
-WAIT_S = 10.0
+WAIT_S = 20.0
 
 
 @pytest.fixture

@@ -62,13 +62,22 @@ async def test_what_a_robot_does_not_take_is_unsent(kind: str) -> None:
     async with robot(kind, "deaf") as (peer, transport):
         await transport.open(OPEN_S)
 
+        sent = 0
+
         async def fill() -> None:
+            nonlocal sent
             while True:
                 await transport.send(large(peer.ask))
+                sent += 1
                 await asyncio.sleep(0)
 
         filling = asyncio.ensure_future(fill())
-        await asyncio.wait([filling], timeout=1.0)
+        before, same = 0, 0
+        async with asyncio.timeout(WAIT_S):
+            while same < 5 and not filling.done():  # nothing goes in several turns of the loop
+                same = same + 1 if sent == before and unsent_of(transport) else 0
+                before = sent
+                await asyncio.sleep(0.1)
         filling.cancel()
         await asyncio.gather(filling, return_exceptions=True)
         assert unsent_of(transport) > 0

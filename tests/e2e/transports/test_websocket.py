@@ -6,14 +6,15 @@ from contextlib import asynccontextmanager
 
 import pytest
 
+from tests.e2e.ports import free_port
 from tests.e2e.transports.certificates import Authority
 from tests.e2e.transports.detour import Detour
 from tests.e2e.transports.leaks import nothing_left
-from tests.e2e.transports.programs import free_port, listens, program
+from tests.e2e.transports.programs import listens, program
 from urc.transports.base import ConnectFailed, PeerClosed, Setup, Transport, TransportError
 from urc.transports.websocket import from_setup
 
-WAIT_S = 10.0
+WAIT_S = 20.0
 
 pytestmark = [pytest.mark.anyio, pytest.mark.needs("websocketd")]
 
@@ -35,7 +36,7 @@ async def line(port: int, scheme: str = "ws", **options: object) -> AsyncIterato
     async with nothing_left():
         transport = from_setup(Setup("socket", options))
         try:
-            await transport.open(3.0)
+            await transport.open(20.0)
             yield transport
         finally:
             await transport.close()
@@ -168,7 +169,7 @@ async def test_line_through_another_transport() -> None:
         url = "ws://robot.inside:8765/robot"
         transport = from_setup(Setup("socket", {"url": url}, via=Detour(port)))
         for _ in range(2):
-            await transport.open(3.0)
+            await transport.open(20.0)
             for _ in range(3):
                 await transport.send(b"x" * 10_000)
                 assert await received(transport) == b"x" * 10_000

@@ -4,7 +4,8 @@ import shutil
 from hashlib import md5
 from pathlib import Path
 
-from tests.e2e.transports.processes import Server, free_port
+from tests.e2e.ports import free_port
+from tests.e2e.transports.processes import Server
 
 __all__ = ["camera", "lighttpd"]
 

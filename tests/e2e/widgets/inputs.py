@@ -42,13 +42,17 @@ def use(widget: str, command: str = "go", **options: Any) -> WidgetUse:
 
 @asynccontextmanager
 async def shown(
-    new_page: PageMaker, *uses: WidgetUse, size: str = "desktop", **commands: Command
+    new_page: PageMaker,
+    *uses: WidgetUse,
+    size: str = "desktop",
+    host: str = "127.0.0.1",
+    **commands: Command,
 ) -> AsyncIterator[tuple[Inputs, Page]]:
     """Show widgets on a page of their own, ready to drive."""
     robot = Inputs(*uses, **commands)
     async with driven(robot=robot) as (_, address):
         page = await fresh(new_page, size)
-        await page.goto(address)
+        await page.goto(address.replace("127.0.0.1", host))
         await page.wait_for_function(
             "() => document.querySelector('[data-who]')?.textContent.match(/drive/)"
             " && [...document.querySelectorAll('.urc-cell [data-phase]')]"

@@ -25,6 +25,7 @@ transports:
     host: 127.0.0.1
     port: PORT
     framing: { type: delimiter, tx: LF, rx: LF }
+    timeouts: { reply: 20s }
 signals:
   lamp: { type: boolean }
   mode: { type: string }

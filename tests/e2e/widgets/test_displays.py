@@ -76,6 +76,14 @@ async def transform(page: Page, selector: str) -> str:
     return found
 
 
+async def corners(page: Page, selector: str) -> list[list[float]]:
+    """Return the first two points of a polygon as x and y, to a tenth."""
+    rounded = "[x, y].map((at) => Math.round(at * 10) / 10)"
+    js = f"(el) => [...el.points].slice(0, 2).map(({{ x, y }}) => {rounded})"
+    found: list[list[float]] = await page.eval_on_selector(selector, js)
+    return found
+
+
 async def test_needles_bars_and_tapes_stand_where_the_value_is(new_page: PageMaker) -> None:
     """Each at once and without easing, in the frame that writes the number."""
     uses = (
@@ -101,7 +109,7 @@ async def test_needles_bars_and_tapes_stand_where_the_value_is(new_page: PageMak
         robot.say("mode", "leak")
         robot.say("cells", (3.9, 3.5, None))
         await until_text(page, ".gauge-text", "15.0")
-        assert await transform(page, ".gauge-needle") == "rotate(0deg)"
+        assert await corners(page, ".gauge-needle polygon") == [[-4, 0], [-1.5, -74]]
         await until_attribute(page, ".gauge-target", "visibility", "visible")
         assert await transform(page, ".gauge-target") == "rotate(135deg)"
         marks = await page.locator(".gauge-extremes path").evaluate_all(
@@ -119,7 +127,7 @@ async def test_needles_bars_and_tapes_stand_where_the_value_is(new_page: PageMak
 
         await until_text(page, ".compass-note", "target 90° left")
         await until_text(page, ".compass-text", "090")
-        assert await transform(page, ".compass-needle") == "rotate(90deg)"
+        assert await corners(page, ".compass-needle polygon") == [[52, 0], [-36, 24]]
         await until_text(page, ".attitude-words", "right side down 20°")
         assert await transform(page, ".attitude-world") == "rotate(-20deg) translateY(0px)"
         await until_text(page, ".state-shape", "▲")

@@ -9,9 +9,9 @@ from urllib.parse import urlsplit
 import pytest
 from playwright.async_api import Frame, Page
 
-from tests.e2e.command_line import free_port
 from tests.e2e.conftest import PageMaker
 from tests.e2e.dashboards import running_dashboard, until, until_attribute, until_text
+from tests.e2e.ports import free_port
 from urc.model.interface import WidgetUse
 from urc.testing.dashboard import FakeRobot, dashboard_profile
 

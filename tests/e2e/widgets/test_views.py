@@ -330,13 +330,14 @@ async def test_a_model_bends_as_the_robot_does(new_page: PageMaker, tmp_path: Pa
         await page.wait_for_selector(".scene3d[data-model='urdf']")
         robot.say("elbow", 0.0)
         await until_text(page, ".scene3d-text", "joints: 1")
-        straight = (await coarse(page, [".scene3d-face"]))[0]
         drawn = "document.querySelector('.scene3d-picture').dataset.frames"
         # It comes to rest: twenty frames of the page without one of the scene.
         before = await page.evaluate(RESTED)
         assert before == await page.evaluate(drawn)
+        straight = (await coarse(page, [".scene3d-face"]))[0]
         robot.say("elbow", 1.57)
         await page.wait_for_function(f"(before) => {drawn} !== before", arg=before)
+        await page.evaluate(RESTED)
         bent = (await coarse(page, [".scene3d-face"]))[0]
         moved = [
             abs(one - other)

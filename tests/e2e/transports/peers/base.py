@@ -11,7 +11,7 @@ from urc.transports.base import Transport
 
 __all__ = ["Behaviour", "Peer", "Traits", "WAIT_S"]
 
-WAIT_S = 10.0
+WAIT_S = 20.0
 """Bound of every wait in the tests that is none of the transport's own."""
 
 Behaviour = Literal[

@@ -6,7 +6,7 @@ from tests.e2e.transports.peers.base import Behaviour, Traits
 from tests.e2e.transports.peers.tcp import StreamRobot, TcpPeer
 from urc.model.codec import Envelope
 from urc.transports.base import Setup, Subscription, Transport
-from urc.transports.mqtt_options import from_setup
+from urc.transports.mqtt import from_setup
 
 __all__ = ["MqttPeer"]
 
