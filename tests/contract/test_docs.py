@@ -17,7 +17,7 @@ from urc.config.load import Shelf, check
 from urc.model.values import Limits, Signal
 from urc.runtime.catalog import built_in_catalog
 from urc.runtime.selftest import run_tests
-from urc.web.cells import WidgetContext, render_widget
+from urc.web.show.cells import WidgetContext, render_widget
 
 COMMANDS = [
     (block, command)

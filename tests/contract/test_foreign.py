@@ -13,7 +13,7 @@ from urc.model.interface import WidgetUse
 from urc.shipped import shipped
 from urc.testing.dashboard import FakeRobot, dashboard_profile, plain_widget
 from urc.web.app import Robot, build_app
-from urc.web.foreign import OURS, Border
+from urc.web.load.foreign import OURS, Border
 
 CODE = " ".join(
     f"http://localhost:8080/{folder}/" for folder in ("static", "vendor", "words", "widgets/lamp")
@@ -48,7 +48,7 @@ def client(robot: FakeRobot, host: str = "localhost:8080", *trusted: str) -> Tes
 def test_each_widget_that_ships_is_named() -> None:
     """A folder that somebody puts beside them is not taken for one of them."""
     names = Shelf(shipped("widgets")).names()
-    assert sorted(OURS) == names, "name the widgets that ship with URC in urc/web/foreign.py"
+    assert sorted(OURS) == names, "name the widgets that ship with URC in urc/web/load/foreign.py"
 
 
 def test_a_widget_of_another_folder_is_foreign_whatever_its_name(tmp_path: Path) -> None:

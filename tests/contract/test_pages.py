@@ -14,7 +14,7 @@ from urc.model.profile import Setting
 from urc.problems import UrcError
 from urc.testing.dashboard import FakeRobot, dashboard_profile, plain_widget
 from urc.web.app import build_app
-from urc.web.robots import Robot
+from urc.web.fleet.robots import Robot
 
 ROOT = Path(__file__).resolve().parents[2]
 STATIC = ROOT / "urc" / "web" / "static"

@@ -16,7 +16,7 @@ from urc.runtime.coverage import measure
 from urc.runtime.selftest import exercise, sample_settings
 from urc.testing.dashboard import FakeRobot
 from urc.web.app import build_app
-from urc.web.robots import Robot
+from urc.web.fleet.robots import Robot
 
 FOLDER = Path(__file__).parents[2] / "robots"
 WIDGETS = FOLDER.parent / "widgets"

@@ -13,8 +13,8 @@ from urc.model.widget import Widget
 from urc.shipped import shipped
 from urc.source import read_document
 from urc.testing.dashboard import option_defaults
-from urc.web.cells import WidgetContext, render_widget, widget_context
-from urc.web.demos import DemoState, demo_states
+from urc.web.show.cells import WidgetContext, render_widget, widget_context
+from urc.web.show.demos import DemoState, demo_states
 
 FOLDERS = sorted(path for path in shipped("widgets").iterdir() if path.is_dir())
 FILES = {"widget.yaml", "template.html.j2", "widget.js", "widget.css", "demo.yaml"}

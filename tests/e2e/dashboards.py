@@ -10,7 +10,7 @@ from websockets.exceptions import ConnectionClosed
 
 from urc.testing.dashboard import FakeRobot
 from urc.web.app import Robot, build_app, serve
-from urc.web.connection import CONNECTIONS, REQUEST_S
+from urc.web.serve.connection import CONNECTIONS, REQUEST_S
 
 WAIT_S = 30.0
 

@@ -10,7 +10,7 @@ from playwright.async_api import Page
 
 from urc.config.parse_widget import Shelf
 from urc.shipped import shipped
-from urc.web.demos import DemoState, demo_states
+from urc.web.show.demos import DemoState, demo_states
 
 __all__ = [
     *("CELL_SIZES", "FAULTS", "HIGH", "MOST_DIFFERENT", "ONLY", "PICTURES", "SETTLE_MS", "SHOTS"),

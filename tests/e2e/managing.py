@@ -19,7 +19,7 @@ from urc.packages.repositories import Repositories
 from urc.packages.store import Store
 from urc.runtime.kept import Kept, KeptFile
 from urc.web.app import build_app, serve
-from urc.web.garage import Garage
+from urc.web.fleet.garage import Garage
 
 __all__ = [
     "GONE",

@@ -17,10 +17,10 @@ from urc.model.interface import WidgetUse
 from urc.model.values import Signal
 from urc.problems import UrcError
 from urc.testing.dashboard import FakeRobot, dashboard_profile
-from urc.web.addresses import local_addresses
 from urc.web.app import build_app, serve
-from urc.web.policy import REFUSAL_HEADERS
-from urc.web.server import reachable_urls
+from urc.web.serve.addresses import local_addresses
+from urc.web.serve.policy import REFUSAL_HEADERS
+from urc.web.serve.server import reachable_urls
 
 pytestmark = pytest.mark.anyio
 

@@ -15,7 +15,7 @@ from urc.model.values import Signal
 from urc.model.widget import Widget
 from urc.shipped import shipped
 from urc.testing.dashboard import BATTERY, FakeRobot, dashboard_profile, plain_widget
-from urc.web.demos import colour_bars
+from urc.web.show.demos import colour_bars
 
 pytestmark = pytest.mark.anyio
 

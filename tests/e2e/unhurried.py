@@ -26,5 +26,5 @@ def unhurried() -> Iterator[None]:
         patched.setattr("urc.motion.hold.LONGEST_LEASE_S", LONGEST_S)
         patched.setattr("urc.motion.fresh.OLDEST_S", LONGEST_S)
         patched.setattr("urc.motion.fresh._KEPT", BEATS)
-        patched.setattr("urc.web.controls.TOO_LATE_S", LONGEST_S)
+        patched.setattr("urc.web.drive.controls.TOO_LATE_S", LONGEST_S)
         yield

@@ -24,8 +24,8 @@ from urc.runtime.session import Motion, Session
 from urc.simulator.stand_in import stand_in
 from urc.simulator.twin import Twin
 from urc.web.app import Robot, build_app, serve
-from urc.web.garage import Garage, Workshop
-from urc.web.robots import Glimpse
+from urc.web.fleet.garage import Garage, Workshop
+from urc.web.fleet.robots import Glimpse
 
 __all__ = ["Place", "SettingsOf", "run_dashboard", "workshop_of"]
 

@@ -186,8 +186,8 @@ def _serve(arguments: argparse.Namespace) -> int:
     from urc.cli.running import run_loop
     from urc.packages.server import repository_app
     from urc.runtime.examine import examine_apart
-    from urc.web.connection import REQUEST_S
-    from urc.web.server import serve
+    from urc.web.serve.connection import REQUEST_S
+    from urc.web.serve.server import serve
 
     folder = Path(_one(arguments, "DIR"))
     tokens, seal = _tokens(arguments, folder), _seal(arguments)

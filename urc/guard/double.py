@@ -1,6 +1,6 @@
 """A double of a line's reins: what it is ticked is written nowhere.
 
-It is the same code, so that a real tick finds it at hand; see `urc.web.rehearsal`.
+It is the same code, so that a real tick finds it at hand; see `urc.web.drive.rehearsal`.
 """
 
 from collections.abc import Callable

@@ -27,34 +27,35 @@ from urc.runtime.latch import LatchFile
 from urc.runtime.shelves import shelf_of
 from urc.runtime.trail import Trail
 from urc.shipped import vendored
-from urc.web import wire, words
+from urc.web import words
 from urc.web.api_document import DOCUMENT, document
-from urc.web.assets import Assets, import_map
-from urc.web.card import Cards
 from urc.web.dev.routes import Dev, dev_url, no_dev_routes
 from urc.web.dev.secrets import secret_texts
 from urc.web.dev.start import DevStart, no_dev_start
 from urc.web.dev.watch import Remake
-from urc.web.file_routes import FileRoutes
-from urc.web.fleet import Fleet
-from urc.web.foreign import OURS, Border
-from urc.web.foreign_frame import Frames
-from urc.web.framed import Linked
-from urc.web.gallery import Gallery
-from urc.web.garage import Garage, Workshop
-from urc.web.interfaces import KEPT, chosen
+from urc.web.drive.spare import Spare
+from urc.web.fleet.fleet import Fleet
+from urc.web.fleet.garage import Garage, Workshop
+from urc.web.fleet.robots import LINGER_S, Robot, Station, missing_settings
+from urc.web.load.assets import Assets, import_map
+from urc.web.load.file_routes import FileRoutes
+from urc.web.load.foreign import OURS, Border
 from urc.web.manage.manager import Manager
 from urc.web.manage.routes import ManageRoutes
 from urc.web.manage.settings_routes import SettingsRoutes
-from urc.web.menu import Ways, menu_page
-from urc.web.pages import Head, error_page, robot_page
-from urc.web.policy import Policy
-from urc.web.robots import LINGER_S, Robot, Station, missing_settings
-from urc.web.server import serve
+from urc.web.serve.policy import Policy
+from urc.web.serve.server import serve
+from urc.web.show.card import Cards
+from urc.web.show.foreign_frame import Frames
+from urc.web.show.framed import Linked
+from urc.web.show.gallery import Gallery
+from urc.web.show.interfaces import KEPT, chosen
+from urc.web.show.menu import Ways, menu_page
+from urc.web.show.pages import Head, error_page, robot_page
 from urc.web.socket import Client
-from urc.web.spare import Spare
 from urc.web.timeline import timeline
 from urc.web.visitor import guest_of, is_here
+from urc.web.wire import messages as wire
 
 __all__ = ["Robot", "build_app", "serve"]
 

@@ -18,22 +18,15 @@ from starlette.websockets import WebSocketDisconnect
 from urc.model.codec import Payload
 from urc.model.values import NOTHING, Reading
 from urc.runtime.session import CommandFailed
-from urc.web import wire
-from urc.web.controls import Seat
-from urc.web.crowd import Place
-from urc.web.fanout import Fanout
-from urc.web.line import Allowance, Flow, Guest, Line
-from urc.web.robots import (
-    HELD,
-    Live,
-    SessionFailed,
-    Station,
-    missing_settings,
-    needs_holding,
-)
-from urc.web.wire_ask import Agree, Prepare, Steer, encode_token
-from urc.web.wire_drive import Drive, Driving, Release, Stop, Tick
-from urc.web.wire_picture import Show
+from urc.web.drive.controls import Seat
+from urc.web.feed.crowd import Place
+from urc.web.feed.fanout import Fanout
+from urc.web.feed.line import Allowance, Flow, Guest, Line
+from urc.web.fleet.robots import HELD, Live, SessionFailed, Station, missing_settings, needs_holding
+from urc.web.wire import messages as wire
+from urc.web.wire.ask import Agree, Prepare, Steer, encode_token
+from urc.web.wire.drive import Drive, Driving, Release, Stop, Tick
+from urc.web.wire.picture import Show
 
 __all__ = ["Allowance", "Client", "Flow", "Guest", "Line"]
 

@@ -16,7 +16,7 @@ from urc.model.driver import Argument, Command
 from urc.model.interface import Grid, Interface, Slot, WidgetUse
 from urc.model.values import Limits, Signal
 from urc.testing.dashboard import FakeRobot, dashboard_profile
-from urc.web.demos import colour_bars as made_picture
+from urc.web.show.demos import colour_bars as made_picture
 
 pytestmark = pytest.mark.anyio
 

@@ -6,8 +6,8 @@ import pytest
 
 from urc.cli.main import main
 from urc.config.parse_widget import Shelf
-from urc.web.cells import render_widget, widget_context
-from urc.web.demos import demo_states
+from urc.web.show.cells import render_widget, widget_context
+from urc.web.show.demos import demo_states
 
 
 def test_a_new_widget_validates_and_shows_all_its_states(tmp_path: Path) -> None:

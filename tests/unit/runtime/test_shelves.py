@@ -7,7 +7,7 @@ import pytest
 from urc.cli.main import main
 from urc.runtime.shelves import shelf_of
 from urc.shipped import shipped
-from urc.web.foreign import Border
+from urc.web.load.foreign import Border
 
 MANIFEST = """
 urc: 1

@@ -4,8 +4,8 @@ import ipaddress
 
 import pytest
 
-from urc.web import server
-from urc.web.server import reachable_urls
+from urc.web.serve import server
+from urc.web.serve.server import reachable_urls
 
 HERE = tuple(ipaddress.ip_address(text) for text in ("192.0.2.7", "198.51.100.1", "2001:db8::7"))
 

@@ -6,8 +6,8 @@ from urc.model.driver import Driver
 from urc.model.values import Signal
 from urc.testing.dashboard import FakeRobot, dashboard_profile
 from urc.web.app import build_app
-from urc.web.card import VALUES, small_values
-from urc.web.robots import Glimpse, Robot
+from urc.web.fleet.robots import Glimpse, Robot
+from urc.web.show.card import VALUES, small_values
 
 JPEG = b"\xff\xd8\xff\xe0 a picture"
 

@@ -16,10 +16,10 @@ from urc.runtime.session import CommandFailed
 from urc.runtime.trail import Trail
 from urc.testing.clock import FakeClock, settle
 from urc.testing.dashboard import FakeRobot, dashboard_profile
-from urc.web.crowd import NO_NUMBER
-from urc.web.robots import Robot, Station
+from urc.web.feed.crowd import NO_NUMBER
+from urc.web.fleet.robots import Robot, Station
 from urc.web.socket import BAD_MESSAGES, MESSAGES_PER_S, TICKS_PER_S, Allowance, Client
-from urc.web.wire import CLOSE_TOO_FAST
+from urc.web.wire.messages import CLOSE_TOO_FAST
 
 pytestmark = pytest.mark.anyio
 

@@ -15,8 +15,8 @@ from urc.runtime.audit import Entry
 from urc.runtime.trail import Trail
 from urc.testing.clock import FakeClock, settle
 from urc.testing.dashboard import FakeRobot, dashboard_profile
-from urc.web.consent import TOKEN_S, WAIT_S
-from urc.web.robots import Robot, Station
+from urc.web.drive.consent import TOKEN_S, WAIT_S
+from urc.web.fleet.robots import Robot, Station
 from urc.web.socket import Client, Guest
 
 pytestmark = pytest.mark.anyio

@@ -17,8 +17,8 @@ from urc.runtime.latch import LatchFile
 from urc.runtime.trail import Trail
 from urc.testing.clock import FakeClock, settle
 from urc.testing.movers import FakeFrames, FakeMovers
-from urc.web import wire_drive as wire
-from urc.web.controls import BEAT_S, THINNED_S, Controls, Seat
+from urc.web.drive.controls import BEAT_S, THINNED_S, Controls, Seat
+from urc.web.wire import drive as wire
 
 pytestmark = pytest.mark.anyio
 

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from urc.model.values import Sample, Signal
 from urc.runtime.hub import Hub
 from urc.testing.clock import FakeClock
-from urc.web.crowd import Kernel, Place
-from urc.web.fanout import Fanout
+from urc.web.feed.crowd import Kernel, Place
+from urc.web.feed.fanout import Fanout
 
 JPEG = b"\xff\xd8\xff\xe0 and so on"
 

@@ -21,7 +21,7 @@ from urc.testing.dashboard import FakeRobot, dashboard_profile
 from urc.web.dev.client import BAD_MESSAGES, MESSAGES_PER_S, ROWS_KEPT, Backlog, DevClient
 from urc.web.dev.rows import Row
 from urc.web.dev.watch import ProfileWatch
-from urc.web.robots import Robot, Station
+from urc.web.fleet.robots import Robot, Station
 
 pytestmark = pytest.mark.anyio
 

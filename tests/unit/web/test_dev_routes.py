@@ -9,7 +9,7 @@ from urc.model.profile import Profile
 from urc.testing.dashboard import FakeRobot, dashboard_profile
 from urc.web.app import build_app
 from urc.web.dev.routes import HOW_TO_TURN_ON
-from urc.web.robots import Robot
+from urc.web.fleet.robots import Robot
 
 HOSTILE = '"><script>alert(1)</script>{{ 7*7 }}'
 HERE = ("127.0.0.1", 50_000)

@@ -8,8 +8,8 @@ import pytest
 from urc.model.values import Sample, Signal
 from urc.runtime.hub import Hub, Note
 from urc.testing.clock import FakeClock, settle
-from urc.web.crowd import Known, Place
-from urc.web.fanout import Fanout, Pacer
+from urc.web.feed.crowd import Known, Place
+from urc.web.feed.fanout import Fanout, Pacer
 
 pytestmark = pytest.mark.anyio
 

@@ -15,8 +15,8 @@ from urc.runtime.permissions import permissions
 from urc.shipped import shipped
 from urc.testing.dashboard import FakeRobot, dashboard_profile
 from urc.web.app import build_app
-from urc.web.files import linked_options
-from urc.web.robots import Robot
+from urc.web.fleet.robots import Robot
+from urc.web.load.files import linked_options
 
 ARM = f"""{WIRE}signals:
   angles: {{ type: array, unit: rad }}

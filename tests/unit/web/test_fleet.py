@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 from urc.testing.dashboard import FakeRobot, dashboard_profile, plain_widget
-from urc.web.fleet import Fleet
-from urc.web.robots import Robot, SessionFailed, Station
+from urc.web.fleet.fleet import Fleet
+from urc.web.fleet.robots import Robot, SessionFailed, Station
 
 pytestmark = pytest.mark.anyio
 

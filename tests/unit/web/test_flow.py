@@ -4,8 +4,8 @@ from typing import Any, cast
 
 import pytest
 
-from urc.web.crowd import NO_NUMBER
-from urc.web.flow import SocketFlow
+from urc.web.feed.crowd import NO_NUMBER
+from urc.web.feed.flow import SocketFlow
 
 
 class Line:

@@ -5,7 +5,7 @@ from random import Random
 import pytest
 from websockets.frames import Frame, Opcode
 
-from urc.web.frames import Frames, text_of
+from urc.web.serve.frames import Frames, text_of
 
 
 def masked(text: bytes, opcode: Opcode = Opcode.TEXT, *, fin: bool = True) -> bytes:

@@ -14,8 +14,8 @@ from urc.problems import UrcError
 from urc.shipped import shipped
 from urc.testing.dashboard import FakeRobot, dashboard_profile
 from urc.web.app import Robot, build_app
-from urc.web.assets import MOST_FILES, widget_assets
-from urc.web.demos import DemoState, colour_bars, demo_states
+from urc.web.load.assets import MOST_FILES, widget_assets
+from urc.web.show.demos import DemoState, colour_bars, demo_states
 
 DEMO = """
 signals:

@@ -4,7 +4,7 @@ import pytest
 
 from tests.unit.web.test_controls import scene
 from urc.testing.clock import settle
-from urc.web import wire_drive as wire
+from urc.web.wire import drive as wire
 
 pytestmark = pytest.mark.anyio
 

@@ -8,7 +8,7 @@ from urc.model.flow import Confirm, Hold
 from urc.model.interface import Interface, Tab
 from urc.model.profile import Profile
 from urc.model.values import Signal
-from urc.web.interfaces import DEBUGGING, choices, chosen, debug_part, page_tabs
+from urc.web.show.interfaces import DEBUGGING, choices, chosen, debug_part, page_tabs
 
 ONE, TWO = Interface("one", "One"), Interface("two", "Two")
 SET = Command(

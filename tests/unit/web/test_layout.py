@@ -3,7 +3,7 @@
 import pytest
 
 from urc.model.interface import Grid, Interface, Slot, Tab
-from urc.web.layout import LEFT_HAND, grid_css, needs_turning
+from urc.web.show.layout import LEFT_HAND, grid_css, needs_turning
 
 MARGIN = "minmax(0,.12fr)"
 ROW = "minmax(8rem,1fr)"

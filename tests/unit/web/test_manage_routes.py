@@ -16,9 +16,9 @@ from urc.packages.store import Store
 from urc.runtime.kept import Kept, KeptFile
 from urc.testing.dashboard import FakeRobot, dashboard_profile
 from urc.web.app import build_app
-from urc.web.garage import Workshop
+from urc.web.fleet.garage import Workshop
+from urc.web.fleet.robots import Robot
 from urc.web.manage.given import given_source
-from urc.web.robots import Robot
 
 HERE = ("127.0.0.1", 50000)
 AWAY = ("192.168.1.9", 50000)

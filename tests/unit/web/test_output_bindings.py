@@ -8,7 +8,7 @@ from urc.model.flow import Confirm, RunStep, WaitStep
 from urc.model.interface import Given, WidgetUse
 from urc.model.widget import Port, Widget
 from urc.shipped import shipped
-from urc.web.outputs import output_config
+from urc.web.show.outputs import output_config
 
 VOLTS = Argument("volts", unit="V", min=0, max=10)
 CHANNEL = Argument("channel", "integer", default=1)

@@ -12,14 +12,14 @@ from urc.model.values import Sample, Signal
 from urc.runtime.hub import Hub
 from urc.testing.clock import FakeClock, settle
 from urc.testing.dashboard import FakeRobot, dashboard_profile
-from urc.web import wire
-from urc.web.crowd import Place
-from urc.web.demos import colour_bars
-from urc.web.fanout import Fanout
-from urc.web.picture_shelf import SHARED_FOR_S, Looks, PictureShelf
-from urc.web.robots import Robot, Station
+from urc.web.feed.crowd import Place
+from urc.web.feed.fanout import Fanout
+from urc.web.feed.picture_shelf import SHARED_FOR_S, Looks, PictureShelf
+from urc.web.fleet.robots import Robot, Station
+from urc.web.show.demos import colour_bars
 from urc.web.socket import Client
-from urc.web.wire_picture import Show, as_frame, encode_picture, media_type
+from urc.web.wire import messages as wire
+from urc.web.wire.picture import Show, as_frame, encode_picture, media_type
 
 pytestmark = pytest.mark.anyio
 

@@ -5,7 +5,7 @@ from collections.abc import Iterable
 import pytest
 from starlette.types import Message, Receive, Scope, Send
 
-from urc.web.policy import (
+from urc.web.serve.policy import (
     BODY_BYTES,
     Authority,
     Policy,

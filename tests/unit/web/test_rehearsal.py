@@ -5,9 +5,9 @@ import json
 import pytest
 
 from tests.unit.web.test_controls import Scene, scene
-from urc.web import wire_drive as wire
-from urc.web.controls import Seat
-from urc.web.rehearsal import AHEAD_S, APART_S, EVERY_S, MOST
+from urc.web.drive.controls import Seat
+from urc.web.drive.rehearsal import AHEAD_S, APART_S, EVERY_S, MOST
+from urc.web.wire import drive as wire
 
 pytestmark = pytest.mark.anyio
 

@@ -10,9 +10,9 @@ import pytest
 from tests.unit.web.test_client import FakeLine
 from tests.unit.web.test_controls import Scene, scene
 from urc.testing.clock import settle
-from urc.web import wire_drive as wire
-from urc.web.seat import Seat
-from urc.web.spare import CLOSE_NO_SEAT, CLOSE_NOT_TAKEN, KEY_WITHIN_S, MESSAGES_PER_S, Spare
+from urc.web.drive.seat import Seat
+from urc.web.drive.spare import CLOSE_NO_SEAT, CLOSE_NOT_TAKEN, KEY_WITHIN_S, MESSAGES_PER_S, Spare
+from urc.web.wire import drive as wire
 
 pytestmark = pytest.mark.anyio
 

@@ -11,7 +11,7 @@ from urc.problems import UrcError
 from urc.runtime.clock import Alarm
 from urc.testing.clock import FakeClock, settle
 from urc.testing.dashboard import FakeRobot, dashboard_profile
-from urc.web.robots import Robot, SessionFailed, Station, missing_settings
+from urc.web.fleet.robots import Robot, SessionFailed, Station, missing_settings
 
 pytestmark = pytest.mark.anyio
 

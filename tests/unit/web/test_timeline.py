@@ -13,7 +13,7 @@ from starlette.testclient import TestClient
 from urc.runtime.audit import AuditLog, Entry
 from urc.testing.dashboard import FakeRobot, dashboard_profile
 from urc.web.app import build_app
-from urc.web.robots import Robot
+from urc.web.fleet.robots import Robot
 from urc.web.timeline import timeline
 
 

@@ -11,7 +11,7 @@ from urc.model.profile import Profile
 from urc.model.values import Limits, Sample, Signal
 from urc.runtime.hub import LinkStatus, Note
 from urc.testing.codec import regex, text
-from urc.web import wire
+from urc.web.wire import messages as wire
 
 
 def test_a_frame_holds_indexes_values_and_ages() -> None:

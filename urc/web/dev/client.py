@@ -26,9 +26,9 @@ from urc.web.dev.rows import Row, held_row, note_row, traffic_row
 from urc.web.dev.secrets import Blanker, stand_ins
 from urc.web.dev.tryout import pasted_bytes, try_out
 from urc.web.dev.watch import ProfileWatch
-from urc.web.robots import Robot, SessionFailed, missing_settings
+from urc.web.fleet.robots import Robot, SessionFailed, missing_settings
 from urc.web.socket import STALL_S, Allowance, Flow, Line
-from urc.web.wire import (
+from urc.web.wire.messages import (
     CLOSE_BAD_MESSAGES,
     CLOSE_TOO_FAST,
     BadMessage,

@@ -16,11 +16,11 @@ from starlette.responses import HTMLResponse, Response
 from starlette.routing import BaseRoute, Route, WebSocketRoute
 from starlette.websockets import WebSocket
 
-from urc.web import wire
 from urc.web.dev.client import DevClient
 from urc.web.dev.watch import ProfileWatch, Remake
-from urc.web.pages import Head, render
-from urc.web.robots import Robot, Station
+from urc.web.fleet.robots import Robot, Station
+from urc.web.show.pages import Head, render
+from urc.web.wire import messages as wire
 
 __all__ = ["HOW_TO_TURN_ON", "Dev", "DevPage", "dev_url", "no_dev_routes"]
 

@@ -10,7 +10,7 @@ import msgspec
 from urc.model.codec import Envelope
 from urc.runtime.hub import Note, Traffic
 from urc.web.dev.secrets import Blanker
-from urc.web.wire_text import cut
+from urc.web.wire.text import cut
 
 __all__ = [
     "SHOWN_BYTES",

@@ -18,12 +18,12 @@ from starlette.routing import Route
 from urc.problems import UrcError
 from urc.runtime.opened import open_document
 from urc.web.dev.watch import Remake
-from urc.web.fleet import Fleet
+from urc.web.fleet.fleet import Fleet
+from urc.web.fleet.robots import Robot
 from urc.web.manage.routes import answer, told
 from urc.web.manage.wire import Started
-from urc.web.menu import Nav, SettingRow, Ways, setting_row
-from urc.web.pages import Head, render
-from urc.web.robots import Robot
+from urc.web.show.menu import Nav, SettingRow, Ways, setting_row
+from urc.web.show.pages import Head, render
 from urc.web.words import t
 
 __all__ = ["DevStart", "DevStartPage", "no_dev_start"]

@@ -17,7 +17,7 @@ from urc.runtime.catalog import built_in_catalog
 from urc.runtime.changes import PERIOD_S, Watched
 from urc.runtime.selftest import exercise
 from urc.runtime.shelves import shelf_of
-from urc.web.robots import Robot, Station
+from urc.web.fleet.robots import Robot, Station
 
 __all__ = ["Examined", "ProfileWatch", "Remake", "examine"]
 

@@ -24,8 +24,8 @@ from urc.web.dev.preview import Preview, Written
 from urc.web.dev.rows import SHOWN_BYTES, Row, fill, grouped
 from urc.web.dev.secrets import Blanker
 from urc.web.dev.tryout import Finding, Piece, Taker
-from urc.web.wire import INBOUND_BYTES, BadMessage, Ping
-from urc.web.wire_text import Outbound, cut, encoded, milliseconds
+from urc.web.wire.messages import INBOUND_BYTES, BadMessage, Ping
+from urc.web.wire.text import Outbound, cut, encoded, milliseconds
 
 __all__ = [
     "Inbound",

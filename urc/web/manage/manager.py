@@ -16,13 +16,13 @@ from urc.packages.repositories import Repository
 from urc.packages.sources import Source
 from urc.problems import UrcError, printable
 from urc.web.daemon import in_daemon
-from urc.web.fleet import Broken, Fleet
-from urc.web.garage import Garage
+from urc.web.fleet.fleet import Broken, Fleet
+from urc.web.fleet.garage import Garage
+from urc.web.fleet.robots import Robot
 from urc.web.manage.catalogue import Catalogue
 from urc.web.manage.jobs import Busy, Job, Jobs
 from urc.web.manage.wire import MOST_HITS, Available, Installed, Shelf
 from urc.web.phrases import spoken
-from urc.web.robots import Robot
 
 __all__ = ["Manager"]
 

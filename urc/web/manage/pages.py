@@ -5,8 +5,8 @@ Floor 5. Pure.
 
 from dataclasses import dataclass
 
-from urc.web.menu import Nav, Ways
-from urc.web.pages import Head, render
+from urc.web.show.menu import Nav, Ways
+from urc.web.show.pages import Head, render
 from urc.web.words import t
 
 __all__ = ["KINDS", "ManagePage", "manage_page"]

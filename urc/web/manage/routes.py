@@ -1,7 +1,7 @@
 """The managers over HTTP: their pages, and what these ask for under ``/api/v1``.
 
 Floor 5. Everything that changes something is a POST with a JSON body, from this server's own pages
-(`urc.web.policy` sees to it), by somebody who sits at this machine or where that was opened.
+(`urc.web.serve.policy` sees to it), by somebody who sits at this machine or where that was opened.
 """
 
 import asyncio
@@ -22,7 +22,7 @@ from urc.web.manage.jobs import Busy, Wanted
 from urc.web.manage.manager import Manager
 from urc.web.manage.pages import manage_page
 from urc.web.manage.wire import Add, Agree, Failure, Gone, JobNews, Line, Package, Url
-from urc.web.menu import Ways
+from urc.web.show.menu import Ways
 from urc.web.words import t
 
 __all__ = ["ManageRoutes", "Refusal", "answer", "body_of", "told"]

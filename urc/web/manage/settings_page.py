@@ -12,9 +12,9 @@ from urllib.parse import quote
 from urc.model.profile import Profile, Setting
 from urc.model.values import Value
 from urc.runtime.kept import Kept
-from urc.web.cells import spoken
-from urc.web.menu import Nav, Ways
-from urc.web.pages import Head, render
+from urc.web.show.cells import spoken
+from urc.web.show.menu import Nav, Ways
+from urc.web.show.pages import Head, render
 from urc.web.words import t
 
 __all__ = ["Field", "Option", "SettingsPage", "settings_page"]

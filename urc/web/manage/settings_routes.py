@@ -20,14 +20,14 @@ from urc.runtime.catalog import built_in_catalog
 from urc.runtime.kept import Kept
 from urc.runtime.probe import Tried, probe
 from urc.runtime.settings import parse_setting
-from urc.web.cells import spoken
+from urc.web.fleet.robots import Station, missing_settings
 from urc.web.manage.jobs import Busy
 from urc.web.manage.manager import Manager
 from urc.web.manage.routes import ManageRoutes, Refusal, answer, body_of, told
 from urc.web.manage.settings_page import settings_page
 from urc.web.manage.wire import SettingsAnswer, SettingsAsked, TriedLine
-from urc.web.menu import Ways
-from urc.web.robots import Station, missing_settings
+from urc.web.show.cells import spoken
+from urc.web.show.menu import Ways
 from urc.web.words import t
 
 __all__ = ["SettingsRoutes"]

@@ -1,0 +1,1 @@
+"""Who holds the controls of a robot, and how their hands reach it."""

@@ -1,0 +1,394 @@
+"""The controls of one robot, as its screens see them: one desk, a seat for each screen.
+
+Floor 5. Nothing waits for anybody: what a seat is told is the newest lease, the newest beat, and
+one line for each control, taken when its own line is free. Ticks that come faster than any robot
+takes them are thinned: the newest wins, and the last one always arrives.
+"""
+
+from collections.abc import Callable
+from hmac import compare_digest
+from typing import Literal
+
+from urc.model.driver import Driver
+from urc.motion.fresh import Input
+from urc.motion.hold import Reason
+from urc.motion.lease import Client, LeaseState, Role
+from urc.motion.pace import Pace
+from urc.runtime.audit import Entry
+from urc.runtime.clock import Alarm, Clock
+from urc.runtime.hub import Hub, Note
+from urc.runtime.latch import LatchFile
+from urc.runtime.lateness import TOO_LATE_S, LoopWatch
+from urc.runtime.motion import MotionDesk
+from urc.runtime.trail import Trail
+from urc.web.drive.rehearsal import Rehearsal
+from urc.web.drive.seat import FLOOD, Drivable, Seat
+from urc.web.wire import drive as wire
+
+__all__ = ["BEAT_S", "Controls", "Drivable", "Seat"]
+
+BEAT_S = 0.05
+"""How often the screen that has the controls is told a number, which its ticks echo."""
+THINNED_S = 0.01
+"""Mean time between two ticks of one control that are looked at, at least."""
+PATIENCE_S = 0.25
+"""A tick that came late is no news while the control moves all the same."""
+
+
+Offered = Literal["in time", "one more", "no tick"]
+"""A tick at a pace that any robot may have, or faster than that, or something else."""
+
+
+class Controls:
+    """The desk of one robot, and who sits at it."""
+
+    def __init__(
+        self,
+        driver: Driver,
+        clock: Clock,
+        file: LatchFile | None = None,
+        trail: Trail | None = None,
+    ) -> None:
+        """Take up the latch where it was.
+
+        Args:
+            driver: its commands with ``hold`` are the controls.
+            clock: the time.
+            file: keeps the latch over a restart; None: nothing does.
+            trail: takes note of what happens; None: nobody does.
+        """
+        self.trail = trail or Trail("", _unread, utc=lambda: 0.0)
+        self.desk = self._desk(driver, file.load() if file is not None else None)
+        self._driver = driver
+        self._clock = clock
+        self._file = file
+        self._hub: Hub | None = None
+        self._seats: dict[str, Seat] = {}
+        self._guests = 0
+        self._number = 0
+        """Of the newest lease."""
+        self._beating: Alarm | None = None
+        self._expiring: Alarm | None = None
+        self._rehearsal = Rehearsal(clock, lambda: self.desk)
+        self.watch = LoopWatch(clock, self._held_up)
+        """Runs while the robot is connected."""
+        self._heed(file)
+
+    @property
+    def seats(self) -> tuple[Seat, ...]:
+        """The screens that look at the robot."""
+        return tuple(self._seats.values())
+
+    @property
+    def commands(self) -> tuple[str, ...]:
+        """Names of the held commands."""
+        return tuple(name for name, one in self._driver.commands.items() if one.hold is not None)
+
+    def renew(self, driver: Driver, file: LatchFile | None) -> None:
+        """Go on with another version of the driver, between two sessions.
+
+        A latched stop holds; nobody has the controls, and nothing that was armed still is.
+        """
+        kept = self.desk.lease.state
+        for seat in self._seats.values():
+            for command in list(seat.alarms):
+                seat.forget(command)
+            seat.paces.clear()
+        self._driver, self._file = driver, file
+        self._heed(file)
+        self.desk = self._desk(driver, kept)
+        for seat in self._seats.values():
+            self.desk.join(seat.client)
+        self._changed(self.desk.lease.state)
+
+    def _desk(self, driver: Driver, kept: LeaseState | None) -> MotionDesk:
+        desk = MotionDesk(driver, kept=kept)
+        desk.on_change = self._changed
+        desk.on_moved = self.trail.moved
+        return desk
+
+    # -- sessions
+
+    async def serve(self, session: Drivable) -> None:
+        """Let a session be driven for as long as this runs; ends by being cancelled."""
+        movers = session.movers
+        if movers is None or not self.desk.can_move:
+            return
+        self._hub = session.hub
+        if self._file is not None and self._file.fault:
+            self._latch_fault(self._file.fault)
+        self.watch.start()
+        self.desk.attach(session.frames, movers)
+        try:
+            while True:
+                for command, reason in await movers.stops():
+                    self._stopped(command, reason)
+        finally:
+            self.watch.end()
+            self._rehearsal.end()
+            self._hub = None
+            self.desk.detach()
+            now = self._clock.now()
+            for command in self.commands:  # its movers stop what moves, and report no more
+                self.trail.stopped(command, "the robot was disconnected", now)
+
+    # -- screens
+
+    def sit(self, place: str, role: Role, wake: Callable[[], None]) -> Seat:
+        """Give a screen its seat; raise `UrcError` when there are too many.
+
+        Args:
+            place: where it is, for the others: an address, or "" for this machine.
+            role: what it may do.
+            wake: called when there is something to take.
+        """
+        self._guests += 1
+        name = f"screen {self._guests}{f' at {place}' if place else ''}"
+        seat = Seat(Client(f"s{self._guests}", name, role), wake)
+        self.desk.join(seat.client)
+        self._seats[seat.client.id] = seat
+        return seat
+
+    def rise(self, seat: Seat) -> None:
+        """Take note that a screen is gone: what it held stops."""
+        for command in list(seat.alarms):
+            seat.forget(command)
+        self._seats.pop(seat.client.id, None)
+        if seat.spare is not None:
+            seat.spare.end()
+        self.desk.part(seat.client.id)
+
+    def seat_of(self, key: str) -> Seat | None:
+        """Return the seat with this key."""
+        said = key.encode()
+        return next(
+            (one for one in self._seats.values() if compare_digest(one.key.encode(), said)), None
+        )
+
+    def take(self, seat: Seat) -> list[str]:
+        """Return the messages that bring a screen up to date."""
+        texts: list[str] = []
+        if self.desk.can_move and seat.seen != self._number:
+            seat.seen = self._number
+            texts.append(self._lease_text(seat))
+        texts += seat.notices.values()
+        seat.notices.clear()
+        if seat.beat is not None:
+            texts.append(wire.encode_beat(seat.beat))
+            seat.beat = None
+        return texts
+
+    # -- what screens say
+
+    def offer(self, seat: Seat, data: bytes) -> Offered:
+        """Take a tick as it came, unread; return what it was.
+
+        Nothing is made of one that comes while another waits: it only takes its place. When many
+        do, the rest waits with it where it is, and costs nobody anything.
+        """
+        if seat.alarms and seat.doubled is None:
+            command = wire.command_of(data)
+            if command in seat.alarms:
+                self._wait(seat, command, data)
+                seat.crowd += 1
+                if seat.crowd == FLOOD:
+                    seat.hold_back(True)
+                return "one more"
+        now = self._clock.now()
+        try:
+            tick = wire.decode_tick(data)
+        except wire.NO_TICK:
+            return "no tick"
+        pace = seat.paces.get(tick.command)
+        is_moving = now - seat.moved_at_s < PATIENCE_S and not seat.alarms
+        if is_moving and not seat.doubled and pace is not None and pace.take(now):
+            self._tick(seat, tick, now)
+            if seat.moved_at_s == now:
+                self._rehearsal.take(seat.client.id, data, now)
+            return "in time"
+        self._thin(seat, tick)
+        return "one more"
+
+    def hear(self, seat: Seat, said: wire.Driving) -> None:
+        """Do what a screen says."""
+        match said:
+            case wire.Tick():
+                self._thin(seat, said)
+            case wire.Release():
+                if self.desk.holds(said.command) and not seat.is_first(said.command, said.number):
+                    return
+                seat.forget(said.command)
+                seat.moved_s.pop(said.command, None)
+                self._rehearsal.end()
+                self.desk.release(seat.client.id, said.command)
+            case wire.Stop():
+                if not seat.is_first("", said.number):
+                    return
+                self.stop(seat.client.name)
+            case wire.Drive():
+                self._drive(seat, said)
+
+    def stop(self, by: str) -> None:
+        """Stop and latch. Never refused."""
+        self._rehearsal.end()
+        for seat in self._seats.values():
+            for command in list(seat.alarms):
+                seat.forget(command)
+        self.desk.stop(by)
+
+    def _drive(self, seat: Seat, said: wire.Drive) -> None:
+        now = self._clock.now()
+        reason = self.desk.drive(seat.client.id, said.verb, now, said.for_s)
+        if reason:
+            seat.notice(said.verb, wire.encode_refused(said.verb, "", reason))
+            self.trail.refused(seat.client, said.verb, reason, now)
+        self._set_expiry()
+
+    def _thin(self, seat: Seat, tick: wire.Tick) -> None:
+        now = self._clock.now()
+        if not self.desk.holds(tick.command):
+            text = f"{tick.command!r} is no held command of this robot"
+            seat.notice("tick", wire.encode_refused("tick", "", text))
+            self.trail.refused(seat.client, tick.command, text, now)
+            return
+        if not seat.is_first(tick.command, tick.number):
+            return
+        pace = seat.paces.get(tick.command)
+        if pace is None:
+            pace = seat.paces[tick.command] = Pace(THINNED_S)
+        if tick.command in seat.alarms:
+            self._wait(seat, tick.command, tick)
+        elif pace.take(now):
+            self._tick(seat, tick, now)
+        else:
+            alarm = self._clock.call_at(pace.free_at, lambda: self._ripe(seat, tick.command))
+            seat.alarms[tick.command] = alarm
+            self._wait(seat, tick.command, tick)
+
+    def _wait(self, seat: Seat, command: str, tick: wire.Tick | bytes) -> None:
+        """Keep a tick until its turn; the newest wins."""
+        seat.dropped += command in seat.pending
+        seat.pending[command] = tick
+
+    def _ripe(self, seat: Seat, command: str) -> None:
+        seat.alarms.pop(command, None)
+        seat.relax()
+        tick = seat.pending.pop(command, None)
+        if isinstance(tick, bytes):
+            tick = self._read(seat, tick)
+        if tick is not None:
+            now = self._clock.now()
+            seat.paces[command].take(now)
+            self._tick(seat, tick, now)
+
+    def _read(self, seat: Seat, data: bytes) -> wire.Tick | None:
+        try:
+            return wire.decode_tick(data)
+        except wire.NO_TICK as fault:
+            seat.notice("tick", wire.encode_refused("tick", "", str(fault)))
+            return None
+
+    def _tick(self, seat: Seat, tick: wire.Tick, now: float) -> None:
+        given = tuple.__new__(Input, (tick.epoch, tick.number, tick.echo))  # one of many a second
+        command = tick.command
+        reason = self.desk.tick(seat.client.id, command, tick.arguments, given, now)
+        if not reason:
+            seat.moved_s[command] = seat.moved_at_s = now
+        elif now - seat.moved_s.get(command, float("-inf")) > PATIENCE_S or self._is_closed(given):
+            seat.notice(command, wire.encode_refused("tick", command, reason))
+            self.trail.refused(seat.client, command, reason, now)
+
+    def _is_closed(self, given: Input) -> bool:
+        return given.epoch != self.desk.lease.state.epoch
+
+    # -- what follows
+
+    def _stopped(self, command: str, reason: Reason) -> None:
+        self.desk.stopped(command, reason)
+        self.trail.stopped(command, reason, self._clock.now())
+        if reason in ("released", "stopped"):
+            return  # the hand knows, or the lease says it
+        for seat in self._seats.values():
+            seat.moved_s.pop(command, None)
+            seat.notice(command, wire.encode_stopped(command, reason))
+
+    def _heed(self, file: LatchFile | None) -> None:
+        if file is not None:
+            file.on_fault = self._latch_fault
+
+    def _latch_fault(self, fault: str) -> None:
+        """Let everybody know that a stop would not outlast a restart, or does again."""
+        if fault:
+            text = f"STOP works, but would not outlast a restart of the server: {fault}"
+            self._tell("error", text)
+            for seat in self._seats.values():
+                seat.notice("latch", wire.encode_refused("latch", "", text))
+        else:
+            self._tell("info", "STOP outlasts a restart of the server again")
+
+    def _held_up(self, late_s: float, is_first: bool) -> None:
+        if late_s > TOO_LATE_S:
+            now = self._clock.now()
+            for command in self.desk.halt():
+                self.trail.stopped(command, "the server was held up", now)
+                for seat in self._seats.values():
+                    seat.forget(command)
+                    seat.moved_s.pop(command, None)
+                    seat.notice(command, wire.encode_stopped(command, "expired"))
+        if is_first:
+            self._tell("warning", f"the server was held up for {late_s * 1000:.0f} ms")
+
+    def _tell(self, level: Literal["info", "warning", "error"], text: str) -> None:
+        if self._hub is not None:
+            self._hub.note(Note(self._clock.now(), level, "URC", text))
+
+    def _changed(self, state: LeaseState) -> None:
+        self._number += 1
+        if self._file is not None:
+            self._file.keep(state)
+        for seat in self._seats.values():
+            seat.wake()
+        self.trail.leased(state, self._clock.now())
+        self._set_expiry()
+        if state.holder is not None and self._beating is None:
+            self._beat()
+
+    def _beat(self) -> None:
+        """Tell the holder a number, and again in a while; nobody else is told any."""
+        self._beating = None
+        holder = self.desk.lease.state.holder
+        seat = self._seats.get(holder.id) if holder is not None else None
+        if seat is None:
+            return
+        now = self._clock.now()
+        seat.beat = self.desk.beat(seat.client.id, now)
+        if seat.spare is not None:
+            seat.spare.beat(seat.beat)
+        seat.wake()
+        self._beating = self._clock.call_at(now + BEAT_S, self._beat)
+
+    def _set_expiry(self) -> None:
+        if self._expiring is not None:
+            self._expiring.cancel()
+        due = self.desk.deadline
+        self._expiring = None if due is None else self._clock.call_at(due, self._expire)
+
+    def _expire(self) -> None:
+        self._expiring = None
+        self.desk.expire(self._clock.now())
+        self._set_expiry()
+
+    def _lease_text(self, seat: Seat) -> str:
+        state = self.desk.lease.state
+        left_s = state.asked_until - self._clock.now() if state.asked_by is not None else 0.0
+        return wire.encode_lease(
+            state,
+            seat.client,
+            left_s=max(0.0, left_s),
+            is_confirmed=self.desk.is_confirmed,
+            spare=seat.key,
+        )
+
+
+def _unread(entry: Entry) -> None:
+    """Nobody reads it."""

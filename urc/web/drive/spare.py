@@ -1,0 +1,102 @@
+"""A second line between a page and its seat, for a link that loses packets.
+
+Floor 5. What a TCP connection has lost holds up everything behind it for a round trip and more, and
+twice that when the repeat is lost, too: longer than a lease. Two connections hardly lose at the
+same time. So a page that drives over such a link says everything about held controls on both, is
+told the beats on both, and whatever comes first counts: all of it carries the page's own number.
+
+A spare line is nobody by itself. It names the seat that it belongs to by a key that only the page
+in that seat was told, and ends with it.
+"""
+
+import msgspec
+from starlette.websockets import WebSocketDisconnect
+
+from urc.motion.fresh import FirstOfTwo
+from urc.runtime.clock import Clock, within
+from urc.web.drive.controls import Controls, Seat
+from urc.web.feed.line import Allowance, Flow, Line
+from urc.web.wire import drive as wire
+from urc.web.wire.picture import as_frame
+
+__all__ = ["CLOSE_NO_SEAT", "CLOSE_NOT_TAKEN", "KEY_WITHIN_S", "Spare"]
+
+CLOSE_NO_SEAT = 4404
+CLOSE_NOT_TAKEN = 4400
+KEY_WITHIN_S = 5.0
+"""In which a line must say whose it is."""
+MESSAGES_PER_S = 2000
+
+_hello = msgspec.json.Decoder(wire.Spare)
+_said: msgspec.json.Decoder[wire.Doubled] = msgspec.json.Decoder(wire.Doubled)
+_BAD = (msgspec.MsgspecError, UnicodeError, RecursionError)
+
+
+class Spare:
+    """One such line."""
+
+    def __init__(
+        self, line: Line, controls: Controls, clock: Clock, flow: Flow | None = None
+    ) -> None:
+        """Prepare; `line` is accepted, and `flow` is the socket below it."""
+        self._line = line
+        self._controls = controls
+        self._clock = clock
+        self._flow = flow
+        self._is_over = False
+        self._allowance = Allowance(MESSAGES_PER_S, clock.now())
+
+    async def serve(self) -> None:
+        """Be this line until either side is done."""
+        try:
+            seat = await self._seat()
+            if seat is None:
+                await self._line.close(CLOSE_NO_SEAT, "it belongs to no page that is open")
+                return
+            if seat.spare is not None:
+                seat.spare.end()
+            seat.spare, seat.doubled = self, seat.doubled or FirstOfTwo()
+            try:
+                await self._listen(seat)
+            finally:
+                if seat.spare is self:
+                    seat.spare = None
+        except WebSocketDisconnect:
+            pass
+
+    def beat(self, number: int) -> None:
+        """Tell the page a number, unless an older one is still on its way."""
+        if self._flow is not None and self._flow.is_free():
+            self._flow.write(as_frame(wire.encode_beat(number).encode(), is_text=True))
+
+    def end(self) -> None:
+        """Take nothing more, because its page has gone or has made another."""
+        self._is_over = True
+        if self._flow is not None:
+            self._flow.abort()
+
+    async def _seat(self) -> Seat | None:
+        try:
+            async with within(self._clock, KEY_WITHIN_S):
+                message = await self._line.receive()
+            said = _hello.decode(message.get("text") or b"")
+        except (TimeoutError, *_BAD):
+            return None
+        return self._controls.seat_of(said.key)
+
+    async def _listen(self, seat: Seat) -> None:
+        while (message := await self._line.receive())["type"] != "websocket.disconnect":
+            if not self._take(seat, message.get("text") or message.get("bytes") or b""):
+                await self._line.close(CLOSE_NOT_TAKEN, "it is for held controls alone")
+                return
+
+    def _take(self, seat: Seat, data: str | bytes) -> bool:
+        if self._is_over or not self._allowance.take(self._clock.now()):
+            return False
+        try:
+            said = _said.decode(data)
+        except _BAD:
+            return False
+        if said.number > 0:  # without a number nobody knows which of two it is
+            self._controls.hear(seat, said)
+        return said.number > 0

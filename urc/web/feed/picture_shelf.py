@@ -1,0 +1,114 @@
+"""The newest image of each signal, encoded once for all who look at it.
+
+Floor 5. Nothing is queued: a client takes an image when its line is free, and then the newest one.
+What came meanwhile, that client has never heard of.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+from urc.model.values import Sample, Signal
+from urc.runtime.clock import Clock
+from urc.runtime.hub import Hub
+from urc.web.wire.picture import picture_head
+from urc.web.wire.text import milliseconds
+
+__all__ = ["Encoded", "Looks", "PictureShelf", "is_picture"]
+
+SHARED_FOR_S = 0.05
+"""How long an encoded image is handed out: the age in it is that of its encoding, and an image of
+some ten kilobytes is not worth making anew for a few milliseconds."""
+
+
+class Encoded(NamedTuple):
+    """An image on its way."""
+
+    parts: tuple[bytes, bytes]
+    """A whole WebSocket frame: what is before the image, and the image as it came."""
+    message_at: int
+    """Where the message begins in it."""
+    sample: Sample
+    """What was encoded."""
+    number: int
+    """Grows with each new image of any signal."""
+    made_s: float
+
+    @property
+    def message(self) -> bytes:
+        """Return what the frame carries."""
+        return self.frame[self.message_at :]
+
+    @property
+    def frame(self) -> bytes:
+        """Return it in one piece."""
+        return b"".join(self.parts)
+
+
+@dataclass(slots=True)
+class Looks:
+    """What one client shows, and what it has of it."""
+
+    names: tuple[str, ...] = ()
+    seen: dict[str, int] = field(default_factory=dict)
+    """Signal → number of the image that it has."""
+    turn: int = 0
+    """Whose turn it is, so that one fast camera leaves room for another."""
+
+    def show(self, names: Iterable[str]) -> None:
+        """Take what the page shows from now on; what it stops showing, it has to be sent anew."""
+        self.names = tuple(dict.fromkeys(names))
+        self.seen = {name: number for name, number in self.seen.items() if name in self.names}
+
+    def is_like(self, other: "Looks") -> bool:
+        """Return whether another one shows the same and has the same of it."""
+        return self.names == other.names and self.seen == other.seen
+
+    def copy(self) -> "Looks":
+        """Return another one that has got as far."""
+        return Looks(self.names, dict(self.seen), self.turn)
+
+
+def is_picture(signal: Signal | None) -> bool:
+    """Return whether a signal's values go as binary messages."""
+    return signal is not None and signal.type in ("image", "blob")
+
+
+class PictureShelf:
+    """What the clients of one session share."""
+
+    def __init__(self, hub: Hub, clock: Clock) -> None:
+        self._hub = hub
+        self._clock = clock
+        self._encoded: dict[str, Encoded] = {}
+        self._count = 0
+
+    def take(self, looks: Looks) -> Encoded | None:
+        """Return an image that the client shows and has not got, or None; it counts as sent."""
+        count = len(looks.names)
+        for step in range(count):
+            name = looks.names[(looks.turn + step) % count]
+            made = self._newest(name)
+            if made is not None and looks.seen.get(name) != made.number:
+                looks.turn = (looks.turn + step + 1) % count
+                looks.seen[name] = made.number
+                return made
+        return None
+
+    def _newest(self, name: str) -> Encoded | None:
+        sample = self._hub.latest(name)
+        if sample is None or not isinstance(sample.value, bytes):
+            return None
+        if not is_picture(self._hub.signals.get(name)):
+            return None
+        known, now_s = self._encoded.get(name), self._clock.now()
+        is_new = known is None or known.sample is not sample
+        if known is None or is_new or now_s - known.made_s > SHARED_FOR_S:
+            self._count += is_new
+            number = self._count if known is None or is_new else known.number
+            age_ms = milliseconds(now_s - sample.time_s)
+            index, now_ms = self._hub.index[name], milliseconds(now_s)
+            head, at = picture_head(index, sample.value, age_ms, now_ms)
+            known = Encoded((head, sample.value), at, sample, number, now_s)
+            self._encoded[name] = known
+        return known

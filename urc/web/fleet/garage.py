@@ -1,0 +1,185 @@
+"""Makes the robots that a dashboard shows: from documents, settings, and what is installed.
+
+Floor 5. It reads files and keeps what the operator fills in; it holds no session. Reading takes a
+while: from the event loop it is called in a thread.
+"""
+
+from collections.abc import Callable, Mapping
+from contextlib import AbstractAsyncContextManager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final, NamedTuple
+
+from urc.config.fit import Fitted, fit_interface
+from urc.model.profile import Profile
+from urc.model.values import Value
+from urc.packages.lock import Lock
+from urc.packages.manifest import Manifest
+from urc.packages.names import PackageError
+from urc.packages.package import open_package
+from urc.packages.store import Store
+from urc.problems import UrcError
+from urc.runtime.kept import Kept, KeptFile
+from urc.runtime.opened import open_document
+from urc.runtime.session import Session
+from urc.runtime.settings import parse_setting
+from urc.runtime.shelves import shelf_of
+from urc.web.fleet.robots import Robot
+
+__all__ = ["DRIVEN", "Added", "Garage", "Workshop"]
+
+DRIVEN: Final = ("robot", "driver")
+"""Kinds of packages that stand on the menu; of one name, the robot goes before the driver."""
+
+
+@dataclass(frozen=True, slots=True)
+class Workshop:
+    """What makes robots, chosen by who starts the dashboard."""
+
+    data: Path
+    """Folder in which settings and packages are kept."""
+    make: Callable[[Profile, Mapping[str, Value]], Robot]
+    """Return the robot of a profile with settings."""
+    tried: Callable[[Profile, Mapping[str, Value]], AbstractAsyncContextManager[Session]]
+    """Give a session that only tries the lines: nothing is steered by it."""
+    given: Callable[[Profile], Mapping[str, Value]]
+    """Return the settings that were given at the start; nothing that is filled in changes them.
+    Raises `UrcError` for those that no longer fit."""
+    shows_installed: bool = False
+    """Whether the menu has the robots and drivers that are installed."""
+    is_open: bool = False
+    """Whether other machines may manage packages and settings, too."""
+
+
+class Added(NamedTuple):
+    """An installed interface."""
+
+    lock: Lock
+    document: str
+
+
+class Garage:
+    """The documents behind the robots."""
+
+    def __init__(self, workshop: Workshop) -> None:
+        """Read nothing yet."""
+        self.workshop = workshop
+        self.store = Store(workshop.data / "packages")
+        self._manifests: dict[tuple[str, int, int], Manifest] = {}
+        """By digest and state of the archive: pages ask for all of them again and again."""
+
+    def stamp(self) -> object:
+        """Return what is another thing whenever something was installed or removed."""
+        try:
+            found = (self.store.folder / "state.json").stat()
+        except OSError:
+            return None
+        return found.st_mtime_ns, found.st_size, found.st_ino
+
+    def kept(self, name: str) -> KeptFile:
+        """Return where it is kept what was filled in for the robot of that name."""
+        return KeptFile(self.workshop.data / "robots", name)
+
+    def robot(self, name: str, profile: Profile, kept: Kept | None = None) -> Robot:
+        """Return a robot with its settings and all interfaces that fit; raise `UrcError`.
+
+        Args:
+            name: in its URL.
+            profile: as its document says.
+            kept: what was filled in; None: what is in its file.
+        """
+        chosen = self.kept(name).load() if kept is None else kept
+        values = self.values(profile, chosen)
+        return self.workshop.make(self.furnished(profile, chosen.interface), values)
+
+    def values(self, profile: Profile, kept: Kept) -> dict[str, Value]:
+        """Return the value of every setting that has one.
+
+        What was given at the start wins over what was filled in, and that over the default.
+        What was filled in and does not fit any more, as after an update, counts as not set.
+        """
+        values: dict[str, Value] = {
+            name: setting.default
+            for name, setting in profile.settings.items()
+            if setting.default is not None
+        }
+        for name, text in kept.settings.items():
+            if name in profile.settings:
+                try:
+                    values[name] = parse_setting(profile.settings[name], text)
+                except UrcError:
+                    values.pop(name, None)
+        return values | dict(self.workshop.given(profile))
+
+    def furnished(self, profile: Profile, first: str = "") -> Profile:
+        """Return a profile with the installed interfaces that fit it; `first` is shown first."""
+        interfaces, widgets = dict(profile.interfaces), dict(profile.widgets)
+        for added in self.interfaces():
+            found = self.fitted(added, profile)
+            if found.interface is not None and added.lock.key.name not in interfaces:
+                interfaces[added.lock.key.name] = found.interface._replace(name=added.lock.key.name)
+                widgets |= found.widgets
+        if first in interfaces:
+            interfaces = {first: interfaces[first], **interfaces}
+        return profile._replace(interfaces=interfaces, widgets=widgets)
+
+    def fitted(self, added: Added, profile: Profile) -> Fitted:
+        """Return what an installed interface is on a robot."""
+        if added.lock.key.name in profile.interfaces:
+            return Fitted(None, fault="this robot has an interface of that name")
+        return fit_interface(added.document, profile, shelf_of(added.document))
+
+    def interfaces(self) -> list[Added]:
+        """Return the interfaces that were installed by themselves, the newest version of each."""
+        newest = {lock.root: lock for lock in _ascending(self.store.installed())}
+        found = []
+        for lock in newest.values():
+            if lock.key.kind == "interface":
+                try:
+                    found.append(Added(lock, str(self.store.document(lock))))
+                except PackageError:
+                    continue  # damaged: the list of what is installed says so
+        return found
+
+    def parked(self) -> dict[str, list[Lock]]:
+        """Return the installed packages that can be driven: name → its versions, oldest first.
+
+        Of a robot and a driver of one name there is the robot.
+        """
+        found: dict[str, list[Lock]] = {}
+        for kind in DRIVEN:
+            mine: dict[str, list[Lock]] = {}
+            for lock in _ascending(self.store.installed()):
+                if lock.key.kind == kind:
+                    mine.setdefault(lock.key.name, []).append(lock)
+            found = {**mine, **found}
+        return dict(sorted(found.items()))
+
+    def chosen(self, locks: list[Lock], version: str) -> Lock:
+        """Return the version that was chosen for a robot; the newest where it is not there."""
+        return next((lock for lock in locks if lock.version == version), locks[-1])
+
+    def profile(self, lock: Lock) -> Profile:
+        """Return the profile of an installed package; raise `UrcError`."""
+        return open_document(self.store.document(lock))
+
+    def reread(self, profile: Profile) -> Profile:
+        """Return what the document of a robot that was there from the start says; raise."""
+        return open_document(profile.file)
+
+    def manifest(self, lock: Lock) -> Manifest:
+        """Return what an installed package says of itself; raise `UrcError`."""
+        digest = lock.packages[lock.root].sha256
+        try:
+            found = self.store.blob_file(digest).stat()
+            key = digest, found.st_mtime_ns, found.st_size
+        except OSError:
+            key = digest, 0, 0
+        if key not in self._manifests:
+            said = open_package(self.store.blob(digest), str(lock)).manifest
+            self._manifests = {**self._manifests, key: said}
+        return self._manifests[key]
+
+
+def _ascending(locks: tuple[Lock, ...]) -> list[Lock]:
+    return sorted(locks, key=lambda lock: (lock.root, lock.number))

@@ -1,0 +1,337 @@
+"""A robot as the dashboard sees it, and the life of its session.
+
+Floor 5. The session is opened for the first client and closed a short while after the last one has
+gone, so that a reload of the page does not cut the robot off and Back does.
+"""
+
+import asyncio
+import logging
+import secrets
+from collections.abc import AsyncIterator, Callable, Iterator, Mapping
+from contextlib import AbstractAsyncContextManager, asynccontextmanager, contextmanager
+from dataclasses import dataclass
+from typing import Protocol
+
+from urc.model.codec import Payload
+from urc.model.driver import Driver
+from urc.model.profile import Profile, Setting
+from urc.model.values import Reading, Value
+from urc.problems import UrcError
+from urc.protocol.events import Replied
+from urc.protocol.reins import Pull
+from urc.runtime.clock import Clock, LoopClock
+from urc.runtime.hub import Hub
+from urc.runtime.latch import LatchFile
+from urc.runtime.motion import Frames, Movers
+from urc.runtime.trail import Trail
+from urc.web.drive.consent import Consent
+from urc.web.drive.controls import Controls
+from urc.web.feed.fanout import Fanout
+
+__all__ = [
+    "HELD",
+    "Glimpse",
+    "Live",
+    "Robot",
+    "SessionFailed",
+    "SessionLike",
+    "Station",
+    "missing_settings",
+    "needs_holding",
+]
+
+LINGER_S = 2.0
+OPEN_TIMEOUT_S = 10.0
+RETRY_S = 1.0
+CLIENTS = 256
+CLOSE_TIMEOUT_S = 8.0
+"""How long a session that is to end is waited for."""
+STOP_WITHIN_S = 1.0
+"""How long somebody who stops a robot without a socket waits to hear that it was reached."""
+_LOOK_S = 0.01
+HELD = "this command moves the robot for as long as it is held, and nothing here can hold it"
+
+log = logging.getLogger(__name__)
+
+
+class SessionLike(Protocol):
+    """What the dashboard needs of an opened profile."""
+
+    @property
+    def hub(self) -> Hub:
+        """Latest values and link states."""
+
+    @property
+    def frames(self) -> Frames:
+        """What makes the frames of held commands."""
+
+    @property
+    def movers(self) -> Movers | None:
+        """Who writes them; None where the robot has no held command."""
+
+    async def command(
+        self,
+        name: str,
+        arguments: Mapping[str, Reading],
+        *,
+        confirmed_by: tuple[str, ...] = (),
+        on_sent: Callable[[Payload], None] | None = None,
+    ) -> Replied:
+        """Run one command and return its reply; raise `CommandFailed` when there is none."""
+
+    def pull(self, sequence: str, what: Pull) -> None:
+        """Let a sequence pause, do one more step, go on, or end."""
+
+
+Glimpse = bytes | Mapping[str, Reading] | None
+"""A picture, or values by signal; None: nothing is known of the robot."""
+
+
+@dataclass(frozen=True, slots=True)
+class Robot:
+    """One robot to serve."""
+
+    profile: Profile
+    settings: Mapping[str, Value]
+    """What is set now, defaults included."""
+    open_session: Callable[[], AbstractAsyncContextManager[SessionLike]]
+    """Connects while the context lasts. Must not wait for the robot to answer."""
+    glimpse: Callable[[], Glimpse] | None = None
+    """What is seen of an emulated robot without being connected to it; None for a real one."""
+
+
+@dataclass(frozen=True, slots=True)
+class Live:
+    """An open session with its fan-out."""
+
+    session: SessionLike
+    fanout: Fanout
+    number: str
+    """Tells this session from the robot's other ones, also across restarts of the server."""
+    ended: asyncio.Event
+    """Set when the session is over, whatever the reason."""
+
+
+class SessionFailed(UrcError):
+    """The robot's session could not be opened, or ended."""
+
+
+def missing_settings(robot: Robot) -> tuple[Setting, ...]:
+    """Return the settings that must be filled in before the robot can be connected."""
+    return tuple(
+        setting
+        for name, setting in robot.profile.settings.items()
+        if robot.settings.get(name, setting.default) in (None, "")
+    )
+
+
+def needs_holding(driver: Driver, command: str) -> bool:
+    """Return whether the command is motion: given once, it would never be stopped."""
+    known = driver.commands.get(command)
+    return known is not None and known.hold is not None
+
+
+class Station:
+    """Opens and closes the session of one robot as clients come and go."""
+
+    def __init__(
+        self,
+        robot: Robot,
+        *,
+        linger_s: float = LINGER_S,
+        clock: Clock | None = None,
+        latch: LatchFile | None = None,
+        trail: Trail | None = None,
+    ) -> None:
+        """Wait for the first client.
+
+        Args:
+            robot: whose session it is.
+            linger_s: how long it stays open after the last client has gone, in seconds.
+            clock: the time.
+            latch: keeps a stop over a restart.
+            trail: takes note of who moves the robot.
+        """
+        self.robot = robot
+        self.clock: Clock = clock or LoopClock()
+        self.controls = Controls(robot.profile.driver, self.clock, latch, trail)
+        self.consent = Consent(lambda: self.controls.seats, self.clock)
+        self._linger_s = linger_s
+        self._visitors = 0
+        self._stirred = asyncio.Event()
+        self._next: asyncio.Future[Live] | None = None
+        self._is_open = False
+        self._held_off = 0
+        """How many want the robot left alone."""
+        self._successor: tuple[Robot, LatchFile | None] | None = None
+
+    @property
+    def is_full(self) -> bool:
+        """Whether one more client would be one too many."""
+        return self._visitors >= CLIENTS
+
+    @contextmanager
+    def visit(self) -> Iterator[None]:
+        """Count as a client for as long as the context lasts."""
+        self._visitors += 1
+        self._stirred.set()
+        try:
+            yield
+        finally:
+            self._visitors -= 1
+            self._stirred.set()
+
+    async def live(self) -> Live:
+        """Return the open session; raise `SessionFailed` when there will be none."""
+        try:
+            async with asyncio.timeout(OPEN_TIMEOUT_S):
+                return await asyncio.shield(self._coming())
+        except TimeoutError:
+            raise SessionFailed("the robot's session did not open in time") from None
+
+    def glimpse(self) -> Glimpse:
+        """Return what can be seen of the robot just now; nobody is connected for it."""
+        if self.robot.glimpse is not None:
+            return self.robot.glimpse()
+        coming = self._next
+        if coming is None or not coming.done() or coming.cancelled() or coming.exception():
+            return None
+        hub = coming.result().session.hub
+        samples = {name: hub.latest(name) for name in hub.signals}
+        values = {name: one.value for name, one in samples.items() if one is not None}
+        pictures = (value for value in values.values() if isinstance(value, bytes))
+        return next(pictures, None) or values or None
+
+    async def deliver_stop(self) -> bool:
+        """Wait a moment for the stop to reach the robot, connecting it when nobody looks at it."""
+        desk = self.controls.desk
+        end_s = self.clock.now() + STOP_WITHIN_S
+        with self.visit():
+            while not desk.is_confirmed and self.clock.now() < end_s:
+                await self.clock.sleep(_LOOK_S)
+        return desk.is_confirmed
+
+    @property
+    def is_at_rest(self) -> bool:
+        """Whether nobody has the controls and every stop has reached the robot."""
+        desk = self.controls.desk
+        return desk.lease.state.holder is None and desk.is_confirmed
+
+    @property
+    def is_open(self) -> bool:
+        """Whether there is a session, or one is being opened or closed."""
+        return self._is_open
+
+    @asynccontextmanager
+    async def held_off(self) -> AsyncIterator[None]:
+        """Leave the robot alone for as long as the context lasts: many robots serve one at a time.
+
+        For a robot that nobody drives. An open session ends first; clients wait for the next one.
+        """
+        self._held_off += 1
+        self._stirred.set()
+        try:
+            end_s = self.clock.now() + CLOSE_TIMEOUT_S
+            while self._is_open and self.clock.now() < end_s:
+                await self.clock.sleep(_LOOK_S)
+            yield
+        finally:
+            self._held_off -= 1
+            self._stirred.set()
+
+    def replace(self, robot: Robot, latch: LatchFile | None = None) -> None:
+        """Go on with another version of the robot; an open session ends, and the next is its own.
+
+        For a robot that `is_at_rest`: it is disconnected meanwhile.
+        """
+        self._successor = (robot, latch)
+        if not self._is_open:
+            self._succeed()
+        self._stirred.set()
+
+    def _succeed(self) -> None:
+        self._is_open = False
+        if self._successor is not None:
+            (self.robot, latch), self._successor = self._successor, None
+            self.controls.renew(self.robot.profile.driver, latch)
+
+    async def run(self) -> None:
+        """Supervise for ever; ends by being cancelled."""
+        while True:
+            self._succeed()
+            await self._wait_for(present=True)
+            self._is_open = True
+            try:
+                async with self.robot.open_session() as session:
+                    await self._serve(session)
+            except UrcError as error:
+                self._fail(str(error))
+                await self.clock.sleep(RETRY_S)
+            except Exception:  # a supervisor: one robot's bug must not end the others
+                log.exception("the session of %s broke", self.robot.profile.name)
+                self._fail("the robot's session broke; the server's log says why")
+                await self.clock.sleep(RETRY_S)
+
+    async def _serve(self, session: SessionLike) -> None:
+        fanout = Fanout(session.hub, clock=self.clock)
+        live = Live(session, fanout, secrets.token_hex(8), asyncio.Event())
+        self._coming().set_result(live)
+        try:
+            async with asyncio.TaskGroup() as group:
+                tasks = [
+                    group.create_task(work)
+                    for work in (live.fanout.run(), self.controls.serve(session))
+                ]
+                await self._until_deserted()
+                self._next = None  # who comes from here on waits for the next session
+                for task in tasks:
+                    task.cancel()
+        finally:
+            self._next = None
+            live.ended.set()
+            live.fanout.end()
+
+    async def _until_deserted(self) -> None:
+        while True:
+            await self._wait_for(present=False)
+            # Whether the time is over the alarm says, not the clock: a loop's timer may be a
+            # fraction of a millisecond early, and would then not ring again.
+            rung = asyncio.Event()
+
+            def ring(rung: asyncio.Event = rung) -> None:
+                rung.set()
+                self._stirred.set()
+
+            alarm = self.clock.call_at(self.clock.now() + self._linger_s, ring)
+            while not (self._visitors or self._is_unwanted or rung.is_set()):
+                self._stirred.clear()
+                await self._stirred.wait()
+            alarm.cancel()
+            if not self._visitors or self._is_unwanted:
+                return
+
+    @property
+    def _is_unwanted(self) -> bool:
+        """Whether an open session is to end, whoever looks on."""
+        return self._successor is not None or self._held_off > 0
+
+    async def _wait_for(self, *, present: bool) -> None:
+        """Wait until the robot is wanted, or until it is not, for any reason."""
+        while not (self._is_wanted if present else self._visitors == 0 or self._is_unwanted):
+            self._stirred.clear()
+            await self._stirred.wait()
+
+    @property
+    def _is_wanted(self) -> bool:
+        return (self._visitors > 0 and not self._held_off) or self._successor is not None
+
+    def _coming(self) -> asyncio.Future[Live]:
+        if self._next is None:
+            self._next = asyncio.get_running_loop().create_future()
+        return self._next
+
+    def _fail(self, reason: str) -> None:
+        coming, self._next = self._next, None
+        if coming is not None and not coming.done():
+            coming.set_exception(SessionFailed(reason))
+            coming.exception()  # nobody may be waiting: that is no error

@@ -1,0 +1,1 @@
+"""What pages may load: looked up, never found."""

@@ -1,0 +1,161 @@
+"""Files a page may load: known before the first request, never a path made from a URL.
+
+Floor 5. Every table below is filled from folders that ship with URC, or from widget manifests; a
+request is a look-up in it. Files are read again when they change, so that an edit shows at once.
+"""
+
+import hashlib
+import json
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from starlette.exceptions import HTTPException
+from starlette.requests import Request
+from starlette.responses import Response
+
+from urc.model.widget import Widget
+from urc.problems import UrcError
+
+__all__ = ["Assets", "folder_assets", "import_map", "script", "widget_assets"]
+
+STATIC = Path(__file__).resolve().parents[1] / "static"
+KIT = ("curve", "giving", "kit", "meter", "motion", "padmap", "palette", "scale", "stroke")
+"""Modules of ours that widgets import as ``urc/…``."""
+WIDGET_FILES = ("widget.js", "widget.css")
+MOST_FILES = 200
+"""That pages may load of one widget."""
+CODE = ("/static/", "/vendor/", "/words/", "/widgets/")
+"""Where frames may load from."""
+MEDIA_TYPES = {
+    ".css": "text/css; charset=utf-8",
+    ".js": "text/javascript; charset=utf-8",
+    ".mjs": "text/javascript; charset=utf-8",
+    ".json": "application/json",
+    ".webmanifest": "application/manifest+json",
+    ".map": "application/json",
+    ".svg": "image/svg+xml",
+    ".png": "image/png",
+    ".jpg": "image/jpeg",
+    ".webp": "image/webp",
+    ".urdf": "application/xml",
+    ".stl": "model/stl",
+    ".dae": "application/xml",
+    ".woff2": "font/woff2",
+    ".wasm": "application/wasm",
+}
+
+
+@dataclass(slots=True)
+class _File:
+    path: Path
+    stamp: tuple[int, int] = (0, 0)
+    body: bytes = b""
+    tag: str = ""
+
+    def refresh(self) -> None:
+        """Read the file when it is not the one in memory; raises OSError when it is gone."""
+        found = self.path.stat()
+        stamp = (found.st_mtime_ns, found.st_size)
+        if stamp != self.stamp:
+            self.body = self.path.read_bytes()
+            self.tag = _tag(self.body)
+            self.stamp = stamp
+
+
+@dataclass(slots=True)
+class Assets:
+    """Name in the URL → file."""
+
+    files: dict[str, _File] = field(default_factory=dict)
+
+    def respond(self, name: str, request: Request) -> Response:
+        """Return the file, or 304 when the browser has it already; raise 404."""
+        file = self.files.get(name)
+        if file is None:
+            raise HTTPException(404)
+        try:
+            file.refresh()
+        except OSError as error:
+            raise HTTPException(404) from error
+        return _kept(file.body, file.tag, MEDIA_TYPES[file.path.suffix], request)
+
+
+def script(source: str, request: Request) -> Response:
+    """Return a module that was made, not read; 304 when the browser has it already."""
+    body = source.encode()
+    return _kept(body, _tag(body), MEDIA_TYPES[".js"], request)
+
+
+def _kept(body: bytes, tag: str, media_type: str, request: Request) -> Response:
+    # Foreign widgets load it from their frames.
+    request.state.is_code = request.url.path.startswith(CODE)
+    headers = {"etag": tag, "cache-control": "no-cache"}
+    if tag in request.headers.get("if-none-match", ""):
+        return Response(status_code=304, headers=headers)
+    return Response(body, media_type=media_type, headers=headers)
+
+
+def _tag(body: bytes) -> str:
+    return f'"{hashlib.blake2b(body, digest_size=12).hexdigest()}"'
+
+
+def folder_assets(folder: Path) -> Assets:
+    """Return every file of `folder` whose type a page can use, by its name relative to it."""
+    root = folder.resolve()
+    found = Assets()
+    for path in sorted(root.rglob("*")):
+        is_ours = path.is_file() and path.resolve().is_relative_to(root)
+        if is_ours and path.suffix in MEDIA_TYPES:
+            found.files[path.relative_to(root).as_posix()] = _File(path)
+    return found
+
+
+def widget_assets(widgets: Iterable[Widget]) -> Assets:
+    """Return what pages load of each widget: modules, style sheet and small assets.
+
+    The names are ``<widget>/<path in its folder>``. A link that leads out of the folder is left
+    out, and so is what is hidden.
+
+    Raises:
+        UrcError: two widgets of one name come from different folders, or one has too many files.
+    """
+    found = Assets()
+    folders: dict[str, Path] = {}
+    for widget in widgets:
+        folder = folders.setdefault(widget.name, widget.folder)
+        if folder != widget.folder:
+            raise UrcError(
+                f"two robots bring different widgets named {widget.name!r}: "
+                f"{folder} and {widget.folder}"
+            )
+        # Also when they are not there yet: a widget is written while the page is open.
+        for name in WIDGET_FILES:
+            found.files[f"{widget.name}/{name}"] = _File(widget.folder / name)
+        for name, file in _more_files(widget):
+            found.files[f"{widget.name}/{name}"] = file
+    return found
+
+
+def _more_files(widget: Widget) -> Iterable[tuple[str, _File]]:
+    more = folder_assets(widget.folder).files
+    mine = {name: file for name, file in more.items() if not any(map(_is_hidden, name.split("/")))}
+    if len(mine) > MOST_FILES:
+        raise UrcError(f"widget {widget.name!r} has {len(mine)} files; {MOST_FILES} are allowed")
+    return mine.items()
+
+
+def _is_hidden(part: str) -> bool:
+    return part.startswith((".", "_"))
+
+
+def import_map(vendor: Path | None) -> Mapping[str, object]:
+    """Return the page's import map: our kit, and the third-party modules that the build brought."""
+    imports = {f"urc/{name}": f"/static/{name}.js" for name in KIT}
+    imports["urc/words"] = "/words/en.js"
+    place = vendor / "importmap.json" if vendor else None
+    if place is not None and place.is_file():
+        written: dict[str, str] = json.loads(place.read_text(encoding="utf-8"))["imports"]
+        # The build writes them relative to its folder, which pages see as /vendor/.
+        imports |= {name: f"/vendor/{url.removeprefix('./')}" for name, url in written.items()}
+    return {"imports": imports}

@@ -1,0 +1,88 @@
+"""What pages load, as routes: our modules and styles, those of others, of widgets, words, tiles.
+
+Floor 5. Each is a look-up in a table; see `urc.web.load.assets`.
+"""
+
+from collections.abc import Callable
+from pathlib import Path
+
+from starlette.exceptions import HTTPException
+from starlette.requests import Request
+from starlette.responses import Response
+from starlette.routing import Route
+
+from urc.web import words
+from urc.web.load.assets import STATIC, Assets, folder_assets, script
+from urc.web.load.files import tile
+
+__all__ = ["FileRoutes"]
+
+
+class FileRoutes:
+    """The routes.
+
+    Args:
+        vendor: folder of the third-party modules that the build brought; None: there are none.
+        tiles: folder of map pictures, ``z/x/y.png``; None: there are none.
+        widgets: returns the tables of the widgets' files, the first that has a name counts.
+    """
+
+    def __init__(
+        self, vendor: Path | None, tiles: Path | None, widgets: Callable[[], tuple[Assets, ...]]
+    ) -> None:
+        self._static = folder_assets(STATIC)
+        self._vendor = folder_assets(vendor) if vendor else Assets()
+        self._tiles = tiles
+        self._widgets = widgets
+
+    def routes(self) -> list[Route]:
+        """Return what has to come behind the pages of the widgets."""
+        return [
+            Route("/favicon.ico", self._favicon),
+            Route("/app.webmanifest", self._manifest),
+            Route("/sw.js", self._worker),
+            Route("/words/{tag}.js", self._words),
+            Route("/static/{file:path}", self._static_file),
+            Route("/vendor/{file:path}", self._vendor_file),
+            Route("/widgets/{file:path}", self._widget_file),
+            Route("/tiles/{z:int}/{x:int}/{y:int}.{kind}", self._tile),
+        ]
+
+    def has_widget(self, name: str) -> bool:
+        """Return whether pages load files of a widget of that name."""
+        return any(f"{name}/widget.js" in table.files for table in self._widgets())
+
+    async def _favicon(self, request: Request) -> Response:
+        return self._static.respond("favicon.svg", request)
+
+    async def _manifest(self, request: Request) -> Response:
+        return self._static.respond("app.webmanifest", request)
+
+    async def _worker(self, request: Request) -> Response:
+        """Serve the service worker from the root: it may only look after what lies below it."""
+        return self._static.respond("sw.js", request)
+
+    async def _words(self, request: Request) -> Response:
+        """Serve what pages say, in one language, as a module."""
+        tag = request.path_params["tag"]
+        if tag not in words.LANGUAGES:
+            raise HTTPException(404)
+        return script(words.module(tag), request)
+
+    async def _static_file(self, request: Request) -> Response:
+        return self._static.respond(request.path_params["file"], request)
+
+    async def _vendor_file(self, request: Request) -> Response:
+        return self._vendor.respond(request.path_params["file"], request)
+
+    async def _widget_file(self, request: Request) -> Response:
+        file = request.path_params["file"]
+        tables = self._widgets()
+        table = next((one for one in tables if file in one.files), tables[-1])
+        return table.respond(file, request)
+
+    async def _tile(self, request: Request) -> Response:
+        """Serve a square of a map, where a folder with tiles was given."""
+        if self._tiles is None:
+            raise HTTPException(404)
+        return tile(self._tiles, **request.path_params, request=request)

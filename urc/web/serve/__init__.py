@@ -1,0 +1,1 @@
+"""The HTTP server underneath, and who may talk to it."""

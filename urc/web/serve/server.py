@@ -1,0 +1,278 @@
+"""The HTTP server underneath: uvicorn, run from a coroutine, with low limits on what may wait.
+
+Floor 5. Besides `connection` the only module that knows uvicorn. The kernel and the process keep as
+little unsent data per client as possible: whatever waits there grows old and can't be taken back.
+"""
+
+import asyncio
+import contextlib
+import ipaddress
+import signal
+import socket
+from collections.abc import Callable, Iterable, Iterator
+from functools import partial
+from typing import Any, cast
+
+import uvicorn
+from starlette.types import ASGIApp
+from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
+from uvicorn.server import ServerState
+
+from urc.problems import UrcError
+from urc.web.feed.flow import SocketFlow
+from urc.web.serve.addresses import local_addresses
+from urc.web.serve.connection import CONNECTIONS, REQUEST_S, Connection
+from urc.web.serve.frames import Frames, text_of
+from urc.web.wire.messages import INBOUND_BYTES
+
+__all__ = ["reachable_urls", "serve"]
+
+SEND_BUFFER_BYTES = 64 * 1024
+UNSENT_BYTES = 8 * 1024
+HEADER_BYTES = 16 * 1024
+PING_EVERY_S = 5.0
+PING_TIMEOUT_S = 10.0
+GRACE_S = 2
+DATE_S = 1.0
+BACKLOG = 128
+
+
+async def serve(
+    app: ASGIApp,
+    *,
+    host: str = "127.0.0.1",
+    port: int = 8080,
+    on_ready: Callable[[str], None] | None = None,
+    request_s: float = REQUEST_S,
+    connections: int = CONNECTIONS,
+) -> None:
+    """Serve `app` until SIGINT, SIGTERM or cancellation; then close within 3 seconds.
+
+    Args:
+        app: what `build_app` made.
+        host: an address or name of this machine.
+        port: 0 lets the system choose one.
+        on_ready: called once with an address to open, as ``http://127.0.0.1:8080/``: the first of
+            `reachable_urls`.
+        request_s: in which a connection must bring a whole request, in seconds.
+        connections: how many may be open at once; the next is answered with 503.
+
+    Raises:
+        UrcError: the address cannot be listened on.
+    """
+    listener = _listen(host, port)
+    connection = partial(Connection, request_s=request_s, most=connections)
+    config = uvicorn.Config(
+        app,
+        loop="none",
+        http=cast("type[asyncio.Protocol]", connection),
+        ws=_DashboardSocket,
+        ws_max_size=INBOUND_BYTES,
+        ws_ping_interval=PING_EVERY_S,
+        ws_ping_timeout=PING_TIMEOUT_S,
+        ws_per_message_deflate=False,
+        lifespan="on",
+        log_config=None,
+        access_log=False,
+        proxy_headers=False,
+        server_header=False,
+        timeout_keep_alive=5,
+        timeout_graceful_shutdown=GRACE_S,
+        h11_max_incomplete_event_size=HEADER_BYTES,
+    )
+    server = _Server(config)
+    try:
+        with _ending(server):
+            running = asyncio.ensure_future(server.serve(sockets=[listener]))
+            await _until_ready(server, running)
+            if on_ready and server.started:
+                on_ready(reachable_urls(*listener.getsockname()[:2])[0])
+            await _follow(server, running)
+    finally:
+        listener.close()
+
+
+class _Server(uvicorn.Server):
+    """uvicorn's server, told of its end instead of looking for it ten times a second."""
+
+    def __init__(self, config: uvicorn.Config) -> None:
+        super().__init__(config)
+        self._ending = asyncio.Event()
+
+    def end(self) -> None:
+        """Close in good order."""
+        self.should_exit = True
+        self._ending.set()
+
+    async def main_loop(self) -> None:
+        """Renew the date of the answers, until the end."""
+        while not await self.on_tick(0):
+            with contextlib.suppress(TimeoutError):
+                async with asyncio.timeout(DATE_S):
+                    await self._ending.wait()
+
+    @contextlib.contextmanager
+    def capture_signals(self) -> Iterator[None]:
+        """Leave the signals to `_ending`: uvicorn's own handling raises them again at the end."""
+        yield
+
+
+class _DashboardSocket(WebSocketsSansIOProtocol):
+    """uvicorn's WebSocket, with nothing waiting in the process, and a word when the line is free.
+
+    WARNING: only asyncio's own protocol methods and the constructor's arguments are used here, the
+    rest of the base class is uvicorn's business. The application finds the `SocketFlow` in
+    ``scope["state"]["flow"]`` and must do without it on another server.
+    """
+
+    def __init__(
+        self,
+        config: uvicorn.Config,
+        server_state: ServerState,
+        app_state: dict[str, Any],
+        _loop: asyncio.AbstractEventLoop | None = None,
+    ) -> None:
+        self._urc_flow = SocketFlow()
+        self._urc_frames: Frames | None = None
+        """None before the handshake, which is what comes first."""
+        super().__init__(config, server_state, {**app_state, "flow": self._urc_flow}, _loop)
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        """Take the transport, and let it pause us as soon as the kernel is full."""
+        super().connection_made(transport)
+        self._urc_flow.made(cast("asyncio.Transport", transport))
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        """Let a waiting writer go on, to learn that the line is gone."""
+        super().connection_lost(exc)
+        self._urc_flow.lost()
+
+    def data_received(self, data: bytes) -> None:
+        """Pass a whole text on at once, if the client takes it; all else goes its usual way."""
+        if self._urc_frames is None:
+            self._urc_frames = Frames()
+            self._urc_usual(data)
+            return
+        text = self._urc_frames.whole(data)
+        sink = self._urc_flow.sink
+        if sink is None:
+            self._urc_usual(data)
+        elif text is None:
+            self._urc_several(data, self._urc_frames.spans, sink)
+        elif not sink(text):
+            self._urc_usual(data)
+
+    def _urc_several(
+        self, data: bytes, spans: Iterable[tuple[int, int]], sink: Callable[[bytes], bool]
+    ) -> None:
+        """Pass on what came together, up to the first that the client does not take."""
+        at = 0
+        for begin, end in spans:
+            if not sink(text_of(data[begin:end])):
+                break
+            at = end
+        if at < len(data):
+            self._urc_usual(data[at:])
+
+    def _urc_usual(self, data: bytes) -> None:
+        super().data_received(data)
+        if self._urc_flow.is_closing():  # it was a goodbye, which was answered
+            self._urc_flow.closing()
+
+    def pause_writing(self) -> None:
+        """Tell the client that the kernel is full."""
+        super().pause_writing()
+        self._urc_flow.pause()
+
+    def resume_writing(self) -> None:
+        """Tell the client that the kernel has taken everything."""
+        super().resume_writing()
+        self._urc_flow.resume()
+
+
+def _listen(host: str, port: int) -> socket.socket:
+    try:
+        family, kind, protocol, _, address = socket.getaddrinfo(
+            host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE
+        )[0]
+        listener = socket.socket(family, kind, protocol)
+    except OSError as error:
+        raise UrcError(f"cannot listen on {host}: {error.strerror or error}") from error
+    try:
+        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        # Accepted sockets inherit these two.
+        listener.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BUFFER_BYTES)
+        if hasattr(socket, "TCP_NOTSENT_LOWAT"):
+            listener.setsockopt(socket.IPPROTO_TCP, socket.TCP_NOTSENT_LOWAT, UNSENT_BYTES)
+        if family == socket.AF_INET6:
+            # "::" means every address, of both kinds, whatever the system's own default is.
+            with contextlib.suppress(OSError):  # a system that knows no such thing
+                listener.setsockopt(socket.IPPROTO_IPV6, socket.IPV6_V6ONLY, 0)
+        listener.bind(address)
+        listener.listen(BACKLOG)
+    except OSError as error:
+        listener.close()
+        reason = error.strerror or str(error)
+        hint = "; choose another with --port" if port else ""
+        raise UrcError(f"cannot listen on {host} port {port}: {reason}{hint}") from error
+    listener.setblocking(False)
+    return listener
+
+
+def reachable_urls(host: str, port: int) -> tuple[str, ...]:
+    """Return the addresses under which a dashboard that listens on `host` can be opened.
+
+    For ``0.0.0.0`` and ``::`` these are the addresses of this machine's interfaces, those of the
+    network first, or its loopback when it has none; else it is `host`. No packet is sent.
+
+    Args:
+        host: what is listened on: an address, or a name.
+        port: the real one.
+    """
+    try:
+        address = ipaddress.ip_address(host.partition("%")[0])
+    except ValueError:
+        return (_url(host, port),)
+    if not address.is_unspecified:
+        return (_url(host, port),)
+    found = [each for each in local_addresses() if each.version <= address.version]
+    loopback = ipaddress.ip_address("127.0.0.1" if address.version == 4 else "::1")
+    return tuple(_url(str(each), port) for each in found or [loopback])
+
+
+def _url(host: str, port: int) -> str:
+    return f"http://[{host}]:{port}/" if ":" in host else f"http://{host}:{port}/"
+
+
+async def _until_ready(server: uvicorn.Server, running: "asyncio.Future[None]") -> None:
+    while not server.started and not running.done():
+        await asyncio.wait((running,), timeout=0.01)
+
+
+async def _follow(server: _Server, running: "asyncio.Future[None]") -> None:
+    """Wait for the server's end; being cancelled ends it in good order first."""
+    try:
+        await asyncio.shield(running)
+    except asyncio.CancelledError:
+        server.end()
+        await asyncio.wait((running,), timeout=GRACE_S + 1)
+        running.cancel()
+        raise
+
+
+@contextlib.contextmanager
+def _ending(server: _Server) -> Iterator[None]:
+    """Let SIGINT and SIGTERM end the server while the context lasts, where they can be caught."""
+    loop = asyncio.get_running_loop()
+    caught: list[signal.Signals] = []
+
+    for number in (signal.SIGINT, signal.SIGTERM):
+        # Not in a thread, and not on Windows: there the caller's own handling stays.
+        with contextlib.suppress(NotImplementedError, RuntimeError, ValueError):
+            loop.add_signal_handler(number, server.end)
+            caught.append(number)
+    try:
+        yield
+    finally:
+        for number in caught:
+            loop.remove_signal_handler(number)

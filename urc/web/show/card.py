@@ -1,0 +1,74 @@
+"""The picture on a robot's card: what its camera sees, where it is, or its main values.
+
+Floor 5. A card looks, and connects nothing: an emulated robot is looked at from outside, a real one
+only while somebody is connected to it.
+"""
+
+from collections.abc import Callable, Mapping
+
+from starlette.exceptions import HTTPException
+from starlette.requests import Request
+from starlette.responses import JSONResponse, Response
+from starlette.routing import Route
+
+from urc.model.driver import Driver
+from urc.model.values import Reading, Signal
+from urc.web.fleet.robots import Station
+from urc.web.show.cells import spoken
+from urc.web.wire.picture import media_type
+from urc.web.words import t
+
+__all__ = ["VALUES", "Cards", "small_values"]
+
+VALUES = 4
+"""How many values a card shows, where there is no picture."""
+_FRESH = {"cache-control": "no-store"}
+_UNSHOWN = ("image", "blob", "array")
+
+
+class Cards:
+    """Answers what a card shows now.
+
+    Args:
+        stations: of all robots that are served, by the name in their URL.
+    """
+
+    def __init__(self, stations: Callable[[], Mapping[str, Station]]) -> None:
+        self._stations = stations
+
+    def routes(self) -> list[Route]:
+        """Return the one route there is."""
+        return [Route("/robots/{name}/card", self.card)]
+
+    async def card(self, request: Request) -> Response:
+        """Send a picture, or values as JSON ``[[title, text], …]``; 204 when nothing is known."""
+        station = self._stations().get(request.path_params["name"])
+        if station is None:
+            raise HTTPException(404, t("No robot of that name is served here."))
+        seen = station.glimpse()
+        if seen is None:
+            return Response(status_code=204, headers=_FRESH)
+        if isinstance(seen, bytes):
+            return Response(seen, media_type=media_type(seen), headers=_FRESH)
+        shown = small_values(station.robot.profile.driver, seen)
+        return JSONResponse(shown, headers=_FRESH)
+
+
+def small_values(driver: Driver, readings: Mapping[str, Reading]) -> list[tuple[str, str]]:
+    """Return the first values of a robot that fit on a card, each with its title."""
+    found = [
+        (one.title or spoken(name), _text(one, readings[name]))
+        for name, one in driver.signals.items()
+        if one.type not in _UNSHOWN and readings.get(name) is not None
+    ]
+    return found[:VALUES]
+
+
+def _text(signal: Signal, value: Reading) -> str:
+    if isinstance(value, bool):
+        return t("yes") if value else t("no")
+    if isinstance(value, bytes):
+        return f"{len(value)} B"
+    if isinstance(value, float):
+        value = f"{value:.{1 if signal.precision is None else signal.precision}f}"
+    return f"{value} {signal.unit}" if signal.unit else str(value)

@@ -1,0 +1,155 @@
+"""One cell of a page: a widget's own markup, and what the page must know to bring it to life.
+
+Floor 5. Widget templates come from packages, so they run in a sandbox, and one that fails costs its
+own cell.
+"""
+
+import json
+import logging
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import lru_cache
+
+from jinja2 import Environment, StrictUndefined, Template
+from jinja2.sandbox import ImmutableSandboxedEnvironment
+from markupsafe import Markup
+
+from urc.model.driver import Driver
+from urc.model.interface import WidgetUse
+from urc.model.profile import Profile
+from urc.model.values import Signal
+from urc.model.widget import Widget
+from urc.web import words
+from urc.web.load.files import linked_options
+from urc.web.load.foreign import Border, frame_url
+from urc.web.show.markdown import markdown
+from urc.web.show.outputs import inputs_config, output_config
+
+__all__ = ["Cell", "WidgetContext", "render_widget", "spoken", "widget_cell", "widget_context"]
+
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, slots=True)
+class Cell:
+    """One slot of the grid with its widget's markup."""
+
+    index: int
+    """Place in the page's cells; the grid's rules name it."""
+    config: str
+    """JSON for the host: slot, widget, inputs, outputs (see ``output.js``), options, title."""
+    html: Markup
+    """The widget's own rendered template; "" when it failed."""
+    error: str
+    """Why the widget's template failed, when it did."""
+    is_background: bool
+    frame: str = ""
+    """URL of the frame that it lives in; "" for one that lives in the page."""
+
+
+@dataclass(frozen=True, slots=True)
+class WidgetContext:
+    """``widgets/*/template.html.j2``, whose fields are its variables.
+
+    The markup is shown before the module has loaded, so it must make sense without any value.
+    """
+
+    title: str
+    """What the author calls this place, else the first needed signal's, else the first command's,
+    else the widget's title."""
+    options: Mapping[str, object]
+    """Checked against the manifest; every declared option has a key, None where nothing is set."""
+    inputs: Mapping[str, Signal | tuple[Signal, ...]]
+    """Input → the signal bound to it, of one that takes many all of them; inputs that are not bound
+    are missing."""
+    widget: str
+    """The widget's name."""
+    uid: str
+    """Unique in the page, for ``id`` and ``aria-labelledby``."""
+    outputs: Mapping[str, str] = field(default_factory=dict)
+    """Output → what the command bound to it is called, for people; outputs that are not bound are
+    missing, so that a widget can leave out what would do nothing."""
+
+
+def render_widget(widget: Widget, context: WidgetContext) -> Markup:
+    """Return the widget's markup. Whatever its template raises comes through."""
+    source = (widget.folder / "template.html.j2").read_text(encoding="utf-8")
+    variables = {name: getattr(context, name) for name in WidgetContext.__slots__}
+    return Markup(_widget_template(source).render(variables))  # noqa: S704  # autoescaped
+
+
+def widget_context(use: WidgetUse, widget: Widget, profile: Profile, uid: str) -> WidgetContext:
+    """Return what the widget's template may know."""
+    signals = profile.driver.signals
+    single = {name: signals[signal] for name, signal in use.inputs.items()}
+    several = {name: tuple(signals[one] for one in many) for name, many in use.lists.items()}
+    outputs = {name: _called(command, profile.driver) for name, command in use.outputs.items()}
+    declared: dict[str, object] = dict.fromkeys(widget.options)
+    first = single | {name: many[0] for name, many in several.items() if many}
+    title = use.title or _heading(widget, first, outputs)
+    options = {**declared, **linked_options(use, profile.name)}
+    return WidgetContext(title, options, {**single, **several}, widget.name, uid, outputs)
+
+
+def _heading(widget: Widget, inputs: Mapping[str, Signal], outputs: Mapping[str, str]) -> str:
+    """Return what the widget is about: the first signal it needs, else its command."""
+    needed = [name for name in inputs if widget.inputs[name].is_required]
+    about = [inputs[name].title or spoken(inputs[name].name) for name in (*needed, *inputs)]
+    if not needed:
+        about = [*outputs.values(), *about]
+    return next(iter(about), widget.title)
+
+
+def _called(command: str, driver: Driver) -> str:
+    known = driver.commands.get(command)
+    return (known and known.title) or spoken(command)
+
+
+def widget_cell(
+    index: int,
+    use: WidgetUse,
+    profile: Profile,
+    border: Border = Border(),  # noqa: B008  # frozen
+    *,
+    is_background: bool = False,
+) -> Cell:
+    """Return one slot with its widget; whatever the widget's template raises costs this one."""
+    widget = profile.widgets[use.widget]
+    context = widget_context(use, widget, profile, uid=f"cell-{index}")
+    html, error = Markup(), ""
+    try:
+        html = render_widget(widget, context)
+    except Exception as problem:  # a supervisor: a widget costs its own cell
+        log.warning("widget %s: its template failed: %s", widget.name, problem)
+        error = f"{type(problem).__name__}: {problem}"
+    config = {
+        "slot": use.slot,
+        "widget": use.widget,
+        "title": context.title,
+        **inputs_config(use, widget, profile.driver),
+        "outputs": {name: output_config(use, name, widget, profile.driver) for name in use.outputs},
+        "options": dict(context.options),
+    }
+    frame = frame_url(widget) if border.is_foreign(widget) else ""
+    return Cell(index, json.dumps(config), html, error, is_background, frame)
+
+
+def spoken(name: str) -> str:
+    """Return an identifier as a person would write it: ``left_motor`` → ``Left motor``."""
+    words = name.replace("_", " ").replace("-", " ").strip()
+    return words[:1].upper() + words[1:]
+
+
+@lru_cache(maxsize=1)
+def _widgets() -> Environment:
+    widgets = ImmutableSandboxedEnvironment(
+        autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    )
+    widgets.globals["t"] = words.t
+    widgets.filters["markdown"] = markdown
+    return widgets
+
+
+@lru_cache(maxsize=256)
+def _widget_template(source: str) -> Template:
+    return _widgets().from_string(source)

@@ -1,0 +1,226 @@
+"""A widget's ``demo.yaml``: its states, each as a small robot of its own that says what it shows.
+
+Floor 5. The gallery shows them, and the tests and the pictures of the manual come from it.
+"""
+
+import base64
+import binascii
+import json
+import struct
+import zlib
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from urc.model.codec import ReadSpec, WriteSpec
+from urc.model.driver import Argument, Command, Driver, Reply, TransportSpec
+from urc.model.flow import Hold
+from urc.model.interface import Interface, WidgetUse
+from urc.model.profile import Profile
+from urc.model.values import Limits, Signal
+from urc.model.widget import Port, Widget
+from urc.problems import UrcError
+from urc.source import read_document
+from urc.web.wire.messages import encode_hello
+from urc.web.wire.picture import media_type
+
+__all__ = ["DemoState", "demo_states", "colour_bars"]
+
+PICTURE_BYTES = 4 << 20
+"""Most bytes of an image in a demo."""
+_BARS = ((0xC0,) * 3, (0xC0, 0xC0, 0), (0, 0xC0, 0xC0), (0, 0xC0, 0), (0xC0, 0, 0xC0), (0xC0, 0, 0))
+
+
+class DemoState(NamedTuple):
+    """One state of a widget, ready to be rendered."""
+
+    name: str
+    use: WidgetUse
+    profile: Profile
+    """A robot with just this widget; nothing is connected to it."""
+    news: str
+    """JSON for ``gallery.js``: what the robot says."""
+    shows: tuple[str, ...]
+    """Texts that must then be readable."""
+
+
+def demo_states(widget: Widget) -> list[DemoState]:
+    """Return the states that the widget's ``demo.yaml`` describes, in its order.
+
+    Raises:
+        UrcError: the file is missing, or does not say what can be shown.
+    """
+    file = widget.folder / "demo.yaml"
+    demo: Any = read_document(str(file)).data
+    try:
+        return [_state(widget, demo, name) for name in demo["states"]]
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        raise UrcError(f"{file}: {type(error).__name__}: {error}") from error
+
+
+def _state(widget: Widget, demo: Mapping[str, Any], name: str) -> DemoState:
+    shown: Mapping[str, Any] = demo["states"][name] or {}
+    signals, inputs, lists = _signals(demo.get("signals") or {})
+    commands, outputs = _commands(widget, demo.get("outputs") or {})
+    options = {**_defaults(widget), **(shown.get("options") or {})}
+    use = WidgetUse(name, widget.name, inputs, outputs, options, shown.get("title", ""))
+    use = use._replace(lists=lists)
+    driver = Driver({"wire": TransportSpec("wire", "tcp")}, signals, commands=commands)
+    profile = Profile(
+        name="demo",
+        title="Demo",
+        file=str(widget.folder / "demo.yaml"),
+        driver=driver,
+        slots={name: use},
+        interfaces={"default": Interface("default")},
+        widgets={widget.name: widget},
+    )
+    news = {
+        "hello": json.loads(encode_hello(profile, "demo", 0.0)),
+        "readings": list(_readings(widget, shown, inputs, lists)),
+        "history": shown.get("history") or {},
+        "follow": shown.get("follow") or {},
+        "replies": shown.get("replies") or {},
+    }
+    texts = tuple(str(text) for text in shown.get("shows") or ())
+    return DemoState(name, use, profile, json.dumps(news), texts)
+
+
+def _signals(
+    declared: Mapping[str, Any],
+) -> tuple[dict[str, Signal], dict[str, str], dict[str, tuple[str, ...]]]:
+    """Return the signals, and which input is bound to which; an input of many has a list."""
+    signals: dict[str, Signal] = {}
+    inputs: dict[str, str] = {}
+    lists: dict[str, tuple[str, ...]] = {}
+    for name, given in declared.items():
+        if isinstance(given, list):
+            lists[name] = tuple(f"{name}_{place}" for place in range(len(given)))
+            signals |= {
+                signal: _signal(signal, one) for signal, one in zip(lists[name], given, strict=True)
+            }
+        else:
+            inputs[name] = name
+            signals[name] = _signal(name, given)
+    return signals, inputs, lists
+
+
+def _signal(name: str, given: Mapping[str, Any]) -> Signal:
+    limits = Limits(**(given.get("limits") or {}))
+    states = tuple((str(raw), str(word)) for raw, word in dict(given.get("states") or {}).items())
+    return Signal(name, **{**given, "limits": limits, "states": states})
+
+
+def _commands(
+    widget: Widget, bound: Mapping[str, Any]
+) -> tuple[dict[str, Command], dict[str, str]]:
+    commands: dict[str, Command] = {}
+    outputs: dict[str, str] = {}
+    for output, given in bound.items():
+        spec = {"command": given} if isinstance(given, str) else given
+        name = str(spec["command"])
+        outputs[output] = name
+        commands[name] = _command(name, widget.outputs.get(output, Port(output)), spec)
+    return commands, outputs
+
+
+def _command(name: str, port: Port, spec: Mapping[str, Any]) -> Command:
+    given = spec.get("arguments")
+    if given is None:
+        arguments = {one: Argument(one, min=-1, max=1, default=0.0) for one in port.arguments}
+    else:
+        arguments = {one: _argument(one, more or {}) for one, more in given.items()}
+    return Command(
+        name,
+        "wire",
+        WriteSpec("text"),
+        arguments,
+        reply=Reply(ReadSpec("regex")) if spec.get("reply") else None,
+        title=spec.get("title", ""),
+        hold=Hold(0.05) if port.is_held else None,
+    )
+
+
+def _argument(name: str, given: Mapping[str, Any]) -> Argument:
+    return Argument(name, **{**given, "choices": tuple(given.get("choices") or ())})
+
+
+def _defaults(widget: Widget) -> dict[str, object]:
+    return {
+        name: schema["default"]
+        for name, schema in widget.options.items()
+        if isinstance(schema, Mapping) and "default" in schema
+    }
+
+
+def _readings(
+    widget: Widget,
+    shown: Mapping[str, Any],
+    inputs: Mapping[str, str],
+    lists: Mapping[str, tuple[str, ...]],
+) -> Iterator[dict[str, Any]]:
+    """Yield one reading a signal: its value or picture, its age in seconds, its alarm."""
+    ages, alarms = shown.get("age_s", 0.0), shown.get("alarms") or {}
+    for name, value in (shown.get("values") or {}).items():
+        many = name in lists
+        names = lists[name] if many else (inputs[name],)
+        age_s = ages.get(name, 0.0) if isinstance(ages, Mapping) else ages
+        for place, signal in enumerate(names):
+            alarm = alarms.get(name, "")
+            one = {
+                "signal": signal,
+                "age": _nth(age_s, place),
+                "alarm": _nth(alarm, place) if many else alarm,
+            }
+            yield {**one, **_value(widget, value[place] if many else value)}
+
+
+def _nth(given: Any, place: int) -> Any:
+    return given[place] if isinstance(given, list) else given
+
+
+def _value(widget: Widget, value: Any) -> dict[str, Any]:
+    """Return a plain value, or an image that is made, read, or written out."""
+    if not isinstance(value, Mapping):
+        return {"value": value}
+    if set(value) == {"picture"}:
+        data = colour_bars(*value["picture"])
+    elif set(value) == {"file"}:
+        data = _file(widget.folder, str(value["file"]))
+    elif set(value) == {"base64"}:
+        data = _decoded(str(value["base64"]))
+    else:
+        return {"value": value}
+    return {"picture": base64.b64encode(data).decode(), "type": media_type(data)}
+
+
+def _decoded(text: str) -> bytes:
+    try:
+        return base64.b64decode(text, validate=True)
+    except binascii.Error as error:
+        raise UrcError(f"base64: {error}") from error
+
+
+def _file(folder: Path, name: str) -> bytes:
+    """Return a file of the widget's folder, and of no other."""
+    path = (folder / name).resolve()
+    if not path.is_relative_to(folder.resolve()) or not path.is_file():
+        raise UrcError(f"{folder / 'demo.yaml'}: there is no file {name!r} in the widget's folder")
+    if path.stat().st_size > PICTURE_BYTES:
+        raise UrcError(f"{path}: longer than {PICTURE_BYTES} bytes")
+    return path.read_bytes()
+
+
+def colour_bars(width: int, height: int) -> bytes:
+    """Return a PNG with colour bars over a ramp from black to white; the same at every call."""
+    if not (1 <= width <= 2048 and 1 <= height <= 2048):
+        raise ValueError(f"a test picture has 1 to 2048 pixels a side, not {width} x {height}")
+    bars = b"".join(bytes(_BARS[x * len(_BARS) // width]) for x in range(width))
+    ramp = b"".join(bytes((x * 255 // max(1, width - 1),) * 3) for x in range(width))
+    rows = b"".join(b"\0" + (bars if y < height * 2 // 3 else ramp) for y in range(height))
+    header = struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)
+    chunks = ((b"IHDR", header), (b"IDAT", zlib.compress(rows, 6)), (b"IEND", b""))
+    return b"\x89PNG\r\n\x1a\n" + b"".join(
+        struct.pack(">I", len(body)) + kind + body + struct.pack(">I", zlib.crc32(kind + body))
+        for kind, body in chunks
+    )

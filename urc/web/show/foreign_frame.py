@@ -1,0 +1,56 @@
+"""The document in which a foreign widget lives: an empty cell, and what it may load.
+
+Floor 5. It holds nothing of a robot: the page hands the markup and the values over (``warden.js``).
+Its policy names the few places that it may load code from; there is no other way out of it.
+"""
+
+import base64
+import hashlib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from jinja2.utils import htmlsafe_json_dumps
+from markupsafe import Markup
+from starlette.exceptions import HTTPException
+from starlette.requests import Request
+from starlette.responses import HTMLResponse, Response
+
+from urc.web.serve.policy import frame_policy
+from urc.web.show.pages import render, with_words
+
+__all__ = ["FramePage", "Frames"]
+
+
+@dataclass(frozen=True, slots=True)
+class FramePage:
+    """``frame.html.j2``: the document around one foreign widget."""
+
+    title: str
+    import_map: Markup
+    """JSON; the policy names its digest, so it is written exactly so."""
+    style: str
+    """URL of the widget's style sheet."""
+
+
+class Frames:
+    """Makes the documents.
+
+    Args:
+        modules: the import map.
+        has: whether pages may load that widget's files.
+    """
+
+    def __init__(self, modules: Mapping[str, object], has: Callable[[str], bool]) -> None:
+        self._modules = modules
+        self._has = has
+
+    async def frame(self, request: Request) -> Response:
+        """Return the document for one widget; raise 404 when there is none of that name."""
+        name = request.path_params["widget"]
+        if not self._has(name):
+            raise HTTPException(404)
+        text = htmlsafe_json_dumps(with_words(self._modules))
+        digest = base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()
+        request.state.frame_policy = frame_policy(request.scope, name, f"sha256-{digest}")
+        page = FramePage(name, text, f"/widgets/{name}/widget.css")
+        return HTMLResponse(render("frame.html.j2", page), headers={"cache-control": "no-store"})

@@ -1,0 +1,171 @@
+"""Which interface of a robot a page shows, its pages, and the others that it offers.
+
+Floor 5. Pure. Beside its own interfaces every robot has the one that is made for finding faults.
+"""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Final
+from urllib.parse import quote
+
+from urc.model.driver import Argument, Command, Driver
+from urc.model.interface import DEBUG, Interface
+from urc.model.profile import Profile
+from urc.model.values import NOTHING, Reading, Signal
+from urc.web import words
+from urc.web.show.layout import needs_turning
+from urc.web.show.outputs import asked_before
+
+__all__ = [
+    "DEBUGGING",
+    "DEBUG_STYLES",
+    "KEPT",
+    "Choice",
+    "DebugPart",
+    "PageTab",
+    "choices",
+    "chosen",
+    "debug_part",
+    "is_turned",
+    "page_tabs",
+]
+
+DEBUGGING: Final = Interface(DEBUG, "Debug")
+"""Stands for the interface that is made: it has no grid."""
+DEBUG_STYLES: Final = ("/static/dev.css", "/static/debug.css")
+KEPT: Final = "urc-interface"
+"""Cookie in which a device keeps which interface of a robot it showed last; its path is the robot's
+page, and ``interfaces.js`` writes it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Choice:
+    """An interface of the robot."""
+
+    name: str
+    title: str
+    url: str
+    is_current: bool
+
+
+@dataclass(frozen=True, slots=True)
+class PageTab:
+    """One page of an interface."""
+
+    number: int
+    title: str
+    name: str
+    is_current: bool
+
+
+@dataclass(frozen=True, slots=True)
+class DebugPart:
+    """``debug.html.j2``: every signal and every command of a robot."""
+
+    signals: tuple[Signal, ...]
+    commands: str
+    """JSON list for ``debug_commands.js``."""
+    count: int
+    """How many commands there are."""
+    wire: str
+    """Path of the dev page's socket; "" where there is none."""
+    dev_url: str
+
+
+def chosen(profile: Profile, wanted: str | None, kept: str = "") -> Interface | None:
+    """Return the interface to show.
+
+    Args:
+        profile: of the robot.
+        wanted: its name in the page's address; None: the address says nothing.
+        kept: which one the device showed last; one that is not there any more is passed over.
+
+    Returns:
+        None when there is no interface of the name that is wanted.
+    """
+    known = {**profile.interfaces, DEBUG: DEBUGGING}
+    if wanted is not None:
+        return known.get(wanted)
+    return known.get(kept) or next(iter(known.values()))
+
+
+def choices(profile: Profile, interface: Interface, url: str, more: str) -> tuple[Choice, ...]:
+    """Return all interfaces of a robot, the one for finding faults last.
+
+    Args:
+        profile: of the robot.
+        interface: the one that is shown.
+        url: path of the robot's page.
+        more: what stands behind the name in each address.
+    """
+    every = (*profile.interfaces.values(), DEBUGGING)
+    return tuple(
+        Choice(
+            each.name,
+            words.t("Debug") if each is DEBUGGING else each.title or each.name,
+            f"{url}?interface={quote(each.name)}{more}",
+            each is interface,
+        )
+        for each in every
+    )
+
+
+def page_tabs(interface: Interface, wanted: str = "") -> tuple[PageTab, ...]:
+    """Return the pages of an interface with tabs, of which exactly one is current."""
+    names = list(interface.tabs)
+    current = wanted if wanted in interface.tabs else next(iter(names), "")
+    return tuple(
+        PageTab(number, page.title or page.name, page.name, page.name == current)
+        for number, page in enumerate(interface.tabs.values())
+    )
+
+
+def is_turned(interface: Interface, slots: tuple[str, ...]) -> bool:
+    """Return whether the drawn picture is only seen on a phone that lies on its side."""
+    return any(needs_turning(page, slots) for page in interface.pages)
+
+
+def debug_part(profile: Profile, dev_url: str = "") -> DebugPart:
+    """Return what the interface for finding faults shows."""
+    driver = profile.driver
+    commands = [_command(one, driver) for one in driver.commands.values()]
+    signals = tuple(driver.signals.values())
+    wire = f"{dev_url}/ws" if dev_url else ""
+    return DebugPart(signals, json.dumps(commands), len(commands), wire, dev_url)
+
+
+def _command(command: Command, driver: Driver) -> dict[str, object]:
+    hold = command.hold
+    release = hold.release if hold is not None else NOTHING
+    spec = driver.transports.get(command.transport)
+    is_kept = spec is not None and spec.connection != "per_request"
+    return {
+        "name": command.name,
+        "title": command.title,
+        "description": command.description,
+        "line": command.transport if is_kept else "",
+        "steps": len(command.steps),
+        "isAnswered": command.reply is not None or bool(command.steps),
+        "leaseMs": round(hold.lease_s * 1000) if hold is not None else 0,
+        "asks": asked_before(command),
+        "requires": [one.text for one in command.requires],
+        "arguments": [_argument(one, release) for one in command.arguments.values()],
+    }
+
+
+def _argument(argument: Argument, release: Mapping[str, Reading]) -> dict[str, object]:
+    return {
+        "name": argument.name,
+        "title": argument.title,
+        "type": argument.type,
+        "of": argument.of,
+        "unit": argument.unit,
+        "min": argument.min,
+        "max": argument.max,
+        "choices": list(argument.choices),
+        "default": argument.default,
+        "rest": release.get(argument.name),
+        "required": argument.is_required,
+        "description": argument.description,
+    }

@@ -1,0 +1,160 @@
+"""The menu: every robot that is served, what is set for it, and the ways from here.
+
+Floor 5. Pure. `menu.html.j2` sees `MenuPage`; all pages around the dashboard have `Nav`.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import PurePath
+from urllib.parse import quote
+
+from urc.model.profile import Setting
+from urc.model.values import Value
+from urc.web.fleet.fleet import Broken
+from urc.web.fleet.robots import Robot, missing_settings
+from urc.web.show.cells import spoken
+from urc.web.show.pages import Head, render
+from urc.web.words import t
+
+__all__ = ["Card", "MenuPage", "Nav", "SettingRow", "Ways", "menu_page", "setting_row"]
+
+
+@dataclass(frozen=True, slots=True)
+class Ways:
+    """Which pages there are on this server."""
+
+    has_managers: bool = False
+    """Drivers, interfaces, settings."""
+    has_dev: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Nav:
+    """``nav.html.j2``: the ways between the pages around the dashboard."""
+
+    current: str
+    """``menu``, ``drivers``, ``interfaces``, ``widgets``, ``dev``, or "" for none of them."""
+    ways: Ways
+
+
+@dataclass(frozen=True, slots=True)
+class SettingRow:
+    """One line of a robot's settings."""
+
+    title: str
+    name: str
+    value: str
+    """As shown; "" when nothing is set."""
+    description: str
+    is_missing: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Card:
+    """One robot on the menu."""
+
+    name: str
+    """In its URL."""
+    title: str
+    summary: str
+    url: str
+    driver: str
+    """What it is driven with: an installed package, or a file."""
+    interface: str
+    """Title of the interface that is shown first."""
+    rows: tuple[SettingRow, ...]
+    missing: tuple[str, ...]
+    """Titles of the settings that keep Connect disabled."""
+    missing_names: tuple[str, ...]
+    """Their names, for a command line."""
+    settings_url: str = ""
+    """Of its settings; "" where they cannot be changed."""
+    dev_url: str = ""
+    """Of its dev page; "" where there are none."""
+    is_looked_at: bool = False
+    """Whether there is a live picture before anybody is connected."""
+    fault: str = ""
+    """Why it cannot be used at all; "" when it can."""
+
+
+@dataclass(frozen=True, slots=True)
+class MenuPage:
+    """``menu.html.j2``: the robots that are served, and what is set for each."""
+
+    head: Head
+    nav: Nav
+    cards: tuple[Card, ...]
+
+
+def menu_page(
+    head: Head,
+    robots: Mapping[str, Robot],
+    *,
+    ways: Ways = Ways(),
+    drivers: Mapping[str, str] | None = None,
+    broken: Mapping[str, Broken] | None = None,
+) -> str:
+    """Return the menu.
+
+    Args:
+        head: of the page.
+        robots: by the name in their URL.
+        ways: which pages there are.
+        drivers: name → the installed package that the robot is, with its version.
+        broken: robots that should be here and cannot.
+    """
+    cards = [
+        _card(name, robot, ways, (drivers or {}).get(name, "")) for name, robot in robots.items()
+    ]
+    cards += [
+        _broken(name, one, ways) for name, one in (broken or {}).items() if name not in robots
+    ]
+    return render("menu.html.j2", MenuPage(head, Nav("menu", ways), tuple(cards)))
+
+
+def setting_row(setting: Setting, value: Value) -> SettingRow:
+    """Return a setting as people read it; what is secret is not shown."""
+    if value is None:
+        shown = ""
+    elif setting.is_secret:
+        shown = "••••••"
+    elif isinstance(value, bool):
+        shown = t("yes") if value else t("no")
+    else:
+        shown = str(value)
+    title = setting.title or spoken(setting.name)
+    return SettingRow(title, setting.name, shown, setting.description, value is None)
+
+
+def _card(name: str, robot: Robot, ways: Ways, driver: str) -> Card:
+    profile = robot.profile
+    missing = missing_settings(robot)
+    rows = tuple(
+        setting_row(one, None if one in missing else robot.settings.get(one.name, one.default))
+        for one in profile.settings.values()
+    )
+    first = next(iter(profile.interfaces.values()), None)
+    url = f"/robots/{quote(name, safe='')}/"
+    return Card(
+        name=name,
+        title=profile.title or name,
+        summary=profile.summary,
+        url=url,
+        driver=driver or PurePath(profile.file).name,
+        interface=(first.title or first.name) if first is not None else "",
+        rows=rows,
+        missing=tuple(row.title for row in rows if row.is_missing),
+        missing_names=tuple(one.name for one in missing),
+        settings_url=f"{url}settings" if ways.has_managers else "",
+        dev_url=f"{url}dev" if ways.has_dev else "",
+        is_looked_at=robot.glimpse is not None,
+    )
+
+
+def _broken(name: str, one: Broken, ways: Ways) -> Card:
+    empty: Sequence[SettingRow] = ()
+    url = f"/robots/{quote(name, safe='')}/"
+    settings_url = f"{url}settings" if ways.has_managers else ""
+    return Card(
+        name, one.title, "", url, name, "", tuple(empty), (), (), settings_url, fault=one.fault
+    )

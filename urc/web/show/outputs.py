@@ -1,0 +1,179 @@
+"""What the page must know of a binding: ``cell.js``, ``output.js`` and ``input.js`` read it.
+
+Floor 5. Pure.
+"""
+
+from collections.abc import Mapping
+
+from urc.model.driver import Argument, Command, Driver
+from urc.model.interface import Given, WidgetUse
+from urc.model.units import conversion
+from urc.model.values import Reading
+from urc.model.widget import Port, Widget
+from urc.web.fleet.robots import HELD, needs_holding
+from urc.web.show.step_words import step_words
+
+__all__ = ["asked_before", "inputs_config", "motion_lines", "output_config"]
+
+_NO_PORT = Port("")
+_NOTHING_GIVEN = Given()
+
+
+def inputs_config(use: WidgetUse, widget: Widget, driver: Driver) -> dict[str, object]:
+    """Return what the inputs are bound to, and how values get into the units that they ask for."""
+    bound: dict[str, str | list[str]] = {**use.inputs}
+    bound |= {name: list(many) for name, many in use.lists.items()}
+    found: dict[str, list[dict[str, object] | None]] = {}
+    for name, signals in bound.items():
+        port = widget.inputs.get(name, _NO_PORT)
+        each = [signals] if isinstance(signals, str) else signals
+        scales = [_scale(driver.signals[signal].unit, port.unit) for signal in each]
+        if any(scales):
+            found[name] = scales
+    return {"inputs": bound, "conversions": found}
+
+
+def _scale(have: str, want: str) -> dict[str, object] | None:
+    scale = conversion(have, want) if want and have != want else None
+    return scale and {"factor": scale.factor, "offset": scale.offset, "symbol": want}
+
+
+def output_config(use: WidgetUse, output: str, widget: Widget, driver: Driver) -> dict[str, object]:
+    """Return the binding of one output."""
+    name = use.outputs[output]
+    command = driver.commands.get(name)
+    port = widget.outputs.get(output, _NO_PORT)
+    given = use.given.get(output, _NOTHING_GIVEN)
+    hold = command.hold if command is not None else None
+    is_held = hold is not None and port.is_held
+    return {
+        "command": name,
+        "names": _names(command, port, given, is_held=is_held),
+        "fixed": dict(given.fixed),
+        "ranges": _ranges(command, port, given) if is_held else {},
+        "neutral": _neutral(command, port, given) if is_held else {},
+        "line": _line(command, driver),
+        "refusal": HELD if needs_holding(driver, name) and not is_held else "",
+        "isHeld": is_held,
+        "leaseMs": round(hold.lease_s * 1000) if hold is not None else 0,
+        "title": (command and command.title) or "",
+        "arguments": _arguments(command, given),
+        "asks": asked_before(command),
+        "steps": [step_words(one) for one in command.steps] if command is not None else [],
+        "isAnswered": command is not None and (command.reply is not None or bool(command.steps)),
+    }
+
+
+def _names(command: Command | None, port: Port, given: Given, *, is_held: bool) -> dict[str, str]:
+    """Return argument of the command → argument of the output."""
+    if command is None or is_held:
+        return _targets(command, port, given) if command is not None else dict(given.names)
+    open_ones = [name for name in command.arguments if name not in given.fixed]
+    if not given.names and len(port.arguments) == 1 and len(open_ones) == 1:
+        return {open_ones[0]: port.arguments[0]}  # it can only mean this one
+    return dict(given.names)
+
+
+def _arguments(command: Command | None, given: Given) -> dict[str, dict[str, object]]:
+    """Return what the arguments are that are not fixed, by the names of the command."""
+    found: dict[str, dict[str, object]] = {}
+    for name, one in (command.arguments if command is not None else {}).items():
+        if name not in given.fixed:
+            found[name] = {
+                "type": one.type,
+                "title": one.title or "",
+                "unit": one.unit,
+                "min": one.min,
+                "max": one.max,
+                "choices": list(one.choices),
+                "default": one.default
+                if isinstance(one.default, (bool, int, float, str))
+                else None,
+                "allowsControl": one.allows_control,
+            }
+    return found
+
+
+def asked_before(command: Command | None) -> list[dict[str, object]]:
+    """Return what people are asked: before the command, or before one value of an argument."""
+    if command is None:
+        return []
+    asked = [] if command.confirm is None else [("", "", command.confirm)]
+    for name, argument in command.arguments.items():
+        asked += [(name, value, confirm) for value, confirm in argument.confirm.items()]
+    return [
+        {
+            "argument": argument,
+            "value": value,
+            "text": confirm.text or command.title or command.name,
+            "level": confirm.level,
+            "isTwoPerson": confirm.is_two_person,
+        }
+        for argument, value, confirm in asked
+    ]
+
+
+def motion_lines(driver: Driver) -> list[str]:
+    """Return the transports that carry motion, each once."""
+    lines = [one.transport for one in driver.commands.values() if one.hold is not None]
+    return list(dict.fromkeys(lines))
+
+
+def _line(command: Command | None, driver: Driver) -> str:
+    """Return the transport without which a command cannot be given."""
+    line = command.transport if command else ""
+    spec = driver.transports.get(line)
+    # A line that is only made for a command is tried again by the next command, and by nothing
+    # else: one that is lost must not keep anybody from giving it.
+    is_made_for_it = (
+        spec is not None
+        and spec.connection == "per_request"
+        and not any(poll.transport == line for poll in driver.polls)
+    )
+    return "" if is_made_for_it else line
+
+
+def _targets(command: Command, port: Port, given: Given) -> dict[str, str]:
+    """Return argument of the command → argument of the output that moves it."""
+    renamed = set(given.names.values())
+    own = {
+        name: name for name in port.arguments if name in command.arguments and name not in renamed
+    }
+    return {**own, **given.names}
+
+
+def _ranges(command: Command | None, port: Port, given: Given) -> dict[str, dict[str, object]]:
+    """Return what -1 to 1 of the widget means for each argument that has a range of its own."""
+    if command is None:
+        return {}
+    found: dict[str, dict[str, object]] = {}
+    for target, source in _targets(command, port, given).items():
+        argument = command.arguments.get(target)
+        if argument is None or source not in port.arguments or argument.max is None:
+            continue
+        least = argument.min if argument.min is not None else -argument.max
+        found[target] = {
+            "min": least,
+            "max": argument.max,
+            "rest": _rest(command, argument, least),
+            "isWhole": argument.type == "integer",
+        }
+    return found
+
+
+def _rest(command: Command, argument: Argument, least: float) -> float:
+    stop = _release_of(command).get(argument.name, argument.default)
+    is_number = isinstance(stop, (int, float)) and not isinstance(stop, bool)
+    return float(stop) if is_number else max(0.0, least)  # type: ignore[arg-type]  # it is one
+
+
+def _neutral(command: Command | None, port: Port, given: Given) -> dict[str, Reading]:
+    """Return the values that stop what this output moves, where the command says them."""
+    if command is None:
+        return {}
+    release = _release_of(command)
+    return {name: release[name] for name in _targets(command, port, given) if name in release}
+
+
+def _release_of(command: Command) -> Mapping[str, Reading]:
+    return command.hold.release if command.hold is not None else {}

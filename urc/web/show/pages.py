@@ -1,0 +1,198 @@
+"""Jinja → HTML. Each template has one documented context: the dataclass that it is rendered with.
+
+Floor 5. Templates see the dataclass as ``page`` and nothing else; logic beyond ``for`` and ``if``
+belongs here; the cells of a page are made in `urc.web.show.cells`.
+"""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import lru_cache
+from typing import cast
+from urllib.parse import quote
+
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+from urc import __version__
+from urc.model.interface import Interface, WidgetUse
+from urc.model.profile import Profile
+from urc.shipped import shipped
+from urc.web import words
+from urc.web.load.foreign import Border
+from urc.web.show.cells import Cell, widget_cell
+from urc.web.show.interfaces import (
+    DEBUG_STYLES,
+    DEBUGGING,
+    Choice,
+    DebugPart,
+    PageTab,
+    choices,
+    debug_part,
+    is_turned,
+    page_tabs,
+)
+from urc.web.show.layout import grid_css
+from urc.web.show.outputs import motion_lines
+
+__all__ = [
+    "ErrorPage",
+    "Head",
+    "RobotPage",
+    "error_page",
+    "render",
+    "robot_page",
+]
+
+
+@dataclass(frozen=True, slots=True)
+class Head:
+    """What every page needs in its head."""
+
+    nonce: str
+    """Of this one response; every script and style element carries it."""
+    title: str
+    import_map: Mapping[str, object] = field(default_factory=lambda: with_words({"imports": {}}))
+    widget_styles: tuple[str, ...] = ()
+    """URLs of widget style sheets."""
+    grid_css: str = ""
+    """Rules that place the cells; made of numbers only."""
+    version: str = __version__
+
+
+@dataclass(frozen=True, slots=True)
+class RobotPage:
+    """``robot.html.j2``: one interface of one robot, live."""
+
+    head: Head
+    title: str
+    socket: str
+    """Path and query of the WebSocket."""
+    interfaces: tuple[Choice, ...]
+    """All that the robot has."""
+    tabs: tuple[PageTab, ...]
+    """Pages of this interface; empty when it has but one."""
+    number: int
+    """Of the page that is open."""
+    is_turned: bool
+    """Whether the picture is only seen as it was drawn on a phone that lies on its side."""
+    is_part: bool
+    """Whether ``interfaces.js`` asks, which takes out the stage and what its style is made of."""
+    debug: DebugPart | None
+    """What stands in place of a grid, in the interface for finding faults."""
+    cells: tuple[Cell, ...]
+    stop_url: str
+    """Where STOP goes when the socket is down."""
+    lines: str
+    """JSON list of the transports that carry motion; "[]" for a robot that does not move."""
+    can_move: bool
+    """Whether the controls and STOP are shown."""
+
+
+@dataclass(frozen=True, slots=True)
+class ErrorPage:
+    """``error.html.j2``: one sentence, and the way back."""
+
+    head: Head
+    status: int
+    message: str
+
+
+def robot_page(
+    nonce: str,
+    name: str,
+    profile: Profile,
+    interface: Interface,
+    modules: Mapping[str, object],
+    *,
+    is_watching: bool = False,
+    tab: str = "",
+    wire: str = "",
+    is_part: bool = False,
+    border: Border = Border(),  # noqa: B008  # frozen
+) -> str:
+    """Return the page of one interface.
+
+    Args:
+        nonce: of this response.
+        name: of the robot in its URL.
+        profile: what it is.
+        interface: one of its interfaces.
+        modules: the import map.
+        is_watching: the page is never to drive.
+        tab: name of the page of it that is open; "" or an unknown one: the first.
+        wire: path of the dev page; "" where there is none for who asks.
+        is_part: a page that is open already wants the interface in place of another.
+        border: which widgets live in frames.
+    """
+    uses = _uses(profile, interface)
+    slots = tuple(uses)
+    used = dict.fromkeys(use.widget for use in uses.values())
+    head = Head(
+        nonce=nonce,
+        title=profile.title,
+        import_map=with_words(modules),
+        widget_styles=DEBUG_STYLES
+        if interface is DEBUGGING
+        else border.styles(profile.widgets[name] for name in used),
+        grid_css=grid_css(interface, slots),
+    )
+    place = quote(name, safe="")
+    url, watch = f"/robots/{place}/", "&watch" if is_watching else ""
+    lines = motion_lines(profile.driver)
+    tabs = page_tabs(interface, tab)
+    page = RobotPage(
+        head=head,
+        title=profile.title,
+        socket=f"/ws?robot={place}{watch}",
+        interfaces=choices(profile, interface, url, watch),
+        tabs=tabs,
+        number=next((each.number for each in tabs if each.is_current), 0),
+        is_turned=is_turned(interface, slots),
+        is_part=is_part,
+        debug=debug_part(profile, wire) if interface is DEBUGGING else None,
+        cells=tuple(
+            widget_cell(index, use, profile, border, is_background=slot == interface.background)
+            for index, (slot, use) in enumerate(uses.items())
+        ),
+        stop_url=f"/api/v1/robots/{place}/stop",
+        lines=json.dumps(lines),
+        can_move=bool(lines),
+    )
+    return render("robot.html.j2", page)
+
+
+def with_words(modules: Mapping[str, object]) -> Mapping[str, object]:
+    """Return the import map with the words of the reader's language in it."""
+    imports = cast("Mapping[str, str]", modules["imports"])
+    return {"imports": {**imports, "urc/words": words.address(words.language.get())}}
+
+
+def error_page(nonce: str, status: int, message: str) -> str:
+    """Return a page that says what is wrong in one sentence."""
+    return render("error.html.j2", ErrorPage(Head(nonce, f"{status}"), status, message))
+
+
+def render(template: str, page: object) -> str:
+    """Return a page's HTML; `page` is the dataclass that the template is documented with."""
+    return _pages().get_template(template).render(page=page)
+
+
+def _uses(profile: Profile, interface: Interface) -> dict[str, WidgetUse]:
+    """Return slot → widget, in reading order; slots that nobody fills are left out."""
+    found = {
+        name: interface.widgets.get(name) or profile.slots.get(name) for name in interface.shown
+    }
+    return {name: use for name, use in found.items() if use is not None}
+
+
+@lru_cache(maxsize=1)
+def _pages() -> Environment:
+    pages = Environment(
+        loader=FileSystemLoader(shipped("templates")),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    pages.globals.update(t=words.t, language=words.language.get, languages=words.LANGUAGES)
+    return pages

@@ -1,0 +1,1 @@
+"""What goes over a dashboard's sockets: message shapes, and nothing else."""

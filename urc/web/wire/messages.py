@@ -1,0 +1,361 @@
+"""What goes over a dashboard's WebSocket: message shapes, and nothing else.
+
+Floor 5. JSON text both ways. Times are milliseconds on the server's monotonic clock; ages are
+milliseconds at the moment of encoding. Values travel as index arrays over the names of `Hello`.
+
+Server → page, by ``t``::
+
+    hello   once, first: names, what each signal means, the server's clock
+    v       changed signals: i indexes, v values, a ages, s alarms (left out when all are normal)
+    links   the state of every transport
+    log     lines, oldest first; numbers run on, so that a gap shows what was dropped
+    reply   the one answer to a command
+    pong    the answer to a ping
+    error   a message of the page that could not be used, or why the socket is about to close
+
+    lease   who has the controls, who asks for them, and whether a stop is latched
+    beat    a number for the screen that has the controls, every 50 ms: its ticks echo it
+    stopped a control stopped without being let go: nothing moves before a new gesture
+    refused a tick, or a wish about the controls, was not taken
+
+    ask     a question that a second person must answer; ``asked``: it is over
+    token   the answer to ``prepare``: lets one command be given, once, within 5 s
+    progress where the sequences stand
+
+Images go as binary messages, see `wire_picture`.
+
+Page → server: ``ping``, ``run``, ``show``, ``agree``, ``prepare``, ``steer``, and for the controls
+``drive``, ``tick``, ``release`` and ``stop``; the last three also on a second line, which begins
+with ``spare`` and is told beats. The types below bound their nesting: anything deeper than an
+argument map of plain values is refused by the decoder without being read further.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+
+import msgspec
+
+from urc.model.driver import Command, Driver, Poll
+from urc.model.profile import Profile
+from urc.model.values import Reading, Sample, Signal
+from urc.runtime.hub import LinkStatus, Note
+from urc.web.wire.ask import Agree, Arguments, Prepare, Steer
+from urc.web.wire.drive import Drive, Release, Stop, Tick
+from urc.web.wire.picture import Show
+from urc.web.wire.text import Outbound, cut, encoded, milliseconds
+
+__all__ = [
+    "CLOSE_BAD_MESSAGES",
+    "CLOSE_FAILED",
+    "CLOSE_FULL",
+    "CLOSE_NO_ROBOT",
+    "CLOSE_NOT_READY",
+    "CLOSE_TOO_FAST",
+    "INBOUND_BYTES",
+    "BadMessage",
+    "Inbound",
+    "Indexes",
+    "Ping",
+    "Run",
+    "decode",
+    "encode_error",
+    "encode_hello",
+    "encode_links",
+    "encode_log",
+    "encode_pong",
+    "encode_reply",
+    "encode_values",
+]
+
+VERSION = 1
+INBOUND_BYTES = 64 * 1024
+"""Longest message taken from a page."""
+_AS_THEY_ARE = frozenset((float, bool, type(None)))
+_EXACT = 2**53 - 1  # beyond it a browser's numbers skip integers
+
+CLOSE_BAD_MESSAGES = 4400
+CLOSE_NO_ROBOT = 4404
+CLOSE_NOT_READY = 4409
+CLOSE_TOO_FAST = 4429
+CLOSE_FAILED = 4500
+CLOSE_FULL = 4503
+
+
+class BadMessage(Exception):
+    """A page sent something that is no message; the text says what was expected."""
+
+
+class _Signal(msgspec.Struct, omit_defaults=True, frozen=True):
+    name: str
+    type: str
+    title: str = ""
+    unit: str = ""
+    min: float | None = None
+    max: float | None = None
+    precision: int | None = None
+    states: dict[str, str] | None = None
+    limits: dict[str, float] | None = None
+    stale_after_s: float = 0.0
+    sources: tuple[str, ...] = ()
+    """Transports that bring it: when none of them is live, the value is old at once."""
+    axes: str = ""
+    """Which way its axes point; "" says nothing of it."""
+
+
+class _Hello(Outbound, tag="hello", omit_defaults=False, frozen=True):
+    version: int
+    session: str
+    """Changes when the robot was connected anew: the log's numbers begin again."""
+    robot: str
+    title: str
+    now: int
+    names: tuple[str, ...]
+    signals: list[_Signal]
+
+
+class _Values(Outbound, tag="v", frozen=True):
+    n: int
+    i: Sequence[int]
+    v: Sequence[object]
+    a: Sequence[int]
+    s: Sequence[str] | None = None
+
+
+class _Link(msgspec.Struct, frozen=True):
+    transport: str
+    state: str
+    address: str
+    since: int
+    detail: str
+    attempts: int
+    faults: int
+
+
+class _Links(Outbound, tag="links", omit_defaults=False, frozen=True):
+    links: list[_Link]
+
+
+class _Line(msgspec.Struct, frozen=True):
+    age: int
+    level: str
+    source: str
+    text: str
+
+
+class _Log(Outbound, tag="log", omit_defaults=False, frozen=True):
+    first: int
+    """Number of the first line in this session, from 0."""
+    lines: list[_Line]
+
+
+class _Reply(Outbound, tag="reply", frozen=True):
+    id: int
+    ok: bool
+    values: Mapping[str, object] | None = None
+    code: str = ""
+    message: str = ""
+
+
+class _Pong(Outbound, tag="pong", frozen=True):
+    c: float
+    n: int
+    u: int = 0
+    """Milliseconds since 1970, by the server's clock; left out where nobody has told it."""
+
+
+class _Error(Outbound, tag="error", frozen=True):
+    code: str
+    message: str
+
+
+class Ping(msgspec.Struct, tag_field="t", tag="ping", forbid_unknown_fields=True, frozen=True):
+    """Asks for a `pong` with the same `c`, the page's own clock in milliseconds."""
+
+    c: float
+
+
+class Run(msgspec.Struct, tag_field="t", tag="run", forbid_unknown_fields=True, frozen=True):
+    """One command. The page chooses `id`; exactly one reply carries it."""
+
+    id: int
+    command: str
+    arguments: Arguments = {}
+    token: str = ""
+    """Answer to `Prepare`, where the driver wants people to be asked: somebody said yes to this."""
+
+
+Inbound = Ping | Run | Show | Agree | Prepare | Steer | Drive | Tick | Release | Stop
+
+_decoder: msgspec.json.Decoder[Inbound] = msgspec.json.Decoder(Inbound)
+
+
+def decode(text: str | bytes) -> Inbound:
+    """Return the message, or raise `BadMessage` saying what is wrong with it."""
+    if len(text) > INBOUND_BYTES:
+        raise BadMessage(f"longer than {INBOUND_BYTES} bytes")
+    try:
+        return _decoder.decode(text)
+    except (msgspec.MsgspecError, UnicodeError, RecursionError) as error:
+        raise BadMessage(str(error)) from error
+
+
+def encode_hello(profile: Profile, session: str, now_s: float) -> str:
+    """Return the first message: what every later index means."""
+    sources = _sources(profile.driver)
+    signals = profile.driver.signals
+    return encoded(
+        _Hello(
+            version=VERSION,
+            session=session,
+            robot=profile.name,
+            title=profile.title,
+            now=milliseconds(now_s),
+            names=tuple(signals),
+            signals=[_signal(signal, sources.get(name, ())) for name, signal in signals.items()],
+        )
+    )
+
+
+class Indexes:
+    """Which number each name has; mostly those are asked for that were asked for last."""
+
+    def __init__(self, index: Mapping[str, int]) -> None:
+        self._index = index
+        self._names: tuple[str, ...] = ()
+        self._found: list[int] = []
+
+    def of(self, names: tuple[str, ...]) -> list[int]:
+        """Return the numbers; the list must not be changed."""
+        if names != self._names:
+            self._names, self._found = names, [*map(self._index.__getitem__, names)]
+        return self._found
+
+
+def encode_values(samples: Sequence[Sample], indexes: Indexes, now_s: float) -> str:
+    """Return one frame with the newest reading of each changed signal."""
+    names, values, times, alarms = zip(*samples, strict=True)
+    if times.count(times[0]) == len(times):  # what came together is equally old
+        ages = [max(0, milliseconds(now_s - times[0]))] * len(times)
+    else:
+        ages = [max(0, milliseconds(now_s - time_s)) for time_s in times]
+    are_as_they_are = _AS_THEY_ARE.issuperset(map(type, values))
+    return encoded(
+        _Values(
+            n=milliseconds(now_s),
+            i=indexes.of(names),
+            v=values if are_as_they_are else [*map(_plain, values)],
+            a=ages,
+            s=alarms if any(alarms) else None,
+        )
+    )
+
+
+def encode_links(links: Iterable[LinkStatus], now_s: float) -> str:
+    """Return the state of every transport."""
+    return encoded(
+        _Links(
+            [
+                _Link(
+                    transport=link.transport,
+                    state=link.state,
+                    address=link.address,
+                    since=max(0, milliseconds(now_s - link.since_s)),
+                    detail=cut(link.detail),
+                    attempts=link.attempts,
+                    faults=link.faults,
+                )
+                for link in links
+            ]
+        )
+    )
+
+
+def encode_log(notes: Iterable[Note], first: int, now_s: float) -> str:
+    """Return lines of the log, the first of which has the number `first` in its session."""
+    lines = [
+        _Line(max(0, milliseconds(now_s - note.time_s)), note.level, note.source, cut(note.text))
+        for note in notes
+    ]
+    return encoded(_Log(first, lines))
+
+
+def encode_reply(
+    run: Run, *, values: Mapping[str, Reading] | None = None, code: str = "", message: str = ""
+) -> str:
+    """Return the answer to a command: its values, or `code` and `message` when it failed."""
+    if code:
+        return encoded(_Reply(run.id, ok=False, code=code, message=cut(message)))
+    plain = {name: _plain(value) for name, value in (values or {}).items()}
+    return encoded(_Reply(run.id, ok=True, values=plain))
+
+
+def encode_pong(ping: Ping, now_s: float, utc_s: float = 0.0) -> str:
+    """Return the answer to a ping; `utc_s` is the time of day, in seconds since 1970."""
+    return encoded(_Pong(ping.c, milliseconds(now_s), milliseconds(utc_s)))
+
+
+def encode_error(code: str, message: str) -> str:
+    """Return why a message was not used, or why the socket closes."""
+    return encoded(_Error(code, cut(message)))
+
+
+def _plain(value: object) -> object:
+    """Return the value as a browser can hold it; of bytes, only how many there are."""
+    if isinstance(value, str):
+        return cut(value)
+    if type(value) is int and not -_EXACT <= value <= _EXACT:
+        return str(value)
+    if value is None or isinstance(value, (bool, int, float)):
+        return value
+    if isinstance(value, (bytes, bytearray)):
+        return {"bytes": len(value)}
+    if isinstance(value, Mapping):
+        return {str(name): _plain(item) for name, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(item) for item in value]
+    return cut(str(value))
+
+
+def _signal(signal: Signal, sources: tuple[str, ...]) -> _Signal:
+    limits = {
+        name: value
+        for name in ("lolo", "low", "high", "hihi")
+        if (value := getattr(signal.limits, name)) is not None
+    }
+    return _Signal(
+        name=signal.name,
+        type=signal.type,
+        title=signal.title,
+        unit=signal.unit,
+        min=signal.min,
+        max=signal.max,
+        precision=signal.precision,
+        states=dict(signal.states) or None,
+        limits=limits or None,
+        stale_after_s=signal.stale_after_s,
+        sources=sources,
+        axes=signal.axes,
+    )
+
+
+def _sources(driver: Driver) -> dict[str, tuple[str, ...]]:
+    """Return which transports bring each signal, by the fields of what is read."""
+    asked: tuple[Poll | Command, ...] = (*driver.polls, *driver.commands.values())
+    reads = [(message.transport, message.read) for message in driver.messages.values()]
+    reads += [(each.transport, each.reply.read) for each in asked if each.reply]
+    found: dict[str, dict[str, None]] = {}
+    for transport, read in reads:
+        for field in read.fields:
+            found.setdefault(field, {})[transport] = None
+    for name in driver.signals:
+        _add_sources(name, driver, found)
+    return {name: tuple(transports) for name, transports in found.items()}
+
+
+def _add_sources(name: str, driver: Driver, found: dict[str, dict[str, None]]) -> dict[str, None]:
+    """Return the sources of a signal; of a computed one those of its inputs, which are added."""
+    signal = driver.signals.get(name)
+    if signal is not None and signal.formula is not None and name not in found:
+        found[name] = {}
+        for other in sorted(signal.formula.names):
+            found[name] |= _add_sources(other, driver, found)
+    return found.get(name, {})
