@@ -26,6 +26,7 @@ from urc.runtime.lines import make_transports
 from urc.runtime.link import Link
 from urc.runtime.motion import Frames
 from urc.runtime.settings import resolve_settings
+from urc.runtime.turnstile import Turnstile
 
 if TYPE_CHECKING:
     from urc.runtime.guarding import GuardedMovers
@@ -130,8 +131,8 @@ class Session:
             )
             self._dispatcher.attach(name, link)
             self._links[name] = link
-        self._untried = set(self._links)
-        """Lines whose first attempt may not have ended yet."""
+        self._untried = {name: Turnstile(link.tried) for name, link in self._links.items()}
+        """Lines whose first attempt may not have ended yet: commands wait for it, in order."""
         self._numbers = count(1)
         self._group = asyncio.TaskGroup()
         self._tasks: list[asyncio.Task[None]] = []
@@ -234,14 +235,16 @@ class Session:
 
     async def _first_attempt(self, name: str) -> None:
         """Wait until the line of a command has been tried, well or not, for as long as may take."""
-        self._untried = {one for one in self._untried if not self._links[one].tried.is_set()}
         command = self.profile.driver.commands.get(name)
-        if command is None or command.transport not in self._untried:
+        turnstile = self._untried.get(command.transport) if command is not None else None
+        if command is None or turnstile is None:
             return
         timeouts = self.profile.driver.transports[command.transport].timeouts
         with suppress(TimeoutError):  # then the engine says that it is not connected
             async with within(self._clock, timeouts.connect_s + _GRACE_S):
-                await self._links[command.transport].tried.wait()
+                await turnstile.wait()
+        if turnstile.is_open:
+            self._untried.pop(command.transport, None)
 
 
 def _limit_s(driver: Driver, name: str) -> float:
