@@ -4,6 +4,9 @@ import asyncio
 import subprocess
 import sys
 import time
+from asyncio import StreamReader, StreamWriter
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
 from pathlib import Path
 
 import httpx2
@@ -33,12 +36,14 @@ async def asked(port: int) -> tuple[bytes, float]:
     return answer, time.monotonic() - begin
 
 
-@pytest.mark.anyio
-async def test_faults_are_given_at_the_start_and_changed_by_typed_lines() -> None:
-    """The answer is late as told; after `mend` nothing is wrong; nonsense is told in one line."""
+@asynccontextmanager
+async def running(
+    *arguments: str,
+) -> AsyncIterator[tuple[StreamWriter, StreamReader, StreamReader]]:
+    """Run `urc`; give what is typed, said and complained about. Nothing of it takes for ever."""
     process = await asyncio.create_subprocess_exec(
         *URC,
-        *("simulate", PUPPET, "--set", "port=0", "--fault", "delay=400ms"),
+        *arguments,
         cwd=ROOT,
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
@@ -49,48 +54,41 @@ async def test_faults_are_given_at_the_start_and_changed_by_typed_lines() -> Non
     assert process.stderr is not None
     try:
         async with asyncio.timeout(WAIT_S):
-            port = int((await process.stdout.readline()).split(b":")[-1])
-            answer, took_s = await asked(port)
-            assert answer.strip().isdigit()
-            assert took_s >= 0.35
-            process.stdin.write(b"fault nosie=2x\nmend\n")
-            error = await process.stderr.readline()
-            assert error.startswith(b"there is no fault 'nosie'; there are delay=200ms, loss=5%")
-            assert await process.stdout.readline() == b"faults: none\n"
-            assert (await asked(port))[0].strip().isdigit()
-            process.stdin.write(b"fault silent\n")
-            assert await process.stdout.readline() == b"faults: silent\n"
+            yield process.stdin, process.stdout, process.stderr
     finally:
         process.terminate()
         await process.wait()
+
+
+@pytest.mark.anyio
+async def test_faults_are_given_at_the_start_and_changed_by_typed_lines() -> None:
+    """The answer is late as told; after `mend` nothing is wrong; nonsense is told in one line."""
+    how = ("simulate", PUPPET, "--set", "port=0", "--fault", "delay=400ms")
+    async with running(*how) as (typed, said, complaints):
+        port = int((await said.readline()).split(b":")[-1])
+        answer, took_s = await asked(port)
+        assert answer.strip().isdigit()
+        assert took_s >= 0.35
+        typed.write(b"fault nosie=2x\nmend\n")
+        error = await complaints.readline()
+        assert error.startswith(b"there is no fault 'nosie'; there are delay=200ms, loss=5%")
+        assert await said.readline() == b"faults: none\n"
+        assert (await asked(port))[0].strip().isdigit()
+        typed.write(b"fault silent\n")
+        assert await said.readline() == b"faults: silent\n"
 
 
 @pytest.mark.anyio
 async def test_a_dashboard_has_faults_from_the_start_and_by_typed_lines(tmp_path: Path) -> None:
     """`urc serve --simulate`, as `urc demo`: the robot is named, since there may be several."""
-    process = await asyncio.create_subprocess_exec(
-        *URC,
-        *("serve", PUPPET, "--simulate", "--port", "0", "--data-dir", str(tmp_path)),
-        *("--fault", "puppet:delay=400ms"),
-        cwd=ROOT,
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-    )
-    assert process.stdin is not None
-    assert process.stdout is not None
-    assert process.stderr is not None
-    try:
-        async with asyncio.timeout(WAIT_S):
-            assert (await process.stdout.readline()).startswith(b"dashboard http://")
-            process.stdin.write(b"faults\nfault tello:silent\nmend puppet\n")
-            assert await process.stdout.readline() == b"faults: delay=400ms\n"
-            error = await process.stderr.readline()
-            assert error.startswith(b"no robot 'tello' is emulated here")
-            assert await process.stdout.readline() == b"faults: none\n"
-    finally:
-        process.terminate()
-        await process.wait()
+    how = ("serve", PUPPET, "--simulate", "--port", "0", "--data-dir", str(tmp_path))
+    async with running(*how, "--fault", "puppet:delay=400ms") as (typed, said, complaints):
+        assert (await said.readline()).startswith(b"dashboard http://")
+        typed.write(b"faults\nfault tello:silent\nmend puppet\n")
+        assert await said.readline() == b"faults: delay=400ms\n"
+        error = await complaints.readline()
+        assert error.startswith(b"no robot 'tello' is emulated here")
+        assert await said.readline() == b"faults: none\n"
 
 
 def test_an_unknown_fault_is_wrong_use() -> None:
