@@ -13,8 +13,11 @@ LEAST_SHARE = 0.5
 """Of what the robot told; below it nothing is said."""
 FIRST_S = 20.0
 MODULUS_MS = MODULUS / 10
-# By "frame", ages are taken after each frame was drawn: a message that is posted in the frame comes
-# behind it. By "write", at the end of the callback that wrote the value.
+# By "frame", the text counts that stood there when the frame was laid out: a page that writes
+# outside of frames may have changed it again before anybody looks at what was drawn. An observer of
+# sizes is called after all of a frame's callbacks and before it is drawn; a message that is posted
+# there comes when that is done, and then the age is taken. By "write", at the end of the callback
+# that wrote the value.
 WATCH = """
 async ([seconds, by]) => {
   const isClock = (text) => /^[0-9]{10}$/.test(text);
@@ -27,11 +30,13 @@ async ([seconds, by]) => {
     return null;
   };
   const found = [];
-  let last = "", place = null, untilMs = Infinity;
-  const look = () => {
-    const now = performance.now();
+  let last = "", place = null, untilMs = Infinity, laidOut = "";
+  const read = () => {
     if (!place?.isConnected) place = search();
-    const text = place?.textContent.trim() ?? "";
+    return place?.textContent.trim() ?? "";
+  };
+  const look = (text) => {
+    const now = performance.now();
     if (text === last || !isClock(text)) return;
     if (!last) untilMs = now + seconds * 1000;
     else found.push([now, Number(text)]);
@@ -39,20 +44,29 @@ async ([seconds, by]) => {
   };
   const startMs = performance.now();
   const channel = new MessageChannel();
-  channel.port1.onmessage = look;
-  const observer = new MutationObserver(look);
+  channel.port1.onmessage = () => look(laidOut);
+  const probe = document.body.appendChild(document.createElement("div"));
+  probe.style.cssText = "position: fixed; width: 1px; height: 1px; visibility: hidden";
+  const sizes = new ResizeObserver(() => {
+    laidOut = read();
+    channel.port2.postMessage(0);
+  });
+  sizes.observe(probe);
+  const observer = new MutationObserver(() => look(read()));
   const kinds = { subtree: true, childList: true, characterData: true };
   if (by === "write") observer.observe(document.body, kinds);
   await new Promise((done) => {
     const frame = () => {
       const now = performance.now();
-      if (by === "frame") channel.port2.postMessage(0);
+      if (by === "frame") probe.style.width = probe.style.width === "1px" ? "2px" : "1px";
       if (now > untilMs || (!last && now - startMs > 20000)) done();
       else requestAnimationFrame(frame);
     };
     requestAnimationFrame(frame);
   });
   observer.disconnect();
+  sizes.disconnect();
+  probe.remove();
   channel.port1.close();
   return { found, said: document.body.innerText.slice(0, 200) };
 }
@@ -70,7 +84,7 @@ async def ages(one: Opened, seconds: float, rate_hz: float, *, by: str = "frame"
         one: the page.
         seconds: for how long, from the first value on.
         rate_hz: how often the robot tells its clock.
-        by: when a value counts as shown: "frame", once its frame was drawn, or "write".
+        by: when a value counts as shown: "frame", once the frame that has it was drawn, or "write".
 
     Raises:
         TooFew: fewer than `LEAST_SHARE` of them were shown.
