@@ -58,7 +58,7 @@ TESTS = (
         "tests e2e",
         (
             *(PYTHON, "-m", "pytest", "tests/e2e", "-m", "not alone"),
-            *("-n", "4", "--dist", "loadgroup"),
+            *("-n", "3", "--dist", "loadgroup"),
         ),
         timeout_s=700,
     ),

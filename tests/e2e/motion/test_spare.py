@@ -10,7 +10,7 @@ from tests.e2e.conftest import PageMaker
 from tests.e2e.dashboards import until
 from tests.e2e.motion.driving import Wire, calmly_driven, fresh, moved, push
 
-pytestmark = pytest.mark.anyio
+pytestmark = [pytest.mark.anyio, pytest.mark.alone]
 
 FAR_S = 0.1
 TIMES, LOOKS = 6, 200

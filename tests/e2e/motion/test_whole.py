@@ -18,7 +18,7 @@ from tests.e2e.motion.driving import STOP, fresh, push
 from tests.e2e.ports import free_port
 from tests.e2e.processes import UrcProcess
 
-pytestmark = pytest.mark.anyio
+pytestmark = [pytest.mark.anyio, pytest.mark.alone]
 
 PROFILE = """\
 urc: 1

@@ -37,6 +37,10 @@ class Readings:
         self._names: list[str] = []
         page.on("websocket", self._listen)
 
+    async def until_picture(self, signal: str) -> None:
+        """Wait until one of that signal has come."""
+        await until(lambda: bool(self.pictures.get(signal)), lambda: f"no image of {signal} came")
+
     def _listen(self, line: WebSocket) -> None:
         if "/ws" in line.url and "/dev" not in line.url:
             line.on("framereceived", self._take)

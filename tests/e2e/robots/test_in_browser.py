@@ -107,7 +107,7 @@ async def test_a_robot_is_connected_seen_commanded_driven_and_left(
         await is_whole(page)
         await each_interface(page, robot)
         await each_command(page, robot)
-        await each_signal(page, robot)
+        await each_signal(page, robot, readings)
         if name in STICKS:
             await driven(page, robot, STICKS[name], readings)
         if name == "esp32-cam":
@@ -200,13 +200,18 @@ def told(robot: Overheard, sample: Sample, mark: Mapping[str, int]) -> str:
     return f"{sample}: the robot got {heard}"
 
 
-async def each_signal(page: Page, robot: Overheard) -> None:
-    """Look at every signal of the profile until it is shown as live."""
-    names = list(robot.profile.driver.signals)
+async def each_signal(page: Page, robot: Overheard, readings: Readings) -> None:
+    """Look at every signal of the profile until it is shown as live; an image is asked for anew."""
+    signals = robot.profile.driver.signals
+    names = list(signals)
+    readings.pictures.clear()  # what comes from now on is wanted by the table of signals
     end_s = time.monotonic() + SLOWEST_S
     while names := await page.evaluate(NOT_LIVE, names):
         assert time.monotonic() < end_s, f"not shown as live: {names}"
         await asyncio.sleep(0.15)  # rows are written ten times a second, and only those in sight
+    for name in (one for one, signal in signals.items() if signal.type == "image"):
+        await page.locator(f"[data-signal='{name}']").scroll_into_view_if_needed()
+        await readings.until_picture(name)
 
 
 NOT_LIVE = """(names) => {

@@ -26,6 +26,11 @@ export class Debug {
     if (wire) watchWire(el, wire, this.over.signal);
   }
 
+  /** Names of the images that can be seen. */
+  pictures() {
+    return this.signals.pictures();
+  }
+
   /** @param {number} nowMs */
   frame(nowMs) {
     this.signals.frame(nowMs);

@@ -19,7 +19,7 @@
 import { ALARMS, DASH, attribute, t, write } from "urc/kit";
 import { part } from "./badge.js";
 import { visible } from "./dev_bytes.js";
-import { ageText } from "./store.js";
+import { PICTURES, ageText } from "./store.js";
 
 const WRITE_EVERY_MS = 100;
 const SAMPLE_EVERY_MS = 1000;
@@ -58,6 +58,13 @@ export class DebugSignals {
   find(text) {
     const wanted = text.trim().toLowerCase();
     for (const { el } of this.rows.values()) el.hidden = !(el.dataset["words"] ?? "").includes(wanted);
+  }
+
+  /** Names of the images whose rows can be seen: a server sends those that are asked for. */
+  pictures() {
+    if (!this.store.hasPictures) return [];
+    const seen = [...this.rows.values()].filter((row) => row.isVisible).map((row) => row.name);
+    return seen.filter((name) => PICTURES.has(this.store.signals.get(name)?.type ?? ""));
   }
 
   /** @param {number} nowMs */

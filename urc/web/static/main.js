@@ -147,7 +147,7 @@ function draw() {
 
 /** Ask for the images that can be seen, and for no others. */
 function askPictures() {
-  const signals = host.pictures();
+  const signals = [...host.pictures(), ...stage.pictures()];
   const wanted = JSON.stringify(signals);
   if (wanted !== shown && socket.send({ t: "show", signals })) shown = wanted;
 }

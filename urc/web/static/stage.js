@@ -38,6 +38,11 @@ export class Stage {
     });
   }
 
+  /** Names of the images that can be seen and are no widget's. */
+  pictures() {
+    return this.debug?.pictures() ?? [];
+  }
+
   /** @param {number} nowMs */
   frame(nowMs) {
     this.debug?.frame(nowMs);
