@@ -43,6 +43,8 @@ export class Control {
     this.closedEpoch = -1;
     this.epoch = 0;
     this.askedMs = 0;
+    /** When a move of its hand went out before the frame. */
+    this.movedMs = -Infinity;
     this.sentMs = -Infinity;
     this.sent = "";
     this.isReleaseOwed = false;

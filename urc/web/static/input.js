@@ -20,12 +20,12 @@
 import { Gate } from "./gate.js";
 import { ANY, Control, Grip } from "./grip.js";
 import { Pads } from "./pad.js";
-import { t } from "./words.js";
+import { said, t } from "./words.js";
 
 const TICK_MS = 50;
 /** So long the server may take to grant the controls. */
 const ASK_MS = 1500;
-/** Ticks of one control are so far apart at least; what comes between goes out with the frame. */
+/** Moves of one control that go out at once are so far apart; what comes between waits for a frame. */
 const SOONEST_MS = 4;
 
 export class Input {
@@ -143,9 +143,9 @@ export class Input {
   refusal() {
     const { lease, isMine } = this.drive;
     if (!lease) return t("no connection to URC");
-    if (lease.latched) return t("stopped by {name}: reset it first", { name: lease.latched });
+    if (lease.latched) return t("stopped by {name}: reset it first", { name: said(lease.latched) });
     if (!lease.drives) return t("this page only watches");
-    if (lease.holder && !isMine) return t("{name} has the controls", { name: lease.holder.name });
+    if (lease.holder && !isMine) return t("{name} has the controls", { name: said(lease.holder.name) });
     return this.gates.size === 0 || [...this.gates].some((gate) => gate.isOpen)
       ? ""
       : t("hold the dead-man control first");
@@ -159,8 +159,9 @@ export class Input {
   moved(grip) {
     const { control } = grip;
     const nowMs = performance.now();
-    if (control.phase !== "held" || nowMs - control.sentMs < SOONEST_MS) return;
+    if (control.phase !== "held" || nowMs - control.movedMs < SOONEST_MS) return;
     if (nowMs - this.frameMs > control.leaseMs) return; // held up: the next frame ends the gesture
+    control.movedMs = nowMs;
     grip.take(nowMs);
     this.stepOne(control, nowMs);
   }

@@ -1,0 +1,79 @@
+// @ts-check
+/** When what a hand does goes out: with each of its moves, and not more often than helps anybody. */
+import assert from "node:assert/strict";
+import test from "node:test";
+
+let nowMs = 1000;
+/** A page of which nothing is heard. */
+const silent = { addEventListener() {} };
+Object.assign(globalThis, {
+  addEventListener() {},
+  document: silent,
+  screen: { orientation: silent },
+  requestAnimationFrame() {},
+});
+performance.now = () => nowMs;
+const { Input } = await import("../../urc/web/static/input.js");
+const { Control } = await import("../../urc/web/static/grip.js");
+
+/** A control that a hand holds, and what was told of it. */
+function held() {
+  /** @type {number[]} */
+  const told = [];
+  const drive = {
+    lease: { epoch: 1 },
+    isMine: true,
+    isFree: true,
+    beat: 7,
+    tell: (/** @type {any} */ tick) => told.push(tick.arguments.x) > 0,
+  };
+  const input = new Input(/** @type {any} */ (drive));
+  const control = Object.assign(new Control("go"), { phase: "held", epoch: 1 });
+  const hand = { x: 0 };
+  const grip = {
+    control,
+    output: { neutral: { x: 0 }, leaseMs: 300 },
+    spec: {},
+    x: 0,
+    take: () => (grip.x = hand.x),
+    given: () => ({ x: grip.x }),
+    check() {},
+    show() {},
+  };
+  control.grips.add(/** @type {any} */ (grip));
+  input.controls.set("go", control);
+  input.frameMs = nowMs;
+  const frame = () => void input.step(nowMs);
+  const move = (/** @type {number} */ x) => {
+    hand.x = x;
+    input.moved(/** @type {any} */ (grip));
+  };
+  return { told, frame, move };
+}
+
+test("a move goes out at once, also right behind the tick of a frame", () => {
+  const { told, frame, move } = held();
+  frame();
+  nowMs += 1;
+  move(5);
+  assert.deepEqual(told, [0, 5]);
+});
+
+test("of a thousand moves a second, one in four milliseconds goes out", () => {
+  const { told, move } = held();
+  for (let x = 1; x <= 12; x += 1) {
+    nowMs += 1;
+    move(x);
+  }
+  assert.deepEqual(told, [1, 5, 9]);
+});
+
+test("what was kept back goes out with the frame", () => {
+  const { told, frame, move } = held();
+  move(1);
+  nowMs += 1;
+  move(2);
+  nowMs += 1;
+  frame();
+  assert.deepEqual(told, [1, 2]);
+});
