@@ -17,6 +17,8 @@ export class Alarms {
     this.el = el;
     /** @type {Map<string, Alarm>} */
     this.told = new Map();
+    /** Whether any value was past a limit when they were looked at last. */
+    this.isAny = false;
   }
 
   /**
@@ -24,7 +26,9 @@ export class Alarms {
    * @param {number} nowMs
    */
   frame(store, nowMs) {
+    this.isAny = false;
     for (const [name, sample] of store.samples) {
+      if (sample.alarm) this.isAny = true;
       const before = this.told.get(name) ?? "";
       if (before === sample.alarm) continue;
       this.told.set(name, sample.alarm);

@@ -34,6 +34,7 @@
  * @property {(command: string, verb: string) => void} steer
  * @property {(wish: import("./types.js").Wish) => void} drive
  * @property {() => void} wake asks for an animation frame
+ * @property {() => void} again asks for one in which widgets are drawn, and no more
  * @property {Pick<import("./input.js").Input, "hold" | "gate" | "letGo" | "refusal" | "isDriving"> & {pads: PadDesk}} input
  * @property {Pick<import("./stop.js").StopButton, "press" | "follow">} stop
  * @property {Pick<import("./follow.js").Follows, "listen">} follows

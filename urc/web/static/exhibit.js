@@ -141,6 +141,7 @@ export class Exhibit {
     const { drive, input, stop, follows, news } = this;
     return {
       wake,
+      again: wake,
       input,
       follows,
       asks: new Asks(bar, (message) => {

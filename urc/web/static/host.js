@@ -127,7 +127,7 @@ export class Host {
     for (const cell of this.cells.values()) {
       if (!this.waiting.has(cell)) draw(cell);
     }
-    if (this.waiting.size > 0) this.doors.wake();
+    if (this.waiting.size > 0) this.doors.again();
     if (drawn < FEW || this.drawn > 0) return;
     this.drawn = drawn;
     this.begunMs = nowMs;

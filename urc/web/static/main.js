@@ -46,6 +46,8 @@ const waiting = new Map();
 const meant = new Map();
 let lastId = 0;
 let isFrameDue = false;
+/** Whether more than widgets has to be looked at in the next frame. */
+let isAllDue = false;
 let session = "";
 
 const address = new URL(root.dataset["socket"] ?? "/ws", location.href);
@@ -109,6 +111,7 @@ const host = new Host(store, {
     drive.changed();
   },
   wake,
+  again: wakeWidgets,
   input,
   stop,
   follows,
@@ -125,6 +128,12 @@ let shown = "";
 
 /** Ask for the one animation frame in which everything is drawn. */
 function wake() {
+  isAllDue = true;
+  wakeWidgets();
+}
+
+/** Ask for it where only readings are new, as most often: the page around the widgets shows none. */
+function wakeWidgets() {
   if (isFrameDue) return;
   isFrameDue = true;
   requestAnimationFrame(draw);
@@ -134,6 +143,9 @@ function draw() {
   isFrameDue = false;
   const nowMs = performance.now();
   host.frame(nowMs);
+  stage.frame(nowMs);
+  if (!isAllDue) return;
+  isAllDue = false;
   follows.frame();
   askPictures();
   badge.frame(store, socket);
@@ -141,7 +153,6 @@ function draw() {
   alarms.frame(store, nowMs);
   stop.frame();
   controls?.frame(nowMs);
-  stage.frame(nowMs);
   wakeLock.want(drive.isMine);
 }
 
@@ -157,7 +168,7 @@ function takePicture(data) {
   const frame = frameOf(data);
   if (!frame) return;
   store.picture(frame, performance.now());
-  wake();
+  wakeWidgets();
 }
 
 /** @param {any} message */
@@ -166,7 +177,9 @@ function take(message) {
   switch (message.t) {
     case "v":
       store.values(message, nowMs);
-      break;
+      if (message.s || alarms.isAny) break; // what is past a limit is told outside of widgets too
+      wakeWidgets();
+      return;
     case "hello":
       store.hello(message, nowMs);
       session = message.session;
