@@ -2,8 +2,8 @@
 
 Each line is the machine's monotonic clock in tenths of milliseconds, modulo `MODULUS` and `START`
 on top, so that it has ten digits and whoever shows it shows how old it is. At 50 lines a second
-there are five phases between robot and display; each line is moved by up to 3 ms, the same way in
-each run, so that no phase is favoured.
+there are five phases between robot and display, a fifth of a frame apart; each line is moved by up
+to half of that, the same way in each run, so that all phases come equally often.
 """
 
 import asyncio
@@ -13,7 +13,7 @@ import time
 
 MODULUS = 9 * 10**9
 START = 10**9
-MOVED_S = 0.003
+MOVED_S = 1 / 60 / 5 / 2
 GOLDEN = 0.6180339887
 
 
@@ -27,7 +27,7 @@ async def tell(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> No
             writer.write(b"%d\n" % (START + int(time.monotonic() * 10_000) % MODULUS))
             await writer.drain()
             number += 1
-            moved_s = (number * GOLDEN % 1 - 0.5) * 2 * min(MOVED_S, period_s / 3)
+            moved_s = (number * GOLDEN % 1 - 0.5) * 2 * MOVED_S
             due_s = began_s + number * period_s + moved_s
             await asyncio.sleep(max(0.0, due_s - time.monotonic()))
 
