@@ -19,6 +19,11 @@ const FAR_MS = 40;
 const LATE_BEAT_MS = 150;
 /** For so long a link that has lost something counts as one that does. */
 const LOSSY_MS = 5000;
+/**
+ * So long after a tick the browser need not have noted yet that it has left: until then another may
+ * follow. It notes that when it has nothing better to do, such as painting.
+ */
+const LEAVING_MS = 8;
 
 export class Drive {
   /**
@@ -39,6 +44,8 @@ export class Drive {
     /** When a beat came late, on this page's clock. */
     this.lateMs = -Infinity;
     this.spare = new Spare(spareUrl, (message) => this.hear(message.n, performance.now()));
+    /** When a tick went out last with nothing before it. */
+    this.freeMs = -Infinity;
     /** Counts what this page says of held controls. */
     this.number = 0;
     /** @type {StopPhase} */
@@ -108,7 +115,12 @@ export class Drive {
 
   /** Whether a tick would go out at once. */
   get isFree() {
-    return this.socket.unsent === 0 || this.spare.isFree;
+    return this.isClear || this.spare.isFree;
+  }
+
+  /** Whether nothing waits on the first line. */
+  get isClear() {
+    return this.socket.unsent === 0 || performance.now() - this.freeMs < LEAVING_MS;
   }
 
   /**
@@ -121,7 +133,9 @@ export class Drive {
   tell(message, isTick = false) {
     this.number += 1;
     const numbered = { ...message, number: this.number };
-    const isSent = (!isTick || this.socket.unsent === 0) && this.socket.send(numbered);
+    const isClear = this.isClear;
+    if (isTick && this.socket.unsent === 0) this.freeMs = performance.now();
+    const isSent = (!isTick || isClear) && this.socket.send(numbered);
     return this.spare.send(numbered) || isSent;
   }
 
