@@ -1,7 +1,7 @@
 """Two hundred values to many pages: URC beside a bare loop in C, and beside a message a value.
 
 What counts is the processor time of the server for the same news, the making of the readings and
-their encoding included; the pages are another process.
+their encoding included; the pages are another process, and so is the robot that wakes the server.
 The loop in C writes as many bytes to as many pages, and knows no value and no WebSocket.
 """
 
@@ -21,7 +21,7 @@ from starlette.routing import WebSocketRoute
 from starlette.websockets import WebSocket
 
 from bench.harness import Goal, Result, compare
-from bench.watching import cost_s, ticking
+from bench.watching import cost_s, speaking
 from urc._loop import run as run_loop
 from urc.model.values import Sample, Signal
 from urc.testing.dashboard import FakeRobot, dashboard_profile
@@ -79,10 +79,9 @@ async def _urc(clients: int, ticks: int) -> tuple[float, int]:
         readings = zip(signals, repeat(tick + 0.25), repeat(now_s), repeat(""))
         robot.hub.put(tuple(map(_sample, readings)))
 
-    async def play() -> None:
-        await ticking(tell, ticks, RATE_HZ)
-
-    spent_s, tally = await cost_s(app, "/ws?robot=puppet", clients, [], play)
+    async with speaking(ticks, RATE_HZ) as line:
+        path = "/ws?robot=puppet"
+        spent_s, tally = await cost_s(app, path, clients, [], lambda: line.heard(tell))
     if min(messages for messages, _ in tally) < ticks * 0.9:
         raise SystemExit("bench: the machine was too busy for every frame")
     return spent_s, tally[0][1] // ticks

@@ -1,13 +1,15 @@
 """Images to twenty pages: URC beside ``send_bytes`` for each page, and beside base64 in JSON.
 
-All three serve with the same uvicorn, in this process; the pages are another one. What counts is
-the processor time of this process for each image that reached a page.
+All three serve with the same uvicorn, in this process, and are woken by the same robot, which is
+another one, as are the pages. What counts is the processor time of this process for each image that
+reached a page.
 """
 
 import asyncio
 import base64
 import json
 from collections.abc import Sequence
+from functools import partial
 
 from starlette.applications import Starlette
 from starlette.routing import WebSocketRoute
@@ -15,10 +17,10 @@ from starlette.types import ASGIApp
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from bench.harness import Goal, Result, compare_all
-from bench.watching import cost_s, ticking
+from bench.watching import cost_s, speaking
 from urc._loop import run as run_loop
 from urc.model.interface import WidgetUse
-from urc.model.values import Signal
+from urc.model.values import Sample, Signal
 from urc.testing.dashboard import FakeRobot, dashboard_profile
 from urc.web.app import Robot, build_app
 
@@ -88,13 +90,23 @@ def run(*, full: bool) -> Sequence[Result]:
 async def _naive(images: int, *, is_json: bool) -> float:
     naive = Naive(is_json=is_json)
 
-    async def play() -> None:
-        for _ in range(images):
-            await naive.put(IMAGE)
-            await asyncio.sleep(1 / RATE_HZ)
-        await naive.put(b"")
+    said = asyncio.Event()
 
-    spent_s, tally = await cost_s(naive.app, "/ws", CLIENTS, [], play)
+    async def passing_on() -> None:
+        for _ in range(images):
+            await said.wait()
+            said.clear()
+            await naive.put(IMAGE)
+
+    async with speaking(images, RATE_HZ) as line:
+
+        async def play() -> None:
+            passing = asyncio.create_task(passing_on())
+            await line.heard(lambda _: said.set())
+            await passing
+            await naive.put(b"")
+
+        spent_s, tally = await cost_s(naive.app, "/ws", CLIENTS, [], play)
     return _each(spent_s, [size for _, size in tally], len(IMAGE) * (4 / 3 if is_json else 1))
 
 
@@ -103,10 +115,12 @@ async def _urc(images: int) -> float:
     robot = FakeRobot(dashboard_profile(signals={"cam": Signal("cam", "image")}, uses=[use]))
     app = build_app({"puppet": Robot(robot.profile, {}, robot.open)})
 
-    async def play() -> None:
-        await ticking(lambda _: robot.say("cam", IMAGE), images, RATE_HZ)
+    def tell(_: int) -> None:
+        robot.hub.put((Sample("cam", IMAGE, robot.clock.now()),))
 
-    spent_s, tally = await cost_s(app, "/ws?robot=puppet", CLIENTS, ["cam"], play)
+    async with speaking(images, RATE_HZ) as line:
+        hear = partial(line.heard, tell)
+        spent_s, tally = await cost_s(app, "/ws?robot=puppet", CLIENTS, ["cam"], hear)
     return _each(spent_s, [size for _, size in tally], len(IMAGE))
 
 

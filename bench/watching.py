@@ -2,6 +2,7 @@
 
 import asyncio
 import json
+import socket
 import sys
 import time
 from collections.abc import AsyncIterator, Awaitable, Callable
@@ -11,7 +12,7 @@ from starlette.types import ASGIApp
 
 from urc.web.app import serve
 
-__all__ = ["Tally", "cost_s", "serving", "ticking"]
+__all__ = ["Robot", "Tally", "cost_s", "serving", "speaking"]
 
 READY_S = 20.0
 Tally = list[tuple[int, int]]
@@ -59,17 +60,55 @@ async def cost_s(
     return spent_s, [(int(messages), int(size)) for messages, size in json.loads(told)]
 
 
-async def ticking(tell: Callable[[int], None], ticks: int, rate_hz: float) -> None:
-    """Call `tell` at a rate, as a robot's line does when something came: in no task of its own."""
-    loop = asyncio.get_running_loop()
-    done = loop.create_future()
+class Robot:
+    """Another process that says something at a rate, as a robot does."""
 
-    def step(tick: int) -> None:
-        if tick == ticks:
-            done.set_result(None)
-        else:
-            loop.call_later(1 / rate_hz, step, tick + 1)
-            tell(tick)
+    def __init__(self, line: socket.socket, ticks: int) -> None:
+        self._line = line
+        self._ticks = ticks
 
-    step(0)
-    await done
+    async def heard(self, tell: Callable[[int], None]) -> None:
+        """Let it begin, and call `tell` whenever it has said something, until it is done."""
+        loop = asyncio.get_running_loop()
+        done = loop.create_future()
+        tick = 0
+
+        def come() -> None:
+            nonlocal tick
+            if self._line.recv(1):
+                tell(tick)
+                tick += 1
+            elif not done.done():
+                done.set_result(None)
+
+        loop.add_reader(self._line, come)
+        try:
+            self._line.send(b"!")
+            async with asyncio.timeout(READY_S):
+                await done
+        finally:
+            loop.remove_reader(self._line)
+        if tick != self._ticks:
+            raise SystemExit("bench: the robot fell silent")
+
+
+@asynccontextmanager
+async def speaking(ticks: int, rate_hz: float) -> AsyncIterator[Robot]:
+    """Start a robot, which waits until somebody hears it.
+
+    What wakes the server is then what wakes it in life, a line that has something to read: a timer
+    in this process would cost several times as much, and be the benchmark's.
+    """
+    ours, theirs = socket.socketpair()
+    with ours, theirs:
+        ours.setblocking(False)
+        number = str(theirs.fileno())
+        command = (sys.executable, "-m", "bench.robot", number, str(ticks), str(rate_hz))
+        robot = await asyncio.create_subprocess_exec(*command, pass_fds=(theirs.fileno(),))
+        theirs.close()
+        try:
+            yield Robot(ours, ticks)
+        finally:
+            if robot.returncode is None:
+                robot.kill()
+            await robot.wait()

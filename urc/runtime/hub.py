@@ -10,13 +10,14 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from operator import itemgetter
+from functools import partial
 from typing import Literal
 
 from urc.model.codec import Envelope
-from urc.model.values import Sample, Signal
+from urc.model.values import Alarm, Reading, Sample, Signal
 
 __all__ = [
+    "Columns",
     "Hub",
     "LinkState",
     "LinkStatus",
@@ -36,7 +37,11 @@ TRAFFIC_KEPT = 1000
 TAP_KEPT = 10_000
 _FEW = 16
 """Readings that are kept one by one; of more, most are older than others of the same signal."""
-_name_of = itemgetter(0)
+_sample = partial(tuple.__new__, Sample)
+"""Of what `Columns` give row by row."""
+
+Columns = tuple[tuple[str, ...], tuple[Reading, ...], tuple[float, ...], tuple[Alarm, ...]]
+"""Readings part by part, as of `Sample`: all names, all values, all times, all alarms."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -178,12 +183,16 @@ class Hub:
         """Traffic is recorded while this is above 0."""
         self._latest: dict[str, Sample] = {}
         self._changed: dict[str, int] = {}
-        self._batch: tuple[Sample, ...] = ()
+        self._last: tuple[Sample, ...] = ()
+        """What came together last if it was little, ..."""
+        self._batch: Columns | None = None
+        """... or much, each reading of another signal. That is filed by signal when somebody asks
+        for one, or when others come: a robot that tells all it has in one message does so again
+        and again."""
         self._batch_names: tuple[str, ...] = ()
-        self._batch_revision = 0
-        """Many readings that came together last, each of another signal, and the revision they
-        made. They are filed by signal when somebody asks for one, or when others come: a robot
-        that tells all it has in one message does so again and again."""
+        """Signals of the last that was much; mostly the next is of the same."""
+        self._last_revision = 0
+        """What the last made."""
         self._wakers: set[Callable[[], None]] = set()
         self._taps: set[Tap] = set()
         self._traffic_taps: set[Tap] = set()
@@ -192,34 +201,40 @@ class Hub:
         """Take readings; a repeated value counts as a change, because its age is new."""
         taken = samples if type(samples) is tuple else tuple(samples)
         revision = self.revision = self.revision + 1
-        if len(taken) <= _FEW:
-            self._file()
+        if len(taken) > _FEW:
+            self._put_many(taken)
+        else:
+            if self._batch is not None:
+                self._file()
             latest, changed = self._latest, self._changed
             for sample in taken:
                 name = sample[0]
                 latest[name] = sample
                 changed[name] = revision
-        else:
-            self._put_many(taken, revision)
+            self._last = taken
+        self._last_revision = revision
         for tap in self._taps:
             tap.put(taken)
         for wake in self._wakers:
             wake()
 
-    def _put_many(self, taken: tuple[Sample, ...], revision: int) -> None:
-        names = tuple(map(_name_of, taken))
+    def _put_many(self, taken: tuple[Sample, ...]) -> None:
+        names, values, times, alarms = zip(*taken, strict=False)
         if names != self._batch_names:
             self._file()
-            newest = dict(zip(names, taken, strict=True))
-            taken, names = tuple(newest.values()), tuple(newest)
-        self._batch, self._batch_names, self._batch_revision = taken, names, revision
+            if len(newest := dict(zip(names, taken, strict=True))) < len(taken):
+                names, values, times, alarms = zip(*newest.values(), strict=True)
+            self._batch_names = names
+        # The names as they were: who gets the same again need not look at each of them.
+        self._batch = (self._batch_names, values, times, alarms)
 
     def _file(self) -> None:
         """Note of each signal what came of it last."""
-        if self._batch:
-            self._latest.update(zip(self._batch_names, self._batch, strict=True))
-            self._changed.update(dict.fromkeys(self._batch_names, self._batch_revision))
-            self._batch = self._batch_names = ()
+        if self._batch is not None:
+            filed = map(_sample, zip(*self._batch, strict=True))
+            self._latest.update(zip(self._batch_names, filed, strict=True))
+            self._changed.update(dict.fromkeys(self._batch_names, self._last_revision))
+            self._batch = None
 
     def set_link(self, status: LinkStatus) -> None:
         """Take the state of one transport."""
@@ -259,16 +274,32 @@ class Hub:
 
     def latest(self, name: str) -> Sample | None:
         """Return the newest reading of a signal, or None when there was none."""
-        self._file()
+        if self._batch is not None:
+            self._file()
         return self._latest.get(name)
 
     def changed_since(self, revision: int) -> Sequence[Sample]:
         """Return the newest reading of every signal that changed after `revision`."""
-        if self._batch and revision == self._batch_revision - 1 == self.revision - 1:
-            return self._batch
         self._file()
         changed = self._changed
         return [sample for name, sample in self._latest.items() if changed[name] > revision]
+
+    def columns_since(self, revision: int) -> Columns | None:
+        """Return the same part by part; None when there is nothing."""
+        samples: Sequence[Sample] = ()
+        if revision == self._last_revision - 1 == self.revision - 1:
+            if self._batch is not None:
+                return self._batch
+            samples = self._last
+            if len(samples) == 1:
+                name, value, time_s, alarm = samples[0]
+                return (name,), (value,), (time_s,), (alarm,)
+        if not samples or len({sample[0] for sample in samples}) < len(samples):
+            samples = self.changed_since(revision)
+        if not samples:
+            return None
+        names, values, times, alarms = zip(*samples, strict=False)
+        return names, values, times, alarms
 
     @contextmanager
     def subscribe(self) -> Iterator[Subscription]:

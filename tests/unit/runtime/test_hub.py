@@ -70,6 +70,51 @@ def test_reader_gets_the_newest_of_each_changed_signal_once(hub: Hub) -> None:
     assert hub.latest("c") is None
 
 
+@pytest.mark.parametrize("count", [1, 3, 40])
+def test_what_came_together_is_given_part_by_part(count: int) -> None:
+    """However much it is: all that is newer, with the newest of each signal, and no more."""
+    names = tuple(f"s{place}" for place in range(count))
+    hub = Hub({name: Signal(name) for name in names})
+    assert hub.columns_since(0) is None
+    hub.put(Sample(name, place, 1.0) for place, name in enumerate(names))
+    assert hub.columns_since(0) == (names, (*range(count),), (1.0,) * count, ("",) * count)
+    assert hub.columns_since(1) is None
+    hub.put((Sample(names[0], 7, 2.0, "low"),))
+    assert hub.columns_since(1) == (names[:1], (7,), (2.0,), ("low",))
+    rest = count - 1
+    values, times = (7, *range(1, count)), (2.0, *(1.0,) * rest)
+    assert hub.columns_since(0) == (names, values, times, ("low", *("",) * rest))
+    hub.note(NOTE)
+    assert hub.columns_since(2) is None
+
+
+@pytest.mark.parametrize("count", [2, 40])
+def test_a_signal_that_came_twice_at_once_counts_once(count: int) -> None:
+    """The later one is the newest."""
+    names = [f"s{place}" for place in range(count - 1)]
+    hub = Hub({name: Signal(name) for name in names})
+    hub.put([sample("s0", 1), *(sample(name, 2) for name in names)])
+    found = hub.columns_since(0)
+    assert found is not None
+    assert found[:2] == (tuple(names), (2,) * (count - 1))
+    assert hub.changed_since(0) == [sample(name, 2) for name in names]
+    assert hub.latest("s0") == sample("s0", 2)
+
+
+def test_much_that_came_is_found_by_signal_whatever_comes_next() -> None:
+    """The same again, other signals, a few, or a question."""
+    names = [f"s{place}" for place in range(60)]
+    hub = Hub({name: Signal(name) for name in names})
+    for value in (1, 2):
+        hub.put([sample(name, value) for name in names[:30]])
+    hub.put([sample(name, 3) for name in names[20:]])
+    assert (hub.latest("s0"), hub.latest("s25")) == (sample("s0", 2), sample("s25", 3))
+    hub.put([sample(name, 4) for name in names[20:]])
+    hub.put([sample("s1", 5)])
+    found = {each.signal: each.value for each in hub.changed_since(2)}
+    assert found == {"s1": 5, **dict.fromkeys(names[20:], 4)}
+
+
 async def test_reader_is_woken_by_a_change_and_waits_without_one(hub: Hub) -> None:
     """`changed` returns at once when there is news, else with the next news."""
     with hub.subscribe() as subscription:

@@ -165,6 +165,42 @@ def test_images_go_to_those_who_show_them_and_once_each() -> None:
     assert it.fanout.shelf.take(bob.place.looks) is None
 
 
+def test_an_image_beside_a_value_follows_its_frame() -> None:
+    """However many cameras are shown; no image comes once more with the next value."""
+    it = Scene()
+    ann, bob, cy = Client(it, 7), Client(it, 8, "cam"), Client(it, 9, "cam")
+    it.say(cam=JPEG + b"1", a=1)
+    it.say(a=2)
+    it.say(cam=JPEG + b"2")
+    assert ann.values == bob.values == [1, 2]
+    assert [frame for frame in bob.frames if frame.startswith(JPEG)] == [JPEG + b"1", JPEG + b"2"]
+    assert bob.frames == cy.frames
+
+
+def test_a_lone_crowd_gets_images_and_values_in_turn() -> None:
+    """It goes a shorter way, with the same at its end."""
+    it = Scene()
+    ann = Client(it, 7, "cam")
+    it.say(cam=JPEG)
+    it.say(cam=JPEG + b"2", a=1)
+    it.hub.put([Sample("a", 2, it.clock.now())])
+    it.say(a=3)
+    assert ann.woken == 0
+    assert ann.values == [1, 3]
+    assert [frame for frame in ann.frames if frame.startswith(JPEG)] == [JPEG, JPEG + b"2"]
+
+
+def test_a_camera_that_has_nothing_any_more_is_a_value() -> None:
+    """The page is told so; it has the last image already."""
+    it = Scene()
+    ann = Client(it, 7, "cam")
+    it.say(cam=JPEG)
+    it.hub.put([Sample("cam", None, it.clock.now())])
+    it.fanout.flush()
+    assert ann.values == [None]
+    assert ann.frames[0] == JPEG
+
+
 def test_the_end_wakes_everybody() -> None:
     """Whoever was settled learns that there is nothing more to come."""
     it = Scene()

@@ -7,12 +7,11 @@ fell behind gets the newest values merged into one frame, and is nobody else's p
 """
 
 import asyncio
-from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 
-from urc.model.values import Sample
 from urc.runtime.clock import Alarm, Clock, LoopClock
-from urc.runtime.hub import Hub
+from urc.runtime.hub import Columns, Hub
 from urc.web.feed.crowd import NO_NUMBER, Crowd, Kernel, Known, Listener, Place
 from urc.web.feed.line import Flow
 from urc.web.feed.picture_shelf import PictureShelf, is_picture
@@ -22,6 +21,8 @@ from urc.web.wire.picture import as_frame
 
 __all__ = ["FRAMES_PER_SECOND", "Fanout", "Pacer"]
 
+_known = partial(tuple.__new__, Known)
+"""Of its four numbers, without a function of Python's."""
 FRAMES_PER_SECOND = 60.0
 LOG_LINES_FOR_NEWCOMERS = 50
 SHARED_FOR_S = 0.005
@@ -33,10 +34,14 @@ class _Taken:
     """What everybody gets who knows equally much."""
 
     after: Known
-    messages: tuple[str, ...]
+    messages: list[bytes]
+    frames: bytes
+    """The same as WebSocket frames, one behind the other; empty when there is nothing."""
     time_s: float
-    frames: bytes = b""
-    """The same as WebSocket frames, one behind the other; empty until somebody wants them."""
+    has_pictures: bool
+    """Whether there is a new image as well, for those who show it."""
+    texts: tuple[str, ...] | None = None
+    """The messages once more; None until somebody wants them so."""
 
 
 class Pacer:
@@ -48,15 +53,17 @@ class Pacer:
 
     def __init__(self, rate_hz: float) -> None:
         self._period_s = 1.0 / rate_hz
-        self._due_s = 0.0
+        self.free_s = -self._period_s
+        """When the next one may go."""
 
     def delay_s(self, now_s: float) -> float:
         """Return how long to wait before the next one may go; 0 = now."""
-        return max(0.0, self._due_s - self._period_s - now_s)
+        return max(0.0, self.free_s - now_s)
 
     def went(self, now_s: float) -> None:
         """Count one that went."""
-        self._due_s = max(now_s, self._due_s) + self._period_s
+        due_s = self.free_s + self._period_s
+        self.free_s = now_s if now_s > due_s else due_s
 
 
 class Fanout:
@@ -83,6 +90,8 @@ class Fanout:
         self._taken: dict[Known, _Taken] = {}
         self._due: Alarm | None = None
         """The flush that is to come."""
+        self._loop: asyncio.AbstractEventLoop | None = None
+        """While this runs."""
         self._broken: asyncio.Future[None] | None = None
         self._looked_at = -1
         self._pictures = {name for name, signal in hub.signals.items() if is_picture(signal)}
@@ -90,7 +99,8 @@ class Fanout:
 
     async def run(self) -> None:
         """Flush for ever; ends by being cancelled, or with what a flush raised."""
-        self._broken = asyncio.get_running_loop().create_future()
+        self._loop = asyncio.get_running_loop()  # which costs a system call
+        self._broken = self._loop.create_future()
         try:
             with self.hub.heed(self._changed):
                 if self.hub.revision:
@@ -102,14 +112,13 @@ class Fanout:
 
     def _changed(self) -> None:
         """Have a flush, as soon as may be, and after whatever the loop is at."""
-        if self._due is not None:
+        if self._due is not None or self._loop is None:
             return
-        now_s = self._clock.now()
-        delay_s = self._pacer.delay_s(now_s)
-        if delay_s > 0:
-            self._due = self._clock.call_at(now_s + delay_s, self._ripe)
+        free_s = self._pacer.free_s
+        if self._clock.now() >= free_s:
+            self._due = self._loop.call_soon(self._ripe)
         else:
-            self._due = asyncio.get_running_loop().call_soon(self._ripe)
+            self._due = self._clock.call_at(free_s, self._ripe)
 
     def _ripe(self) -> None:
         self._due = None
@@ -122,18 +131,45 @@ class Fanout:
 
     def flush(self) -> None:
         """Forget the last frame, and bring everybody up to date who is ready for it."""
-        self._head = self.hub.revision
+        self._head = self._looked_at = self.hub.revision
         self._taken.clear()
+        if len(self._crowds) == 1 and not self._waiting and self._tell(self._crowds[0]):
+            return
         waiting = tuple(self._waiting)  # who falls out of a crowd has been given what is new
         for crowd in tuple(self._crowds):
-            taken = self._shared_frames(crowd.known)
+            known = crowd.known
+            taken = self._taken.get(known) or self._make(known, self._clock.now())
             crowd.known = taken.after
             if taken.frames:
                 crowd.send(taken.frames)
-            while (picture := self.shelf.take(crowd.looks)) is not None:
-                crowd.send_parts(picture.parts)
+            if taken.has_pictures:
+                for picture in self.shelf.take_all(crowd.looks):
+                    crowd.send_parts(picture.parts)
         for listener in waiting:
             listener.wake()
+
+    def _tell(self, crowd: Crowd) -> bool:
+        """Write what is new to the only crowd if it came together, and return whether it did.
+
+        It mostly does. This is `flush` in few steps: in a process that has rested for some
+        milliseconds each function that is called costs microseconds more.
+        """
+        hub, known = self.hub, crowd.known
+        if known.revision != hub.revision - 1:
+            return False
+        columns = hub.columns_since(known.revision)
+        if columns is None:
+            return False
+        has_pictures = not self._pictures.isdisjoint(columns[0])
+        plain = self._plain(columns) if has_pictures else columns
+        crowd.known = _known((hub.revision, known.links, known.progress, known.notes))
+        if plain is not None:
+            text = encode_values(plain, self._indexes, self._clock.now())
+            crowd.send(as_frame(text, is_text=True))
+        if has_pictures:
+            for picture in self.shelf.take_all(crowd.looks):
+                crowd.send_parts(picture.parts)
+        return True
 
     def end(self) -> None:
         """Wake everybody: there is nothing more to come."""
@@ -184,18 +220,17 @@ class Fanout:
 
     def take(self, place: Place) -> tuple[str, ...]:
         """Return the messages that bring `place` up to date, and move it there."""
-        taken = self._shared(place.known)
-        place.known = taken.after
-        return taken.messages
+        taken = self._shared(place)
+        if taken.texts is None:
+            taken.texts = tuple(message.decode() for message in taken.messages)
+        return taken.texts
 
     def take_frames(self, place: Place) -> bytes:
         """Return the same as WebSocket frames, one behind the other; empty when there is nothing.
 
         They are made once for all who know equally much.
         """
-        taken = self._shared_frames(place.known)
-        place.known = taken.after
-        return taken.frames
+        return self._shared(place).frames
 
     def catch_up(self, place: Place, flow: Flow) -> None:
         """Write what is new on a line that is free, and images for as long as it is."""
@@ -208,48 +243,51 @@ class Fanout:
                 break
             flow.write(picture.frame)
 
-    def _shared_frames(self, known: Known) -> _Taken:
-        taken = self._shared(known)
-        if taken.messages and not taken.frames:
-            texts = [as_frame(text.encode(), is_text=True) for text in taken.messages]
-            taken.frames = b"".join(texts)
-        return taken
-
-    def _shared(self, known: Known) -> _Taken:
+    def _shared(self, place: Place) -> _Taken:
         if self._looked_at != self.hub.revision:
             self._looked_at = self.hub.revision
             self._taken.clear()
-        taken, now_s = self._taken.get(known), self._clock.now()
+        taken, now_s = self._taken.get(place.known), self._clock.now()
         if taken is None or now_s - taken.time_s > SHARED_FOR_S:
-            taken = self._taken[known] = self._make(known, now_s)
+            taken = self._make(place.known, now_s)
+        place.known = taken.after
         return taken
 
     def _make(self, known: Known, now_s: float) -> _Taken:
-        hub, messages = self.hub, []
-        revision = known.revision
-        if known.links != hub.links_count:
-            messages.append(encode_links(hub.links.values(), now_s))
+        hub = self.hub
+        messages: list[bytes] = []
+        revision, links, progress, notes = known
+        has_pictures = False
+        if links != hub.links_count:
+            messages.append(encode_links(hub.links.values(), now_s).encode())
         if revision < self._head:  # what came since the last flush waits for the next one
-            samples = self._plain(hub.changed_since(revision))
+            columns = hub.columns_since(revision)
             revision = hub.revision
-            if samples:
-                messages.append(encode_values(samples, self._indexes, now_s))
-        if hub.notes_count > known.notes:
-            messages.append(self._take_log(hub.notes_count - known.notes, now_s))
-        if known.progress != hub.progress_count:
-            messages.append(encode_progress(tuple(hub.progress.values())))
+            if columns is not None and not self._pictures.isdisjoint(columns[0]):
+                has_pictures, columns = True, self._plain(columns)
+            if columns is not None:
+                messages.append(encode_values(columns, self._indexes, now_s))
+        if hub.notes_count > notes:
+            messages.append(self._take_log(hub.notes_count - notes, now_s).encode())
+        if progress != hub.progress_count:
+            messages.append(encode_progress(tuple(hub.progress.values())).encode())
         after = Known(revision, hub.links_count, hub.progress_count, hub.notes_count)
-        return _Taken(after, tuple(messages), now_s)
+        frames = b"".join([as_frame(message, is_text=True) for message in messages])
+        taken = _Taken(after, messages, frames, now_s, has_pictures)
+        self._taken[known] = taken
+        return taken
 
-    def _plain(self, samples: Sequence[Sample]) -> Sequence[Sample]:
-        """Return the readings without the images, which only go to those who show them."""
-        if not self._pictures:
-            return samples
-        return [
-            sample
-            for sample in samples
-            if sample.signal not in self._pictures or sample.value is None
-        ]
+    def _plain(self, columns: Columns) -> Columns | None:
+        """Return readings without the images in them, which only go to those who show them."""
+        pictures, values = self._pictures, columns[1]
+        if len(values) == 1 and values[0] is not None:
+            return None  # there is an image, and so nothing else
+        rows = zip(*columns, strict=True)
+        kept = [row for row in rows if row[0] not in pictures or row[1] is None]
+        if not kept:
+            return None
+        names, values, times, alarms = zip(*kept, strict=True)
+        return names, values, times, alarms
 
     def _take_log(self, wanted: int, now_s: float) -> str:
         kept = list(self.hub.notes)[-wanted:]

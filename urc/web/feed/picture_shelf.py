@@ -12,7 +12,6 @@ from urc.model.values import Sample, Signal
 from urc.runtime.clock import Clock
 from urc.runtime.hub import Hub
 from urc.web.wire.picture import picture_head
-from urc.web.wire.text import milliseconds
 
 __all__ = ["Encoded", "Looks", "PictureShelf", "is_picture"]
 
@@ -95,20 +94,31 @@ class PictureShelf:
                 return made
         return None
 
+    def take_all(self, looks: Looks) -> list[Encoded]:
+        """Return every image that somebody shows and has not got; they count as sent."""
+        found: list[Encoded] = []
+        for name in looks.names:
+            made = self._newest(name)
+            if made is not None and looks.seen.get(name) != made.number:
+                looks.seen[name] = made.number
+                found.append(made)
+        return found
+
     def _newest(self, name: str) -> Encoded | None:
         sample = self._hub.latest(name)
         if sample is None or not isinstance(sample.value, bytes):
             return None
-        if not is_picture(self._hub.signals.get(name)):
-            return None
         known, now_s = self._encoded.get(name), self._clock.now()
-        is_new = known is None or known.sample is not sample
-        if known is None or is_new or now_s - known.made_s > SHARED_FOR_S:
-            self._count += is_new
-            number = self._count if known is None or is_new else known.number
-            age_ms = milliseconds(now_s - sample.time_s)
-            index, now_ms = self._hub.index[name], milliseconds(now_s)
-            head, at = picture_head(index, sample.value, age_ms, now_ms)
-            known = Encoded((head, sample.value), at, sample, number, now_s)
-            self._encoded[name] = known
-        return known
+        if known is None or known.sample is not sample:
+            if known is None and not is_picture(self._hub.signals.get(name)):
+                return None
+            self._count += 1
+            number = self._count
+        elif now_s - known.made_s > SHARED_FOR_S:
+            number = known.number
+        else:
+            return known
+        age_s, index = now_s - sample.time_s, self._hub.index[name]
+        head, at = picture_head(index, sample.value, round(age_s * 1000), round(now_s * 1000))
+        made = self._encoded[name] = Encoded((head, sample.value), at, sample, number, now_s)
+        return made

@@ -117,7 +117,7 @@ export class Store {
       this.samples.set(name, {
         value: frame.v[place] ?? null,
         alarm: frame.s?.[place] ?? "",
-        timeMs: sentMs - (frame.a[place] ?? 0),
+        timeMs: sentMs - (typeof frame.a === "number" ? frame.a : (frame.a[place] ?? 0)),
         serial: this.serial,
       });
     });

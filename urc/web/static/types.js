@@ -118,7 +118,7 @@
  * @property {number} n
  * @property {number[]} i
  * @property {Held[]} v
- * @property {number[]} a
+ * @property {number | number[]} a One for all where all are equally old.
  * @property {Alarm[]} [s]
  *
  * @typedef {object} Reply

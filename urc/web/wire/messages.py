@@ -6,7 +6,8 @@ milliseconds at the moment of encoding. Values travel as index arrays over the n
 Server → page, by ``t``::
 
     hello   once, first: names, what each signal means, the server's clock
-    v       changed signals: i indexes, v values, a ages, s alarms (left out when all are normal)
+    v       changed signals: i indexes, v values, a ages (one number when all are equally old),
+            s alarms (left out when all are normal)
     links   the state of every transport
     log     lines, oldest first; numbers run on, so that a gap shows what was dropped
     reply   the one answer to a command
@@ -36,12 +37,12 @@ import msgspec
 
 from urc.model.driver import Command, Driver, Poll
 from urc.model.profile import Profile
-from urc.model.values import Reading, Sample, Signal
-from urc.runtime.hub import LinkStatus, Note
+from urc.model.values import Reading, Signal
+from urc.runtime.hub import Columns, LinkStatus, Note
 from urc.web.wire.ask import Agree, Arguments, Prepare, Steer
 from urc.web.wire.drive import Drive, Release, Stop, Tick
 from urc.web.wire.picture import Show
-from urc.web.wire.text import Outbound, cut, encoded, milliseconds
+from urc.web.wire.text import Outbound, cut, encoded, encoded_bytes, milliseconds, repaired
 
 __all__ = [
     "CLOSE_BAD_MESSAGES",
@@ -114,9 +115,10 @@ class _Hello(Outbound, tag="hello", omit_defaults=False, frozen=True):
 
 class _Values(Outbound, tag="v", frozen=True):
     n: int
-    i: Sequence[int]
+    i: msgspec.Raw
     v: Sequence[object]
-    a: Sequence[int]
+    a: int | Sequence[int]
+    """One for all where all are equally old."""
     s: Sequence[str] | None = None
 
 
@@ -221,32 +223,31 @@ class Indexes:
     def __init__(self, index: Mapping[str, int]) -> None:
         self._index = index
         self._names: tuple[str, ...] = ()
-        self._found: list[int] = []
+        self._found = msgspec.Raw(b"[]")
 
-    def of(self, names: tuple[str, ...]) -> list[int]:
-        """Return the numbers; the list must not be changed."""
-        if names != self._names:
-            self._names, self._found = names, [*map(self._index.__getitem__, names)]
+    def of(self, names: tuple[str, ...]) -> msgspec.Raw:
+        """Return the numbers as they stand in a message."""
+        if names is not self._names and names != self._names:
+            found = [*map(self._index.__getitem__, names)]
+            self._names, self._found = names, msgspec.Raw(msgspec.json.encode(found))
         return self._found
 
 
-def encode_values(samples: Sequence[Sample], indexes: Indexes, now_s: float) -> str:
+def encode_values(columns: Columns, indexes: Indexes, now_s: float) -> bytes:
     """Return one frame with the newest reading of each changed signal."""
-    names, values, times, alarms = zip(*samples, strict=True)
-    if times.count(times[0]) == len(times):  # what came together is equally old
-        ages = [max(0, milliseconds(now_s - times[0]))] * len(times)
+    values: Sequence[object]
+    names, values, times, alarms = columns
+    count, first_s = len(names), times[0]
+    ages: int | list[int]
+    if times.count(first_s) == count:  # what came together is equally old
+        ages = max(0, round((now_s - first_s) * 1000))
     else:
         ages = [max(0, milliseconds(now_s - time_s)) for time_s in times]
-    are_as_they_are = _AS_THEY_ARE.issuperset(map(type, values))
-    return encoded(
-        _Values(
-            n=milliseconds(now_s),
-            i=indexes.of(names),
-            v=values if are_as_they_are else [*map(_plain, values)],
-            a=ages,
-            s=alarms if any(alarms) else None,
-        )
-    )
+    if not _AS_THEY_ARE.issuperset(map(type, values)):
+        values = tuple(repaired(_plain(value)) for value in values)
+    are_normal = alarms.count("") == count
+    now_ms, numbers = round(now_s * 1000), indexes.of(names)
+    return encoded_bytes(_Values(now_ms, numbers, values, ages, None if are_normal else alarms))
 
 
 def encode_links(links: Iterable[LinkStatus], now_s: float) -> str:

@@ -19,16 +19,20 @@ __all__ = ["Show", "as_frame", "encode_picture", "media_type", "picture_head"]
 
 _PICTURE = 1
 _HEADER = struct.Struct(">BBHId")
+_MEDIUM_FRAME = struct.Struct(">BBHBBHId")
+"""The same behind the head of a frame whose length takes three bytes."""
 _OLDEST_MS = 2**32 - 1
-_FINAL_TEXT, _FINAL_BINARY = 0x81, 0x82
+_FINAL_TEXT, _FINAL_BINARY = b"\x81", b"\x82"
+_SHORT, _MEDIUM = 126, 1 << 16
+"""A frame's length takes one byte below the first, three below the second, else nine."""
 
 _SIGNS = (
-    (b"\xff\xd8\xff", "image/jpeg"),
-    (b"\x89PNG\r\n\x1a\n", "image/png"),
-    (b"GIF8", "image/gif"),
-    (b"BM", "image/bmp"),
+    (b"\xff\xd8\xff", b"image/jpeg"),
+    (b"\x89PNG\r\n\x1a\n", b"image/png"),
+    (b"GIF8", b"image/gif"),
+    (b"BM", b"image/bmp"),
 )
-OTHER = "application/octet-stream"
+OTHER = b"application/octet-stream"
 
 
 class Show(msgspec.Struct, tag_field="t", tag="show", forbid_unknown_fields=True, frozen=True):
@@ -41,13 +45,17 @@ class Show(msgspec.Struct, tag_field="t", tag="show", forbid_unknown_fields=True
 
 def media_type(data: bytes) -> str:
     """Return what the bytes are, by how they begin; ``application/octet-stream`` when unknown."""
+    return _kind(data).decode()
+
+
+def _kind(data: bytes) -> bytes:
     for sign, name in _SIGNS:
         if data.startswith(sign):
             return name
     if data[:4] == b"RIFF" and data[8:12] == b"WEBP":
-        return "image/webp"
+        return b"image/webp"
     if data[4:8] == b"ftyp" and data[8:12] in (b"avif", b"avis"):
-        return "image/avif"
+        return b"image/avif"
     return OTHER
 
 
@@ -60,30 +68,31 @@ def encode_picture(index: int, data: bytes, age_ms: int, now_ms: int) -> bytes:
         age_ms: how old it is now.
         now_ms: the server's clock.
     """
-    return _header(index, data, age_ms, now_ms) + data
+    head, at = picture_head(index, data, age_ms, now_ms)
+    return head[at:] + data
 
 
 def picture_head(index: int, data: bytes, age_ms: int, now_ms: int) -> tuple[bytes, int]:
     """Return what is before the image in one WebSocket frame, and where the message begins."""
-    header = _header(index, data, age_ms, now_ms)
-    head = _head(len(header) + len(data), _FINAL_BINARY)
-    return head + header, len(head)
-
-
-def _header(index: int, data: bytes, age_ms: int, now_ms: int) -> bytes:
-    kind = media_type(data).encode("ascii")
-    age_ms = min(max(0, age_ms), _OLDEST_MS)
-    return _HEADER.pack(_PICTURE, len(kind), index, age_ms, now_ms) + kind
+    kind = _kind(data)
+    age_ms = 0 if age_ms < 0 else age_ms if age_ms < _OLDEST_MS else _OLDEST_MS
+    length = len(kind)
+    size = _HEADER.size + length + len(data)
+    if _SHORT <= size < _MEDIUM:
+        head = _MEDIUM_FRAME.pack(0x82, 126, size, _PICTURE, length, index, age_ms, now_ms)
+        return head + kind, _MEDIUM_FRAME.size - _HEADER.size
+    head = _FINAL_BINARY + _length(size)
+    return head + _HEADER.pack(_PICTURE, length, index, age_ms, now_ms) + kind, len(head)
 
 
 def as_frame(message: bytes, *, is_text: bool = False) -> bytes:
     """Return a message as one WebSocket frame, ready for any client's line."""
-    return _head(len(message), _FINAL_TEXT if is_text else _FINAL_BINARY) + message
+    return (_FINAL_TEXT if is_text else _FINAL_BINARY) + _length(len(message)) + message
 
 
-def _head(size: int, first: int) -> bytes:
-    if size < 126:
-        return struct.pack(">BB", first, size)
-    if size < 1 << 16:
-        return struct.pack(">BBH", first, 126, size)
-    return struct.pack(">BBQ", first, 127, size)
+def _length(size: int) -> bytes:
+    if size < _SHORT:
+        return size.to_bytes(1, "big")
+    if size < _MEDIUM:
+        return b"\x7e" + size.to_bytes(2, "big")
+    return b"\x7f" + size.to_bytes(8, "big")

@@ -5,12 +5,20 @@ Floor 5.
 
 import msgspec
 
-__all__ = ["TEXT_CHARACTERS", "Outbound", "cut", "encoded", "milliseconds"]
+__all__ = [
+    "TEXT_CHARACTERS",
+    "Outbound",
+    "cut",
+    "encoded",
+    "encoded_bytes",
+    "milliseconds",
+    "repaired",
+]
 
 TEXT_CHARACTERS = 4096
 """Longest text value sent to a page; a longer one is cut and ends in an ellipsis."""
 
-_encoder = msgspec.json.Encoder()
+_encode = msgspec.json.Encoder().encode
 
 
 class Outbound(msgspec.Struct, tag_field="t", omit_defaults=True, frozen=True):
@@ -19,20 +27,26 @@ class Outbound(msgspec.Struct, tag_field="t", omit_defaults=True, frozen=True):
 
 def encoded(message: msgspec.Struct) -> str:
     """Return the JSON text of a message."""
+    return encoded_bytes(message).decode()
+
+
+def encoded_bytes(message: msgspec.Struct) -> bytes:
+    """Return it in UTF-8."""
     try:
-        return _encoder.encode(message).decode()
+        return _encode(message)
     except UnicodeEncodeError:
         # A lone surrogate in a robot's text; it must not stop everybody's values.
-        return _encoder.encode(_repaired(msgspec.to_builtins(message))).decode()
+        return _encode(repaired(msgspec.to_builtins(message)))
 
 
-def _repaired(tree: object) -> object:
+def repaired(tree: object) -> object:
+    """Return what can be encoded: with a question mark for each lone surrogate."""
     if isinstance(tree, str):
         return tree.encode("utf-8", "replace").decode()
     if isinstance(tree, (list, tuple)):
-        return [_repaired(item) for item in tree]
+        return [repaired(item) for item in tree]
     if isinstance(tree, dict):
-        return {_repaired(key): _repaired(value) for key, value in tree.items()}
+        return {repaired(key): repaired(value) for key, value in tree.items()}
     return tree
 
 
