@@ -3,7 +3,7 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 
 import { tell } from "../../urc/web/static/kit.js";
-import { LONGEST_TURN, Pace, SHARE_MS } from "../../urc/web/static/pace.js";
+import { FEW, LONGEST_TURN, Pace, SHARE_MS } from "../../urc/web/static/pace.js";
 
 const COUNT = 60;
 
@@ -40,6 +40,20 @@ test("what was a moment's hindrance is forgotten within a second", () => {
   const pace = new Pace();
   play(pace, () => 300, 20);
   assert.equal(play(pace, (drawn) => drawn * 0.05, 60), COUNT);
+});
+
+test("a page whose turns are as short as can be still finds out that there is room", () => {
+  const pace = new Pace();
+  play(pace, () => 300, 20);
+  const drawn = pace.allowed(COUNT);
+  assert.ok(drawn < FEW, `${drawn} widgets have their turn`);
+  assert.ok(pace.isTelling(drawn, COUNT - drawn));
+});
+
+test("a frame of few widgets, or of none, tells nothing", () => {
+  const pace = new Pace();
+  assert.equal(pace.isTelling(FEW - 1, 0), false);
+  assert.equal(pace.isTelling(0, COUNT), false);
 });
 
 test("fewer widgets than frames of a turn are one each", () => {

@@ -3,7 +3,7 @@
 /** @typedef {import("../../urc/web/static/types.js").Context} Context */
 /** @typedef {import("../../urc/web/static/types.js").Instance} Instance */
 /** @typedef {Readonly<Record<string, Reading>>} Readings */
-import { attribute, drawing, format, many, noteOf, number, numbers, part, style, tell, worst, write } from "urc/kit";
+import { attribute, drawing, fit, format, many, noteOf, number, numbers, part, style, tell, worst, write } from "urc/kit";
 import { share } from "urc/scale";
 import { Mean, cellScale, clock, spread, timeLeft } from "./charge.js";
 import { INSIDE, mark } from "./drawing.js";
@@ -81,7 +81,7 @@ class Shell {
     const symbol = known === null ? "" : (signal.unit ?? "%");
     const text = known === null ? "—" : level.text;
     if (this.number && this.digits && this.unit) {
-      style(this.number, "--battery-characters", String(text.length + UNIT_WIDTH * symbol.length));
+      fit(this.number, "--battery-characters", text.length + UNIT_WIDTH * symbol.length, true);
       write(this.digits, text);
       write(this.unit, symbol);
     }

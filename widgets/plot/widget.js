@@ -15,7 +15,8 @@ const COLOURS = /** @type {const} */ (["series-1", "series-2", "series-3", "seri
 const DASHES = [[], [8, 4], [2, 3], [10, 3, 2, 3]];
 const HERTZ = 60;
 const MOST_READINGS = 18_000;
-const LEGEND_EVERY_MS = 100;
+/** Nobody reads figures that change faster, and ten texts are the dearest part of a frame. */
+const LEGEND_EVERY_MS = 250;
 const FIT_EVERY_MS = 1000;
 /** Values may fill the scale from this share on before it becomes smaller. */
 const LOOSE = 0.4;

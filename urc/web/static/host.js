@@ -11,8 +11,12 @@
 import { Cell } from "./cell.js";
 import { Pace } from "./pace.js";
 
-/** Fewer widgets than these never take turns: looking at what they cost would cost more. */
-const FEW = 8;
+/**
+ * A browser that is not told so looks where all cells are in each frame, twice.
+ *
+ * @type {IntersectionObserverInit & {delay: number}}
+ */
+const SELDOM = { delay: 100 };
 
 export class Host {
   /**
@@ -45,7 +49,7 @@ export class Host {
         if (cell) cell.isVisible = entry.isIntersecting || this.isAllInSight;
       }
       this.doors.wake();
-    });
+    }, SELDOM);
     this.sizes = new ResizeObserver((entries) => {
       for (const entry of entries) {
         const cell = this.cells.get(entry.target);
@@ -128,7 +132,7 @@ export class Host {
       if (!this.waiting.has(cell)) draw(cell);
     }
     if (this.waiting.size > 0) this.doors.again();
-    if (drawn < FEW || this.drawn > 0) return;
+    if (this.drawn > 0 || !this.pace.isTelling(drawn, this.waiting.size)) return;
     this.drawn = drawn;
     this.begunMs = nowMs;
     this.painted.port2.postMessage(null);

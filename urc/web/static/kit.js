@@ -119,9 +119,10 @@ const rooms = new WeakMap();
  * @param {Element} el
  * @param {string} name as "--value-characters"
  * @param {number} characters
+ * @param {boolean} [isExact] in no steps: the text fills all the room that it has
  */
-export function fit(el, name, characters) {
-  const needed = clamp(2 * Math.ceil(characters / 2), 4, 40);
+export function fit(el, name, characters, isExact = false) {
+  const needed = isExact ? characters : clamp(2 * Math.ceil(characters / 2), 4, 40);
   const known = rooms.get(el);
   const nowMs = performance.now();
   if (known && needed === known.room) known.untilMs = nowMs + LARGER_AFTER_MS;

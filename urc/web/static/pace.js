@@ -11,6 +11,8 @@
 export const SHARE_MS = 8;
 /** In so many frames each widget has its turn, however slow the device is. */
 export const LONGEST_TURN = 10;
+/** Fewer widgets than these never take turns: looking at what they cost would cost more. */
+export const FEW = 8;
 const FASTER = 1.1;
 const SLOWER = 0.75;
 
@@ -26,6 +28,17 @@ export class Pace {
    */
   allowed(count) {
     return Math.max(1, Math.ceil(count / LONGEST_TURN), Math.floor(this.most));
+  }
+
+  /**
+   * Return whether a frame is worth learning from. Those that wait count as well: where turns are
+   * short, few are drawn in each frame, and it could never be found out that there is room for more.
+   *
+   * @param {number} drawn how many widgets it drew
+   * @param {number} waiting how many wait for their turn
+   */
+  isTelling(drawn, waiting) {
+    return drawn > 0 && drawn + waiting >= FEW;
   }
 
   /**
