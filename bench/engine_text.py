@@ -11,6 +11,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from importlib.metadata import version
+from typing import cast
 
 from bench.documents import DOCUMENT, by_json, by_orjson, json_lines
 from bench.harness import Goal, Result, compare
@@ -223,12 +224,16 @@ def reader_of(text: str) -> Callable[[bytes, float], Taken | None]:
     return messages.take
 
 
+Encode = Callable[[Mapping[str, object]], bytes]
+"""What a command becomes: bytes, as all its transports carry them."""
+
+
 def sender_of(text: str) -> Callable[[str, Mapping[str, object]], bytes]:
     """Return command and arguments → bytes, the check of the arguments included."""
     driver = driver_of(text)
     builder = Builder(driver, Readings(driver.signals), Known(driver.signals, {}))
     commands = {
-        name: (build_check(command), builder.command(command).encode)
+        name: (build_check(command), cast("Encode", builder.command(command).encode))
         for name, command in driver.commands.items()
     }
 
@@ -295,8 +300,9 @@ def run(*, full: bool = False) -> Sequence[Result]:
         taken = declared(line, 1.0)
         assert taken is not None
         assert {*taken[0]} == {*(by_orjson(line, 1.0) or ())}
+    hands: Mapping[str, Callable[..., bytes]] = {"drive": drive, "aim": aim}
     for name, arguments in ARGUMENTS:
-        assert {"drive": drive, "aim": aim}[name](**arguments) == send(name, arguments)
+        assert hands[name](**arguments) == send(name, arguments)
 
     def pair(
         name: str,

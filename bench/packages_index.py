@@ -88,7 +88,7 @@ def _compare(folder: Path, index: Index, database: sqlite3.Connection, rounds: i
         )
         cold = compare_all(
             [(Goal(f"{what} from the file / {limit_s:g} s", 4.0), _always(limit_s))],
-            lambda subject=subject: _timed(lambda _: subject(from_file()), None)(),
+            _timed(_of_file(subject, from_file), None),
             rounds=rounds,
         )
         results += cold
@@ -97,6 +97,12 @@ def _compare(folder: Path, index: Index, database: sqlite3.Connection, rounds: i
 
 def _always(seconds: float) -> Callable[[], float]:
     return lambda: seconds
+
+
+def _of_file(
+    subject: Callable[[Index], object], from_file: Callable[[], Index]
+) -> Callable[[object], object]:
+    return lambda _: subject(from_file())
 
 
 def _timed(work: Callable[[Any], object], given: object) -> Callable[[], float]:

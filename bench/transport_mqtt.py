@@ -86,7 +86,9 @@ class Bare:
         self.client.on_subscribe = lambda *_: ready.set()
         self.client.connect("127.0.0.1", port)
         # paho leaves it out, and then waits 40 ms for every acknowledgement the kernel holds back.
-        self.client.socket().setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        line = self.client.socket()
+        assert isinstance(line, socket.socket)
+        line.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self.client.loop_start()
         self.client.subscribe("bare")
         assert ready.wait(WAIT_S)

@@ -10,10 +10,12 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Mapping
-from contextlib import suppress
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
+from tempfile import TemporaryFile
+from typing import IO
 
 from hatch_build import NPM_TIMEOUT_S, VendorError, npm_command
 from scripts.needs import Brought, bring
@@ -31,6 +33,8 @@ class Step:
     name: str
     command: tuple[str, ...]
     timeout_s: float = 120
+    beside: tuple[str, ...] = ()
+    """A second one, run at the same time; it must too, and what it says is shown at the end."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,23 +53,44 @@ STATIC = (
     Step("types", (PYTHON, "-m", "mypy"), timeout_s=300),
     Step("docs", (PYTHON, "-m", "scripts.docs")),
 )
-# Two processes: the browser's loop stays out of the way of the rest.
+PYTEST = (PYTHON, "-m", "pytest")
+
+
+def halves(tests: str, *half: str, timeout_s: float) -> Step:
+    """Return the step that runs `half` of the `tests`, by time, and beside it all the others.
+
+    The two processes know nothing of each other: a third that hands out thousands of small tests,
+    and hears of each, would take a fifth of the processors.
+    """
+    half = tuple(f"{tests}/{name}" for name in half)
+    others = (*PYTEST, tests, *(f"--ignore={path}" for path in half))
+    name = f"tests {tests.rpartition('/')[2]}"
+    return Step(name, (*PYTEST, *half), timeout_s, beside=others)
+
+
 TESTS = (
-    Step("tests unit", (PYTHON, "-m", "pytest", "tests/unit", "-n", "2"), timeout_s=240),
-    Step("tests contract", (PYTHON, "-m", "pytest", "tests/contract", "-n", "2"), timeout_s=420),
+    halves(
+        "tests/unit",
+        *("protocol", "runtime", "guard", "simulator", "motion", "config", "cli"),
+        timeout_s=240,
+    ),
+    halves(
+        "tests/contract",
+        *("test_robots.py", "test_protocols.py", "test_worlds.py"),
+        *("test_schemas.py", "test_codes.py", "test_house.py"),
+        timeout_s=420,
+    ),
     # Most of them wait for a server or for silence, so a few at a time take no more processor.
     Step(
         "tests e2e",
         (
-            *(PYTHON, "-m", "pytest", "tests/e2e", "-m", "not alone"),
+            *(*PYTEST, "tests/e2e", "-m", "not alone"),
             *("-n", "3", "--dist", "loadgroup"),
         ),
         timeout_s=700,
     ),
     # They measure how soon a robot stops.
-    Step(
-        "tests motion", (PYTHON, "-m", "pytest", "tests/e2e/motion", "-m", "alone"), timeout_s=420
-    ),
+    Step("tests motion", (*PYTEST, "tests/e2e/motion", "-m", "alone"), timeout_s=420),
 )
 
 
@@ -125,22 +150,51 @@ def run(step: Step, environment: Mapping[str, str]) -> Outcome:
     """Run one step with its output shown as it comes, and end all that it started."""
     print(f"\n== {step.name}", flush=True)
     start = time.monotonic()
+    fault = ""
+    with ExitStack() as started:
+        processes = [started.enter_context(running(step.command, environment))]
+        if step.beside:
+            said = started.enter_context(shown_at_the_end())
+            processes.append(started.enter_context(running(step.beside, environment, said)))
+        try:
+            for process in processes:
+                code = process.wait(max(0.0, start + step.timeout_s - time.monotonic()))
+                fault = fault or (f"exit code {code}" if code else "")
+        except subprocess.TimeoutExpired:
+            fault = f"not done within {step.timeout_s:.0f} s"
+    return Outcome(step.name, fault, time.monotonic() - start)
+
+
+@contextmanager
+def running(
+    command: tuple[str, ...], environment: Mapping[str, str], output: IO[bytes] | None = None
+) -> Iterator[subprocess.Popen[bytes]]:
+    """Start a program; in the end nothing of it is left. `output`: where it writes, if not here."""
     # A session of its own, so that what a killed test leaves behind can be ended too.
     process = subprocess.Popen(
-        step.command,
+        command,
         cwd=ROOT,
         env=dict(environment),
         stdin=subprocess.DEVNULL,
+        stdout=output,
+        stderr=output,
         start_new_session=os.name != "nt",
     )
     try:
-        code = process.wait(step.timeout_s)
-        fault = f"exit code {code}" if code else ""
-    except subprocess.TimeoutExpired:
-        fault = f"not done within {step.timeout_s:.0f} s"
+        yield process
     finally:
         end_group(process)
-    return Outcome(step.name, fault, time.monotonic() - start)
+
+
+@contextmanager
+def shown_at_the_end() -> Iterator[IO[bytes]]:
+    """Give a file to write to, and show what was written."""
+    with TemporaryFile() as said:
+        try:
+            yield said
+        finally:
+            said.seek(0)
+            print(said.read().decode("utf-8", "replace"), flush=True)
 
 
 def end_group(process: subprocess.Popen[bytes]) -> None:

@@ -40,6 +40,29 @@ def test_a_step_ends_well_or_says_how(program: str, timeout_s: float, fault: str
     assert run(step, os.environ).fault == fault
 
 
+@pytest.mark.parametrize(
+    ("here", "beside", "timeout_s", "fault"),
+    [
+        ("", "", 30, ""),
+        ("raise SystemExit(3)", "", 30, "exit code 3"),
+        ("", "raise SystemExit(4)", 30, "exit code 4"),
+        ("", SLEEP, 5, "not done within 5 s"),
+    ],
+)
+def test_both_commands_of_a_step_must_end_well(
+    capfd: pytest.CaptureFixture[str], here: str, beside: str, timeout_s: float, fault: str
+) -> None:
+    """What the second says is shown, whole and after the first, however it ends."""
+    say = "print('I am {}', flush=True);"
+    first, second = (
+        (sys.executable, "-c", say.format("first") + here),
+        say.format("second") + beside,
+    )
+    step = Step("step", first, timeout_s, beside=(sys.executable, "-c", second))
+    assert run(step, os.environ).fault == fault
+    assert capfd.readouterr().out.split("\n")[:4] == ["", "== step", "I am first", "I am second"]
+
+
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no process groups to end")
 @pytest.mark.parametrize("ending", ["", SLEEP])
 def test_nothing_outlives_a_step(tmp_path: Path, ending: str) -> None:

@@ -7,6 +7,7 @@ or fill the disk, put their own function in the place of ``os.fsync``.
 import gc
 import os
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -14,9 +15,10 @@ import pytest
 from urc.config.parse_widget import Shelf
 from urc.model.widget import Widget
 from urc.shipped import shipped
+from urc.web.load import file_routes
 
 # By default what is new is gone over at each 700 objects; making the tests makes a million.
-gc.set_threshold(20_000, 20, 50)
+gc.set_threshold(200_000, 20, 50)
 
 
 def pytest_collection_finish() -> None:
@@ -59,3 +61,5 @@ def read_shipped_widgets_once() -> None:
 
 
 read_shipped_widgets_once()
+# Each dashboard looks through the folders that ship. What is in them is still looked at when asked.
+file_routes.folder_assets = cache(file_routes.folder_assets)  # type: ignore[attr-defined]

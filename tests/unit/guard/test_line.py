@@ -6,7 +6,7 @@ from collections.abc import AsyncIterator
 import pytest
 
 from tests.unit.guard.lines import STOP, TERMS, CountedWire, Rig, SlowWire, Wire
-from urc.guard import wire
+from urc.guard import proxy, wire
 from urc.model.codec import Envelope
 from urc.motion.stall import AFRESH_S, SHORTEST_CUT_S, STOP_WITHIN_S
 from urc.testing.clock import settle
@@ -316,14 +316,17 @@ async def test_closing_stops_before(rig: Rig) -> None:
     assert rig.robot.opens == 1
 
 
-async def test_stop_that_did_not_get_through_is_owed_after_closing(rig: Rig) -> None:
+async def test_stop_that_did_not_get_through_is_owed_after_closing(
+    rig: Rig, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(proxy, "_CLOSE_S", 0.02)  # of real time, and it is waited for in full
     robot = rig.robot
     assert isinstance(robot, CountedWire)
     await rig.drive()
     robot.is_stuck = True
     closing = asyncio.ensure_future(rig.transport.close())
     while not closing.done():
-        await rig.clock.advance(0.05)
+        await rig.clock.advance(1.0)
     robot.is_stuck = False
     robot.stuck_bytes = 0
     await rig.clock.advance(0.3)

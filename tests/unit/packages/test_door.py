@@ -11,7 +11,7 @@ import pytest
 from starlette.testclient import TestClient
 
 from tests.unit.packages.made import package, write_package
-from tests.unit.packages.test_archive import HOSTILE
+from tests.unit.packages.test_archive import HOSTILE, hostile
 from urc.packages import disk, door
 from urc.packages.archive import PACKAGE
 from urc.packages.index import INDEX, read_index
@@ -164,8 +164,8 @@ def test_a_package_stands_where_it_belongs(lab: Lab) -> None:
 def test_a_hostile_archive_is_refused_and_nothing_is_written(lab: Lab, name: str) -> None:
     """The same as where one is installed."""
     before = lab.holds()
-    make, told = HOSTILE[name]
-    status, said = lab.puts(DIAL, data=make())
+    data, told = hostile(name)
+    status, said = lab.puts(DIAL, data=data)
     assert status in (413, 422)
     assert status == 413 or told in said
     assert lab.holds() == before

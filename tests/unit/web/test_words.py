@@ -1,12 +1,21 @@
 """Which language a reader gets, and what is said in it."""
 
 import asyncio
+from collections.abc import Iterator
 
 import pytest
 
 from urc.web import words
 
 ENGLISH = "Connect to {title}"
+
+
+@pytest.fixture(autouse=True)
+def nobody_else_hears_it() -> Iterator[None]:
+    """Give the language back: whichever test comes next reads what its own reader reads."""
+    before = words.language.set("en")
+    yield
+    words.language.reset(before)
 
 
 @pytest.mark.parametrize(

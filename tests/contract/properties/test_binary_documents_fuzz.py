@@ -17,7 +17,7 @@ from urc.protocol.codec import BadText, CodecContext, Frame, NotWritable
 from urc.protocol.forms import build_reader, build_writer
 from urc.runtime.catalog import built_in_catalog
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 DATA = yaml.safe_load((ROOT / "tests/contract/every_key/binary.yaml").read_text("utf-8"))
 SHELF = Shelf(ROOT / "tests" / "broken" / "shelf")
 CATALOG = built_in_catalog()

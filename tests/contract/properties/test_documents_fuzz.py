@@ -12,7 +12,7 @@ from urc.problems import ProblemsError, to_json, to_text
 from urc.runtime.catalog import built_in_catalog
 from urc.source import parse_document
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 PUPPET = (ROOT / "robots" / "puppet.yaml").read_text("utf-8")
 SHELF = Shelf(ROOT / "tests" / "broken" / "shelf")
 CATALOG = built_in_catalog()
