@@ -62,9 +62,17 @@ WATCH_TAB = """
 }
 """
 
-# What can be worked with and has, in the system's few colours, neither words nor a line around it.
+# What can be worked with and has, in the system's few colours, neither words nor a line around it;
+# or words of the colour that the browser then lays behind words.
 UNSEEN = """
-() => [...document.querySelectorAll("button, select, input, [role='slider'], [role='application']")]
+() => {
+const behind = document.createElement("i");
+behind.style.color = "Canvas";
+document.body.append(behind);
+const canvas = getComputedStyle(behind).color;
+behind.remove();
+const WORKED_WITH = "button, select, input, [role='slider'], [role='application']";
+return [...document.querySelectorAll(WORKED_WITH)]
   .filter((el) => el.checkVisibility({ visibilityProperty: true }) && !el.closest(".urc-hidden"))
   .filter((el) => {
     const style = getComputedStyle(el);
@@ -76,9 +84,11 @@ UNSEEN = """
       return borderTopStyle !== "none" && parseFloat(borderTopWidth) > 0;
     });
     const isSaid = el.textContent.trim() !== "" && style.color !== style.backgroundColor;
-    return !isLined && !isSaid && !el.querySelector("svg, canvas");
+    const isLost = style.forcedColorAdjust !== "none" && style.color === canvas;
+    return (isSaid && isLost) || (!isLined && !isSaid && !el.querySelector("svg, canvas"));
   })
-  .map((el) => el.outerHTML.slice(0, 120))
+  .map((el) => el.outerHTML.slice(0, 120));
+}
 """
 
 MOVING = """

@@ -78,7 +78,7 @@ class Table {
       const line = this.body.children[place] ?? this.body.appendChild(emptyLine());
       attribute(line, "data-level", row.level);
       const [level, name, message] = line.children;
-      if (level) write(level, this.words[row.level]);
+      if (level) writeLevel(level, this.words[row.level]);
       if (name) write(name, row.name);
       if (message) write(message, row.message);
     });
@@ -86,8 +86,25 @@ class Table {
     if (rows.length > 0 || !first) return;
     attribute(first, "data-level", "unknown");
     const texts = [this.rows.length === 0 ? "—" : "", this.rows.length === 0 ? "" : t("no row fits the filter"), ""];
-    [...first.children].forEach((cell, place) => write(cell, texts[place] ?? ""));
+    [...first.children].forEach((cell, place) => (place ? write : writeLevel)(cell, texts[place] ?? ""));
   }
+}
+
+/**
+ * A sign and a word; a narrow cell shows the sign alone.
+ *
+ * @param {Element} cell
+ * @param {string} text
+ */
+function writeLevel(cell, text) {
+  const [sign = "", ...words] = text.split(" ");
+  if (cell.children.length !== 2) {
+    cell.replaceChildren(document.createElement("span"), document.createElement("span"));
+    cell.children[1]?.classList.add("table-word");
+  }
+  const [first, second] = cell.children;
+  if (first) write(first, sign);
+  if (second) write(second, words.length > 0 ? ` ${words.join(" ")}` : "");
 }
 
 function emptyLine() {

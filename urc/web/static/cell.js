@@ -338,7 +338,9 @@ export class Cell {
     title.textContent = t("◆ {title}: this widget does not work", { title: this.config.title });
     const reason = document.createElement("p");
     reason.textContent = error instanceof Error ? error.message : String(error);
-    card.append(title, reason);
+    const hint = document.createElement("p");
+    hint.textContent = t("The others go on. Open the page again to try this one anew.");
+    card.append(title, reason, hint);
     this.el.replaceChildren(card);
   }
 

@@ -40,6 +40,14 @@ export class Panel {
     const follow = () => el.toggleAttribute("open", wide.matches);
     wide.addEventListener("change", follow);
     follow();
+    // Below the widgets it unfolds where nobody looks: it comes to where it is seen.
+    const show = () => !wide.matches && el.hasAttribute("open") && el.scrollIntoView({ block: "start" });
+    part(el, "summary").addEventListener("click", () => requestAnimationFrame(show));
+    document.querySelector("[data-badge-why]")?.addEventListener("click", () => {
+      el.toggleAttribute("open", !wide.matches || !el.hasAttribute("open"));
+      show();
+      if (el.hasAttribute("open")) part(el, "summary").focus({ preventScroll: true });
+    });
   }
 
   /**

@@ -27,22 +27,22 @@
     for (const choice of document.querySelectorAll("select[data-theme-choice]")) {
       if (!(choice instanceof HTMLSelectElement)) continue;
       choice.value = THEMES.has(kept()) ? kept() : "";
-      choice.addEventListener("change", () => {
-        show(choice.value);
-        try {
-          localStorage.setItem(KEY, choice.value);
-        } catch {
-          // Private mode: the choice lasts as long as this page.
-        }
-      });
     }
-    for (const choice of document.querySelectorAll("select[data-language-choice]")) {
-      if (!(choice instanceof HTMLSelectElement)) continue;
-      choice.addEventListener("change", () => {
-        // A cookie, since the server writes the page's words.
-        document.cookie = `urc-language=${choice.value};path=/;max-age=${YEAR_S};samesite=strict`;
-        location.reload();
-      });
+  });
+  // Of the document, so that a choice counts that is made while the page's modules are still coming.
+  document.addEventListener("change", ({ target }) => {
+    if (!(target instanceof HTMLSelectElement)) return;
+    if (target.matches("[data-theme-choice]")) {
+      show(target.value);
+      try {
+        localStorage.setItem(KEY, target.value);
+      } catch {
+        // Private mode: the choice lasts as long as this page.
+      }
+    } else if (target.matches("[data-language-choice]")) {
+      // A cookie, since the server writes the page's words.
+      document.cookie = `urc-language=${target.value};path=/;max-age=${YEAR_S};samesite=strict`;
+      location.reload();
     }
   });
 }
