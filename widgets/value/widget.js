@@ -32,6 +32,8 @@ export default {
     const history = place && windowS ? new History(place, windowS) : null;
     const facts = new Facts(ctx);
     signal.addEventListener("abort", () => history?.destroy());
+    /** All but the figure, as it was shown last. */
+    let seen = "";
 
     return {
       update({ value: reading }) {
@@ -39,12 +41,17 @@ export default {
         const { symbol: known, factor } = ctx.unit("value");
         const shown = textOf(reading, options["precision"], factor, t);
         const symbol = reading.value === null ? "" : reading.unit || known;
-        attribute(root, "data-state", reading.state);
-        attribute(root, "data-alarm", reading.alarm);
         fit(line, "--value-characters", shown.length + symbol.length / 2);
         write(text, shown);
-        write(unit, symbol);
-        write(note, noteOf(reading, t));
+        // Seldom new; to compare each with what stands there takes longer than to write the figure.
+        const look = `${reading.state} ${reading.alarm} ${reading.age} ${symbol}`;
+        if (look !== seen) {
+          seen = look;
+          attribute(root, "data-state", reading.state);
+          attribute(root, "data-alarm", reading.alarm);
+          write(unit, symbol);
+          write(note, noteOf(reading, t));
+        }
         facts.update(reading, symbol, factor);
         history?.add(reading, factor);
       },

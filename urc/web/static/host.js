@@ -11,13 +11,6 @@
 import { Cell } from "./cell.js";
 import { Pace } from "./pace.js";
 
-/**
- * A browser that is not told so looks where all cells are in each frame, twice.
- *
- * @type {IntersectionObserverInit & {delay: number}}
- */
-const SELDOM = { delay: 100 };
-
 export class Host {
   /**
    * @param {Store} store
@@ -49,7 +42,7 @@ export class Host {
         if (cell) cell.isVisible = entry.isIntersecting || this.isAllInSight;
       }
       this.doors.wake();
-    }, SELDOM);
+    });
     this.sizes = new ResizeObserver((entries) => {
       for (const entry of entries) {
         const cell = this.cells.get(entry.target);
