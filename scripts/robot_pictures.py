@@ -12,6 +12,8 @@ import argparse
 import asyncio
 import io
 import sys
+import tempfile
+from collections.abc import Mapping
 from pathlib import Path
 
 from PIL import Image
@@ -68,7 +70,13 @@ async def take(browser: Browser, address: str, name: str) -> None:
 async def pictures(names: list[str]) -> None:
     """Take the pictures, one after the other."""
     IMAGES.mkdir(parents=True, exist_ok=True)
-    demo = UrcProcess(("demo", "--no-browser", "--port", "0"), {})
+    with tempfile.TemporaryDirectory() as folder:  # nobody's latched stop is in the pictures
+        await pictures_of(names, {"URC_DATA_DIR": folder})
+
+
+async def pictures_of(names: list[str], environment: Mapping[str, str]) -> None:
+    """Take them of a demo in an environment."""
+    demo = UrcProcess(("demo", "--no-browser", "--port", "0"), environment)
     try:
         address = (await demo.wait_for_async(r"dashboard (http://\S+)", READY_MS / 1000))[1]
         async with running_browser() as browser:

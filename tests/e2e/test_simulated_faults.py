@@ -1,6 +1,7 @@
 """Faults on demand over real sockets: given at the start, changed by typed lines, and over HTTP."""
 
 import asyncio
+import json
 import subprocess
 import sys
 import time
@@ -138,3 +139,26 @@ async def test_a_camera_shows_the_world_and_fails_on_demand() -> None:
         twin.inject("loss=100%", time.time())
         with pytest.raises(httpx2.TransportError):
             await client.get(status)
+
+
+@pytest.mark.anyio
+async def test_what_is_done_with_an_emulated_robot_leaves_the_real_ones_stop_as_it_was(
+    tmp_path: Path,
+) -> None:
+    """Both have one name: who plays with the one must not lift, or make, a stop of the other."""
+    tello = str(ROOT / "robots" / "tello.yaml")
+    latches = tmp_path / "latches"
+    latches.mkdir()
+    real = latches / "tello.latch.json"
+    real.write_text('{"epoch": 7, "latched_by": "screen 1"}', "utf-8")
+    how = ("serve", tello, "--simulate", "--port", "0", "--data-dir", str(tmp_path))
+    async with running(*how) as (_, said, _), httpx2.AsyncClient() as page:
+        address = (await said.readline()).split()[1].decode()
+        stopped = await page.post(
+            f"{address}api/v1/robots/tello/stop", headers={"Origin": address.rstrip("/")}
+        )
+        assert stopped.status_code == 200, stopped.text
+        while not (latches / "emulated" / "tello.latch.json").exists():
+            await asyncio.sleep(0.05)
+    assert "screen 1" in real.read_text("utf-8")
+    assert json.loads(real.read_text("utf-8"))["epoch"] == 7

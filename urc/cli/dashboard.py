@@ -118,7 +118,7 @@ async def _serve(
                     stand_in(robot.profile, robot.settings, twin)
                 )
                 robot = _robot(_motion(place), None, redirected, robot.settings)
-                robot = replace(robot, glimpse=partial(_seen, twin))
+                robot = replace(robot, glimpse=partial(_seen, twin), is_emulated=True)
             robots[profile.name] = robot
         if faulty is not None:
             faulty.begin(faults)
@@ -183,7 +183,7 @@ def _robot(
     """Return a robot whose session is opened when somebody looks at it."""
     settings = values if faulty is None else _complete(profile, values)
     opened = partial(_session, motion, faulty, profile, settings)
-    return Robot(profile, settings, opened)
+    return Robot(profile, settings, opened, is_emulated=faulty is not None)
 
 
 def _seen(twin: Twin) -> Glimpse:

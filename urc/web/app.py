@@ -120,7 +120,10 @@ def build_app(
 
 def _latch(data: Path | None, robot: Robot) -> LatchFile | None:
     can_move = any(command.hold for command in robot.profile.driver.commands.values())
-    return LatchFile(data / "latches", robot.profile.name) if data and can_move else None
+    if data is None or not can_move:
+        return None
+    folder = data / "latches"
+    return LatchFile(folder / "emulated" if robot.is_emulated else folder, robot.profile.name)
 
 
 def _trail(audit: AuditLog | None, name: str, robot: Robot) -> Trail | None:

@@ -98,6 +98,8 @@ class Robot:
     """Connects while the context lasts. Must not wait for the robot to answer."""
     glimpse: Callable[[], Glimpse] | None = None
     """What is seen of an emulated robot without being connected to it; None for a real one."""
+    is_emulated: bool = False
+    """It has the name of a real one: what is kept of the one is not the other's."""
 
 
 @dataclass(frozen=True, slots=True)
