@@ -13,6 +13,7 @@ from pathlib import Path
 import httpx2
 import pytest
 
+from tests.e2e.dashboards import until
 from urc.config.load import load_profile
 from urc.runtime.catalog import built_in_catalog
 from urc.runtime.selftest import sample_settings
@@ -158,7 +159,6 @@ async def test_what_is_done_with_an_emulated_robot_leaves_the_real_ones_stop_as_
             f"{address}api/v1/robots/tello/stop", headers={"Origin": address.rstrip("/")}
         )
         assert stopped.status_code == 200, stopped.text
-        while not (latches / "emulated" / "tello.latch.json").exists():
-            await asyncio.sleep(0.05)
+        await until((latches / "emulated" / "tello.latch.json").exists)
     assert "screen 1" in real.read_text("utf-8")
     assert json.loads(real.read_text("utf-8"))["epoch"] == 7
