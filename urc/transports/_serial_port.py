@@ -174,7 +174,8 @@ class SerialPort(asyncio.Protocol):
                 # Nobody tells when the wire has taken the last byte.
                 while self._ended is None and self._writable.is_set() and self.unsent():  # noqa: ASYNC110
                     await asyncio.sleep(_LOOK_S)
-        if self.socket is None:
+        # A pseudo terminal has nothing unsent, and forgets all the same what was not read yet.
+        if self.socket is None and self.unsent():
             self._forget_unsent()
         await self._close()
 
