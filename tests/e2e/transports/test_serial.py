@@ -26,7 +26,6 @@ from urc.runtime.session import Session
 from urc.simulator.server import serve
 from urc.simulator.stand_in import stand_in
 from urc.testing.profile import line_profile
-from urc.transports._serial_port import SerialPort
 from urc.transports.base import ConnectFailed, PeerClosed, Setup, TransportError
 from urc.transports.serial import SerialTransport, explain, from_setup
 
@@ -126,18 +125,6 @@ async def test_what_came_before_is_not_heard(
         finally:
             os.close(other)
             writer.transport.abort()
-
-
-async def test_closing_makes_the_system_forget_nothing_that_it_has_taken(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """A pseudo terminal drops then what it has not handed on yet, and counts as sent."""
-    forgotten: list[str] = []
-    monkeypatch.setattr(SerialPort, "_forget_unsent", lambda _: forgotten.append("all"))
-    async with cable(tmp_path) as port, opened(line(port)) as transport:
-        await says_back(transport, b"last words")
-        await transport.close()
-    assert forgotten == []
 
 
 async def test_two_programs_do_not_share_a_port(tmp_path: Path) -> None:
