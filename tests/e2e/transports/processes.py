@@ -52,6 +52,7 @@ class Server:
         """End it and all that it has started, without a word; nobody listens any more then."""
         if self._process is None:
             return
+        self.stop()  # who was started meanwhile would be missed
         process, self._process = self._process, None
         pids = family(process.pid)
         for pid in pids:
@@ -64,8 +65,22 @@ class Server:
             time.sleep(0.005)
 
     def stop(self) -> None:
-        """Freeze it with all that it has started: connections stay, nobody answers."""
-        self.signal(signal.SIGSTOP)
+        """Freeze it with all that it has started: connections stay, nobody answers.
+
+        Who is frozen starts nobody any more, so it is over when no other one is found.
+        """
+        if self._process is None:
+            return
+        frozen: set[int] = set()
+        while young := set(family(self._process.pid)) - frozen:
+            for pid in young:
+                with suppress(ProcessLookupError):
+                    os.kill(pid, signal.SIGSTOP)
+            until = time.monotonic() + READY_WITHIN_S
+            while not all(_state(pid) in "TtZX" for pid in young):
+                assert time.monotonic() < until, f"one of {young} does not freeze"
+                time.sleep(0.001)
+            frozen |= young
 
     def signal(self, number: int) -> None:
         """Send a signal to it and to all that it has started."""
@@ -78,11 +93,15 @@ class Server:
 
 def _is_alive(pid: int) -> bool:
     """Return whether a process runs; one that is dead and not yet buried has closed all it had."""
+    return _state(pid) not in "ZX"
+
+
+def _state(pid: int) -> str:
+    """Return the letter by which the system tells what a process does; X when there is none."""
     try:
-        state = Path(f"/proc/{pid}/stat").read_text("utf-8").rpartition(")")[2].split()[0]
+        return Path(f"/proc/{pid}/stat").read_text("utf-8").rpartition(")")[2].split()[0]
     except (FileNotFoundError, ProcessLookupError):
-        return False
-    return state not in "ZX"
+        return "X"
 
 
 def family(pid: int) -> list[int]:
