@@ -56,10 +56,6 @@ class Pacer:
         self.free_s = -self._period_s
         """When the next one may go."""
 
-    def delay_s(self, now_s: float) -> float:
-        """Return how long to wait before the next one may go; 0 = now."""
-        return max(0.0, self.free_s - now_s)
-
     def went(self, now_s: float) -> None:
         """Count one that went."""
         due_s = self.free_s + self._period_s

@@ -15,7 +15,7 @@ from typing import Annotated
 
 import msgspec
 
-__all__ = ["Show", "as_frame", "encode_picture", "media_type", "picture_head"]
+__all__ = ["Show", "as_frame", "media_type", "picture_head"]
 
 _PICTURE = 1
 _HEADER = struct.Struct(">BBHId")
@@ -59,8 +59,8 @@ def _kind(data: bytes) -> bytes:
     return OTHER
 
 
-def encode_picture(index: int, data: bytes, age_ms: int, now_ms: int) -> bytes:
-    """Return one message.
+def picture_head(index: int, data: bytes, age_ms: int, now_ms: int) -> tuple[bytes, int]:
+    """Return what is before an image in one WebSocket frame, and where the message begins.
 
     Args:
         index: of the signal in the names of `Hello`.
@@ -68,12 +68,6 @@ def encode_picture(index: int, data: bytes, age_ms: int, now_ms: int) -> bytes:
         age_ms: how old it is now.
         now_ms: the server's clock.
     """
-    head, at = picture_head(index, data, age_ms, now_ms)
-    return head[at:] + data
-
-
-def picture_head(index: int, data: bytes, age_ms: int, now_ms: int) -> tuple[bytes, int]:
-    """Return what is before the image in one WebSocket frame, and where the message begins."""
     kind = _kind(data)
     age_ms = 0 if age_ms < 0 else age_ms if age_ms < _OLDEST_MS else _OLDEST_MS
     length = len(kind)
