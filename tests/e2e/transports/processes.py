@@ -29,6 +29,11 @@ class Server:
         """Everything that it has written so far."""
         return self._log.read_text("utf-8", "replace") if self._log.exists() else ""
 
+    @property
+    def pids(self) -> list[int]:
+        """It and all that it has started, the youngest last."""
+        return [] if self._process is None else family(self._process.pid)
+
     async def start(self) -> None:
         """Start it, and wait until it takes connections."""
         self._process = process = self._begin()
@@ -53,8 +58,8 @@ class Server:
         if self._process is None:
             return
         self.stop()  # who was started meanwhile would be missed
+        pids = self.pids
         process, self._process = self._process, None
-        pids = family(process.pid)
         for pid in pids:
             with suppress(ProcessLookupError):
                 os.kill(pid, signal.SIGKILL)
@@ -69,24 +74,20 @@ class Server:
 
         Who is frozen starts nobody any more, so it is over when no other one is found.
         """
-        if self._process is None:
-            return
         frozen: set[int] = set()
-        while young := set(family(self._process.pid)) - frozen:
+        while young := set(self.pids) - frozen:
             for pid in young:
                 with suppress(ProcessLookupError):
                     os.kill(pid, signal.SIGSTOP)
             until = time.monotonic() + READY_WITHIN_S
-            while not all(_state(pid) in "TtZX" for pid in young):
+            while not all(map(_is_frozen, young)):
                 assert time.monotonic() < until, f"one of {young} does not freeze"
                 time.sleep(0.001)
             frozen |= young
 
     def signal(self, number: int) -> None:
         """Send a signal to it and to all that it has started."""
-        if self._process is None:
-            return
-        for pid in family(self._process.pid):
+        for pid in self.pids:
             with suppress(ProcessLookupError):
                 os.kill(pid, number)
 
@@ -94,6 +95,15 @@ class Server:
 def _is_alive(pid: int) -> bool:
     """Return whether a process runs; one that is dead and not yet buried has closed all it had."""
     return _state(pid) not in "ZX"
+
+
+def _is_frozen(pid: int) -> bool:
+    """Return whether a process that was told to stop does nothing more of its own.
+
+    One in uninterruptible sleep (D) stops before it comes back from the system, and may never:
+    a shell sleeps so while its child is about to become another program, and that is frozen too.
+    """
+    return _state(pid) in "TtDZX"
 
 
 def _state(pid: int) -> str:
