@@ -1,6 +1,5 @@
 """The third-party servers of these tests are frozen and ended, whatever they are doing."""
 
-import asyncio
 import signal
 import sys
 from pathlib import Path
@@ -8,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from tests.e2e.ports import free_port
+from tests.e2e.transports.hostile import until
 from tests.e2e.transports.processes import Server
 
 pytestmark = pytest.mark.anyio
@@ -33,9 +33,7 @@ async def test_a_server_that_is_starting_somebody_is_frozen_and_ended(tmp_path: 
     server = Server(command, port, tmp_path / "log")
     await server.start()
     try:
-        async with asyncio.timeout(10):
-            while len(server.pids) < 2:
-                await asyncio.sleep(0.005)
+        await until(lambda: len(server.pids) > 1)
         server.stop()
     finally:
         server.kill()
