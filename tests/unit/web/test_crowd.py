@@ -1,12 +1,11 @@
 """Clients that wait for the same get it in one loop, and nobody gets a frame twice or torn."""
 
 import json
-from collections.abc import Sequence
 
 from urc.model.values import Sample, Signal
 from urc.runtime.hub import Hub
 from urc.testing.clock import FakeClock
-from urc.web.feed.crowd import Kernel, Place
+from urc.web.feed.crowd import Place
 from urc.web.feed.fanout import Fanout
 
 JPEG = b"\xff\xd8\xff\xe0 and so on"
@@ -20,9 +19,6 @@ class Room:
         self.room: dict[int, int] = {}
         """Of those that are full or gone."""
         self.is_gone: set[int] = set()
-
-    def write_parts(self, number: int, parts: Sequence[bytes]) -> int:
-        return self.write(number, b"".join(parts))
 
     def write(self, number: int, data: bytes) -> int:
         if number in self.is_gone:
@@ -41,9 +37,7 @@ class Scene:
         self.clock = FakeClock()
         self.hub = Hub({"a": Signal("a"), "cam": Signal("cam", "image")})
         self.kernel = Room()
-        self.fanout = Fanout(
-            self.hub, clock=self.clock, kernel=Kernel(self.kernel.write, self.kernel.write_parts)
-        )
+        self.fanout = Fanout(self.hub, clock=self.clock, write=self.kernel.write)
 
     def say(self, **values: float | bytes) -> None:
         self.hub.put([Sample(name, value, self.clock.now()) for name, value in values.items()])

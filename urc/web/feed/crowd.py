@@ -4,29 +4,20 @@ Floor 5. In that loop nothing of a client is touched but the number of its socke
 belongs to it lies somewhere in memory, and fetching that costs as much as writing the frame.
 """
 
-import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Final, NamedTuple, Protocol
 
 from urc.web.feed.picture_shelf import Looks
 
-__all__ = ["NO_NUMBER", "Crowd", "Kernel", "Known", "Listener", "Place"]
+__all__ = ["NO_NUMBER", "Crowd", "Known", "Listener", "Place", "Write"]
 
 NO_NUMBER: Final = -1
 """Of a line that cannot be written to by number."""
 
 
-def _nothing_written(number: int, parts: Sequence[bytes]) -> int:
-    """Nobody comes here: where sockets are no files there is no crowd."""
-    return 0
-
-
-class Kernel(NamedTuple):
-    """What writes to a file without waiting, and returns how many bytes were taken."""
-
-    write: Callable[[int, bytes], int] = os.write
-    write_parts: Callable[[int, Sequence[bytes]], int] = getattr(os, "writev", _nothing_written)
+Write = Callable[[int, bytes], int]
+"""Writes to a file by its number, without waiting; returns how many bytes were taken."""
 
 
 class Listener(Protocol):
@@ -70,10 +61,10 @@ class Place:
 class Crowd:
     """Those of one robot that show the same images, and have got equally far."""
 
-    def __init__(self, place: Place, kernel: Kernel) -> None:
+    def __init__(self, place: Place, write: Write) -> None:
         self.known = place.known
         self.looks = place.looks.copy()
-        self._kernel = kernel
+        self._write = write
         self._places: dict[int, Place] = {}
         self._numbers: tuple[int, ...] = ()
 
@@ -106,7 +97,7 @@ class Crowd:
 
     def send(self, frame: bytes) -> None:
         """Write whole frames to everybody."""
-        write, size = self._kernel.write, len(frame)
+        write, size = self._write, len(frame)
         for number in self._numbers:
             try:
                 sent = write(number, frame)
@@ -114,14 +105,3 @@ class Crowd:
                 sent = 0
             if sent != size:
                 self._places[number].finish(frame[sent:])
-
-    def send_parts(self, parts: tuple[bytes, ...]) -> None:
-        """Do so with a frame in parts, which need not be copied together."""
-        write, size = self._kernel.write_parts, sum(map(len, parts))
-        for number in self._numbers:
-            try:
-                sent = write(number, parts)
-            except OSError:
-                sent = 0
-            if sent != size:
-                self._places[number].finish(b"".join(parts)[sent:])

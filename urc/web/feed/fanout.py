@@ -7,12 +7,13 @@ fell behind gets the newest values merged into one frame, and is nobody else's p
 """
 
 import asyncio
+import os
 from dataclasses import dataclass
 from functools import partial
 
 from urc.runtime.clock import Alarm, Clock, LoopClock
 from urc.runtime.hub import Columns, Hub
-from urc.web.feed.crowd import NO_NUMBER, Crowd, Kernel, Known, Listener, Place
+from urc.web.feed.crowd import NO_NUMBER, Crowd, Known, Listener, Place, Write
 from urc.web.feed.line import Flow
 from urc.web.feed.picture_shelf import PictureShelf, is_picture
 from urc.web.wire.ask import encode_progress
@@ -71,14 +72,14 @@ class Fanout:
         *,
         rate_hz: float = FRAMES_PER_SECOND,
         clock: Clock | None = None,
-        kernel: Kernel = Kernel(),  # noqa: B008 - it cannot be changed
+        write: Write = os.write,
     ) -> None:
         self.hub = hub
         self._crowds: list[Crowd] = []
         """One for each set of images that somebody shows."""
         self._waiting: dict[Listener, None] = {}
         """Those in no crowd."""
-        self._kernel = kernel
+        self._write = write
         self._indexes = Indexes(hub.index)
         self._clock: Clock = clock or LoopClock()
         self._pacer = Pacer(rate_hz)
@@ -140,7 +141,7 @@ class Fanout:
                 crowd.send(taken.frames)
             if taken.has_pictures:
                 for picture in self.shelf.take_all(crowd.looks):
-                    crowd.send_parts(picture.parts)
+                    crowd.send(picture.frame)
         for listener in waiting:
             listener.wake()
 
@@ -164,7 +165,7 @@ class Fanout:
             crowd.send(as_frame(text, is_text=True))
         if has_pictures:
             for picture in self.shelf.take_all(crowd.looks):
-                crowd.send_parts(picture.parts)
+                crowd.send(picture.frame)
         return True
 
     def end(self) -> None:
@@ -196,7 +197,7 @@ class Fanout:
         same = [crowd for crowd in self._crowds if crowd.looks.names == place.looks.names]
         if same and not same[0].fits(place):
             return
-        crowd = same[0] if same else Crowd(place, self._kernel)
+        crowd = same[0] if same else Crowd(place, self._write)
         if not same:
             self._crowds.append(crowd)
         crowd.add(place)

@@ -23,8 +23,8 @@ some ten kilobytes is not worth making anew for a few milliseconds."""
 class Encoded(NamedTuple):
     """An image on its way."""
 
-    parts: tuple[bytes, bytes]
-    """A whole WebSocket frame: what is before the image, and the image as it came."""
+    frame: bytes
+    """A whole WebSocket frame, in one piece: joined once for all, written to each."""
     message_at: int
     """Where the message begins in it."""
     sample: Sample
@@ -37,11 +37,6 @@ class Encoded(NamedTuple):
     def message(self) -> bytes:
         """Return what the frame carries."""
         return self.frame[self.message_at :]
-
-    @property
-    def frame(self) -> bytes:
-        """Return it in one piece."""
-        return b"".join(self.parts)
 
 
 @dataclass(slots=True)
@@ -120,5 +115,5 @@ class PictureShelf:
             return known
         age_s, index = now_s - sample.time_s, self._hub.index[name]
         head, at = picture_head(index, sample.value, round(age_s * 1000), round(now_s * 1000))
-        made = self._encoded[name] = Encoded((head, sample.value), at, sample, number, now_s)
+        made = self._encoded[name] = Encoded(head + sample.value, at, sample, number, now_s)
         return made
