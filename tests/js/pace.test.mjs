@@ -3,49 +3,74 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 
 import { tell } from "../../urc/web/static/kit.js";
-import { FEW, LONGEST_TURN, Pace, SHARE_MS } from "../../urc/web/static/pace.js";
+import { FEW, LONGEST_TURN, Pace, SHARE_MS, SHARE_OF_TWO_MS } from "../../urc/web/static/pace.js";
 
 const COUNT = 60;
 
 /**
- * Let frames pass on a device.
+ * Let frames pass on a device where all widgets always have something new; return how many each of
+ * the last two drew.
  *
  * @param {Pace} pace
  * @param {(drawn: number) => number} cost milliseconds of a frame that draws so many
  * @param {number} [frames]
  */
 function play(pace, cost, frames = 200) {
-  let drawn = 0;
+  const drawn = [];
   for (let frame = 0; frame < frames; frame += 1) {
-    drawn = Math.min(COUNT, pace.allowed(COUNT));
-    pace.learn(drawn, cost(drawn), COUNT);
+    const now = Math.min(COUNT, pace.begin(COUNT));
+    pace.end(now);
+    if (pace.isTelling(now, COUNT - now)) pace.learn(now, cost(now), COUNT);
+    drawn.push(now);
   }
-  return drawn;
+  return drawn.slice(-2);
 }
 
 test("a device that is fast enough draws everything in each frame", () => {
-  assert.equal(play(new Pace(), (drawn) => drawn * 0.1), COUNT);
+  assert.deepEqual(play(new Pace(), (drawn) => drawn * 0.1), [COUNT, COUNT]);
 });
 
 test("a slower one draws as many widgets as fit into their share of a frame", () => {
-  const drawn = play(new Pace(), (each) => 2 + each * 0.3);
-  assert.ok(drawn >= 15 && drawn <= 21, `${drawn} widgets, ${2 + drawn * 0.3} of ${SHARE_MS} ms`);
+  for (const drawn of play(new Pace(), (each) => 2 + each * 0.15)) {
+    assert.ok(drawn >= 34 && drawn <= 41, `${drawn} widgets, ${2 + drawn * 0.15} of ${SHARE_MS} ms`);
+  }
+});
+
+test("where there is no room for half of them, every second frame is free, and more are drawn", () => {
+  const cost = (/** @type {number} */ each) => 5 + each * 0.3;
+  const [one = 0, other = 0] = play(new Pace(), cost);
+  const drawn = Math.max(one, other);
+  assert.equal(Math.min(one, other), 0);
+  assert.ok(drawn >= 20 && drawn <= 24, `${drawn} widgets, ${cost(drawn)} of ${SHARE_OF_TWO_MS} ms`);
+  const inEach = (SHARE_MS - 5) / 0.3;
+  assert.ok(drawn / 2 >= inEach, `${drawn} in two frames, ${inEach} in one`);
 });
 
 test("on the slowest one each widget still has its turn", () => {
-  assert.equal(play(new Pace(), () => 300), COUNT / LONGEST_TURN);
+  assert.deepEqual(play(new Pace(), () => 300).sort(), [0, COUNT / LONGEST_TURN]);
+});
+
+test("after a free frame, or one in which nothing was new, widgets are drawn", () => {
+  const pace = new Pace();
+  play(pace, () => 300, 21); // the last one drew
+  assert.equal(pace.begin(COUNT), 0);
+  pace.end(1); // an alarm does not wait
+  assert.equal(pace.isTelling(1, COUNT - 1), false);
+  assert.ok(pace.begin(COUNT) > 0);
+  pace.end(0);
+  assert.ok(pace.begin(COUNT) > 0);
 });
 
 test("what was a moment's hindrance is forgotten within a second", () => {
   const pace = new Pace();
   play(pace, () => 300, 20);
-  assert.equal(play(pace, (drawn) => drawn * 0.05, 60), COUNT);
+  assert.deepEqual(play(pace, (drawn) => drawn * 0.05, 60), [COUNT, COUNT]);
 });
 
 test("a page whose turns are as short as can be still finds out that there is room", () => {
   const pace = new Pace();
   play(pace, () => 300, 20);
-  const drawn = pace.allowed(COUNT);
+  const drawn = pace.begin(COUNT);
   assert.ok(drawn < FEW, `${drawn} widgets have their turn`);
   assert.ok(pace.isTelling(drawn, COUNT - drawn));
 });
@@ -59,7 +84,7 @@ test("a frame of few widgets, or of none, tells nothing", () => {
 test("fewer widgets than frames of a turn are one each", () => {
   const pace = new Pace();
   pace.learn(2, 300, 2);
-  assert.equal(pace.allowed(2), 1);
+  assert.equal(pace.begin(2), 1);
 });
 
 test("screen readers are told at once, and then the newest after a while", async () => {

@@ -106,7 +106,7 @@ export class Host {
    * @param {number} nowMs
    */
   frame(nowMs) {
-    let left = this.pace.allowed(this.cells.size);
+    let left = this.pace.begin(this.cells.size);
     let drawn = 0;
     const draw = (/** @type {Cell} */ cell) => {
       const news = cell.news(this.store, nowMs);
@@ -124,6 +124,7 @@ export class Host {
     for (const cell of this.cells.values()) {
       if (!this.waiting.has(cell)) draw(cell);
     }
+    this.pace.end(drawn);
     if (this.waiting.size > 0) this.doors.again();
     if (this.drawn > 0 || !this.pace.isTelling(drawn, this.waiting.size)) return;
     this.drawn = drawn;

@@ -5,40 +5,64 @@
  * Where all that is new fits into a frame, all of it is drawn. On a device that is too slow for that,
  * widgets take turns, so that the frames keep coming: what is then drawn is the newest, and no widget
  * waits for more than a few frames.
+ *
+ * On one that is too slow for half of them, widgets are drawn in every second frame only. To draw
+ * anything at all costs the browser as much as several widgets, so more are drawn in a second in that
+ * way; and every other frame is free for hands.
  */
 
 /** The widgets' share of a frame: styles, layout and painting included; the rest is for hands. */
 export const SHARE_MS = 8;
-/** In so many frames each widget has its turn, however slow the device is. */
+/** Their share of a frame whose next one is free. */
+export const SHARE_OF_TWO_MS = 12;
+/** In so many frames in which widgets are drawn each has its turn, however slow the device is. */
 export const LONGEST_TURN = 10;
 /** Fewer widgets than these never take turns: looking at what they cost would cost more. */
 export const FEW = 8;
 const FASTER = 1.1;
 const SLOWER = 0.75;
+/** What all of them may take in every second frame, in shares, before each frame is tried again. */
+const NEARLY = 1.25;
 
 export class Pace {
   constructor() {
     this.most = Infinity;
+    /** Whether widgets are drawn in every second frame only. */
+    this.isHalved = false;
+    /** Whether this frame is a free one. */
+    this.isFree = false;
+    this.hasDrawn = false;
   }
 
   /**
-   * Return how many widgets may be drawn in this frame.
+   * Begin a frame; return how many widgets may be drawn in it.
    *
    * @param {number} count how many there are
    */
-  allowed(count) {
-    return Math.max(1, Math.ceil(count / LONGEST_TURN), Math.floor(this.most));
+  begin(count) {
+    this.isFree = this.isHalved && this.hasDrawn;
+    return this.isFree ? 0 : Math.max(1, Math.ceil(count / LONGEST_TURN), Math.floor(this.most));
+  }
+
+  /**
+   * End a frame. What could not wait may be drawn in a free one as well; the next is for the others.
+   *
+   * @param {number} drawn how many widgets it drew
+   */
+  end(drawn) {
+    this.hasDrawn = drawn > 0 && !this.isFree;
   }
 
   /**
    * Return whether a frame is worth learning from. Those that wait count as well: where turns are
    * short, few are drawn in each frame, and it could never be found out that there is room for more.
+   * A free frame draws only what cannot wait.
    *
    * @param {number} drawn how many widgets it drew
    * @param {number} waiting how many wait for their turn
    */
   isTelling(drawn, waiting) {
-    return drawn > 0 && drawn + waiting >= FEW;
+    return !this.isFree && drawn > 0 && drawn + waiting >= FEW;
   }
 
   /**
@@ -49,10 +73,14 @@ export class Pace {
    * @param {number} count how many widgets there are
    */
   learn(drawn, tookMs, count) {
-    const share = SHARE_MS / Math.max(0.1, tookMs);
+    const share = (this.isHalved ? SHARE_OF_TWO_MS : SHARE_MS) / Math.max(0.1, tookMs);
     if (share < 1) this.most = Math.min(this.most, drawn) * Math.max(SLOWER, share);
     else if (this.most < count) this.most *= Math.min(FASTER, share);
-    else this.most = Infinity;
+    else {
+      this.most = Infinity;
+      this.isHalved &&= tookMs > SHARE_MS * NEARLY;
+    }
+    this.isHalved ||= this.most < count / 2;
     this.most = Math.max(this.most, count / LONGEST_TURN);
   }
 }
