@@ -5,8 +5,8 @@ first, with as many places: a message a value, written as it comes. Both also wi
 processor slowed six times, as on an old telephone.
 
 Where a frame has no room for all sixty, URC's widgets take turns (``static/pace.js``): each is then
-drawn with its newest value three times a second or more often. So the time of a frame counts beside
-the number of frames: the naive page writes each value and comes to few frames.
+drawn with its newest value in every twentieth frame or more often. So the time of a frame counts
+beside the number of frames: the naive page writes each value and comes to few frames.
 """
 
 import asyncio

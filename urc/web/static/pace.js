@@ -3,8 +3,8 @@
  * How many widgets are drawn in one frame. Knows no DOM.
  *
  * Where all that is new fits into a frame, all of it is drawn. On a device that is too slow for that,
- * widgets take turns, so that the frames keep coming: what is then drawn is the newest, and no widget
- * waits for more than a few frames.
+ * widgets take turns, so that the frames keep coming: what is then drawn is the newest, and each has
+ * its turn several times a second.
  *
  * On one that is too slow for half of them, widgets are drawn in every second frame only. To draw
  * anything at all costs the browser as much as several widgets, so more are drawn in a second in that
