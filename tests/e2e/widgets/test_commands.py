@@ -85,8 +85,9 @@ class Crane:
         finally:
             writer.close()
 
-    def tell(self, lamp: str, mode: str, volts: str) -> None:
-        """Say how it is."""
+    async def tell(self, lamp: str, mode: str, volts: str) -> None:
+        """Say how it is; the page may know of the connection before this end of it does."""
+        await until(lambda: bool(self._writers))
         for writer in self._writers:
             writer.write(f"{lamp},{mode},{volts}\n".encode())
 
@@ -149,27 +150,27 @@ async def test_each_control_gives_exactly_its_command(
         page = await new_page(size="desktop")
         await page.goto(address)
         await ready(page, ".switch-on")
-        robot.tell("off", "idle", "2.5")
+        await robot.tell("off", "idle", "2.5")
 
         # A switch shows the robot's state, never the wish.
         await until_text(page, ".switch-word", "off")
         await page.click(".switch-main")
         await robot.until_got("LAMP 1")
         await until_text(page, ".switch-word", "off …")
-        robot.tell("on", "idle", "2.5")
+        await robot.tell("on", "idle", "2.5")
         await until_text(page, ".switch-word", "on")
         await page.focus(".switch-main")
         await page.keyboard.press("Space")
         await robot.until_got("LAMP 0")
         await until_attribute(page, ".switch", "data-wish", "missed")
         assert await page.inner_text(".switch-word") == "on ≠"
-        robot.tell("off", "idle", "2.5")
+        await robot.tell("off", "idle", "2.5")
         await until_attribute(page, ".switch", "data-wish", "")
 
         await page.get_by_role("radio", name="auto").click()
         await robot.until_got("MODE auto")
         assert await page.get_by_role("radio", name="idle").is_checked()
-        robot.tell("off", "auto", "2.5")
+        await robot.tell("off", "auto", "2.5")
         await until_text(page, ".select-now", "auto")
 
         track = await ready(page, ".slider-track")
@@ -177,12 +178,12 @@ async def test_each_control_gives_exactly_its_command(
         await track.focus()
         await page.keyboard.press("ArrowRight")
         await robot.until_got("VOLT 3")
-        robot.tell("off", "auto", "3")
+        await robot.tell("off", "auto", "3")
         await until_attribute(page, ".slider-track", "aria-valuetext", "3.0 V")
         for key, line, said in (("PageDown", "VOLT 2", "2.0 V"), ("End", "VOLT 10", "10.0 V")):
             await page.keyboard.press(key)
             await robot.until_got(line)
-            robot.tell("off", "auto", line.split()[1])
+            await robot.tell("off", "auto", line.split()[1])
             await until_attribute(page, ".slider-track", "aria-valuetext", said)
         box = await track.bounding_box()
         assert box is not None
