@@ -19,8 +19,7 @@ function play(pace, cost, frames = 200) {
   const drawn = [];
   for (let frame = 0; frame < frames; frame += 1) {
     const now = Math.min(COUNT, pace.begin(COUNT));
-    pace.end(now);
-    if (pace.isTelling(now, COUNT - now)) pace.learn(now, cost(now), COUNT);
+    if (pace.end(now, COUNT - now)) pace.learn(now, cost(now), COUNT);
     drawn.push(now);
   }
   return drawn.slice(-2);
@@ -46,6 +45,16 @@ test("where there is no room for half of them, every second frame is free, and m
   assert.ok(drawn / 2 >= inEach, `${drawn} in two frames, ${inEach} in one`);
 });
 
+test("few widgets are drawn in each frame, whatever it was like with many", () => {
+  const pace = new Pace();
+  play(pace, () => 300);
+  for (let frame = 0; frame < 10; frame += 1) {
+    const room = pace.begin(COUNT);
+    if (frame > 0) assert.ok(room > 0, `frame ${frame} has room for ${room}`);
+    pace.end(Math.min(3, room), Math.max(0, 3 - room));
+  }
+});
+
 test("on the slowest one each widget still has its turn", () => {
   assert.deepEqual(play(new Pace(), () => 300).sort(), [0, COUNT / LONGEST_TURN]);
 });
@@ -54,10 +63,9 @@ test("after a free frame, or one in which nothing was new, widgets are drawn", (
   const pace = new Pace();
   play(pace, () => 300, 21); // the last one drew
   assert.equal(pace.begin(COUNT), 0);
-  pace.end(1); // an alarm does not wait
-  assert.equal(pace.isTelling(1, COUNT - 1), false);
+  assert.equal(pace.end(1, COUNT - 1), false); // an alarm does not wait
   assert.ok(pace.begin(COUNT) > 0);
-  pace.end(0);
+  assert.equal(pace.end(0, 0), false);
   assert.ok(pace.begin(COUNT) > 0);
 });
 
@@ -72,13 +80,13 @@ test("a page whose turns are as short as can be still finds out that there is ro
   play(pace, () => 300, 20);
   const drawn = pace.begin(COUNT);
   assert.ok(drawn < FEW, `${drawn} widgets have their turn`);
-  assert.ok(pace.isTelling(drawn, COUNT - drawn));
+  assert.ok(pace.end(drawn, COUNT - drawn));
 });
 
 test("a frame of few widgets, or of none, tells nothing", () => {
   const pace = new Pace();
-  assert.equal(pace.isTelling(FEW - 1, 0), false);
-  assert.equal(pace.isTelling(0, COUNT), false);
+  assert.equal(pace.end(FEW - 1, 0), false);
+  assert.equal(pace.end(0, COUNT), false);
 });
 
 test("fewer widgets than frames of a turn are one each", () => {

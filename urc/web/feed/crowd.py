@@ -15,7 +15,6 @@ __all__ = ["NO_NUMBER", "Crowd", "Known", "Listener", "Place", "Write"]
 NO_NUMBER: Final = -1
 """Of a line that cannot be written to by number."""
 
-
 Write = Callable[[int, bytes], int]
 """Writes to a file by its number, without waiting; returns how many bytes were taken."""
 

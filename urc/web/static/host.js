@@ -124,9 +124,9 @@ export class Host {
     for (const cell of this.cells.values()) {
       if (!this.waiting.has(cell)) draw(cell);
     }
-    this.pace.end(drawn);
+    const isTelling = this.pace.end(drawn, this.waiting.size);
     if (this.waiting.size > 0) this.doors.again();
-    if (this.drawn > 0 || !this.pace.isTelling(drawn, this.waiting.size)) return;
+    if (this.drawn > 0 || !isTelling) return;
     this.drawn = drawn;
     this.begunMs = nowMs;
     this.painted.port2.postMessage(null);

@@ -31,7 +31,8 @@ export class Pace {
     this.isHalved = false;
     /** Whether this frame is a free one. */
     this.isFree = false;
-    this.hasDrawn = false;
+    /** Whether the last frame drew widgets, and many had something new. */
+    this.isLastFull = false;
   }
 
   /**
@@ -40,29 +41,21 @@ export class Pace {
    * @param {number} count how many there are
    */
   begin(count) {
-    this.isFree = this.isHalved && this.hasDrawn;
+    this.isFree = this.isHalved && this.isLastFull;
     return this.isFree ? 0 : Math.max(1, Math.ceil(count / LONGEST_TURN), Math.floor(this.most));
   }
 
   /**
-   * End a frame. What could not wait may be drawn in a free one as well; the next is for the others.
-   *
-   * @param {number} drawn how many widgets it drew
-   */
-  end(drawn) {
-    this.hasDrawn = drawn > 0 && !this.isFree;
-  }
-
-  /**
-   * Return whether a frame is worth learning from. Those that wait count as well: where turns are
-   * short, few are drawn in each frame, and it could never be found out that there is room for more.
-   * A free frame draws only what cannot wait.
+   * End a frame; return whether it is worth learning from. Those that wait count as well: where turns
+   * are short, few are drawn in each frame, and it could never be found out that there is room for
+   * more. A free frame draws only what cannot wait, and the next is for the others.
    *
    * @param {number} drawn how many widgets it drew
    * @param {number} waiting how many wait for their turn
    */
-  isTelling(drawn, waiting) {
-    return !this.isFree && drawn > 0 && drawn + waiting >= FEW;
+  end(drawn, waiting) {
+    this.isLastFull = !this.isFree && drawn > 0 && drawn + waiting >= FEW;
+    return this.isLastFull;
   }
 
   /**
