@@ -1,11 +1,14 @@
 """`./dev bench [--full] [NAME…]`: every benchmark, or those named; 1 when a goal is missed."""
 
 import argparse
+import os
 import sys
+from collections.abc import Sequence
 from importlib import import_module
 
 from bench.figures import PAGE, told, write_docs
 from bench.harness import report
+from scripts.needs import NEEDS, bring
 
 NAMES = (
     "startup",
@@ -43,6 +46,18 @@ NAMES = (
     "motion_loss",
 )
 
+PROGRAMS = {
+    "transport_ssh": "sshd",
+    "transport_mqtt": "mosquitto",
+    "browser_peers": "chromium",
+    "browser_widgets": "chromium",
+    "browser_plot_scan": "chromium",
+    "browser_needle": "chromium",
+    "wire_to_pixel": "chromium",
+    "motion_input": "chromium",
+}
+"""Benchmark → the program beside Python that it needs, as the tests name it."""
+
 
 def main() -> int:
     parser = argparse.ArgumentParser(prog="./dev bench", description=__doc__)
@@ -55,12 +70,29 @@ def main() -> int:
     for name in arguments.names:
         if name not in NAMES:
             parser.error(f"there is no benchmark {name!r}; there are: {', '.join(NAMES)}")
-    missed = 0
-    for name in arguments.names or NAMES:
+    names = arguments.names or NAMES
+    left_out = bring_programs(names)
+    missed = int(bool(left_out))
+    for name in names:
+        if name in left_out:
+            continue
         missed |= report(import_module(f"bench.{name}").run(full=arguments.full))
         if arguments.write_docs and told:
             write_docs()
     return missed
+
+
+def bring_programs(names: Sequence[str]) -> set[str]:
+    """Install what these benchmarks need; return those whose program could not be brought."""
+    wanted = {PROGRAMS[name] for name in names if name in PROGRAMS}
+    brought = bring([need for need in NEEDS if need.name in wanted])
+    os.environ.update(brought.environment)
+    missing = {need.name for need in brought.left_out}
+    left_out = {name for name in names if PROGRAMS.get(name) in missing}
+    for name in sorted(left_out):
+        remedy = f"to bring it: {brought.remedy}"
+        print(f"bench: {name} left out: no {PROGRAMS[name]}; {remedy}", file=sys.stderr)
+    return left_out
 
 
 if __name__ == "__main__":

@@ -8,7 +8,7 @@ import os
 import shutil
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -242,14 +242,15 @@ class Brought:
         self.environment["URC_LEFT_OUT"] = ",".join(need.name for need in self.left_out)
 
 
-def bring() -> Brought:
-    """Find or install every need; report what is missing."""
-    missing = [need for need in NEEDS if need.find() is None]
+def bring(needs: Sequence[Need] = NEEDS) -> Brought:
+    """Find or install each of these needs; report what is missing."""
+    missing = [need for need in needs if need.find() is None]
     if any(need.package for need in missing) and _is_root() and shutil.which("apt-get"):
         _apt_install([name for need in missing for name in need.package.split()])
         missing = [need for need in missing if need.find() is None]
-    browser = NEEDS[0].find() or _chromium_from_npm()
     brought = Brought(playwright_environment())
+    chromium = next((need for need in needs if need.name == "chromium"), None)
+    browser = chromium and (chromium.find() or _chromium_from_npm())
     if browser:
         brought.environment["URC_CHROMIUM"] = browser
     brought.left_out = [need for need in missing if need.name != "chromium" or not browser]

@@ -1,9 +1,12 @@
-"""`./dev test` and `./dev docs`: what counts as a failure, and how it is told."""
+"""`./dev test`, `./dev bench` and `./dev docs`: what counts as a failure, and how it is told."""
 
+import ast
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
 
+from bench import __main__ as bench
 from scripts import check, docs, needs
 from scripts.needs import NEEDS, Brought
 
@@ -87,6 +90,48 @@ def test_what_npm_brings_is_named_and_left_out_until_it_is_there(
     brought.look_again()
     assert brought.left_out == []
     assert brought.environment["URC_LEFT_OUT"] == ""
+
+
+def test_a_benchmark_without_its_program_is_left_out_by_name(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """One line with the remedy, and no success; nothing is started that could only break."""
+    browser = [need for need in NEEDS if need.name == "chromium"]
+    monkeypatch.setattr(bench, "bring", lambda wanted: Brought(left_out=list(wanted)))
+    monkeypatch.setattr("sys.argv", ["bench", "wire_to_pixel"])
+    assert bench.main() == 1
+    said = capsys.readouterr()
+    assert said.out == ""
+    remedy = Brought(left_out=browser).remedy
+    line = f"bench: wire_to_pixel left out: no chromium; to bring it: {remedy}"
+    assert said.err.splitlines() == [line]
+
+
+def test_a_benchmark_asks_for_no_program_that_it_does_not_need(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Nobody installs a browser to measure a relay."""
+    asked: list[str] = []
+
+    def bring(wanted: list[needs.Need]) -> Brought:
+        asked.extend(need.name for need in wanted)
+        return Brought()
+
+    monkeypatch.setattr(bench, "bring", bring)
+    assert bench.bring_programs(["fanout", "transport_ssh"]) == set()
+    assert asked == ["sshd"]
+
+
+@pytest.mark.parametrize("name", bench.NAMES)
+def test_a_benchmark_with_a_page_brings_its_browser(name: str) -> None:
+    """Whatever opens one says so in the table."""
+    spec = find_spec(f"bench.{name}")
+    assert spec is not None
+    assert spec.origin is not None
+    tree = ast.parse(Path(spec.origin).read_text(encoding="utf-8"))
+    imported = {node.module for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)}
+    has_page = bool(imported & {"bench.browser_page", "tests.e2e.browser"})
+    assert (bench.PROGRAMS.get(name) == "chromium") == has_page
 
 
 @pytest.mark.parametrize(
