@@ -8,7 +8,7 @@ from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from typing import Literal
 
-from playwright.async_api import Browser, ConsoleMessage, Error, Page, async_playwright
+from playwright.async_api import Browser, ConsoleMessage, Error, Page, Request, async_playwright
 
 from scripts.needs import NEEDS
 
@@ -71,8 +71,13 @@ class PageFaults:
     def __init__(self, page: Page) -> None:
         self.found: list[str] = []
         self._allowed: list[Callable[[str], bool]] = []
+        self.unanswered: dict[Request, None] = {}
+        """What the page asked for and has not got, oldest first: why a load does not end."""
         page.on("console", self._console)
         page.on("pageerror", self._page_error)
+        page.on("request", self._asked)
+        page.on("requestfinished", self._answered)
+        page.on("requestfailed", self._answered)
 
     def allow(self, is_allowed: Callable[[str], bool]) -> None:
         """Let the faults pass that a test brings about on purpose, as a server that is killed."""
@@ -81,6 +86,12 @@ class PageFaults:
     def unexpected(self) -> list[str]:
         """Return the faults that no test allowed."""
         return [text for text in self.found if not any(test(text) for test in self._allowed)]
+
+    def _asked(self, request: Request) -> None:
+        self.unanswered[request] = None
+
+    def _answered(self, request: Request) -> None:
+        self.unanswered.pop(request, None)
 
     def _console(self, message: ConsoleMessage) -> None:
         if message.type == "error":

@@ -1,5 +1,6 @@
 """Fixtures of the tests over real sockets: the browser, its pages, and URC as a process."""
 
+import logging
 from collections.abc import AsyncIterator, Callable, Iterator
 from pathlib import Path
 
@@ -21,6 +22,8 @@ from tests.e2e.command_line import BOT
 from tests.e2e.processes import UrcProcess
 from tests.e2e.together import Together
 from tests.e2e.unhurried import unhurried
+
+LOG = logging.getLogger(__name__)
 
 expect.set_options(timeout=PAGE_TIMEOUT_MS)
 
@@ -80,7 +83,13 @@ class PageMaker:
         self._faults[page].allow(is_allowed)
 
     async def close(self) -> list[str]:
-        """Close every page; return the faults that no test allowed."""
+        """Close every page; return the faults that no test allowed.
+
+        What a page still waits for is logged: pytest shows it when the test has failed.
+        """
+        for page, faults in self._faults.items():
+            for request in faults.unanswered:
+                LOG.warning("%s still waits for %s %s", page.url, request.method, request.url)
         for context in self._contexts:
             await context.close()
         return [fault for faults in self._faults.values() for fault in faults.unexpected()]

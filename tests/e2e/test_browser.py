@@ -86,3 +86,23 @@ async def test_a_page_that_complains_is_noticed(new_page: PageMaker, body: str, 
     await until(lambda: any(fault in text for text in faults.unexpected()))
     faults.allow(lambda text: True)
     assert faults.unexpected() == []
+
+
+async def test_what_a_page_still_waits_for_is_told(
+    new_page: PageMaker, caplog: pytest.LogCaptureFixture
+) -> None:
+    """A load that does not end names the file that did not come."""
+    page = await new_page()
+
+    async def answer(route: Route) -> None:
+        if route.request.url.endswith("/late.js"):
+            asked.append(route)
+        else:
+            await route.fulfill(body='<script src="late.js"></script>', content_type="text/html")
+
+    asked: list[Route] = []
+    await page.route("**/*", answer)
+    await page.goto(f"{HOST}/", wait_until="commit")
+    await until(lambda: len(asked) == 1)
+    assert await new_page.close() == []
+    assert f"{HOST}/ still waits for GET {HOST}/late.js" in caplog.messages
