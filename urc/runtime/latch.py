@@ -18,6 +18,8 @@ __all__ = ["LatchFile"]
 RETRY_S = 5.0
 _MOST_BYTES = 4096
 _LONGEST_NAME = 200
+_BEFORE = ", before a restart"
+_UNREADABLE = "URC, whose record of the last stop cannot be read"
 
 log = logging.getLogger(__name__)
 
@@ -40,20 +42,21 @@ class LatchFile:
         """Return what was kept.
 
         A file that cannot be read, or holds anything else, means latched: nobody knows what was.
+        Screens are numbered from one in each run: whoever stopped it is told as of another one.
         """
         try:
             with self._file.open("rb") as file:
                 found = json.loads(file.read(_MOST_BYTES))
             epoch, by = found["epoch"], found["latched_by"]
             if type(epoch) is int and epoch >= 0 and type(by) is str:
-                return LeaseState(epoch=epoch, latched_by=by[:_LONGEST_NAME])
+                return LeaseState(epoch=epoch, latched_by=_of_before(by[:_LONGEST_NAME]))
         except FileNotFoundError:
             return LeaseState()
         except (OSError, ValueError, KeyError, TypeError) as error:
             log.warning("%s cannot be read (%s): the robot stays stopped", self._file, error)
-            return LeaseState(latched_by="URC, whose record of the last stop cannot be read")
+            return LeaseState(latched_by=_UNREADABLE)
         log.warning("%s is no record of a stop: the robot stays stopped", self._file)
-        return LeaseState(latched_by="URC, whose record of the last stop cannot be read")
+        return LeaseState(latched_by=_UNREADABLE)
 
     def keep(self, state: LeaseState) -> None:
         """Write `state` soon; only the newest counts. Returns at once.
@@ -97,6 +100,10 @@ class LatchFile:
         """Put a whole new file in the place of the old one: a crash leaves one of the two."""
         text = json.dumps({"epoch": state.epoch, "latched_by": state.latched_by[:_LONGEST_NAME]})
         put_private(self._file, text.encode())
+
+
+def _of_before(by: str) -> str:
+    return by if by in ("", _UNREADABLE) or by.endswith(_BEFORE) else by + _BEFORE
 
 
 def _untold(fault: str) -> None:

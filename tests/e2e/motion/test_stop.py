@@ -162,12 +162,10 @@ async def test_a_latched_stop_holds_over_a_restart(new_page: PageMaker, tmp_path
 
 
 async def opened_latched(new_page: PageMaker, address: str) -> Page:
-    """Open the page of a robot that is stopped."""
+    """Open the page of a robot that was stopped before; it is screen 1, too, and was not it."""
     page = await fresh(new_page)
     await page.goto(address)
-    await page.wait_for_function(
-        "() => document.querySelector('[data-who]').textContent.startsWith('■ Stopped by')"
-    )
+    await until_text(page, "[data-who]", "■ Stopped by screen 1, before a restart")
     return page
 
 

@@ -13,16 +13,29 @@ from urc.runtime.latch import LatchFile
 pytestmark = pytest.mark.anyio
 
 
+BEFORE = ", before a restart"
+
+
 async def test_what_was_kept_is_found_again(tmp_path: Path) -> None:
     """The latch and the epoch; nobody keeps the controls over a restart."""
     file = LatchFile(tmp_path / "new" / "folder", "puppet")
     assert file.load() == LeaseState()
     file.keep(LeaseState(7, Client("a"), None, 0.0, "ann"))
     await file.settle()
-    assert LatchFile(tmp_path / "new" / "folder", "puppet").load() == LeaseState(
-        7, latched_by="ann"
-    )
+    found = LatchFile(tmp_path / "new" / "folder", "puppet").load()
+    assert found == LeaseState(7, latched_by=f"ann{BEFORE}")
     assert len(list((tmp_path / "new" / "folder").iterdir())) == 1, "no half file is left behind"
+
+
+async def test_who_stopped_it_in_another_run_is_none_of_this_ones_screens(tmp_path: Path) -> None:
+    """They are numbered from one again: screen 1 of now stopped nothing. However many runs ago."""
+    file = LatchFile(tmp_path, "puppet")
+    state = LeaseState(7, latched_by="screen 1")
+    for _ in range(3):
+        file.keep(state)
+        await file.settle()
+        state = file.load()
+        assert state.latched_by == f"screen 1{BEFORE}"
 
 
 async def test_of_many_states_the_newest_is_kept(tmp_path: Path) -> None:
@@ -96,4 +109,4 @@ async def test_what_could_not_be_written_is_tried_again(
     file.keep(LeaseState(2, latched_by="ann"))
     async with asyncio.timeout(10):
         await well.wait()
-    assert file.load().latched_by == "ann"
+    assert file.load().latched_by == f"ann{BEFORE}"

@@ -46,6 +46,8 @@ const SENTENCES = [
   mark("too many clients watch this robot"),
   mark("the server was held up"),
   mark("the layout was changed"),
+  mark("{name}, before a restart"),
+  mark("URC, whose record of the last stop cannot be read"),
   mark("screen {n}"),
   mark("screen {n} at {place}"),
   mark("somebody else"),
