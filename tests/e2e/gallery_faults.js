@@ -1,13 +1,16 @@
-// Run in the gallery's page. Returns per cell what hangs over, which text is cut, and whether there is
-// nothing at all. An ellipsis is meant, and so is what can be scrolled to; a text that is only for
+// Run in the gallery's page, or in a robot's, with the selector of the cells. Returns per cell what
+// hangs over, which text is cut, and whether there is nothing at all. A cell that has no place on a
+// screen of this size is none. An ellipsis is meant, and so is what can be scrolled to; a text that is only for
 // screen readers is not seen; the figures of a scale that moves (data-scale) come and go at its ends.
-() => {
+(selector) => {
   const SLACK = 2;
   const clips = (style) => [style.overflowX, style.overflowY].some((each) => each !== "visible");
   const scrolls = (style) => /auto|scroll/.test(style.overflowX + style.overflowY);
   const found = [];
-  for (const cell of document.querySelectorAll("[data-state-name]")) {
-    const name = `${cell.dataset.widget} ${cell.dataset.stateName}`;
+  for (const cell of document.querySelectorAll(selector)) {
+    if (!cell.checkVisibility()) continue;
+    const { stateName, widget, config = "{}" } = cell.dataset;
+    const name = stateName ? `${widget} ${stateName}` : `slot ${JSON.parse(config).slot}`;
     const over = cell.scrollWidth - cell.clientWidth;
     if (over > SLACK) found.push(`${name}: ${over} px wider than its cell`);
     const room = cell.getBoundingClientRect();

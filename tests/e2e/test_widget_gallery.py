@@ -13,17 +13,16 @@ from tests.e2e.conftest import PageMaker
 from tests.e2e.dashboards import running_dashboard
 from tests.e2e.gallery import (
     CELL_SIZES,
-    FAULTS,
+    EXHIBITS,
     HIGH,
     MOST_DIFFERENT,
     ONLY,
-    SETTLE_MS,
-    SHOTS,
     THEMES,
     difference,
     groups,
     keep,
     kept,
+    lasting_faults,
     settled,
     show,
     states_of,
@@ -61,17 +60,6 @@ async def promised(page: Page, group: str) -> None:
             pytest.fail(f"{widget} {name}: {state.shows} is not all in {text!r}")
 
 
-async def lasting_faults(page: Page) -> list[str]:
-    """Return the faults that do not go away: on a busy machine widgets take turns to draw."""
-    found: list[str] = await page.evaluate(FAULTS)
-    for _ in range(SHOTS):
-        if not found:
-            break
-        await page.wait_for_timeout(SETTLE_MS)
-        found = await page.evaluate(FAULTS)
-    return found
-
-
 async def faults_of(page: Page) -> list[str]:
     """Return what a person would see that is wrong, in each size and theme."""
     # Most faults are the same in each theme: told once, with the first.
@@ -79,7 +67,7 @@ async def faults_of(page: Page) -> list[str]:
     for size in CELL_SIZES:
         for theme in THEMES:
             await show(page, theme, size)
-            for fault in await lasting_faults(page):
+            for fault in await lasting_faults(page, EXHIBITS):
                 faults.setdefault(f"{size}: {DIGITS.sub('', fault)}", f"{theme} {fault}")
     return [f"{key} ({first})" for key, first in faults.items()]
 

@@ -15,6 +15,7 @@ import pytest
 from playwright.async_api import Locator, Page, ViewportSize, expect
 
 from tests.e2e.conftest import PageMaker
+from tests.e2e.gallery import CELLS, lasting_faults
 from tests.e2e.robots.hands import Readings, fill, give, held, open_form, until
 from tests.e2e.robots.recording import FOLDER, Overheard, alive
 from tests.e2e.robots.sheets import (
@@ -31,8 +32,14 @@ from urc.model.values import Reading
 pytestmark = pytest.mark.anyio
 
 NAMES = sorted(file.stem for file in FOLDER.glob("*.yaml"))
-PHONE = ViewportSize(width=390, height=844)
 DESKTOP = ViewportSize(width=1440, height=900)
+SIZES = (
+    *(ViewportSize(width=320, height=640), ViewportSize(width=390, height=844)),
+    *(ViewportSize(width=844, height=390), ViewportSize(width=1024, height=768), DESKTOP),
+)
+"""From the narrowest phone that WCAG 1.4.10 asks for."""
+DRAWN = "() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))"
+"""Resolves when widgets have been told of their new size."""
 SLOWEST_S = 60.0
 """A signal that comes every eight seconds, on a machine that is busy."""
 PATIENCE_MS = 30_000
@@ -132,20 +139,21 @@ async def is_whole(page: Page) -> None:
 
 
 async def each_interface(page: Page, robot: Overheard) -> None:
-    """Open every interface, with either hand and on a phone."""
+    """Open every interface, on screens of all sizes, and with either hand."""
     choice = page.get_by_label("Interface")
     for name in robot.profile.interfaces:
         await choice.select_option(name)
         await is_whole(page)
+        for size in SIZES:
+            await page.set_viewport_size(size)
+            await page.evaluate(DRAWN)
+            assert await page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+            assert await lasting_faults(page, CELLS) == [], f"{name} at {size}"
     await page.get_by_role("button", name="This device").click()
     for hand in ("left", ""):
         await page.locator("[data-hand-choice]").select_option(hand)
         await is_whole(page)
     await page.get_by_role("button", name="This device").click()
-    await page.set_viewport_size(PHONE)
-    await is_whole(page)
-    assert await page.evaluate("document.documentElement.scrollWidth <= innerWidth")
-    await page.set_viewport_size(DESKTOP)
     await choice.select_option("debug")
     await page.locator("[data-debug]").wait_for()
 
