@@ -2,6 +2,7 @@
 /** @typedef {import("../../urc/web/static/types.js").Context} Context */
 /** @typedef {import("../../urc/web/static/types.js").Instance} Instance */
 /** @typedef {import("../../urc/web/static/types.js").StopState} StopState */
+import { whenPressed } from "urc/giving";
 
 export default {
   /**
@@ -12,22 +13,13 @@ export default {
     const root = find(el, ".stop");
     const main = find(el, ".stop-main");
     const note = find(el, ".stop-note");
-    let isPressed = false;
     /** @param {StopState} state */
     function show(state) {
       const isCut = state.phase === "failed" || (state.fault !== "" && !state.isConfirmed);
       root.setAttribute("data-phase", isCut ? "fault" : state.phase);
       note.textContent = words(state, isCut, t);
     }
-    // It acts when it is touched; a key has only the one moment, a screen reader only the click.
-    main.addEventListener("pointerdown", (event) => {
-      isPressed = event.button === 0;
-      if (isPressed) stop();
-    }, { signal });
-    main.addEventListener("click", () => {
-      if (!isPressed) stop();
-      isPressed = false;
-    }, { signal });
+    whenPressed(main, stop, signal);
     onStop(show);
     return {};
   },

@@ -61,6 +61,22 @@ async def test_escape_and_the_click_of_a_screen_reader_stop_too(new_page: PageMa
         assert set(robot.after(count)) == {"drive stop", "lift stop"}
 
 
+async def test_a_press_that_slid_off_takes_nothing_from_the_next_one(new_page: PageMaker) -> None:
+    """No click follows it; the next click, of a key or a screen reader, stops all the same."""
+    async with calmly_driven() as (_, address):
+        page = await opened(new_page, address)
+        await page.mouse.move(*await centre(page, STOP))
+        await page.mouse.down()
+        await until_text(page, NOTE, DONE)
+        await page.mouse.move(10, 10)
+        await page.mouse.up()
+        await page.click("[data-verb='reset']")
+        await until_text(page, "[data-who]", "Nobody drives")
+        await page.focus(STOP)
+        await page.keyboard.press("Enter")
+        await until_text(page, NOTE, DONE)
+
+
 async def test_stop_of_somebody_else_stops_who_drives(new_page: PageMaker) -> None:
     """It needs no lease; the driver sees who it was."""
     async with calmly_driven() as (robot, address):

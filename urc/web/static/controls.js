@@ -8,6 +8,7 @@
  * @typedef {import("./types.js").StopState} StopState
  */
 import { part } from "./badge.js";
+import { whenPressed } from "./press.js";
 import { said, t } from "./words.js";
 
 /** @type {Verb[]} */
@@ -33,16 +34,7 @@ export class Controls {
         drive.changed();
       });
     }
-    // It acts when it is touched, not when it is let go; a key and a screen reader have only the click.
-    let isPressed = false;
-    this.stop.addEventListener("pointerdown", (event) => {
-      isPressed = event.button === 0;
-      if (isPressed) stop.press();
-    });
-    this.stop.addEventListener("click", () => {
-      if (!isPressed) stop.press();
-      isPressed = false;
-    });
+    whenPressed(this.stop, () => stop.press());
     stop.follow((state) => this.showStop(state));
   }
 
