@@ -13,7 +13,7 @@ class Element extends EventTarget {
 
   /** @returns {boolean} whether the browser may do with it what it does otherwise */
   get(type, pointerId = 1, more = {}) {
-    return this.dispatchEvent(Object.assign(new Event(type, { cancelable: true }), { pointerId, button: 0, ...more }));
+    return this.dispatchEvent(Object.assign(new Event(type, { cancelable: true }), { pointerId, button: 0, buttons: 1, ...more }));
   }
 }
 
@@ -42,6 +42,16 @@ test("a pointer takes hold, moves and is let go", () => {
   for (const type of ["pointerdown", "pointermove", "pointerup", "lostpointercapture"]) el.get(type);
   assert.deepEqual(said, ["take", "move", "release"]);
   assert.deepEqual(el.captured, [1]);
+});
+
+test("the main button of a mouse comes up while another is down: no event but a move says so", () => {
+  const { el, said } = held();
+  el.get("pointerdown");
+  el.get("pointermove", 1, { buttons: 5 });
+  el.get("pointermove", 1, { buttons: 4 });
+  el.get("pointermove", 1, { buttons: 4 });
+  el.get("pointerup", 1, { buttons: 0 });
+  assert.deepEqual(said, ["take", "move", "release"]);
 });
 
 test("a second pointer means nothing while the first one holds", () => {

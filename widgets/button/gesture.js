@@ -5,6 +5,8 @@
  * from it by time.
  */
 
+import { isDown } from "urc/giving";
+
 /** So long a finger rests before it counts. */
 export const HOLD_MS = 800;
 /** Two taps that are further apart are two. */
@@ -74,7 +76,7 @@ export function listen(el, { gesture, repeatMs, isReady, done, progress, signal 
     const box = el.getBoundingClientRect();
     const isInside = event.clientX >= box.left && event.clientX <= box.right
       && event.clientY >= box.top && event.clientY <= box.bottom;
-    if (downMs >= 0 && !isInside) end();
+    if (downMs >= 0 && !(isInside && isDown(event))) end();
   }, { signal });
   el.addEventListener("keydown", (event) => {
     if (event.key !== "Enter" && event.key !== " ") return;

@@ -40,6 +40,32 @@ async def test_a_stick_goes_where_its_options_say(new_page: PageMaker) -> None:
         await robot.until_stopped("go")
 
 
+async def test_letting_go_counts_while_another_button_of_the_mouse_is_down(
+    new_page: PageMaker,
+) -> None:
+    """The browser tells of the first one's end by a move only."""
+    async with shown(new_page, use("joystick", **PLAIN)) as (robot, page):
+        await drag(page, ".joystick-pad", 0, 400)
+        await until_values(robot, x=1.0)
+        await page.mouse.down(button="middle")
+        await page.mouse.up()
+        await robot.until_stopped("go")
+        assert "released" in robot.line.reasons
+        await page.mouse.up(button="middle")
+
+
+async def test_a_key_that_hides_when_others_come_up_lets_them_go(new_page: PageMaker) -> None:
+    """On a Mac nobody hears a key that comes up while Command is down."""
+    async with shown(new_page, use("joystick", **PLAIN)) as (robot, page):
+        await page.get_by_role("slider", name="joystick: forward and backward").focus()
+        await page.keyboard.down("KeyW")
+        await robot.until_moving("go")
+        await page.keyboard.down("Meta")
+        await robot.until_stopped("go")
+        assert "released" in robot.line.reasons
+        await page.keyboard.up("Meta")
+
+
 async def test_slew_holds_up_speeding_up_and_never_stopping(new_page: PageMaker) -> None:
     """It begins at nothing and grows; letting go is a stop at once."""
     async with shown(new_page, use("joystick", slew=2.0, **PLAIN)) as (robot, page):

@@ -7,7 +7,7 @@
 
 export { boundsOf, keyed, snapped } from "./bounds.js";
 export { Giver } from "./giver.js";
-export { grasp } from "./grasp.js";
+export { grasp, isDown } from "./grasp.js";
 export { whenPressed } from "./press.js";
 export { Setpoint } from "./setpoint.js";
 export { SetpointFace } from "./setpoint_face.js";

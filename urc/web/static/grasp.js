@@ -12,6 +12,16 @@
 const BREAKS = ["blur", "pagehide", "resize", "urc-let-go"];
 
 /**
+ * Whether a finger, a pen or the main button of a mouse is down. With another button of the mouse down
+ * as well, a move that says so is all that is told of the first one's end.
+ *
+ * @param {PointerEvent} event
+ */
+export function isDown({ buttons }) {
+  return (buttons & 1) !== 0;
+}
+
+/**
  * Let one pointer at a time take hold of an element.
  *
  * @param {HTMLElement} el
@@ -37,14 +47,17 @@ export function grasp(el, { take, move, release, cancel, isDrawing = false, sign
     pointerId = event.pointerId;
     el.setPointerCapture(pointerId);
   }, { signal });
-  el.addEventListener("pointermove", (event) => {
-    if (event.pointerId === pointerId) move(event);
-  }, { signal });
-  el.addEventListener("pointerup", (event) => {
+  const letGo = (/** @type {PointerEvent} */ event) => {
     if (event.pointerId !== pointerId) return;
     pointerId = -1; // so that losing the capture, which follows, cancels nothing
     release(event);
+  };
+  el.addEventListener("pointermove", (event) => {
+    if (event.pointerId !== pointerId) return;
+    if (isDown(event)) move(event);
+    else letGo(event);
   }, { signal });
+  el.addEventListener("pointerup", letGo, { signal });
   for (const name of ["pointercancel", "lostpointercapture"]) el.addEventListener(name, drop, { signal });
   if (isDrawing) {
     for (const name of BREAKS) addEventListener(name, drop, { signal });

@@ -19,6 +19,7 @@
  * @property {(grip: Grip) => void} end
  * @property {(grip: Grip) => void} forget
  */
+import { isDown } from "./grasp.js";
 import { takesKeys, takesText } from "./keys.js";
 import { feel } from "./haptics.js";
 import { argumentsOf } from "./output.js";
@@ -123,6 +124,10 @@ export class Grip {
   move(event) {
     const { hand } = this;
     if (hand?.kind !== "pointer" || event.pointerId !== this.pointerId) return;
+    if (!isDown(event)) {
+      this.up(event.pointerId, true);
+      return;
+    }
     if (hand.x === event.clientX && hand.y === event.clientY) return;
     hand.x = event.clientX;
     hand.y = event.clientY;
@@ -147,6 +152,8 @@ export class Grip {
 
   /** @param {KeyboardEvent} event */
   keyDown(event) {
+    // On a Mac nobody hears what comes up while this key is down: what is held would stay so.
+    if (event.key === "Meta") this.drop(["keys"]);
     const { spec } = this;
     const isTap = Object.hasOwn(spec.taps ?? {}, event.code);
     if (!isTap && !spec.keys.includes(event.code)) return;
