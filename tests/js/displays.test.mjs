@@ -2,7 +2,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { bands, digitsOf, ends, share, spanOf, ticks } from "../../urc/web/static/scale.js";
+import { bands, digitsOf, ends, share, spanOf, ticks, wholes } from "../../urc/web/static/scale.js";
 import { offset, covers, tape, HIGH } from "../../widgets/altitude/tape.js";
 import { leanOf, ofQuaternion, solid, wrapped } from "../../widgets/attitude/angles.js";
 import { Mean, cellScale, clock, spread, timeLeft } from "../../widgets/battery/charge.js";
@@ -39,6 +39,18 @@ test("a scale has round ticks, its limits as bands, and clamps what is outside",
   ]);
   assert.deepEqual(spanOf(12, 12.5, [11, 13, 40]), [11, 13]);
   assert.deepEqual(spanOf(Infinity, -Infinity, []), [0, 1]);
+});
+
+test("numbers that are too far from zero to count end a scale, not the page", () => {
+  const [low, high] = [1e17, 1e17 + 16];
+  assert.deepEqual(ticks(low, high, 5), []);
+  assert.deepEqual(tape(1e17, 20).rungs, []);
+  assert.deepEqual(wholes(2 ** 53 - 1, 2 ** 53 + 1), []);
+  assert.deepEqual(wholes(-1, 2), [-1, 0, 1, 2]);
+  assert.deepEqual(wholes(3, 2), []);
+  const [bottom, top] = spanOf(low, high, []);
+  assert.ok(top - bottom > 1e15, "as good as one value");
+  assert.ok(ticks(bottom, top, 5).length > 2);
 });
 
 test("a gauge turns 270 degrees, open below", () => {

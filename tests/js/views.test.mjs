@@ -148,6 +148,7 @@ test("places on the earth: distance, sexagesimal, bearing, fence", () => {
   assert.deepEqual([isInside([1, 1], fence), isInside([3, 1], fence), isInside([1, 3], [])], [true, false, true]);
   assert.deepEqual(placesOf([[1, 2]], true), [[2, 1]]);
   assert.deepEqual([placeOf(91, 0, false), placeOf(null, 0, false), placeOf(91, 0, true)], [null, null, [91, 0]]);
+  assert.deepEqual([placeOf(-1e300, 5, true), placeOf(5, 1e17, true)], [null, null]);
   near(perMetre([60, 0], false)[1] / perMetre([60, 0], false)[0], 2, 1e-3);
   assert.deepEqual([0.1, 1, 3].map((metres) => gridStep(metres)), [10, 100, 200]);
 });

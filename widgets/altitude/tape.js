@@ -5,6 +5,7 @@
  * Its rungs are drawn for three times what is seen, and then it is only moved; it is drawn anew when
  * the mark comes near an end.
  */
+import { wholes } from "urc/scale";
 
 /** How high the picture of the tape is, in its own units. */
 export const HIGH = 200;
@@ -20,12 +21,11 @@ export const HIGH = 200;
 export function tape(value, span) {
   const step = stepOf(span);
   const base = Math.round(value / span) * span;
-  const rungs = [];
-  const [from, to] = [Math.ceil((base - 1.5 * span) / step), Math.floor((base + 1.5 * span) / step)];
-  for (let place = from; place <= to; place += 1) {
+  const places = wholes(Math.ceil((base - 1.5 * span) / step), Math.floor((base + 1.5 * span) / step));
+  const rungs = places.map((place) => {
     const at = Number((place * step).toPrecision(12)) + 0;
-    rungs.push({ value: at, y: (-(at - base) / span) * HIGH, isMain: place % 2 === 0 });
-  }
+    return { value: at, y: (-(at - base) / span) * HIGH, isMain: place % 2 === 0 };
+  });
   return { base, step, rungs };
 }
 

@@ -10,6 +10,8 @@
 
 const EARTH_M = 6_371_008.8;
 const RAD = Math.PI / 180;
+/** No robot's own map goes as far as round the earth: such numbers are noise. */
+const FARTHEST_M = 4e7;
 
 /**
  * Return the distance in metres.
@@ -98,6 +100,7 @@ export function placesOf(value, isLocal) {
  */
 export function placeOf(first, second, isLocal) {
   if (first === null || second === null) return null;
+  if (isLocal && Math.max(Math.abs(first), Math.abs(second)) > FARTHEST_M) return null;
   if (!isLocal && (Math.abs(first) > 90 || Math.abs(second) > 360)) return null;
   return [first, second];
 }

@@ -3,6 +3,7 @@
 /** @typedef {import("leaflet").Map} LeafletMap */
 /** @typedef {import("./geo.js").Place} Place */
 import { board, colours, write } from "urc/kit";
+import { wholes } from "urc/scale";
 import { distance, distanceText, gridStep, perMetre } from "./geo.js";
 
 /** More lines than fit on any screen at their least spacing. */
@@ -85,8 +86,9 @@ export class Grid {
    * @param {(place: number) => void} line
    */
   lines(pen, from, step, [least, most], line) {
-    if (!(step > 0) || (most - least) / step > MOST_LINES) return;
-    for (let index = Math.ceil((least - from) / step); from + index * step <= most; index += 1) {
+    const [first, last] = [Math.ceil((least - from) / step), Math.floor((most - from) / step)];
+    if (!(step > 0) || last - first > MOST_LINES) return;
+    for (const index of wholes(first, last)) {
       pen.beginPath();
       pen.strokeStyle = (index === 0 ? this.ink?.line : this.ink?.faint) ?? "";
       line(from + index * step);

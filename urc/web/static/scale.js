@@ -14,6 +14,9 @@
 /** Tick distances that people read with ease, within a decade. */
 const STEPS = [1, 2, 5, 10];
 
+/** Numbers whose difference is a smaller share of them are drawn as one. */
+const NEAREST = 1e-12;
+
 /**
  * Return where a value stands on a scale, as a share from 0 to 1; ends clamp.
  *
@@ -39,12 +42,22 @@ export function ticks(least, most, count) {
   const rough = (most - least) / Math.max(1, count);
   const decade = 10 ** Math.floor(Math.log10(rough));
   const step = decade * (STEPS.find((each) => each * decade >= rough * 0.999) ?? 10);
-  const found = [];
   // Multiplied, not added up: ten times 0.1 is not 1.
-  for (let place = Math.ceil(least / step - 1e-9); place * step <= most + step * 1e-9; place += 1) {
-    found.push(Number((place * step).toPrecision(12)) + 0);
-  }
-  return found;
+  const places = wholes(Math.ceil(least / step - 1e-9), Math.floor(most / step + 1e-9));
+  return places.map((place) => Number((place * step).toPrecision(12)) + 0);
+}
+
+/**
+ * Return the whole numbers from one to another, both included; none so far from zero that a number and
+ * the next one are not told apart.
+ *
+ * @param {number} first
+ * @param {number} last
+ * @returns {number[]} rising
+ */
+export function wholes(first, last) {
+  if (!Number.isSafeInteger(first) || !Number.isSafeInteger(last)) return [];
+  return Array.from({ length: Math.max(0, last - first + 1) }, (_, index) => first + index);
 }
 
 /**
@@ -110,7 +123,8 @@ export function bands(limits, least, most) {
 export function spanOf(least, most, limits) {
   if (!(most >= least)) return [0, 1];
   let [bottom, top] = [least, most];
-  if (bottom === top) {
+  // Too near each other to be counted between: as good as one value.
+  if (top - bottom <= Math.max(Math.abs(top), Math.abs(bottom)) * NEAREST) {
     const room = Math.abs(top) / 10 || 1;
     [bottom, top] = [bottom - room, top + room];
   }
