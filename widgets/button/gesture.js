@@ -22,6 +22,7 @@ const EVERY_MS = 40;
  * @param {() => void} spec.done
  * @param {(share: number) => void} spec.progress how far the hold has got, 0 to 1
  * @param {AbortSignal} spec.signal
+ * @returns {() => void} ends what a finger has begun
  */
 export function listen(el, { gesture, repeatMs, isReady, done, progress, signal }) {
   let firstMs = -Infinity;
@@ -39,7 +40,7 @@ export function listen(el, { gesture, repeatMs, isReady, done, progress, signal 
       // A key that is held down repeats its clicks: that is one tap.
       if (event.repeat && event.key === "Enter") event.preventDefault();
     }, { signal });
-    return;
+    return () => (firstMs = -Infinity);
   }
 
   function end() {
@@ -52,7 +53,7 @@ export function listen(el, { gesture, repeatMs, isReady, done, progress, signal 
     downMs = performance.now();
     if (gesture === "repeat") {
       done();
-      timer = window.setInterval(() => (isReady() ? done() : undefined), repeatMs);
+      timer = window.setInterval(() => (isReady() ? done() : end()), repeatMs);
       progress(1);
       return;
     }
@@ -87,4 +88,5 @@ export function listen(el, { gesture, repeatMs, isReady, done, progress, signal 
   addEventListener("blur", end, { signal });
   document.addEventListener("visibilitychange", end, { signal });
   signal.addEventListener("abort", end);
+  return end;
 }

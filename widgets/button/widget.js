@@ -62,13 +62,17 @@ class Button {
       slide(this.main, { label, isReady, done: () => this.press(), signal });
     } else if (gesture === "tap" || gesture === "double" || gesture === "hold" || gesture === "repeat") {
       const fill = part(el, ".button-fill");
-      listen(this.main, {
+      const end = listen(this.main, {
         gesture,
         repeatMs: Number(options["repeat_ms"] ?? 250),
-        isReady: gesture === "repeat" ? () => this.giver.isReady && !this.isCold : isReady,
+        // One that is under way, or cold, is left out; without the robot the gesture is over.
+        isReady: gesture === "repeat" ? () => this.giver.isReady : isReady,
         done: () => this.press(),
         progress: (share) => style(fill, "--button-share", share.toFixed(2)),
         signal,
+      });
+      ctx.onStop(({ phase }) => {
+        if (phase !== "") end();
       });
     }
     el.querySelector(".button-yes")?.addEventListener("click", () => this.answer(true), { signal });

@@ -125,9 +125,13 @@ export class OwnList extends Run {
     this.outputs = STEPS.filter((name) => ctx.command(name) !== null);
     this.names = this.outputs.map((name) => ctx.command(name)?.title || ctx.command(name)?.command || name);
     this.isHalted = false;
-    this.isAborted = false;
+    /** Why it goes no further; "" while it may. */
+    this.ended = "";
     /** @type {(() => void) | null} */
     this.goOn = null;
+    ctx.onStop(({ phase }) => {
+      if (phase !== "" && this.state !== "idle") this.abort(ctx.t("STOP was pressed"));
+    });
   }
 
   /** @param {Readonly<Record<string, Outlet>>} outputs */
@@ -138,13 +142,13 @@ export class OwnList extends Run {
 
   async start() {
     const { ctx } = this;
-    this.isAborted = false;
+    this.ended = "";
     this.isHalted = this.isEach;
     [this.place, this.isDone, this.isFailed, this.outcome] = [0, false, false, ""];
     try {
       for (const name of this.outputs) {
         await this.turn();
-        if (this.isAborted) throw new Error(ctx.t("somebody ended it"));
+        if (this.ended) throw new Error(this.ended);
         this.place += 1;
         this.become("running");
         await ctx.send(name);
@@ -161,7 +165,7 @@ export class OwnList extends Run {
 
   /** Wait until the next step may begin. */
   async turn() {
-    if (!this.isHalted || this.isAborted) return;
+    if (!this.isHalted || this.ended) return;
     this.become("paused");
     await new Promise((resolve) => {
       this.goOn = () => resolve(undefined);
@@ -188,8 +192,8 @@ export class OwnList extends Run {
     this.goOn?.();
   }
 
-  abort() {
-    this.isAborted = true;
+  abort(why = this.ctx.t("somebody ended it")) {
+    this.ended = why;
     this.goOn?.();
   }
 

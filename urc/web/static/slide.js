@@ -89,6 +89,8 @@ export function slide(el, { label, done, touched, isReady = () => true, signal }
     const way = { ArrowRight: 0.1, ArrowUp: 0.1, ArrowLeft: -0.1, ArrowDown: -0.1 }[event.key];
     if (way === undefined || !isReady()) return;
     event.preventDefault();
+    // A key that is held down slides once; then it has to come up.
+    if (event.repeat && share === 0) return;
     touched?.();
     hold.drop(); // one hand at a time
     put(Math.round((share + way) * 10) / 10);

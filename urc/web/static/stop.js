@@ -57,6 +57,7 @@ export class StopButton {
   press() {
     this.input.spendAll("STOP");
     this.drive.stop();
+    this.seen = ""; // pressed anew, it is told anew: what goes on by itself ends with each press
     this.frame();
   }
 

@@ -223,7 +223,7 @@
  * @property {PadDesk} pads The gamepads, and where their sticks are.
  * @property {() => void} stop Stops the robot, whoever drives it.
  * @property {(listener: (state: StopState) => void) => void} onStop Calls the listener now, and
- *   whenever what is known of STOP changes.
+ *   whenever STOP is pressed or what is known of it changes. What gives commands by itself ends then.
  * @property {(output: string) => Described | null} command What is bound to an output; null when
  *   nothing is.
  * @property {(output: string, verb: "pause" | "step" | "resume" | "abort") => void} steer Lets the

@@ -1,0 +1,120 @@
+"""What gives commands by itself until somebody ends it: STOP does, and so does a lost line."""
+
+import asyncio
+from collections.abc import Mapping
+from typing import Any
+
+import pytest
+
+from tests.e2e.conftest import PageMaker
+from tests.e2e.dashboards import until, until_text
+from tests.e2e.motion.driving import STOP, centre, driven, fresh
+from tests.e2e.widgets.inputs import Inputs, use
+from urc.model.codec import WriteSpec
+from urc.model.driver import Command
+from urc.model.interface import WidgetUse
+from urc.model.values import Reading
+from urc.protocol.events import Replied
+
+pytestmark = pytest.mark.anyio
+
+STICK = use("joystick")
+PLAIN = {
+    name: Command(name, "wire", WriteSpec("text"), title=name)
+    for name in ("unlock", "fire", "ring")
+}
+
+
+class Slow(Inputs):
+    """Its first command is under way until the test says that it is done."""
+
+    def __init__(self, *uses: WidgetUse) -> None:
+        super().__init__(*uses, **PLAIN)
+        self.done = asyncio.Event()
+
+    async def command(self, name: str, arguments: Mapping[str, Reading], **how: Any) -> Replied:
+        """Answer, `unlock` only when it is done."""
+        replied = await super().command(name, arguments, **how)
+        if name == "unlock":
+            await self.done.wait()
+        return replied
+
+
+async def test_stop_ends_a_list_of_steps(new_page: PageMaker) -> None:
+    """The step that was given is given; none comes after it, and the reason is told."""
+    steps = WidgetUse("list", "sequence", {}, {"step_1": "unlock", "step_2": "fire"})
+    slow = Slow(STICK, steps)
+    async with driven(robot=slow) as (_, address):
+        page = await fresh(new_page)
+        await page.goto(address)
+        await page.locator(".sequence-start:not([aria-disabled='true'], :disabled)").click()
+        await until(lambda: slow.commands == [("unlock", {})])
+        await page.click(STOP)
+        await until_text(page, "[data-who]", "■ Stopped by you")
+        slow.done.set()
+        await until_text(page, ".sequence-note", "▲ STOP was pressed")
+        assert slow.commands == [("unlock", {})]
+
+
+async def repeating(new_page: PageMaker, robot: Inputs, address: str) -> Any:
+    """Rest a finger on a button that repeats; return its page."""
+    page = await fresh(new_page)
+    await page.goto(address)
+    await page.wait_for_selector(".button-main[aria-disabled='false']")
+    await page.mouse.move(*await centre(page, ".button-main"))
+    await page.mouse.down()
+    await until(lambda: len(robot.commands) >= 3)
+    return page
+
+
+RING = WidgetUse("ring", "button", {}, {"press": "ring"}, {"gesture": "repeat", "repeat_ms": 50})
+
+
+async def test_stop_ends_a_button_that_repeats(new_page: PageMaker) -> None:
+    """However long the finger rests on it."""
+    robot = Inputs(STICK, RING, **PLAIN)
+    async with driven(robot=robot) as (_, address):
+        page = await repeating(new_page, robot, address)
+        await page.dispatch_event(STOP, "pointerdown", {"button": 0, "pointerId": 7})
+        await until_text(page, "[data-who]", "■ Stopped by you")
+        count = len(robot.commands)
+        await asyncio.sleep(0.5)
+        assert len(robot.commands) == count
+
+
+async def test_a_button_that_repeats_does_not_go_on_when_the_robot_is_back(
+    new_page: PageMaker,
+) -> None:
+    """That takes a new press."""
+    robot = Inputs(STICK, RING, **PLAIN)
+    async with driven(robot=robot) as (_, address):
+        page = await repeating(new_page, robot, address)
+        robot.link("lost", "cable")
+        await until_text(page, ".button-note", "◆ the robot is not connected")
+        count = len(robot.commands)
+        robot.link("live")
+        await page.wait_for_selector(".button-main[aria-disabled='false']")
+        await asyncio.sleep(0.5)
+        assert len(robot.commands) == count
+        await page.mouse.up()
+        await page.mouse.down()
+        await until(lambda: len(robot.commands) > count)
+
+
+async def test_a_key_that_is_held_down_slides_once(new_page: PageMaker) -> None:
+    """It repeats itself; the slide does not."""
+    slide = WidgetUse("ring", "button", {}, {"press": "ring"}, {"gesture": "slide"})
+    robot = Inputs(STICK, slide, **PLAIN)
+    async with driven(robot=robot) as (_, address):
+        page = await fresh(new_page)
+        await page.goto(address)
+        await page.wait_for_selector(".button-main[aria-disabled='false']")
+        await page.focus(".button-main")
+        for _ in range(35):
+            await page.keyboard.down("ArrowRight")  # from the second on, it repeats
+        await until_text(page, ".button-note", "✓ sent")
+        await page.keyboard.up("ArrowRight")
+        assert robot.commands == [("ring", {})]
+        for _ in range(10):
+            await page.keyboard.press("ArrowRight")
+        await until(lambda: len(robot.commands) == 2)
