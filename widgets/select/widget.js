@@ -5,7 +5,7 @@
 /** @typedef {import("../../urc/web/static/types.js").Reading} Reading */
 /** @typedef {import("../../urc/web/static/types.js").Value} Value */
 import { Giver, Wish } from "urc/giving";
-import { attribute, noteOf, part, write } from "urc/kit";
+import { attribute, noteOf, part, wordOf, write } from "urc/kit";
 
 /** @typedef {{value: Value, label: string}} Choice */
 
@@ -44,12 +44,22 @@ class Select {
     this.chosen = null;
     const show = () => this.show();
     this.giver = new Giver({ give: () => send("change", { value: this.chosen }), show, t, signal });
-    this.wish = new Wish({ withinMs: 1000 * Number(options["echo_s"] ?? 3), show, signal });
+    this.wish = new Wish({
+      withinMs: 1000 * Number(options["echo_s"] ?? 3),
+      show,
+      signal,
+      isSame: (wished, said) => this.word(wished) === String(said),
+    });
     this.place?.addEventListener("change", (event) => {
       const at = event.target;
       if (at instanceof HTMLSelectElement) void this.choose(this.choices[Number(at.value)]);
       if (at instanceof HTMLInputElement) void this.choose(this.choices[Number(at.value)]);
     }, { signal });
+  }
+
+  /** What the robot is heard to say when it is this. @param {Value} value */
+  word(value) {
+    return wordOf(this.state?.signal, value);
   }
 
   /**
@@ -84,12 +94,12 @@ class Select {
     const { giver, wish, state, ctx } = this;
     const isHoped = this.isOptimistic && wish.isWaiting;
     const said = state && state.value !== null ? String(state.value) : null;
-    const shown = isHoped ? String(wish.value) : said;
+    const shown = isHoped ? this.word(wish.value) : said;
     attribute(this.root, "data-state", state?.state ?? "none");
     attribute(this.root, "data-alarm", state?.alarm ?? "");
     attribute(this.root, "data-phase", giver.phase);
     attribute(this.root, "data-wish", wish.isMissed ? "missed" : wish.isWaiting ? "waiting" : "");
-    const now = this.choices.find(({ value }) => String(value) === shown);
+    const now = this.choices.find(({ value }) => this.word(value) === shown);
     const sign = wish.isWaiting ? " …" : wish.isMissed ? " ≠" : "";
     write(this.now, (state ? (now?.label ?? state.text) : "—") + sign);
     this.mark(shown, !giver.isReady || giver.isPending);
@@ -103,16 +113,16 @@ class Select {
    * @param {boolean} isLocked
    */
   mark(shown, isLocked) {
-    const place = this.choices.findIndex(({ value }) => String(value) === shown);
+    const place = this.choices.findIndex(({ value }) => this.word(value) === shown);
     const list = this.place?.querySelector("select");
     if (list) {
       if (list.value !== String(place)) list.value = String(place);
-      if (list.disabled !== isLocked) list.disabled = isLocked;
+      lock(list, isLocked);
     }
     for (const radio of this.place?.querySelectorAll("input") ?? []) {
       const isOne = radio.value === String(place);
       if (radio.checked !== isOne) radio.checked = isOne;
-      if (radio.disabled !== isLocked) radio.disabled = isLocked;
+      lock(radio, isLocked);
       const isWished = this.wish.value !== null && this.choices[Number(radio.value)]?.value === this.wish.value;
       attribute(radio.parentElement ?? radio, "data-wished", isWished ? "true" : null);
     }
@@ -143,6 +153,19 @@ class Select {
     label.append(input, text);
     return label;
   }
+}
+
+/**
+ * Lock a control, but not under a hand that is on it: the focus would fall to the page, and the next
+ * key with it. What is chosen meanwhile is refused.
+ *
+ * @param {HTMLSelectElement | HTMLInputElement} control
+ * @param {boolean} isLocked
+ */
+function lock(control, isLocked) {
+  const isOff = isLocked && document.activeElement !== control;
+  if (control.disabled !== isOff) control.disabled = isOff;
+  attribute(control, "aria-disabled", String(isLocked));
 }
 
 /**

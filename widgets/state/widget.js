@@ -2,7 +2,7 @@
 /** @typedef {import("../../urc/web/static/types.js").Context} Context */
 /** @typedef {import("../../urc/web/static/types.js").Instance} Instance */
 /** @typedef {import("../../urc/web/static/types.js").Reading} Reading */
-import { attribute, clamp, noteOf, part, style, write } from "urc/kit";
+import { attribute, clamp, keyOf, noteOf, part, style, write } from "urc/kit";
 
 /** The same shapes as everywhere: triangle, diamond and square are alarm, caution and advice. */
 const SHAPES = {
@@ -50,9 +50,9 @@ export default {
  * @param {unknown} meanings
  * @returns {keyof typeof SHAPES}
  */
-function meaningOf({ value }, meanings) {
+function meaningOf({ value, signal }, meanings) {
   if (value === null) return "unknown";
-  const said = entry(meanings, String(value));
+  const said = entry(meanings, value, signal);
   if (said !== undefined && Object.hasOwn(SHAPES, said)) return /** @type {keyof typeof SHAPES} */ (said);
   if (typeof value === "boolean") return value ? "on" : "off";
   return "plain";
@@ -63,19 +63,23 @@ function meaningOf({ value }, meanings) {
  * @param {unknown} words
  * @param {Context["t"]} t
  */
-function wordOf({ value, text }, words, t) {
+function wordOf({ value, text, signal }, words, t) {
   if (value === null) return text;
-  const said = entry(words, String(value));
+  const said = entry(words, value, signal);
   if (said !== undefined) return said;
   if (typeof value === "boolean" && text === String(value)) return value ? t("on") : t("off");
   return text;
 }
 
 /**
+ * Return what a table says of a value: by the word that people read, or by what the robot says.
+ *
  * @param {unknown} table
- * @param {string} key
+ * @param {unknown} value
+ * @param {Reading["signal"]} signal
  */
-function entry(table, key) {
-  if (typeof table !== "object" || table === null || !Object.hasOwn(table, key)) return undefined;
-  return String(/** @type {Record<string, unknown>} */ (table)[key]);
+function entry(table, value, signal) {
+  if (typeof table !== "object" || table === null) return undefined;
+  const key = [String(value), keyOf(signal, value)].find((each) => Object.hasOwn(table, each));
+  return key === undefined ? undefined : String(/** @type {Record<string, unknown>} */ (table)[key]);
 }

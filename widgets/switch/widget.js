@@ -5,7 +5,7 @@
 /** @typedef {import("../../urc/web/static/types.js").Reading} Reading */
 /** @typedef {import("../../urc/web/static/types.js").Value} Value */
 import { Giver, Wish } from "urc/giving";
-import { attribute, noteOf, part, write } from "urc/kit";
+import { attribute, noteOf, part, wordOf, write } from "urc/kit";
 
 export default {
   /**
@@ -73,11 +73,11 @@ class Switch {
    */
   isOn(said) {
     if (said === null || said === undefined) return null;
-    const [off, on] = this.values;
-    if (String(said) === String(on)) return true;
-    if (String(said) === String(off)) return false;
+    const [off, on] = this.values.map((value) => wordOf(this.state?.signal, value));
+    if (String(said) === on) return true;
+    if (String(said) === off) return false;
     if (typeof said === "boolean") return said;
-    return typeof said === "number" && on === true ? said !== 0 : null;
+    return typeof said === "number" && this.values[1] === true ? said !== 0 : null;
   }
 
   /** @param {boolean} isOn */

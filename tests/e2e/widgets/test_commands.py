@@ -30,7 +30,10 @@ signals:
   lamp: { type: boolean }
   mode: { type: string }
   volts: { type: number }
+  gear: { type: integer, states: { "0": low, "1": high } }
+  pump: { type: string, states: { P0: still, P1: running } }
 messages:
+  geared: { regex: '^gear (?P<gear>\\d) (?P<pump>P\\d)$' }
   told: { regex: '^(?P<lamp>on|off),(?P<mode>\\w+),(?P<volts>[\\d.]+)$' }
 commands:
   set_lamp:
@@ -44,6 +47,14 @@ commands:
   set_volts:
     send: "VOLT {{ volts }}"
     args: { volts: { type: number, min: 0, max: 10, unit: V } }
+    reply: { equals: OK }
+  set_gear:
+    send: "GEAR {{ gear }}"
+    args: { gear: { type: integer, choices: [0, 1] } }
+    reply: { equals: OK }
+  set_pump:
+    send: "PUMP {{ pump }}"
+    args: { pump: { type: string, choices: [P0, P1] } }
     reply: { equals: OK }
   say: { send: "SAY {{ words }}", args: { words: { type: string } }, reply: { equals: OK } }
   raw: { send: "{{ line }}", args: { line: { type: string } }, reply: { equals: OK } }
@@ -71,6 +82,14 @@ class Crane:
     def __init__(self) -> None:
         self.lines: list[str] = []
         self._writers: list[asyncio.StreamWriter] = []
+        self.holds = False
+        """Whether it keeps its answers until `release`."""
+
+    def release(self) -> None:
+        """Give the answer that it has kept."""
+        self.holds = False
+        for writer in self._writers:
+            writer.write(b"OK\n")
 
     async def talk(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         """Serve one connection."""
@@ -78,8 +97,9 @@ class Crane:
         try:
             while line := await reader.readline():
                 self.lines.append(line.decode())
-                writer.write(b"OK\n")
-                await writer.drain()
+                if not self.holds:
+                    writer.write(b"OK\n")
+                    await writer.drain()
         except ConnectionError:
             pass
         finally:
@@ -90,6 +110,12 @@ class Crane:
         await until(lambda: bool(self._writers))
         for writer in self._writers:
             writer.write(f"{lamp},{mode},{volts}\n".encode())
+
+    async def tell_gear(self, gear: int, pump: str) -> None:
+        """Say it as the robot does, not in the words for people."""
+        await until(lambda: bool(self._writers))
+        for writer in self._writers:
+            writer.write(f"gear {gear} {pump}\n".encode())
 
     async def until_got(self, *lines: str) -> None:
         """Wait for exactly these lines, and forget them."""
@@ -126,6 +152,62 @@ async def ready(page: Page, selector: str) -> Locator:
     """Return a control that can be used."""
     await until_attribute(page, selector, "aria-disabled", "false")
     return page.locator(selector)
+
+
+WORDED = """
+  gear: { use: select, bind: { state: gear, change: set_gear }, options: { look: radio } }
+  gears: { use: select, bind: { state: gear, change: set_gear } }
+  pump: { use: switch, bind: { state: pump, change: set_pump } }
+  seen: { use: state, bind: { value: pump }, options: { meanings: { P1: busy, still: caution } } }
+"""
+
+
+async def test_a_signal_with_words_is_chosen_and_switched_by_what_the_robot_says(
+    new_page: PageMaker, urc_process: Callable[..., UrcProcess], tmp_path: Path
+) -> None:
+    """People read the words, the robot is told its own; the mark stands where it says it is."""
+    async with crane(urc_process, tmp_path, WORDED) as (robot, address):
+        page = await new_page(size="desktop")
+        await page.goto(address)
+        await ready(page, "[data-cell='0'] .select-radio")
+        await robot.tell_gear(0, "P0")
+        await until_text(page, ".select-now", "low")
+        assert await page.get_by_role("radio", name="low").is_checked()
+        assert await page.input_value("select.select-list") == "0"
+        assert await page.inner_text(".state-shape") == "◆"
+        await until_text(page, ".switch-word", "off")
+
+        await page.get_by_role("radio", name="high").click()
+        await robot.until_got("GEAR 1")
+        await page.click(".switch-main")
+        await robot.until_got("PUMP P1")
+        await robot.tell_gear(1, "P1")
+        await until_text(page, ".select-now", "high")
+        assert await page.get_by_role("radio", name="high").is_checked()
+        assert await page.input_value("select.select-list") == "1"
+        await until_text(page, ".switch-word", "on")
+        await until_text(page, ".state-shape", "◐")
+        assert await page.locator("[data-wish=missed], [data-wish=waiting]").count() == 0
+
+
+async def test_choosing_by_keys_keeps_the_focus(
+    new_page: PageMaker, urc_process: Callable[..., UrcProcess], tmp_path: Path
+) -> None:
+    """While the robot is asked, too: a key that fell to the page could drive it."""
+    async with crane(urc_process, tmp_path, WORDED) as (robot, address):
+        page = await new_page(size="desktop")
+        await page.goto(address)
+        await ready(page, "[data-cell='0'] .select-radio")
+        await robot.tell_gear(0, "P0")
+        await until_text(page, ".select-now", "low")
+        for control in ("select.select-list", "[data-cell='0'] .select-radio"):
+            robot.holds = True
+            await page.focus(control)
+            await page.keyboard.press("ArrowDown")
+            await until_attribute(page, ".select:has(:focus)", "data-phase", "pending")
+            robot.release()
+            await page.wait_for_selector(".select:has(:focus)[data-phase='done']")
+            robot.lines.clear()
 
 
 CONTROLS = """

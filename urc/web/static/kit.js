@@ -7,6 +7,7 @@
  *
  * @typedef {import("./types.js").Alarm} Alarm
  * @typedef {import("./types.js").Reading} Reading
+ * @typedef {import("./types.js").Signal} Signal
  */
 
 import { mark } from "./words.js";
@@ -225,6 +226,30 @@ export function format(value, digits) {
 export function number(reading) {
   const value = reading?.value;
   return typeof value === "number" && Number.isFinite(value) ? value : null;
+}
+
+/**
+ * Return the word by which people know a value: where a signal has `states`, its values are words, and
+ * a command takes what the robot says.
+ *
+ * @param {Pick<Signal, "states"> | undefined} signal
+ * @param {unknown} value as the robot says it, or a word already
+ */
+export function wordOf(signal, value) {
+  const states = signal?.states ?? {};
+  const text = String(value);
+  return Object.hasOwn(states, text) ? (states[text] ?? text) : text;
+}
+
+/**
+ * Return what the robot says for a word; the word itself where it has no other.
+ *
+ * @param {Pick<Signal, "states"> | undefined} signal
+ * @param {unknown} word
+ */
+export function keyOf(signal, word) {
+  const found = Object.entries(signal?.states ?? {}).find(([, text]) => text === String(word));
+  return found ? found[0] : String(word);
 }
 
 /**
