@@ -4,7 +4,7 @@ import asyncio
 from collections.abc import Callable
 
 import pytest
-from playwright.async_api import Page
+from playwright.async_api import Page, expect
 
 from tests.e2e.browser import Size
 from tests.e2e.conftest import PageMaker
@@ -214,6 +214,19 @@ async def test_a_value_is_not_shown_a_minute_after_its_line_was_lost(new_page: P
         assert await page.text_content(".value-text") == "—"
         robot.link("live")
         await until_text(page, ".value-text", "open")
+
+
+async def test_a_robot_is_found_by_a_word_on_a_phone(new_page: PageMaker) -> None:
+    """The cards without it are gone; without any, that is said."""
+    robots = [FakeRobot(dashboard_profile(name=f"bot{number}")) for number in range(7)]
+    async with running_dashboard(*robots) as address:
+        page = await new_page(size="phone")
+        await page.goto(address)
+        await page.get_by_role("searchbox", name="Find a robot").fill("bot3")
+        await expect(page.locator("[data-robot-card]:visible")).to_have_count(1)
+        await page.get_by_role("searchbox", name="Find a robot").fill("xyzzy")
+        await expect(page.locator("[data-robot-card]:visible")).to_have_count(0)
+        await expect(page.get_by_text("No robot has these words")).to_be_visible()
 
 
 async def test_from_menu_to_robot_and_back_by_keyboard(new_page: PageMaker) -> None:

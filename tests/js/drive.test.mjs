@@ -4,7 +4,7 @@ import assert from "node:assert/strict";
 import test from "node:test";
 import { Drive } from "../../urc/web/static/drive.js";
 
-Object.assign(globalThis, { WebSocket: { OPEN: 1 } });
+Object.assign(globalThis, { WebSocket: { OPEN: 1 }, window: globalThis });
 let nowMs = 1000;
 performance.now = () => nowMs;
 
@@ -47,4 +47,22 @@ test("as soon as the line is free, the newest goes", () => {
   socket.unsent = 0;
   tell("newest");
   assert.deepEqual(sent, ["one", "newest"]);
+});
+
+test("STOP that nobody could be told is told as soon as URC is back", async () => {
+  /** @type {string[]} */
+  const sent = [];
+  let isUp = false;
+  const socket = { unsent: 0, tripMs: 2, send: (/** @type {any} */ { t }) => isUp && sent.push(t) > 0 };
+  const drive = new Drive(/** @type {any} */ (socket), "http://127.0.0.1:1/stop", () => {});
+  globalThis.fetch = () => Promise.reject(new Error("there is nobody"));
+  const lease = { you: "s1", epoch: 3, holder: null, asker: null, latched: "", confirmed: false, drives: true, left: 0 };
+  drive.stop();
+  await new Promise(setImmediate);
+  assert.equal(drive.phase, "failed");
+  isUp = true;
+  drive.setLease(/** @type {any} */ (lease), nowMs);
+  assert.deepEqual([sent, drive.phase], [["stop"], "sent"]);
+  drive.setLease(/** @type {any} */ ({ ...lease, epoch: 4, latched: "screen 1" }), nowMs);
+  assert.deepEqual([sent, drive.phase, drive.isLatched], [["stop"], "", true]);
 });

@@ -61,6 +61,33 @@ async def test_escape_and_the_click_of_a_screen_reader_stop_too(new_page: PageMa
         assert set(robot.after(count)) == {"drive stop", "lift stop"}
 
 
+async def test_escape_closes_an_open_panel_first(new_page: PageMaker) -> None:
+    """With nothing held it means that; the next one is STOP again."""
+    async with calmly_driven() as (robot, address):
+        page = await opened(new_page, address)
+        await page.get_by_role("button", name="This device").click()
+        await page.wait_for_selector("#device:popover-open")
+        await page.keyboard.press("Escape")
+        await page.wait_for_selector("#device:not(:popover-open)", state="attached")
+        assert robot.line.texts == []
+        await page.keyboard.press("Escape")
+        await until_text(page, NOTE, DONE)
+
+
+async def test_escape_is_stop_while_something_is_held_whatever_lies_open(
+    new_page: PageMaker,
+) -> None:
+    """Who drives is not asked which panel is open."""
+    async with calmly_driven() as (robot, address):
+        page = await opened(new_page, address)
+        await push(page)
+        await robot.until_moving()
+        await page.evaluate("document.querySelector('#device').showPopover()")
+        await page.keyboard.press("Escape")
+        await until_text(page, NOTE, DONE)
+        await page.mouse.up()
+
+
 async def test_a_press_that_slid_off_takes_nothing_from_the_next_one(new_page: PageMaker) -> None:
     """No click follows it; the next click, of a key or a screen reader, stops all the same."""
     async with calmly_driven() as (_, address):

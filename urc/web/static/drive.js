@@ -82,10 +82,12 @@ export class Drive {
     this.handedMs = nowMs + lease.left;
     if (!this.isMine) this.beat = this.beatMs = 0;
     if (this.isMine !== wasMine || lease.latched) this.refusal = "";
-    if (lease.latched || this.phase === "failed") this.settle("");
+    const isOwed = this.phase === "failed" && !lease.latched;
+    if (lease.latched) this.settle("");
     this.posted = null;
     this.double();
-    this.changed();
+    if (isOwed) this.stop(); // pressed when nobody could be told: it is told now
+    else this.changed();
   }
 
   /**

@@ -28,6 +28,8 @@ export class StopButton {
     if (lines.length > 0) {
       addEventListener("keydown", (event) => {
         if (event.key !== "Escape" || event.defaultPrevented || event.repeat) return;
+        // A panel that lies open is closed by it, as everywhere; while something is held it is STOP.
+        if (document.querySelector(":popover-open") && !this.input.isDriving()) return;
         event.preventDefault();
         this.press();
       });
