@@ -24,6 +24,8 @@ export class Wish {
     this.isMissed = false;
     /** Readings up to this one do not answer the wish. */
     this.serial = 0;
+    /** What the robot says now. @type {Reading | undefined} */
+    this.said = undefined;
     /** @type {number | undefined} */
     this.timer = undefined;
     signal.addEventListener("abort", () => clearTimeout(this.timer));
@@ -41,11 +43,21 @@ export class Wish {
     this.value = value;
     this.isMissed = false;
     this.serial = reading?.serial ?? 0;
+    this.said = reading;
     clearTimeout(this.timer);
-    this.timer = window.setTimeout(() => {
-      this.isMissed = this.value !== null;
-      this.show();
-    }, this.withinMs);
+    this.timer = window.setTimeout(() => this.end(), this.withinMs);
+  }
+
+  /** Its time is over. A robot that tells changes only is silent about what it had done before. */
+  end() {
+    if (this.value !== null && this.isSaid(this.said)) this.drop();
+    else this.isMissed = this.value !== null;
+    this.show();
+  }
+
+  /** @param {Reading | undefined} reading */
+  isSaid(reading) {
+    return reading !== undefined && reading.value !== null && this.isSame(this.value, reading.value);
   }
 
   /** It was not even given. */
@@ -57,7 +69,7 @@ export class Wish {
 
   /** @param {Reading | undefined} reading */
   take(reading) {
-    if (this.value === null || !reading || reading.value === null) return;
-    if (reading.serial > this.serial && this.isSame(this.value, reading.value)) this.drop();
+    this.said = reading;
+    if (this.value !== null && reading && reading.serial > this.serial && this.isSaid(reading)) this.drop();
   }
 }
