@@ -115,6 +115,9 @@ export class Alerts {
   news(store, nowMs) {
     /** @type {Alert[]} */
     const found = [];
+    for (const name of this.known.keys()) {
+      if (!store.samples.has(name)) this.known.delete(name);
+    }
     for (const name of store.samples.keys()) {
       const { alarm, text, unit, signal } = store.reading(name, nowMs);
       const before = this.known.get(name);

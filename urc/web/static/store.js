@@ -72,7 +72,8 @@ export class Store {
   }
 
   /**
-   * Take what the server serves. Values stay: they are the last that were seen, with their age.
+   * Take what the server serves. Values stay: they are the last that were seen, with their age. Those
+   * of signals that there are no more go: nothing would ever make them old.
    *
    * @param {Hello} hello
    * @param {number} nowMs
@@ -80,6 +81,9 @@ export class Store {
   hello(hello, nowMs) {
     this.signals = new Map(hello.signals.map((signal) => [signal.name, signal]));
     this.names = hello.signals.map((signal) => signal.name);
+    for (const name of this.samples.keys()) {
+      if (!this.signals.has(name)) this.samples.delete(name);
+    }
     this.hasPictures = hello.signals.some(({ type }) => PICTURES.has(type));
     this.edition += 1;
     this.links = new Map();
