@@ -2,7 +2,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { Alerts } from "../../urc/web/static/follow.js";
+import { Alerts, watched } from "../../urc/web/static/follow.js";
 import { Store } from "../../urc/web/static/store.js";
 
 /** @param {Store} store @param {...object} signals */
@@ -30,4 +30,19 @@ test("a value whose signal is no more is forgotten with its alarm, the others st
   hello(store, { name: "speed" });
   store.values({ n: 0, i: [0], v: [9], a: 0, s: ["hihi"] }, 2000);
   assert.deepEqual(alerts.news(store, 2000).value.map(({ since }) => since), [2], "it is past it anew");
+});
+
+test("an alert says how old its value is, and of what has a limit it is counted what is known", () => {
+  const limits = { high: 5 };
+  const store = storeOf({ name: "speed", limits, stale_after_s: 3 }, { name: "heat", limits }, { name: "name" });
+  const alerts = new Alerts();
+  assert.deepEqual(watched(store, 0).value, { limited: 2, known: 0 });
+  store.values({ n: 0, i: [0, 2], v: [9, 1], a: 0, s: ["high", ""] }, 0);
+  assert.deepEqual([watched(store, 0).value, alerts.news(store, 0).value[0]?.age], [{ limited: 2, known: 1 }, ""]);
+  assert.deepEqual(watched(store, 7000).value, { limited: 2, known: 0 });
+  assert.equal(alerts.news(store, 7000).value[0]?.age, "7 s");
+  store.values({ n: 7000, i: [0, 1], v: [1, 1], a: 0 }, 7000);
+  assert.deepEqual(watched(store, 7000).value, { limited: 2, known: 2 });
+  store.setUp(false, 7000);
+  assert.deepEqual(watched(store, 7001).value, { limited: 2, known: 0 });
 });

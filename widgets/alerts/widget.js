@@ -24,6 +24,8 @@ export default {
     const book = new Book(memory.read());
     /** @type {readonly Alert[]} */
     let alerts = [];
+    let watched = { limited: 0, known: 0 };
+    let isUp = false;
     let isMuted = false;
 
     function look() {
@@ -43,8 +45,9 @@ export default {
     }
 
     /** @param {Alert} alert */
-    function wordsOf({ title, alarm, text, unit }) {
-      return `${title}: ${t(ALARMS[alarm]).replace(/^[▲◆]\s*/, "")}, ${text}${unit ? ` ${unit}` : ""}`;
+    function wordsOf({ title, alarm, text, unit, age }) {
+      const word = t(ALARMS[alarm]).replace(/^[▲◆]\s*/, "");
+      return [`${title}: ${word}`, `${text}${unit ? ` ${unit}` : ""}`, age && t("{age} old", { age })].filter(Boolean).join(", ");
     }
 
     function show() {
@@ -61,10 +64,26 @@ export default {
       const count = states.filter((state) => state === "new").length;
       attribute(root, "data-loud", count > 0 ? "true" : "");
       const shelved = states.filter((state) => state === "shelved").length;
-      write(note, alerts.length === 0 ? `— ${t("✓ no alert")}` : [
+      const said = alerts.length === 0 ? [calm()] : [
         t("{count} not acknowledged", { count }),
         shelved > 0 ? t("{count} put off", { count: shelved }) : "",
-      ].filter(Boolean).join(" · "));
+      ];
+      const words = [...said, unknown()].filter(Boolean).join(" · ");
+      write(note, alerts.length === 0 ? `— ${words}` : words);
+    }
+
+    /** That nothing is past its limit: all is well only where everything that has one is known. */
+    function calm() {
+      const { limited, known } = watched;
+      if (isUp && known === limited) return t("✓ no alert");
+      return isUp && known > 0 ? t("no alert") : "";
+    }
+
+    /** Of what nobody can say now whether it is past its limit. */
+    function unknown() {
+      const count = watched.limited - watched.known;
+      if (!isUp) return t("no connection to URC");
+      return count > 0 ? t("values not known now: {count} of {all}", { count, all: watched.limited }) : "";
     }
 
     /** @param {string} name */
@@ -92,8 +111,10 @@ export default {
       const state = book.state(alert.signal, nowMs);
       attribute(item, "data-alarm", alert.alarm);
       attribute(item, "data-is", state);
+      attribute(item, "data-old", alert.age ? "true" : "");
       const value = `${alert.text}${alert.unit ? ` ${alert.unit}` : ""}`;
-      write(part(item, ".alerts-words"), `${t(ALARMS[alert.alarm])} · ${alert.title}: ${value}`);
+      const old = alert.age ? ` · ${t("{age} old", { age: alert.age })}` : "";
+      write(part(item, ".alerts-words"), `${t(ALARMS[alert.alarm])} · ${alert.title}: ${value}${old}`);
       const leftMin = Math.ceil((book.untilMs(alert.signal) - nowMs) / 60_000);
       const words = { new: "", seen: t("✓ acknowledged"), shelved: t("put off for {minutes} min", { minutes: leftMin }) };
       write(part(item, ".alerts-more"), words[state]);
@@ -124,6 +145,14 @@ export default {
     follow("alarms", (news) => {
       alerts = news;
       look();
+    });
+    follow("watched", (news) => {
+      watched = news;
+      show();
+    });
+    follow("links", (news) => {
+      isUp = news.isUp;
+      show();
     });
     let isDim = false;
     const flash = setInterval(() => {

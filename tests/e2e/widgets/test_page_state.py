@@ -7,7 +7,7 @@ import pytest
 from tests.e2e.conftest import PageMaker
 from tests.e2e.dashboards import running_dashboard, until, until_text
 from urc.model.interface import WidgetUse
-from urc.model.values import Signal
+from urc.model.values import Limits, Signal
 from urc.testing.dashboard import FakeRobot, dashboard_profile
 
 pytestmark = pytest.mark.anyio
@@ -62,3 +62,23 @@ async def test_what_the_page_knows_is_shown_and_acted_upon(new_page: PageMaker) 
         robot.link("lost", "pulled")
         await page.locator(".link-now", has_text="▲ Robot lost").wait_for()
         await page.locator(".link-facts dd", has_text="pulled").wait_for()
+
+
+async def test_no_alert_is_said_only_of_what_is_known(new_page: PageMaker) -> None:
+    """Before a value came, while it is old, and without URC nobody knows whether all is well."""
+    volts = Signal("volts", title="Battery", limits=Limits(low=11), stale_after_s=60)
+    uses = [WidgetUse("alerts", "alerts")]
+    robot = FakeRobot(dashboard_profile(uses=uses, signals={"volts": volts}))
+    page = await new_page(size="desktop")
+    async with running_dashboard(robot) as address:
+        await page.goto(f"{address}robots/puppet/")
+        await until(lambda: robot.is_open)
+        await until_text(page, ".alerts-note", "— values not known now: 1 of 1")
+        robot.say("volts", 9.0, alarm="low", age_s=90)
+        old = page.locator(".alerts-line[data-old='true'] .alerts-words", has_text="old")
+        await old.wait_for()
+        note = "1 not acknowledged · values not known now: 1 of 1"
+        await until_text(page, ".alerts-note", note)
+        robot.say("volts", 12.0)
+        await until_text(page, ".alerts-note", "— ✓ no alert")
+    await until_text(page, ".alerts-note", "— no connection to URC")

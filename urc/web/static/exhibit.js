@@ -32,7 +32,7 @@
  */
 import { Asks } from "./asks.js";
 import { Drive } from "./drive.js";
-import { Alerts, Follows } from "./follow.js";
+import { Alerts, Follows, watched } from "./follow.js";
 import { Host } from "./host.js";
 import { Input } from "./input.js";
 import { StopButton } from "./stop.js";
@@ -187,6 +187,7 @@ export class Exhibit {
       log: { lines: [], missing: 0 },
       lease: { lease: FREE, isMine: false, refusal: "" },
       alarms: [],
+      watched: { limited: 0, known: 0 },
       latency: { isUp: true, tripMs: 12, failures: 0, skewMs: 0, messages: 0, bytes: 0 },
       sequences: {},
       theme: { name: "" },
@@ -198,6 +199,7 @@ export class Exhibit {
       made[what] = () => ({ look: "", value });
     }
     if (!follow.alarms) made.alarms = () => alerts.news(this.store, performance.now());
+    if (!follow.watched) made.watched = () => watched(this.store, performance.now());
     if (!follow.lease) {
       made.lease = () => {
         const { lease, isMine, refusal } = this.drive;

@@ -119,16 +119,30 @@ export class Alerts {
       if (!store.samples.has(name)) this.known.delete(name);
     }
     for (const name of store.samples.keys()) {
-      const { alarm, text, unit, signal } = store.reading(name, nowMs);
+      const { alarm, text, unit, age, signal } = store.reading(name, nowMs);
       const before = this.known.get(name);
       if (!alarm) this.known.delete(name);
       else if (before?.alarm !== alarm) this.known.set(name, { alarm, since: nowMs / 1000 });
       const since = this.known.get(name)?.since ?? 0;
-      if (alarm) found.push({ signal: name, title: signal.title || name, alarm, text, unit, since });
+      if (alarm) found.push({ signal: name, title: signal.title || name, alarm, text, unit, age, since });
     }
     found.sort((one, other) => RANKS[one.alarm] - RANKS[other.alarm] || other.since - one.since);
     return { look: JSON.stringify(found), value: found };
   }
+}
+
+/**
+ * Return how many signals have a limit, and how many of them are known now: of the others nobody can
+ * say that they are within it.
+ *
+ * @param {Store} store
+ * @param {number} nowMs
+ */
+export function watched(store, nowMs) {
+  const limited = [...store.signals.values()].filter(({ limits }) => Object.keys(limits ?? {}).length > 0);
+  const known = limited.filter(({ name }) => store.state(name, nowMs) === "live");
+  const value = { limited: limited.length, known: known.length };
+  return { look: JSON.stringify(value), value };
 }
 
 /** Tells when the colours of the page have changed: by choice, or with the device. */

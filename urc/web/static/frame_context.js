@@ -16,7 +16,7 @@ import { Decoder } from "./picture.js";
 import { loadStyle } from "./style.js";
 
 const MOST_KEPT = 20_000;
-/** What a frame is told of; the log is not among it, for it tells of the whole robot. */
+/** What a frame is told of; the log and what is watched are not among it, for they tell of the whole robot. */
 const TOLD = ["links", "lease", "alarms", "latency", "sequences", "theme"];
 /** What people may want with the controls by a program that is not ours. */
 const WISHES = ["take", "ask", "leave"];

@@ -11,7 +11,7 @@ import { backSafely } from "./back.js";
 import { Badge, part } from "./badge.js";
 import { Controls } from "./controls.js";
 import { Drive } from "./drive.js";
-import { Alerts, Follows, Log, Themes } from "./follow.js";
+import { Alerts, Follows, Log, Themes, watched } from "./follow.js";
 import { frameOf } from "./frames.js";
 import { Host } from "./host.js";
 import { Input } from "./input.js";
@@ -92,6 +92,7 @@ const follows = new Follows(
       return { look: JSON.stringify(value), value };
     },
     alarms: () => alerts.news(store, performance.now()),
+    watched: () => watched(store, performance.now()),
     latency: () => {
       const { isUp, tripMs, failures, skewMs, messages, bytes } = socket;
       const value = { isUp, tripMs, failures, skewMs, messages, bytes };

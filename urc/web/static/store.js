@@ -201,6 +201,16 @@ export class Store {
   /**
    * @param {string} name
    * @param {number} nowMs
+   */
+  state(name, nowMs) {
+    const sample = this.samples.get(name);
+    const ageMs = sample ? Math.max(0, nowMs - sample.timeMs) : 0;
+    return this.stateOf(this.signals.get(name) ?? UNKNOWN, sample, ageMs, nowMs);
+  }
+
+  /**
+   * @param {string} name
+   * @param {number} nowMs
    * @param {Conversion} [conversion] into the unit that the input asks for
    * @returns {Reading}
    */

@@ -251,6 +251,8 @@
  *   how many were lost before they reached this page.
  * @property {{lease: Lease | null, isMine: boolean, refusal: string}} lease Who has the controls.
  * @property {readonly Alert[]} alarms Every signal that is past a limit now, the worst first.
+ * @property {{limited: number, known: number}} watched How many signals have a limit, and of how many
+ *   of them a value is known that is not old.
  * @property {{isUp: boolean, tripMs: number | null, failures: number, skewMs: number | null, messages: number, bytes: number}} latency
  *   The way to URC and back, how far this device's clock is before URC's, null while they are
  *   unknown; and what has come since the page was opened.
@@ -271,6 +273,7 @@
  * @property {Alarm} alarm
  * @property {string} text The value for people.
  * @property {string} unit
+ * @property {string} age Of the value, for people, as "4 s"; "" while it is live.
  * @property {number} since When it was first seen past this limit, in seconds on the page's clock.
  *
  * @typedef {object} StopState
