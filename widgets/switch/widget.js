@@ -48,7 +48,7 @@ class Switch {
     const tap = (/** @type {Element | null} */ button, /** @type {() => boolean} */ wanted) => {
       button?.addEventListener("click", () => void this.turn(wanted()), { signal });
     };
-    tap(this.main, () => this.isOn(this.state?.value) !== true);
+    tap(this.main, () => this.shown !== true);
     tap(el.querySelector(".switch-on"), () => true);
     tap(el.querySelector(".switch-off"), () => false);
   }
@@ -80,6 +80,12 @@ class Switch {
     return typeof said === "number" && this.values[1] === true ? said !== 0 : null;
   }
 
+  /** What the control shows: what was wished for where that is shown meanwhile, else what the robot says. */
+  get shown() {
+    if (this.isOptimistic && this.wish.isWaiting) return this.wish.value === true;
+    return this.isOn(this.state?.value);
+  }
+
   /** @param {boolean} isOn */
   async turn(isOn) {
     if (!this.giver.isReady || this.giver.isPending) return;
@@ -96,10 +102,8 @@ class Switch {
   }
 
   show() {
-    const { giver, wish, state, words } = this;
-    const said = this.isOn(state?.value);
-    const isKnown = said !== null;
-    const hoped = this.isOptimistic && wish.isWaiting ? wish.value === true : said;
+    const { giver, wish, state, words, shown } = this;
+    const isKnown = this.isOn(state?.value) !== null;
     const isLocked = !giver.isReady || giver.isPending;
     attribute(this.root, "data-state", state?.state ?? "none");
     attribute(this.root, "data-alarm", state?.alarm ?? "");
@@ -111,11 +115,11 @@ class Switch {
       this.main.hidden = !isKnown;
       this.pair.hidden = isKnown;
       if (hadFocus && isMoved) (isKnown ? this.main : this.pair.querySelector("button"))?.focus();
-      attribute(this.main, "aria-checked", String(hoped === true));
+      attribute(this.main, "aria-checked", String(shown === true));
       for (const button of [this.main, ...this.pair.children]) attribute(button, "aria-disabled", String(isLocked));
     }
     const sign = wish.isWaiting ? " …" : wish.isMissed ? " ≠" : "";
-    write(this.word, (isKnown ? words[hoped ? 1 : 0] ?? "" : state?.text ?? "—") + sign);
+    write(this.word, (isKnown ? words[shown ? 1 : 0] ?? "" : state?.text ?? "—") + sign);
     const wished = words[wish.value === true ? 1 : 0] ?? "";
     const missed = wish.isMissed ? this.ctx.t("≠ asked for {wish}, the robot says otherwise", { wish: wished }) : "";
     write(this.note, giver.note(missed, state ? noteOf(state, this.ctx.t) : ""));

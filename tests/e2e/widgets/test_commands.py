@@ -321,6 +321,30 @@ async def test_each_control_gives_exactly_its_command(
         assert robot.lines == []
 
 
+WISHED = """
+  lamp: { use: switch, bind: { state: lamp, change: set_lamp }, \
+options: { echo: optimistic, echo_s: 60 } }
+"""
+
+
+async def test_a_switch_that_shows_the_wish_is_switched_back_by_the_next_tap(
+    new_page: PageMaker, urc_process: Callable[..., UrcProcess], tmp_path: Path
+) -> None:
+    """A tap means the other of what is shown, also while the robot has not said it yet."""
+    async with crane(urc_process, tmp_path, WISHED) as (robot, address):
+        page = await new_page(size="desktop")
+        await page.goto(address)
+        await ready(page, ".switch-on")
+        await robot.tell("off", "idle", "2.5")
+        await until_text(page, ".switch-word", "off")
+        for line, word in (("LAMP 1", "on …"), ("LAMP 0", "off …"), ("LAMP 1", "on …")):
+            await (await ready(page, ".switch-main")).click()
+            await robot.until_got(line)
+            await until_text(page, ".switch-word", word)
+        await robot.tell("on", "idle", "2.5")
+        await until_text(page, ".switch-word", "on")
+
+
 ASKING = """
   dock: { use: button, bind: { press: dock } }
   erase: { use: button, bind: { press: erase } }
