@@ -4,12 +4,14 @@
 /** @typedef {import("../../urc/web/static/types.js").Reading} Reading */
 /** @typedef {import("./angles.js").Angles} Angles */
 /** @typedef {import("./angles.js").Lean} Lean */
-import { attribute, noteOf, number, numbers, part, worst, write } from "urc/kit";
+import { attribute, mark, noteOf, number, numbers, part, worst, write } from "urc/kit";
 import { DEGREES, leanOf, ofQuaternion } from "./angles.js";
 import { viewOf } from "./views.js";
 
 /** From this share of a limit on it is a caution. */
 const NEAR = 0.8;
+/** What each part of a lean is called. */
+const NAMES = { bank: mark("roll"), nose: mark("pitch"), turn: mark("yaw") };
 
 export default {
   /**
@@ -21,6 +23,7 @@ export default {
     const words = part(el, ".attitude-words");
     const note = part(el, ".attitude-note");
     const view = viewOf(el, options);
+    const parts = partsOf(options["view"]);
     const axes = (/** @type {(Reading | undefined)[]} */ readings) =>
       String(options["axes"] ?? readings.find((reading) => reading?.signal.axes)?.signal.axes ?? "FLU");
 
@@ -30,21 +33,57 @@ export default {
           ? ofQuaternion(numbers(orientation) ?? [], String(options["order"]))
           : { roll: radians(roll), pitch: radians(pitch), yaw: radians(yaw) };
         const lean = leanOf(angles ?? { roll: null, pitch: null, yaw: null }, axes([orientation, roll, pitch, yaw]));
-        const isKnown = lean.bank !== null || lean.nose !== null || lean.turn !== null;
-        const all = worst([orientation, roll, pitch, yaw]);
-        const reading = isKnown || all.state !== "live" ? all : { ...all, state: /** @type {const} */ ("none") };
+        const bound = orientation
+          ? { bank: orientation, nose: orientation, turn: orientation }
+          : { bank: roll, nose: pitch, turn: yaw };
+        const known = parts.filter((name) => lean[name] !== null);
+        const missing = parts.filter((name) => lean[name] === null && (bound[name] || known.length === 0));
+        const reading = readingOf(known.map((name) => bound[name]), [orientation, roll, pitch, yaw]);
         const own = passed(lean, options);
         attribute(root, "data-state", reading.state);
         attribute(root, "data-alarm", own ? (own.isAlarm ? "hihi" : "high") : reading.alarm);
-        attribute(root, "data-known", isKnown ? "yes" : "no");
+        attribute(root, "data-missing", missing.join(" "));
         view.show(lean);
-        write(words, wordsOf(lean, t));
+        write(words, wordsOf(lean, missing, t));
         const said = own ? (own.isAlarm ? t("▲ Leans too far") : t("◆ Leans far")) : "";
-        write(note, [said, noteOf(reading, t)].filter(Boolean).join(" · "));
+        const lost = known.length > 0 ? missing.map((name) => `${t(NAMES[name])}: ${lossOf(bound[name], t)}`) : [];
+        write(note, [said, noteOf(reading, t), ...lost].filter(Boolean).join(" · "));
       },
     };
   },
 };
+
+/**
+ * Return which parts of a lean a view draws.
+ *
+ * @param {unknown} view
+ * @returns {readonly (keyof Lean)[]}
+ */
+function partsOf(view) {
+  return view === "solid" || view === "axes" ? ["bank", "nose", "turn"] : ["bank", "nose"];
+}
+
+/**
+ * Return how that stands which is shown; where nothing is known, how all stands that is bound.
+ *
+ * @param {readonly (Reading | undefined)[]} known
+ * @param {readonly (Reading | undefined)[]} all
+ */
+function readingOf(known, all) {
+  const { state, age, alarm } = worst(all);
+  if (known.length > 0) return { ...worst(known), alarm };
+  return { state: state === "live" ? /** @type {const} */ ("none") : state, age, alarm };
+}
+
+/**
+ * Return why a part is not known.
+ *
+ * @param {Reading | undefined} reading
+ * @param {Context["t"]} t
+ */
+function lossOf(reading, t) {
+  return (reading && noteOf({ state: reading.state, age: reading.age, alarm: "" }, t)) || t("not known");
+}
 
 /**
  * @param {Reading | undefined} reading
@@ -70,12 +109,14 @@ function passed({ bank, nose }, options) {
 }
 
 /**
- * Say how it leans so that no convention has to be known.
+ * Say how it leans so that no convention has to be known. With a part that is missing nobody knows
+ * that it is level.
  *
  * @param {Lean} lean
+ * @param {readonly (keyof Lean)[]} missing
  * @param {Context["t"]} t
  */
-function wordsOf({ bank, nose }, t) {
+function wordsOf({ bank, nose }, missing, t) {
   const said = [];
   if (nose !== null) {
     const degrees = Math.abs(Math.round(nose));
@@ -86,5 +127,6 @@ function wordsOf({ bank, nose }, t) {
     if (degrees > 0) said.push(bank > 0 ? t("right side down {degrees}°", { degrees }) : t("left side down {degrees}°", { degrees }));
   }
   if (said.length > 0) return said.join(", ");
-  return bank === null && nose === null ? "—" : t("level");
+  const isPart = missing.includes("bank") || missing.includes("nose");
+  return isPart || (bank === null && nose === null) ? "—" : t("level");
 }

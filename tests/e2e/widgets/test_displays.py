@@ -29,6 +29,8 @@ SIGNALS = {
         Signal("height", unit="m"),
         Signal("yaw", unit="rad"),
         Signal("way", unit="rad"),
+        Signal("roll", unit="deg", stale_after_s=60),
+        Signal("pitch", unit="deg", stale_after_s=60),
         Signal("turned", "array", of="number", size=4),
         Signal("rssi", "integer", unit="dBm"),
         Signal("cells", "array", of="number", unit="V", precision=2),
@@ -142,7 +144,40 @@ async def test_needles_bars_and_tapes_stand_where_the_value_is(new_page: PageMak
         await until_text(page, ".attitude-note", "▲ Leans too far")
         robot.say("turned", (0.0, 0.0, 0.0, 0.0))  # no orientation at all
         await until_text(page, ".attitude-words", "—")
-        await until_attribute(page, ".attitude", "data-known", "no")
+        await until_attribute(page, ".attitude", "data-missing", "bank nose")
+
+
+async def test_an_attitude_without_one_of_its_angles_is_not_level(new_page: PageMaker) -> None:
+    """What is bound and not known is named, and whatever would be drawn of it is hidden."""
+    angles = {"roll": "roll", "pitch": "pitch"}
+    uses = (
+        use("attitude", angles, "horizon", view="horizon"),
+        use("attitude", angles, "vehicle", view="vehicle"),
+        use("attitude", angles, "outline", view="outline", roll_limit=30),
+        use("attitude", {"roll": "roll"}, "alone", view="horizon"),
+    )
+    async with shown(new_page, *uses) as (robot, page):
+        robot.say("roll", 0.2)
+        robot.say("pitch", 20.0)
+        await until_text(page, "[data-cell='0'] .attitude-words", "nose down 20°")
+        robot.say("pitch", 20.0, age_s=700)
+        for cell, hidden, seen in (
+            (0, "world", "symbol"),
+            (1, "world", "symbol"),
+            (2, "side", "rear"),
+        ):
+            note = page.locator(f"[data-cell='{cell}'] .attitude-note")
+            await note.filter(has_text="pitch: last seen").wait_for()
+            await until_text(page, f"[data-cell='{cell}'] .attitude-words", "—")
+            assert not await page.is_visible(f"[data-cell='{cell}'] .attitude-{hidden}")
+            assert await page.is_visible(f"[data-cell='{cell}'] .attitude-{seen}")
+        await until_text(page, "[data-cell='3'] .attitude-words", "level")
+        assert await page.is_visible("[data-cell='3'] .attitude-world")
+        # What is known is told, and in colour.
+        robot.say("roll", 40.0)
+        await until_text(page, "[data-cell='2'] .attitude-words", "right side down 40°")
+        await until_attribute(page, "[data-cell='2'] .attitude", "data-state", "live")
+        await until_attribute(page, "[data-cell='2'] .attitude", "data-alarm", "hihi")
 
 
 async def test_a_table_puts_the_gravest_first_and_filters(new_page: PageMaker) -> None:
