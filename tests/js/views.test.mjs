@@ -8,7 +8,7 @@ import {
   Trail, bearingOf, distance, gridStep, isInside, lengthOf, perMetre, placeOf, placeText, placesOf, readFix, sexagesimal,
 } from "../../widgets/map/geo.js";
 import { bearing, crop, firstView, poseOf, target, tilted, turned } from "../../widgets/pano360/look.js";
-import { Track, at, bearings, kindOf, sector, shareOf, sideOf, zoneOf } from "../../widgets/range/sight.js";
+import { Track, at, bearings, besides, kindOf, nearestOf, sector, shareOf, sideOf, zoneOf } from "../../widgets/range/sight.js";
 import { arc, band, chart, dots, graph, view } from "../../widgets/scan/paint.js";
 import {
   NO_RAY, directions, measured, nearest, rayAt, rayOfPixels, raysOfColumns, reachOfPixels, ringStep, sideOf as scanSide,
@@ -318,4 +318,14 @@ test("a model's shape is the file whose path ends most alike", () => {
   assert.equal(fileOf("other/base.stl", files), files[1]);
   assert.equal(fileOf("arm 1.stl", files), files[2]);
   assert.equal(fileOf("gone.stl", files), "");
+});
+
+test("the nearest that is known counts, and where nobody looks is said once for each reason", () => {
+  const bounds = { min: 0, max: 5, near: null, stop: null };
+  assert.deepEqual([[null, 3, 2], [null, null], [5, 4], [4, 0]].map((each) => nearestOf(each, bounds)), [2, 0, 1, 1]);
+  const sides = ["ahead", "left", "behind", "right"];
+  assert.deepEqual(besides(sides, ["", "gone", "7 s old", "gone"], 0), ["left, right: gone", "behind: 7 s old"]);
+  assert.deepEqual(besides(sides, ["gone", "", "gone", ""], 1), ["ahead, behind: gone"]);
+  assert.deepEqual(besides(sides, ["gone", "gone", "gone", "gone"], 0), []);
+  assert.deepEqual(besides([], [], 0), []);
 });

@@ -128,6 +128,43 @@ export function sideOf(bearing) {
   return SIDES[Math.round(turn) % 8] ?? "ahead";
 }
 
+/**
+ * Return which of them matters: the nearest that is known.
+ *
+ * @param {readonly unknown[]} values
+ * @param {Bounds} bounds
+ */
+export function nearestOf(values, bounds) {
+  let found = 0;
+  let least = Infinity;
+  values.forEach((value, index) => {
+    const kind = kindOf(value, bounds);
+    if (kind === "unknown") return;
+    const distance = kind === "close" ? -1 : kind === "clear" ? Number.MAX_VALUE : Number(value);
+    if (distance < least) [found, least] = [index, distance];
+  });
+  return found;
+}
+
+/**
+ * Return what is to be said of the sensors beside the one that is shown: where nobody looks any more,
+ * and which say something old. Nothing when all are as that one.
+ *
+ * @param {readonly string[]} sides where each looks, in words
+ * @param {readonly string[]} said what is to be said of each; "" for nothing
+ * @param {number} shown the index of that one
+ */
+export function besides(sides, said, shown) {
+  if (said.every((words) => words === said[shown])) return [];
+  /** @type {Map<string, string[]>} */
+  const found = new Map();
+  said.forEach((words, index) => {
+    if (index === shown || words === "") return;
+    found.set(words, [...(found.get(words) ?? []), sides[index] ?? ""]);
+  });
+  return [...found].map(([words, places]) => `${[...new Set(places)].join(", ")}: ${words}`);
+}
+
 /** The last minutes of one distance, at most so many points. */
 export class Track {
   /**

@@ -4,8 +4,9 @@
 /** @typedef {import("../../urc/web/static/types.js").Reading} Reading */
 /** @typedef {import("./sight.js").Bounds} Bounds */
 /** @typedef {import("./sight.js").Kind} Kind */
+/** @typedef {{value: unknown, reading: Reading}} Sensor */
 import { DASH, attribute, board, colours, format, many, noteOf, number, part, svg, write } from "urc/kit";
-import { Track, bearings, kindOf, sector, shareOf, sideOf, zoneOf } from "./sight.js";
+import { Track, bearings, besides, kindOf, nearestOf, sector, shareOf, sideOf, zoneOf } from "./sight.js";
 
 const WINDOW_S = 60;
 const RADIUS = 100;
@@ -50,6 +51,8 @@ class View {
     this.ink = colours(el, INK);
     this.track = new Track(WINDOW_S);
     this.drawn = "";
+    /** How many distances the first input held last. */
+    this.count = 1;
     this.state = "none";
     // The line goes on with the time, also when nothing comes.
     this.timer = this.graph ? setInterval(() => this.drawGraph(), 1000) : undefined;
@@ -85,24 +88,57 @@ class View {
   update(reading, others, readings) {
     if (!reading) return;
     const bounds = this.bounds(readings);
-    const first = Array.isArray(reading.value) ? reading.value : [reading.value];
-    const values = [...first, ...others.map((each) => each.value)];
-    const places = this.places(values.length);
-    const worst = nearestOf(values, bounds);
-    const value = values[worst];
-    const kind = kindOf(value, bounds);
-    this.state = reading.state;
-    attribute(this.root, "data-state", reading.state);
-    attribute(this.root, "data-zone", zoneOf(value, bounds));
-    write(this.text, this.words(kind, value, bounds, reading));
+    const sensors = this.sensors(reading, others);
+    const places = this.places(sensors.length);
+    const nearest = nearestOf(sensors.map((each) => each.value), bounds);
+    const shown = sensors[nearest] ?? { value: null, reading };
+    const kind = kindOf(shown.value, bounds);
+    this.state = shown.reading.state;
+    attribute(this.root, "data-state", this.state);
+    attribute(this.root, "data-zone", zoneOf(shown.value, bounds));
+    write(this.text, this.words(kind, shown.value, bounds, shown.reading));
     write(this.symbol, kind === "unknown" || kind === "clear" ? "" : this.unit("range").symbol);
-    const side = values.length > 1 && kind !== "unknown" ? this.t(sideOf(places[worst] ?? 0)) : "";
-    const notes = [this.zoneText(value, bounds, kind, reading), side, noteOf(reading, this.t)];
+    const sides = places.map((place) => this.t(sideOf(place)));
+    const said = sensors.map((each) => this.lossOf(each, bounds));
+    const alarm = noteOf({ state: "live", age: "", alarm: shown.reading.alarm }, this.t);
+    const side = sensors.length > 1 && kind !== "unknown" ? (sides[nearest] ?? "") : "";
+    const own = [this.zoneText(shown.value, bounds, kind), side, alarm, this.lossOf(shown, bounds)];
+    const notes = [...own, ...besides(sides, said, nearest)];
     write(this.note, notes.filter(Boolean).join(" · "));
-    this.draw(values, places, bounds);
-    const isLive = reading.state === "live" && kind !== "unknown";
-    if (this.graph) this.track.add(reading.time, isLive ? shareOf(value, bounds) : null);
+    this.draw(sensors, places, bounds);
+    const isLive = this.state === "live" && kind !== "unknown";
+    const timeS = Math.max(reading.time, ...sensors.map((each) => each.reading.time));
+    if (this.graph) this.track.add(timeS, isLive ? shareOf(shown.value, bounds) : null);
     this.drawGraph();
+  }
+
+  /**
+   * Return every distance with the reading that it comes from.
+   *
+   * @param {Reading} reading
+   * @param {readonly Reading[]} others
+   * @returns {Sensor[]}
+   */
+  sensors(reading, others) {
+    const { value } = reading;
+    if (Array.isArray(value)) this.count = value.length;
+    // What is gone says no longer how many it held, and the others still look where they did.
+    const first = Array.isArray(value) ? value : value === null ? Array(this.count).fill(null) : [value];
+    return [
+      ...first.map((each) => ({ value: each, reading })),
+      ...others.map((each) => ({ value: each.value, reading: each })),
+    ];
+  }
+
+  /**
+   * Return why a sensor does not tell how far it is now; "" when it does.
+   *
+   * @param {Sensor} sensor
+   * @param {Bounds} bounds
+   */
+  lossOf({ value, reading: { state, age } }, bounds) {
+    if (state !== "live") return noteOf({ state, age, alarm: "" }, this.t);
+    return kindOf(value, bounds) === "unknown" ? this.t("not known") : "";
   }
 
   /** @param {number} count */
@@ -131,10 +167,8 @@ class View {
    * @param {unknown} value
    * @param {Bounds} bounds
    * @param {Kind} kind
-   * @param {Reading} reading
    */
-  zoneText(value, bounds, kind, reading) {
-    if (kind === "unknown") return reading.state === "live" ? this.t("not known") : "";
+  zoneText(value, bounds, kind) {
     const zone = zoneOf(value, bounds);
     if (kind === "close") return `▲ ${this.t("too close")}`;
     if (zone === "stop") return `▲ ${this.t("very near")}`;
@@ -142,14 +176,14 @@ class View {
   }
 
   /**
-   * @param {readonly unknown[]} values
+   * @param {readonly Sensor[]} sensors
    * @param {readonly number[]} places
    * @param {Bounds} bounds
    */
-  draw(values, places, bounds) {
+  draw(sensors, places, bounds) {
     const { cones, rings } = this;
     if (!cones || !rings) return;
-    const look = JSON.stringify([values, bounds, this.state]);
+    const look = JSON.stringify([sensors.map(({ value, reading }) => [value, reading.state]), bounds]);
     if (look === this.drawn) return;
     this.drawn = look;
     const isRing = this.options["view"] === "ring";
@@ -161,7 +195,7 @@ class View {
       return svg("path", { class: "range-ring", d: sector(0, 180, 0, radius) });
     });
     rings.replaceChildren(...marks);
-    const made = values.flatMap((value, index) => {
+    const made = sensors.flatMap(({ value, reading: { state } }, index) => {
       const kind = kindOf(value, bounds);
       const bearing = isRing ? (places[index] ?? 0) : 0;
       if (!isRing && index > 0) return [];
@@ -179,6 +213,7 @@ class View {
         class: "range-wall",
         d: sector(bearing, width, inner, inner + 5),
         "data-zone": zoneOf(value, bounds),
+        "data-state": state,
       });
       if (kind === "unknown") return [all];
       return kind === "clear" ? [all, free] : [all, free, wall];
@@ -217,22 +252,4 @@ class View {
     }
     pen.stroke();
   }
-}
-
-/**
- * Return which of them matters: the nearest that is known.
- *
- * @param {readonly unknown[]} values
- * @param {Bounds} bounds
- */
-function nearestOf(values, bounds) {
-  let found = 0;
-  let least = Infinity;
-  values.forEach((value, index) => {
-    const kind = kindOf(value, bounds);
-    if (kind === "unknown") return;
-    const distance = kind === "close" ? -1 : kind === "clear" ? Number.MAX_VALUE : Number(value);
-    if (distance < least) [found, least] = [index, distance];
-  });
-  return found;
 }

@@ -1,18 +1,16 @@
 """What the widgets that look at the world show: values pushed, pixels and words seen."""
 
-from collections.abc import AsyncIterator, Mapping
-from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import Any
 
 import pytest
-from playwright.async_api import Page
 
 from tests.e2e.conftest import PageMaker
-from tests.e2e.dashboards import running_dashboard, until, until_attribute, until_text
+from tests.e2e.dashboards import until, until_attribute, until_text
 from tests.e2e.drawn import BLUE, GREEN, GREY, RED, plain, png, until_pixel
 from tests.e2e.gallery import coarse, difference
 from tests.e2e.motion.driving import CALM_LEASE_S, Wire, centre, driven, fresh, held, number
+from tests.e2e.widgets.viewing import METRES, shown
 from urc.model.driver import Argument, Command
 from urc.model.interface import WidgetUse
 from urc.model.values import Signal
@@ -21,28 +19,9 @@ from urc.testing.dashboard import FakeRobot, dashboard_profile
 pytestmark = pytest.mark.anyio
 
 
-@asynccontextmanager
-async def shown(
-    page: Page,
-    signals: Mapping[str, Signal],
-    *uses: WidgetUse,
-    commands: Mapping[str, Command] | None = None,
-) -> AsyncIterator[FakeRobot]:
-    """Show widgets on a page, and give their robot once it is connected."""
-    profile = dashboard_profile(signals=signals, uses=uses, commands=commands or {})
-    robot = FakeRobot(profile)
-    async with running_dashboard(robot) as address:
-        await page.goto(f"{address}robots/puppet/")
-        await until(lambda: robot.is_open)
-        yield robot
-
-
 def told(name: str, *arguments: str, kind: Any = "number") -> Command:
     """Return a command that is given once."""
     return Command(name, "wire", None, {each: Argument(each, kind) for each in arguments})  # type: ignore[arg-type]
-
-
-METRES = {name: Signal(name, "number", unit="m", stale_after_s=60) for name in ("front", "rear")}
 
 
 async def test_distances_around_the_robot(new_page: PageMaker) -> None:
