@@ -141,6 +141,11 @@ class _Linker:
                 f"{name!r} means nothing here",
                 hint,
             )
+        signals = self.driver.signals
+        if any(name in signals and signals[name].states for name in template.names & allowed):
+            from urc.config.link_words import check_words
+
+            check_words(self.findings, part, template, signals)
         if "world" in template.names and "world" not in self.driver.signals:
             from urc.config.link_world import check_readings
 
