@@ -72,6 +72,7 @@ class Scene {
     /** @type {Readonly<Record<string, Reading>>} */
     this.readings = {};
     this.seen = "";
+    /** Of those that are drawn; -1 while there are none. */
     this.pointsSerial = -1;
     const view = VIEWS.find((each) => each === options["view"]) ?? "orbit";
     try {
@@ -213,9 +214,11 @@ class Scene {
 
   setPoints() {
     const reading = this.readings["points"];
-    if (!reading || !this.stage || reading.serial === this.pointsSerial) return;
-    this.pointsSerial = reading.serial;
-    const values = Array.isArray(reading.value) ? reading.value : [];
+    const values = Array.isArray(reading?.value) ? reading.value : [];
+    // Those that have gone are drawn no more, though no newer ones have come.
+    const serial = reading && reading.value !== null ? reading.serial : -1;
+    if (!this.stage || serial === this.pointsSerial) return;
+    this.pointsSerial = serial;
     this.stage.setPoints(cloud(values, Number(this.options["budget"] ?? 20000), this.convention));
   }
 

@@ -4,7 +4,8 @@ import pytest
 
 from tests.e2e.conftest import PageMaker
 from tests.e2e.dashboards import until_attribute, until_text
-from tests.e2e.widgets.viewing import METRES, shown
+from tests.e2e.gallery import coarse
+from tests.e2e.widgets.viewing import METRES, RESTED, shown
 from urc.model.interface import WidgetUse
 from urc.model.values import Signal
 
@@ -45,3 +46,40 @@ async def test_a_sensor_that_says_nothing_looks_dead(new_page: PageMaker) -> Non
         lost = page.locator(f"{second}-note", has_text="ahead, left, behind: last seen")
         await lost.wait_for()
         assert (await lost.inner_text()).startswith("right · ")
+
+
+def apart(one: list[list[int]], other: list[list[int]]) -> int:
+    """Return how far two pictures are apart where they differ most, 0 to 255."""
+    pairs = zip(one, other, strict=True)
+    return max(abs(a - b) for row, beside in pairs for a, b in zip(row, beside, strict=True))
+
+
+async def test_points_that_have_gone_are_not_drawn(new_page: PageMaker) -> None:
+    """The scene is then as it was before there were any; they come back with the line."""
+    signals = {"seen": Signal("seen", "array", of="number", unit="m", stale_after_s=60)}
+    use = WidgetUse("s", "scene3d", {"points": "seen"}, options={"view": "top"})
+    steps = [0.004 * place for place in range(-20, 21)]
+    plane = tuple(part for x in steps for y in steps for part in (x, y, 1.0))
+    page = await new_page(size="desktop")
+    async with shown(page, signals, use) as robot:
+        await page.wait_for_selector(".scene3d[data-model='box']")
+        # In colour whatever its state, so that only what is drawn differs.
+        await page.eval_on_selector(
+            ".scene3d-picture", "(el) => (el.style = 'filter: none; opacity: 1')"
+        )
+
+        async def look() -> list[list[int]]:
+            await page.evaluate(RESTED)
+            return (await coarse(page, [".scene3d-picture"]))[0]
+
+        before = await look()
+        robot.say("seen", plane)  # type: ignore[arg-type]
+        await until_attribute(page, ".scene3d", "data-state", "live")
+        full = await look()
+        assert apart(before, full) > 20
+        robot.link("lost", age_s=120)
+        await until_attribute(page, ".scene3d", "data-state", "gone")
+        assert apart(before, await look()) < 5
+        robot.link("live")
+        await until_attribute(page, ".scene3d", "data-state", "live")
+        assert apart(full, await look()) < 5

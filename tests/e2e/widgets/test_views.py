@@ -10,7 +10,7 @@ from tests.e2e.dashboards import until, until_attribute, until_text
 from tests.e2e.drawn import BLUE, GREEN, GREY, RED, plain, png, until_pixel
 from tests.e2e.gallery import coarse, difference
 from tests.e2e.motion.driving import CALM_LEASE_S, Wire, centre, driven, fresh, held, number
-from tests.e2e.widgets.viewing import METRES, shown
+from tests.e2e.widgets.viewing import METRES, RESTED, shown
 from urc.model.driver import Argument, Command
 from urc.model.interface import WidgetUse
 from urc.model.values import Signal
@@ -325,18 +325,6 @@ async def test_a_model_bends_as_the_robot_does(new_page: PageMaker, tmp_path: Pa
         ]
         assert max(moved) > 20
 
-
-RESTED = """
-async () => {
-  const drawn = () => document.querySelector(".scene3d-picture").dataset.frames;
-  for (let attempt = 0; attempt < 50; attempt += 1) {
-    const before = drawn();
-    for (let n = 0; n < 20; n += 1) await new Promise((done) => requestAnimationFrame(done));
-    if (drawn() === before) return before;
-  }
-  return "it never rests";
-}
-"""
 
 ARM = """\
 <robot name="arm">

@@ -11,9 +11,21 @@ from urc.model.interface import WidgetUse
 from urc.model.values import Signal
 from urc.testing.dashboard import FakeRobot, dashboard_profile
 
-__all__ = ["METRES", "shown"]
+__all__ = ["METRES", "RESTED", "shown"]
 
 METRES = {name: Signal(name, "number", unit="m", stale_after_s=60) for name in ("front", "rear")}
+RESTED = """
+async () => {
+  const drawn = () => document.querySelector(".scene3d-picture").dataset.frames;
+  for (let attempt = 0; attempt < 50; attempt += 1) {
+    const before = drawn();
+    for (let n = 0; n < 20; n += 1) await new Promise((done) => requestAnimationFrame(done));
+    if (drawn() === before) return before;
+  }
+  return "it never rests";
+}
+"""
+"""Resolves when a scene draws no more, with how often it has drawn."""
 
 
 @asynccontextmanager
