@@ -202,7 +202,7 @@ test("an image has an age like every value, and goes with it", () => {
 test("the kit writes numbers for people, and never takes none for zero", () => {
   assert.equal(format(12.3456, 2), "12.35");
   assert.equal(format(-0.001, 1), "0.0");
-  assert.equal(format(123456.789), "123500");
+  assert.equal(format(123456.789), "123457");
   for (const none of [null, undefined, NaN, Infinity, "3", true]) assert.equal(format(none), DASH);
   const reading = storeOf({}).reading("s0", 0);
   assert.deepEqual([number(reading), numbers(reading), many(reading)], [null, null, []]);

@@ -2,7 +2,7 @@
 /** @typedef {import("../../urc/web/static/types.js").Reading} Reading */
 /** @typedef {import("../../urc/web/static/types.js").Context} Context */
 /** @typedef {import("../../urc/web/static/types.js").Instance} Instance */
-import { attribute, fit, format, noteOf, number, part as find, write } from "urc/kit";
+import { attribute, digitsIn, figure, fit, format, noteOf, number, part as find, write } from "urc/kit";
 import { spanOf } from "urc/scale";
 import { Trend } from "./trend.js";
 
@@ -86,7 +86,7 @@ class Facts {
     if (this.trendText) this.point(reading, value);
     if (this.limitsText) {
       const { lolo, low, high, hihi } = reading.signal.limits ?? {};
-      const digits = typeof this.precision === "number" ? this.precision : reading.signal.precision;
+      const digits = digitsIn(typeof this.precision === "number" ? this.precision : reading.signal.precision, factor);
       const ends = [low ?? lolo, high ?? hihi].map((end) => (end === undefined ? "" : format(factor(end), digits)));
       const said = ends.some(Boolean) ? `${ends.join(" … ").trim()} ${symbol}`.trim() : "";
       write(this.limitsText, said ? this.t("limits {range}", { range: said }) : "");
@@ -293,7 +293,7 @@ function seconds(text) {
  */
 function textOf(reading, precision, factor, t) {
   const { value } = reading;
-  if (typeof precision === "number" && typeof value === "number") return format(factor(value), precision);
+  if (typeof precision === "number" && typeof value === "number") return figure(value, precision, factor);
   if (typeof value === "boolean" && reading.text === String(value)) return value ? t("yes") : t("no");
   return reading.text;
 }

@@ -10,8 +10,10 @@
  * @typedef {import("./types.js").Signal} Signal
  */
 
+import { fixed, rough } from "./figures.js";
 import { mark } from "./words.js";
 
+export { digitsIn, figure } from "./figures.js";
 export { mark, t } from "./words.js";
 
 /** "None": what is not known is never shown as 0. */
@@ -209,12 +211,11 @@ export function clamp(value, least, most) {
  * Return a number for people; "—" for whatever is none.
  *
  * @param {unknown} value
- * @param {number} [digits] after the point; four that mean something when left out
+ * @param {number} [digits] after the point; when left out, four that mean something, and all before it
  */
 export function format(value, digits) {
   if (typeof value !== "number" || !Number.isFinite(value)) return DASH;
-  const text = digits === undefined ? String(Number(value.toPrecision(4))) : value.toFixed(digits);
-  return Number(text) === 0 ? text.replace("-", "") : text; // no "-0"
+  return digits === undefined ? rough(value) : fixed(value, digits);
 }
 
 /**

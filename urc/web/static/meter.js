@@ -12,7 +12,7 @@
  * @param {[number, number]} scale its ends, in the signal's unit
  * @param {(value: number) => number} factor to the unit that is shown
  */
-import { attribute, format, noteOf, number, part, tell, write } from "./kit.js";
+import { attribute, digitsIn, format, noteOf, number, part, tell, write } from "./kit.js";
 import { ends } from "./scale.js";
 
 export class Meter {
@@ -56,8 +56,9 @@ export class Meter {
     attribute(root, "data-state", value.state);
     attribute(root, "data-alarm", value.alarm);
     attribute(root, "data-known", known === null ? "no" : "yes");
-    const digits = ctx.options["precision"] ?? value.signal.precision;
-    const figure = format(known === null ? null : factor(known), typeof digits === "number" ? digits : undefined);
+    const wanted = ctx.options["precision"];
+    const digits = digitsIn(typeof wanted === "number" ? wanted : value.signal.precision, factor);
+    const figure = format(known === null ? null : factor(known), digits);
     this.characters = figure.length + symbol.length / 2;
     write(this.text, figure);
     write(this.unit, known === null ? "" : symbol);

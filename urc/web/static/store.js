@@ -20,8 +20,9 @@
  *
  * @typedef {{value: Held, alarm: Alarm, timeMs: number, serial: number, image?: Picture}} Sample
  */
+import { digitsIn } from "./figures.js";
 import { ageText, textOf } from "./texts.js";
-import { converted, Units } from "./units.js";
+import { converted, factorOf, Units } from "./units.js";
 import { t } from "./words.js";
 
 export { ageText, DASH } from "./texts.js";
@@ -229,7 +230,7 @@ export class Store {
       alarm: isShown ? sample.alarm : "",
       // Made when somebody asks: of a scan it is a thousand numbers that nobody reads.
       get text() {
-        return textOf(shown.factor === 1 && !shown.offset ? value : converted(value, shown), signal);
+        return textOf(value, signal, factorOf(shown));
       },
       unit: shown.symbol,
       age: state === "stale" || state === "gone" ? ageText(ageMs / 1000) : "",
@@ -254,6 +255,8 @@ export class Store {
     if (signal.min !== undefined) made.min = signal.min * factor + offset;
     if (signal.max !== undefined) made.max = signal.max * factor + offset;
     const limits = Object.entries(signal.limits ?? {});
+    const precision = digitsIn(signal.precision, (value) => value * factor + offset);
+    if (precision !== undefined) made.precision = precision;
     if (signal.limits) {
       made.limits = Object.fromEntries(limits.map(([key, at]) => [key, at * factor + offset]));
     }

@@ -5,39 +5,32 @@
  * @typedef {import("./types.js").Held} Held
  * @typedef {import("./types.js").Signal} Signal
  */
+import { figure } from "./figures.js";
 
 export const DASH = "—";
 
 /**
- * @param {Held} value
+ * @param {Held} value in the signal's unit
  * @param {Signal} signal
+ * @param {(value: number) => number} [factor] to the unit that people want to see
  * @returns {string}
  */
-export function textOf(value, signal) {
+export function textOf(value, signal, factor) {
   if (value === null) return DASH;
+  if (Array.isArray(value)) return value.map((each) => textOf(each, signal, factor)).join(", ");
   if (typeof value === "number") {
-    return signal.precision === undefined ? spoken(value, signal) : value.toFixed(signal.precision);
+    const word = signal.precision === undefined ? wordOf(figure(value, undefined), signal) : undefined;
+    return word ?? figure(value, signal.precision, factor);
   }
-  if (Array.isArray(value)) return value.map((each) => textOf(each, signal)).join(", ");
-  return typeof value === "object" ? JSON.stringify(value) : spoken(value, signal);
+  return typeof value === "object" ? JSON.stringify(value) : (wordOf(String(value), signal) ?? String(value));
 }
 
 /**
- * @param {string | number | boolean} value
+ * @param {string} text
  * @param {Signal} signal
  */
-function spoken(value, signal) {
-  const text = typeof value === "number" ? figure(value) : String(value);
-  return signal.states && Object.hasOwn(signal.states, text) ? (signal.states[text] ?? text) : text;
-}
-
-/**
- * A conversion must not bring digits that mean nothing: 0.30000000000000004 is 0.3.
- *
- * @param {number} value
- */
-function figure(value) {
-  return Number.isInteger(value) ? String(value) : String(Number(value.toPrecision(15)));
+function wordOf(text, { states }) {
+  return states && Object.hasOwn(states, text) ? states[text] : undefined;
 }
 
 /**

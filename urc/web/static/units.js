@@ -133,6 +133,16 @@ export function offerSystems(use) {
 }
 
 /**
+ * Return what leads there; undefined where nothing has to be done.
+ *
+ * @param {Conversion} conversion
+ * @returns {((value: number) => number) | undefined}
+ */
+export function factorOf({ factor, offset }) {
+  return factor === 1 && offset === 0 ? undefined : (value) => value * factor + offset;
+}
+
+/**
  * Convert whatever is a number, or numbers; the rest stays.
  *
  * @param {Held} value
