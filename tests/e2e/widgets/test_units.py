@@ -66,3 +66,13 @@ async def test_figures_keep_what_means_something_in_every_unit(new_page: PageMak
         await choose(page, "imperial")
         await until_text(page, "[data-cell='0'] .value-figure", "0.47 in")
         await until_text(page, "[data-cell='1'] .value-figure", "20 mph")
+
+
+async def test_an_alarm_is_read_out_in_the_unit_that_is_shown(new_page: PageMaker) -> None:
+    """A screen reader hears the number with its own unit."""
+    async with shown(new_page, value("pace")) as (robot, page):
+        robot.say("pace", 3.0)
+        await choose(page, "imperial")
+        await until_text(page, ".value-text", "6.711")
+        robot.say("pace", 9.0, alarm="hihi")
+        await until_text(page, "[data-alarms]", "pace very high: 20.13 mph")

@@ -33,9 +33,8 @@ export class Alarms {
       if (before === sample.alarm) continue;
       this.told.set(name, sample.alarm);
       if (!sample.alarm) continue;
-      const { signal, text } = store.reading(name, nowMs);
-      const unit = signal.unit ? ` ${signal.unit}` : "";
-      this.el.textContent = `${signal.title || name} ${WORDS[sample.alarm]}: ${text}${unit}`;
+      const { signal, text, unit } = store.reading(name, nowMs);
+      this.el.textContent = `${signal.title || name} ${WORDS[sample.alarm]}: ${text} ${unit}`.trim();
     }
   }
 }
