@@ -133,12 +133,16 @@ class History {
     this.least = find(root, ".value-least");
     /** @type {number[]} */
     this.times = [];
-    /** A gap is a null: what was not measured is not drawn. @type {(number | null)[]} */
+    /**
+     * In the signal's unit, for people may change theirs. A gap is a null: what was not measured is
+     * not drawn. @type {(number | null)[]}
+     */
     this.values = [];
     /** Lowest and highest that is drawn. @type {[number, number]} */
     this.scale = [0, 1];
     /** @type {Reading["signal"]} */
     this.signal = { name: "", type: "number" };
+    /** To the unit that is shown. */
     this.factor = (/** @type {number} */ value) => value;
     this.serial = -1;
     this.drawnMs = 0;
@@ -187,8 +191,8 @@ class History {
    */
   add(reading, factor) {
     const { state, signal, serial, time } = reading;
-    const known = number(reading);
-    const value = known === null ? null : factor(known);
+    const value = number(reading);
+    const isOther = factor !== this.factor;
     this.signal = signal;
     this.factor = factor;
     const last = this.times.at(-1) ?? -Infinity;
@@ -201,7 +205,9 @@ class History {
       const isClose = time - last < this.windowS / POINTS && typeof this.values.at(-1) === "number";
       if (isClose || time <= last) this.values[this.values.length - 1] = value;
       else this.push(time, value);
-      if (performance.now() - this.drawnMs > DRAW_EVERY_MS) this.draw();
+      if (isOther || performance.now() - this.drawnMs > DRAW_EVERY_MS) this.draw();
+    } else if (isOther) {
+      this.draw();
     }
   }
 
@@ -229,7 +235,7 @@ class History {
     const known = this.values.filter((value) => value !== null);
     const limits = LIMITS.flatMap((name) => {
       const limit = this.signal.limits?.[name];
-      return limit === undefined ? [] : [/** @type {[string, number]} */ ([name, this.factor(limit)])];
+      return limit === undefined ? [] : [/** @type {[string, number]} */ ([name, limit])];
     });
     const ends = spanOf(Math.min(...known), Math.max(...known), limits.map(([, limit]) => limit));
     const rim = (ends[1] - ends[0]) * RIM;
@@ -242,8 +248,7 @@ class History {
 
   /** @param {number} value */
   figure(value) {
-    const { precision } = this.signal;
-    return precision === undefined ? String(Number(value.toPrecision(4))) : value.toFixed(precision);
+    return format(this.factor(value), digitsIn(this.signal.precision, this.factor));
   }
 
   /** @param {[string, number][]} limits */

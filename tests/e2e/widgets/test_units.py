@@ -76,3 +76,16 @@ async def test_an_alarm_is_read_out_in_the_unit_that_is_shown(new_page: PageMake
         await until_text(page, ".value-text", "6.711")
         robot.say("pace", 9.0, alarm="hihi")
         await until_text(page, "[data-alarms]", "pace very high: 20.13 mph")
+
+
+async def test_the_history_of_a_value_is_the_same_line_in_other_units(new_page: PageMaker) -> None:
+    """Its ends change with the unit, and nothing jumps."""
+    async with shown(new_page, value("pace", history="60s")) as (robot, page):
+        robot.say("pace", 10.0)
+        await until_text(page, ".value-most", "11")
+        await choose(page, "imperial")
+        await until_text(page, ".value-most", "24.61")
+        await until_text(page, ".value-least", "20.13")
+        robot.say("pace", 11.0)
+        await until_text(page, ".value-most", "24.61")
+        await until_text(page, ".value-least", "22.37")
