@@ -3,6 +3,9 @@
  * What has been, standing still: uPlot with zoom and a cursor, loaded when somebody looks back.
  *
  * @typedef {{title: string, unit: string, colour: string, dash: number[], isShown: boolean}} Line
+ * @typedef {{times: number[], columns: (number | null | undefined)[][]}} Rows in the signals' units
+ * @typedef {{colour: string, grid: string, epoch: number, moved: (at: number | null) => void,
+ *   factor: (value: number) => number}} Look `factor` leads to the unit that is shown now.
  */
 
 /** uPlot has no types that this page could use. @typedef {any} Plot */
@@ -11,22 +14,27 @@ export class History {
   /**
    * @param {HTMLElement} place
    * @param {readonly Line[]} lines
-   * @param {{times: number[], columns: (number | null | undefined)[][]}} rows
-   * @param {{colour: string, grid: string, epoch: number, moved: (at: number | null) => void}} look
+   * @param {Rows} rows
+   * @param {Look} look
    * @returns {Promise<History>}
    */
   static async open(place, lines, rows, look) {
     const name = "uplot";
     const { default: Chart } = await import(name);
-    return new History(place, new Chart(settings(place, lines, look), [rows.times, ...rows.columns], place));
+    const plot = new Chart(settings(place, lines, look), shownRows(rows, look.factor), place);
+    return new History(place, plot, rows, look.factor);
   }
 
   /**
    * @param {HTMLElement} place
    * @param {Plot} plot
+   * @param {Rows} rows
+   * @param {Look["factor"]} factor
    */
-  constructor(place, plot) {
+  constructor(place, plot, rows, factor) {
     this.plot = plot;
+    this.rows = rows;
+    this.factor = factor;
     this.sizes = new ResizeObserver(() => plot.setSize(sizeOf(place)));
     this.sizes.observe(place);
   }
@@ -71,17 +79,34 @@ export class History {
     this.plot.setSeries(index + 1, { show: isShown });
   }
 
-  /** What the lines have under the cursor. @returns {(number | null)[] | null} */
+  /** Draw the same time anew, in the unit that is shown now. */
+  convert() {
+    const [min, max] = this.span;
+    this.plot.batch(() => {
+      this.plot.setData(shownRows(this.rows, this.factor));
+      this.plot.setScale("x", { min, max });
+    });
+  }
+
+  /** What the lines have under the cursor, else at the end. */
   get values() {
     const { idx } = this.plot.cursor;
-    if (typeof idx !== "number") return null;
-    return this.plot.data.slice(1).map((/** @type {(number | null)[]} */ column) => nearest(column, idx));
+    const row = typeof idx === "number" ? idx : this.rows.times.length - 1;
+    return this.rows.columns.map((column) => nearest(column, row));
   }
 
   close() {
     this.sizes.disconnect();
     this.plot.destroy();
   }
+}
+
+/**
+ * @param {Rows} rows
+ * @param {Look["factor"]} factor
+ */
+function shownRows({ times, columns }, factor) {
+  return [times, ...columns.map((column) => column.map((value) => (typeof value === "number" ? factor(value) : value)))];
 }
 
 /**
@@ -101,7 +126,7 @@ function nearest(column, row) {
 /**
  * @param {HTMLElement} place
  * @param {readonly Line[]} lines
- * @param {{colour: string, grid: string, epoch: number, moved: (at: number | null) => void}} look
+ * @param {Look} look
  */
 function settings(place, lines, { colour, grid, epoch, moved }) {
   const axis = { stroke: colour, grid: { stroke: grid, width: 1 }, ticks: { stroke: grid, width: 1 } };

@@ -2,7 +2,8 @@
 /**
  * Small elements of the plot, and what it does with the browser.
  */
-import { style, write } from "urc/kit";
+import { format, style, write } from "urc/kit";
+import { digitsOf, ticks } from "urc/scale";
 
 /** Milliseconds since 1970 at time 0 of the page's clock. */
 export function epoch() {
@@ -14,12 +15,35 @@ export function epoch() {
  * @param {string} top
  * @param {string} [text]
  */
-export function placed(name, top, text = "") {
+function placed(name, top, text = "") {
   const made = document.createElement("div");
   made.className = name;
   made.style.top = top;
   made.textContent = text;
   return made;
+}
+
+/**
+ * The figures of a scale, with a line for each and one for each limit on it.
+ *
+ * @param {readonly [number, number]} scale
+ * @param {readonly [string, number][]} limits
+ * @param {(value: number) => number} factor from both to the unit that is shown
+ */
+export function ruled(scale, limits, factor) {
+  const [least, most] = [factor(scale[0]), factor(scale[1])];
+  const top = (/** @type {number} */ value) => `${((100 * (most - value)) / (most - least)).toFixed(2)}%`;
+  const values = ticks(least, most, 4);
+  const digits = digitsOf(values);
+  const figures = values.map((value) => placed("plot-figure", top(value), format(value, digits)));
+  const lines = values.map((value) => placed("plot-line", top(value)));
+  for (const [name, limit] of limits) {
+    if (limit <= scale[0] || limit >= scale[1]) continue;
+    const line = placed("plot-limit", top(factor(limit)));
+    line.dataset["limit"] = name;
+    lines.push(line);
+  }
+  return { figures, lines };
 }
 
 /**

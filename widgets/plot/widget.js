@@ -3,11 +3,11 @@
 /** @typedef {import("../../urc/web/static/types.js").Instance} Instance */
 /** @typedef {import("../../urc/web/static/types.js").Reading} Reading */
 /** @typedef {import("./live.js").Trace} Trace */
-import { ALARMS, attribute, colours, format, isStill, many, noteOf, number, part, save, style, write } from "urc/kit";
-import { digitsOf, spanOf, ticks } from "urc/scale";
+import { ALARMS, DASH, attribute, colours, figure, isStill, many, noteOf, number, part, save, style, write } from "urc/kit";
+import { spanOf } from "urc/scale";
 import { History } from "./history.js";
 import { Live } from "./live.js";
-import { epoch, legendItem, placed, writeValue } from "./parts.js";
+import { epoch, legendItem, ruled, writeValue } from "./parts.js";
 import { Ring, csv, extent, seconds, table } from "./traces.js";
 
 const COLOURS = /** @type {const} */ (["series-1", "series-2", "series-3", "series-4", "series-5", "series-6"]);
@@ -45,11 +45,13 @@ class Plot {
     this.readings = [];
     /** @type {number[]} */
     this.serials = [];
-    /** To the unit that is shown. @type {(value: number) => number} */
+    /** To the unit that is shown: all that is kept is as it was said. @type {(value: number) => number} */
     this.factor = (value) => value;
     /** What the legend and the scale were made for. @type {Reading["signal"][]} */
     this.signals = [];
     this.symbol = "";
+    /** Whether all signals are of one unit. Else what is drawn and read back is as declared. */
+    this.isOneUnit = true;
     this.legendMs = 0;
     /** Whether the legend says what was read last. */
     this.isTold = true;
@@ -104,34 +106,31 @@ class Plot {
   update(readings) {
     this.readings = readings;
     const { symbol, factor } = this.ctx.unit("series");
-    const isKnown = readings.every(({ signal }, place) => signal === this.signals[place]);
-    if (!isKnown || readings.length !== this.signals.length || symbol !== this.symbol) {
-      this.signals = readings.map(({ signal }) => signal);
-      this.symbol = symbol;
-      this.begin(factor);
-    }
+    const isOther = readings.length !== this.signals.length || readings.some(({ signal }, place) => signal !== this.signals[place]);
+    if (isOther) this.begin();
+    if (isOther || symbol !== this.symbol) this.showIn(symbol, factor);
     readings.forEach((reading, place) => {
       const ring = this.live.traces[place]?.ring;
       if (!ring) return;
       const value = number(reading);
       if (reading.state !== "live" || value === null) ring.cut();
       else if (reading.serial !== this.serials[place]) {
-        ring.add(reading.time, this.factor(value), reading.signal.stale_after_s ?? 0);
-        this.include(this.factor(value));
+        ring.add(reading.time, value, reading.signal.stale_after_s ?? 0);
+        this.include(value);
       }
       this.serials[place] = reading.serial;
     });
     this.isTold = false;
   }
 
-  /** @param {(value: number) => number} factor to the unit that is shown */
-  begin(factor) {
-    const units = new Set(this.readings.map(({ signal }) => signal.unit ?? ""));
-    this.factor = units.size === 1 ? factor : (value) => value;
+  /** Make a line for each signal; what was kept of it before goes on. */
+  begin() {
+    const traces = new Map(this.signals.map(({ name, unit }, place) => [`${name} ${unit}`, this.live.traces[place]]));
+    this.signals = this.readings.map(({ signal }) => signal);
+    this.isOneUnit = new Set(this.signals.map(({ unit }) => unit)).size === 1;
     const size = Math.min(MOST_READINGS, Math.max(600, this.windowS * HERTZ));
-    const old = this.live.traces;
-    this.live.traces = this.readings.map((_, place) => ({
-      ring: old.length === this.readings.length ? (old[place]?.ring ?? new Ring(size)) : new Ring(size),
+    this.live.traces = this.signals.map(({ name, unit }, place) => ({
+      ring: traces.get(`${name} ${unit}`)?.ring ?? new Ring(size),
       colour: "",
       dash: [...(DASHES[Math.floor(place / COLOURS.length) % DASHES.length] ?? [])],
       isShown: true,
@@ -141,6 +140,21 @@ class Plot {
     this.list();
     this.paint();
     this.fit(true);
+  }
+
+  /**
+   * Lines stay where they are in another unit: only what is written about them changes.
+   *
+   * @param {string} symbol
+   * @param {(value: number) => number} factor
+   */
+  showIn(symbol, factor) {
+    this.symbol = symbol;
+    this.factor = this.isOneUnit ? factor : (value) => value;
+    this.rule();
+    if (!this.history) return;
+    this.history.convert();
+    this.read(this.history.values);
   }
 
   /** Write the legend anew: one button a signal, which hides its line. */
@@ -215,10 +229,7 @@ class Plot {
     const [bottom, top] = spanOf(least, most, this.limits().map(([, limit]) => limit));
     const rim = (top - bottom) * RIM;
     const { min, max } = this.ctx.options;
-    const wanted = [
-      typeof min === "number" ? this.factor(min) : bottom - rim,
-      typeof max === "number" ? this.factor(max) : top + rim,
-    ];
+    const wanted = [typeof min === "number" ? min : bottom - rim, typeof max === "number" ? max : top + rim];
     const [start = 0, end = 1] = wanted;
     const [was, till] = this.live.scale;
     const isLoose = end - start < (till - was) * LOOSE;
@@ -232,25 +243,13 @@ class Plot {
   limits() {
     if (this.ctx.options["limits"] === false) return [];
     const all = this.readings.flatMap(({ signal }) => Object.entries(signal.limits ?? {}));
-    const known = all.filter(([name]) => Object.hasOwn(ALARMS, name));
-    return known.map(([name, limit]) => [name, this.factor(limit)]);
+    return all.filter(([name]) => Object.hasOwn(ALARMS, name));
   }
 
   /** Write the figures of the scale, and the lines of the limits. */
   rule() {
-    const [least, most] = this.live.scale;
-    const top = (/** @type {number} */ value) => `${((100 * (most - value)) / (most - least)).toFixed(2)}%`;
-    const values = ticks(least, most, 4);
-    const digits = digitsOf(values);
-    const figures = values.map((value) => placed("plot-figure", top(value), format(value, digits)));
+    const { figures, lines } = ruled(this.live.scale, this.limits(), this.factor);
     part(this.ctx.el, ".plot-scale").replaceChildren(...figures);
-    const lines = values.map((value) => placed("plot-line", top(value)));
-    for (const [name, limit] of this.limits()) {
-      if (limit <= least || limit >= most) continue;
-      const line = placed("plot-limit", top(limit));
-      line.dataset["limit"] = name;
-      lines.push(line);
-    }
     part(this.ctx.el, ".plot-lines").replaceChildren(...lines);
   }
 
@@ -302,7 +301,9 @@ class Plot {
       isShown: this.live.traces[place]?.isShown ?? true,
     }));
     const { muted, faint } = colours(this.root, ["muted", "faint"]);
-    const look = { colour: muted, grid: faint, epoch: epoch(), moved: (/** @type {number | null} */ at) => this.moved(at) };
+    const moved = (/** @type {number | null} */ at) => this.moved(at);
+    const factor = (/** @type {number} */ value) => this.factor(value);
+    const look = { colour: muted, grid: faint, epoch: epoch(), moved, factor };
     try {
       await this.ctx.style("uplot");
       const opened = await History.open(this.place, lines, rows, look);
@@ -337,11 +338,17 @@ class Plot {
     if (time === null || !values) return;
     const clock = new Date(epoch() + time * 1000).toLocaleTimeString();
     write(this.note, clock);
+    this.read(values);
+  }
+
+  /** @param {readonly (number | null)[]} values what the legend says of each line */
+  read(values) {
     const places = this.legend.querySelectorAll(".plot-value");
-    this.readings.forEach((reading, place) => {
+    this.signals.forEach(({ precision, unit = "" }, place) => {
       const value = values[place] ?? null;
+      const symbol = this.isOneUnit ? this.symbol : unit;
+      const text = value === null ? DASH : `${figure(value, precision, this.factor)} ${symbol}`.trim();
       const el = places[place];
-      const text = `${format(value, reading.signal.precision)} ${value === null ? "" : reading.unit}`.trim();
       if (el) writeValue(el, text);
     });
   }
@@ -369,9 +376,9 @@ class Plot {
     return table(this.live.traces.map(({ ring }) => ring), from, to);
   }
 
-  /** Save what is seen as a file. */
+  /** Save what is seen as a file, as the robot said it. */
   save() {
-    const names = this.readings.map(({ signal, unit }) => (unit ? `${signal.name} (${unit})` : signal.name));
+    const names = this.signals.map(({ name, unit }) => (unit ? `${name} (${unit})` : name));
     save(csv(names, this.rows(this.history?.span ?? [-Infinity, Infinity]), epoch()), "plot.csv", "text/csv");
   }
 }

@@ -1,7 +1,9 @@
 """People who read other units than the robot's: nothing they see is another number than it was."""
 
+import csv
 from collections.abc import AsyncIterator, Mapping
 from contextlib import asynccontextmanager
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -24,6 +26,26 @@ SIGNALS = {
         Signal("ticks", "integer", min=0, max=20000),
     )
 }
+
+
+LINE_TOPS = """
+() => {
+  const canvas = document.querySelector(".plot-canvas");
+  const { width, height } = canvas;
+  const pixels = canvas.getContext("2d").getImageData(0, 0, width, height).data;
+  const rows = new Set();
+  for (let place = 0; place < width * height; place += 1) {
+    if (pixels[4 * place + 3] === 255) rows.add(Math.floor(place / width));
+  }
+  return rows.size ? Math.max(...rows) - Math.min(...rows) : null;
+}
+"""
+"""How many rows of pixels apart the highest and the lowest piece of the line are."""
+
+
+def plot(*signals: str, **options: Any) -> WidgetUse:
+    """Return a plot of signals."""
+    return WidgetUse("plot", "plot", {}, {}, options)._replace(lists={"series": signals})
 
 
 def value(signal: str, **options: Any) -> WidgetUse:
@@ -52,6 +74,19 @@ async def choose(page: Page, system: str) -> None:
       choice.dispatchEvent(new Event("change"));
     }"""
     await page.evaluate(js, system)
+
+
+async def said(page: Page, selector: str) -> list[float]:
+    """Return the numbers that elements say."""
+    return [float(text) for text in await page.locator(selector).all_text_contents() if text]
+
+
+async def saved(page: Page, file: Path) -> list[list[str]]:
+    """Save what a paused plot shows; return its rows."""
+    async with page.expect_download() as download:
+        await page.click(".plot-save")
+    await (await download.value).save_as(file)
+    return list(csv.reader(file.read_text("utf-8").splitlines()))
 
 
 async def test_figures_keep_what_means_something_in_every_unit(new_page: PageMaker) -> None:
@@ -89,3 +124,28 @@ async def test_the_history_of_a_value_is_the_same_line_in_other_units(new_page: 
         robot.say("pace", 11.0)
         await until_text(page, ".value-most", "24.61")
         await until_text(page, ".value-least", "22.37")
+
+
+async def test_a_plot_is_the_same_line_in_other_units(new_page: PageMaker, tmp_path: Path) -> None:
+    """What stands still is level, its scale is in the unit of the legend, the file as declared."""
+    async with shown(new_page, plot("pace")) as (robot, page):
+        robot.say("pace", 10.0, age_s=1.0)
+        await until_text(page, ".plot-value", "10 m/s")
+        await choose(page, "imperial")
+        await until_text(page, ".plot-value", "22.37 mph")
+        robot.say("pace", 10.0)
+        await page.wait_for_function(f"() => ({LINE_TOPS})() !== null")
+        assert await page.evaluate(LINE_TOPS) < 6
+        figures = await said(page, ".plot-figure")
+        assert 19 < min(figures) < 22.37 < max(figures) < 25
+
+        await page.click(".plot-pause")
+        await page.wait_for_selector(".plot-history .u-over")
+        await page.focus(".plot-history")
+        await page.keyboard.press("ArrowRight")
+        await until_text(page, ".plot-value", "22.37 mph")
+        await choose(page, "nautical")
+        await until_text(page, ".plot-value", "19.44 kn")
+        rows = await saved(page, tmp_path / "plot.csv")
+        assert rows[0] == ["time", "pace (m/s)"]
+        assert [row[1] for row in rows[1:]] == ["10", "10"]
