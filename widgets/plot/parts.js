@@ -51,13 +51,14 @@ export function ruled(scale, limits, factor) {
  *
  * @param {string} name
  * @param {string} hint
+ * @param {boolean} isShown
  */
-export function legendItem(name, hint) {
+export function legendItem(name, hint, isShown) {
   const item = document.createElement("li");
   const button = document.createElement("button");
   button.type = "button";
   button.className = "plot-entry";
-  button.setAttribute("aria-pressed", "true");
+  button.setAttribute("aria-pressed", String(isShown));
   button.title = hint;
   for (const [part, text] of Object.entries({ swatch: "", name, value: "—" })) {
     const made = document.createElement("span");

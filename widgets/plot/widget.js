@@ -133,7 +133,7 @@ class Plot {
       ring: traces.get(`${name} ${unit}`)?.ring ?? new Ring(size),
       colour: "",
       dash: [...(DASHES[Math.floor(place / COLOURS.length) % DASHES.length] ?? [])],
-      isShown: true,
+      isShown: traces.get(`${name} ${unit}`)?.isShown ?? true,
       drawn: 0,
       way: 0,
     }));
@@ -162,7 +162,7 @@ class Plot {
     const { signal: end, t } = this.ctx;
     const items = this.readings.map(({ signal }, place) => {
       const name = signal.title || signal.name;
-      const { item, button } = legendItem(name, t("Show or hide {name}", { name }));
+      const { item, button } = legendItem(name, t("Show or hide {name}", { name }), this.live.traces[place]?.isShown ?? true);
       button.addEventListener("click", () => this.show(place, button), { signal: end });
       return item;
     });

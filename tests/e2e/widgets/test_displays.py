@@ -11,6 +11,7 @@ from playwright.async_api import Page
 
 from tests.e2e.conftest import PageMaker
 from tests.e2e.dashboards import running_dashboard, until, until_attribute, until_text
+from tests.e2e.ports import free_port
 from urc.model.codec import WriteSpec
 from urc.model.driver import Argument, Command
 from urc.model.interface import Grid, Interface, Slot, WidgetUse
@@ -295,6 +296,28 @@ async def test_a_plot_draws_each_signal_and_can_be_looked_at(
         await page.wait_for_function(
             "() => Number([...document.querySelectorAll('.plot-figure')].at(-1).textContent) >= 40"
         )
+
+
+async def test_a_line_that_was_hidden_stays_hidden_after_a_cut(new_page: PageMaker) -> None:
+    """What somebody chose is not undone by a new connection."""
+    use = WidgetUse("plot", "plot", {}, {}, {})._replace(lists={"series": ("amps", "goal")})
+    robot = FakeRobot(dashboard_profile(signals=SIGNALS, uses=[use]))
+    page = await new_page()
+    new_page.allow(page, lambda fault: "WebSocket connection to" in fault)
+    port = free_port()
+    async with running_dashboard(robot, port=port) as address:
+        await page.goto(f"{address}robots/puppet/")
+        await until(lambda: robot.is_open)
+        robot.say("goal", 3)
+        await page.wait_for_function(LAST_VALUE_IS, arg="3 A")
+        await page.click(".plot-entry >> nth=0")
+        await until_attribute(page, ".plot-entry", "aria-pressed", "false")
+    async with running_dashboard(robot, port=port):
+        await until(lambda: robot.is_open)
+        robot.say("goal", 4)
+        await page.wait_for_function(LAST_VALUE_IS, arg="4 A")
+        pressed = "(all) => all.map((el) => el.ariaPressed)"
+        assert await page.eval_on_selector_all(".plot-entry", pressed) == ["false", "true"]
 
 
 async def test_the_newest_picture_is_shown(new_page: PageMaker) -> None:
