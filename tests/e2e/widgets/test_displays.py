@@ -320,6 +320,20 @@ async def test_a_line_that_was_hidden_stays_hidden_after_a_cut(new_page: PageMak
         assert await page.eval_on_selector_all(".plot-entry", pressed) == ["false", "true"]
 
 
+async def test_a_paused_plot_in_a_narrow_cell_shows_all_its_buttons(new_page: PageMaker) -> None:
+    """They go on in the next line, and none is cut off."""
+    bound = use("plot", {})._replace(lists={"series": ("amps",)})
+    async with shown(new_page, bound) as (_, page):
+        await page.eval_on_selector("[data-cell]", "(el) => { el.style.width = '280px'; }")
+        await page.click(".plot-pause")
+        await until_text(page, ".plot-pause", "Resume")
+        beyond = """(all) => all.filter((el) =>
+          el.getBoundingClientRect().right > el.closest("[data-cell]").getBoundingClientRect().right
+        ).length"""
+        assert await page.locator(".plot-tools button:visible").count() == 4
+        assert await page.eval_on_selector_all(".plot-tools button", beyond) == 0
+
+
 async def test_the_newest_picture_is_shown(new_page: PageMaker) -> None:
     """In its own size, fitted by the style sheet; a picture of the options stands there before."""
     source = "data:image/svg+xml,%3Csvg xmlns='http://www.w3.org/2000/svg' width='9' height='9'/%3E"
