@@ -8,7 +8,7 @@ import pytest
 from playwright.async_api import FloatRect, Locator, Page, expect
 
 from tests.e2e.conftest import PageMaker
-from tests.e2e.dashboards import WAIT_S, running_dashboard, until, until_text
+from tests.e2e.dashboards import WAIT_S, running_dashboard, until, until_attribute, until_text
 from tests.e2e.dev_pages import served
 from tests.e2e.motion.driving import (
     CALM_LEASE_S,
@@ -209,6 +209,31 @@ async def test_another_interface_keeps_the_connection(new_page: PageMaker) -> No
         await expect(page.locator(".urc-cell")).to_have_count(1)
         await page.goto(address)
         await expect(choice).to_have_value("lift")
+
+
+async def test_a_link_within_the_page_opens_nothing_anew(new_page: PageMaker) -> None:
+    """Neither to the content nor back: what widgets have kept stays, and what is held goes on."""
+    sticks = Interface("sticks", "Sticks", {"wide": row(*(use.slot for use in USES))})
+    lift = Interface("lift", "Lift", {"wide": row("up")})
+    async with driven(robot=steered(sticks, lift)) as (_, address):
+        page = await opened(new_page, address)
+        asked: list[str] = []
+        page.on("request", lambda request: asked.append(request.url))
+        await page.evaluate("document.querySelector('.urc-cell').dataset.kept = 'yes'")
+        await page.locator(".urc-skip").press("Enter")
+        await page.wait_for_url("**#main")
+        await page.go_back()
+        await page.wait_for_url(lambda url: "#" not in url)
+        await page.go_forward()
+        await page.wait_for_url("**#main")
+        await until_attribute(page, "[data-cell='0']", "data-kept", "yes")
+        assert [url for url in asked if "part=" in url] == []
+        choice = page.get_by_label("Interface")
+        await choice.select_option("lift")
+        await expect(page.locator(".urc-cell")).to_have_count(1)
+        await page.go_back()
+        await expect(page.locator(".urc-cell")).to_have_count(len(USES))
+        await expect(choice).to_have_value("sticks")
 
 
 async def test_an_interface_that_cannot_be_opened_leaves_this_one(new_page: PageMaker) -> None:

@@ -32,18 +32,35 @@ export class Interfaces {
     if (!(choice instanceof HTMLSelectElement)) throw new Error("the choice is no select");
     this.choice = choice;
     this.current = choice.value;
+    /** What the page's address was when this one was shown, without the place within the page. */
+    this.address = addressed();
     /** Of two that are on their way, the last one counts. */
     this.round = 0;
     keep(this.current);
     // The page's own address may name none, and mean another one when it is come back to.
     history.replaceState({ url: this.url }, "");
     choice.addEventListener("change", () => void this.open(this.url, true));
-    addEventListener("popstate", ({ state }) => void this.open(state?.url ?? location.href, false));
+    addEventListener("popstate", ({ state }) => this.moved(state?.url));
+  }
+
+  /**
+   * The history has gone a step; also a link within the page makes one.
+   *
+   * @param {string | undefined} url what the step keeps
+   */
+  moved(url) {
+    if (addressed() !== this.address) void this.open(url ?? location.href, false);
+    else if (!url) history.replaceState({ url: this.urlOf(this.current) }, ""); // as above
   }
 
   /** Of the interface that is chosen. */
   get url() {
-    return this.choice.selectedOptions[0]?.dataset["url"] ?? location.href;
+    return this.urlOf(this.choice.value);
+  }
+
+  /** @param {string} name */
+  urlOf(name) {
+    return [...this.choice.options].find(({ value }) => value === name)?.dataset["url"] ?? location.href;
   }
 
   /**
@@ -70,6 +87,7 @@ export class Interfaces {
       return;
     }
     if (isNew) history.pushState({ url }, "", url);
+    this.address = addressed();
     keep(this.current);
   }
 
@@ -87,6 +105,11 @@ export class Interfaces {
     document.title = page.title;
     this.doors.enter();
   }
+}
+
+/** The page's address without the place within the page. */
+function addressed() {
+  return location.pathname + location.search;
 }
 
 /**
