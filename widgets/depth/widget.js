@@ -5,6 +5,7 @@
 /** @typedef {import("../../urc/web/static/types.js").Reading} Reading */
 /** @typedef {import("./field.js").Field} Field */
 /** @typedef {import("./field.js").Form} Form */
+import { grasp } from "urc/giving";
 import { DASH, attribute, clamp, colours, format, noteOf, part, style, write } from "urc/kit";
 import { palette, pixel } from "urc/palette";
 import { arrayField, paint, pixelAt, probe, readField } from "./field.js";
@@ -79,16 +80,16 @@ class Depth {
       const box = this.box();
       this.move((event.clientX - box.left) / box.width, (event.clientY - box.top) / box.height);
     };
-    const down = (/** @type {PointerEvent} */ event) => {
-      this.face.setPointerCapture(event.pointerId);
-      point(event);
-    };
-    const move = (/** @type {PointerEvent} */ event) => {
-      if (this.face.hasPointerCapture(event.pointerId)) point(event);
-    };
-    this.face.addEventListener("pointerdown", down, { signal });
-    this.face.addEventListener("pointermove", move, { signal });
-    this.face.addEventListener("pointerup", () => this.give(), { signal });
+    grasp(this.face, {
+      take(event) {
+        point(event);
+        return true;
+      },
+      move: point,
+      release: () => void this.give(),
+      cancel() {},
+      signal,
+    });
     this.face.addEventListener("keydown", (event) => this.key(event), { signal });
   }
 

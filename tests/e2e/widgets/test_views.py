@@ -10,6 +10,7 @@ from tests.e2e.dashboards import until, until_attribute, until_text
 from tests.e2e.drawn import BLUE, GREEN, GREY, RED, plain, png, until_pixel
 from tests.e2e.gallery import coarse, difference
 from tests.e2e.motion.driving import CALM_LEASE_S, Wire, centre, driven, fresh, held, number
+from tests.e2e.widgets.inputs import drag
 from tests.e2e.widgets.viewing import METRES, RESTED, shown
 from urc.model.driver import Argument, Command
 from urc.model.interface import WidgetUse
@@ -87,10 +88,19 @@ async def test_depth_is_coloured_and_probed(new_page: PageMaker) -> None:
         await until(lambda: len(robot.commands) == 1)
         assert robot.commands[0] == ("look", {"x": 2, "y": 4, "distance": 0.4})
         await until_text(page, ".depth-text", "0.40 m · 2, 4")
+        await drag(page, ".depth-note", 0, 0)
+        await page.mouse.move(middle[0], middle[1], steps=3)
+        await page.mouse.up()
+        await page.mouse.click(middle[0], middle[1], button="right")
         await page.locator(".depth-face").focus()
         for _ in range(5):
             await page.keyboard.press("ArrowRight")
         await until_text(page, ".depth-text", "0.40 m · 4, 4")
+        await page.keyboard.press("Enter")
+        await until(lambda: len(robot.commands) > 1)
+        assert robot.commands[1:] == [("look", {"x": 4, "y": 4, "distance": 0.4})], (
+            "a press that began elsewhere, or with another button, chose nothing"
+        )
         robot.say("depth", b"not a picture")
         await page.wait_for_selector(".depth[data-fault='yes']")
         assert "set the options width and height" in await page.inner_text(".depth-note")
