@@ -4,7 +4,7 @@ import { test } from "node:test";
 
 import { boundsOf, keyed, snapped } from "../../urc/web/static/giving.js";
 import { Book } from "../../widgets/alerts/book.js";
-import { angleOf, arc, ray, shareAt, sharePulled } from "../../widgets/knob/dial.js";
+import { Pull, angleOf, arc, ray, shareAt } from "../../widgets/knob/dial.js";
 import { quality, Trips } from "../../widgets/link/trips.js";
 import { chosen, fileOf } from "../../widgets/log/lines.js";
 import { numberOf } from "../../widgets/number/typed.js";
@@ -36,10 +36,35 @@ test("a dial goes three quarters round and does not leap over its gap", () => {
   assert.equal(shareAt(0, -1), 0.5);
   assert.equal(shareAt(0.1, 0.1), null);
   assert.equal(shareAt(-0.01, 1), 0);
-  assert.equal(sharePulled(-0.01, 1, 0.97), 1);
-  assert.equal(sharePulled(0, 0, 0.4), 0.4);
+  assert.equal(new Pull(0.97).to(-0.01, 1), 1);
+  assert.equal(new Pull(0.1).to(0.3, 0.9), 0);
+  assert.equal(new Pull(0.4).to(0, 0), 0.4);
   assert.match(arc(10, 0, 1), /^M-7.07 7.07A10 10 0 1 1 7.07 7.07$/);
   assert.equal(ray(1, 2, 0.5), "M0 -1L0 -2");
+});
+
+/** @param {number} share */
+function rim(share) {
+  const angle = (angleOf(share) * Math.PI) / 180;
+  return /** @type {const} */ ([Math.sin(angle), -Math.cos(angle)]);
+}
+
+test("a quick finger that goes over the top is followed, however far it leaps", () => {
+  for (const [from, to] of [[0.2, 0.75], [0.45, 0.98], [0.8, 0.2], [0, 0.6], [1, 0.4]]) {
+    assert.equal(new Pull(from).to(...rim(to)).toFixed(3), to.toFixed(3), `${from} to ${to}`);
+  }
+  const pull = new Pull(0.95);
+  for (const [x, y] of [[0.2, 1], [-0.2, 1], [-1, 0.5], [-1, -0.1]]) assert.equal(pull.to(x, y), 1);
+  assert.equal(pull.to(...rim(0.9)).toFixed(3), "0.900", "back on its side of the gap");
+});
+
+test("a finger that goes through the middle of a dial leads its hand across, and to no end", () => {
+  const pull = new Pull(shareAt(-1, 0.05) ?? NaN);
+  const [left, right] = [shareAt(-0.5, 0.05), shareAt(0.5, 0.05)];
+  assert.deepEqual([-0.5, -0.2, 0, 0.2, 0.5].map((x) => pull.to(x, 0.05)), [left, left, left, left, right]);
+  const down = new Pull(0.4);
+  for (const y of [0, 0.5, 0.9]) assert.equal(down.to(0.01, y), 0.4, "below the middle is only the gap");
+  assert.equal(down.to(...rim(0.2)).toFixed(3), "0.200");
 });
 
 test("a number is taken as people write it, and refused with the reason", () => {

@@ -23,21 +23,56 @@ export function angleOf(share) {
  */
 export function shareAt(x, y) {
   if (Math.hypot(x, y) < BLIND) return null;
-  const angle = (Math.atan2(x, -y) * 180) / Math.PI;
+  return shareOf(degrees(x, y));
+}
+
+/** A finger that pulls the hand of a dial. */
+export class Pull {
+  /** @param {number} share where the hand is, 0 to 1 */
+  constructor(share) {
+    /** Of the finger: beyond an end it is in the gap, or has come through it. */
+    this.angle = angleOf(share);
+    /** Whether the finger is in the middle, or has been since it last pointed somewhere. */
+    this.isAstray = false;
+  }
+
+  /**
+   * Follow the finger, but not over the gap from one end to the other: out of the middle it points
+   * anew, as a finger that is put down.
+   *
+   * @param {number} x to the right of the middle, in radii
+   * @param {number} y below the middle, in radii
+   * @returns {number} 0 to 1
+   */
+  to(x, y) {
+    const angle = degrees(x, y);
+    if (Math.hypot(x, y) < BLIND) this.isAstray = true;
+    else if (!this.isAstray) this.turn(angle - this.angle);
+    else if (Math.abs(angle) <= SWEEP) {
+      this.angle = angle;
+      this.isAstray = false;
+    }
+    return shareOf(this.angle);
+  }
+
+  /** Go the shorter way. @param {number} way in degrees */
+  turn(way) {
+    const shorter = Math.abs(way) > 180 ? way - 360 * Math.sign(way) : way;
+    this.angle = Math.min(180, Math.max(-180, this.angle + shorter));
+  }
+}
+
+/** @param {number} angle */
+function shareOf(angle) {
   return Math.min(1, Math.max(0, (angle / SWEEP + 1) / 2));
 }
 
 /**
- * The same while a finger is down: it does not leap over the gap from one end to the other.
- *
  * @param {number} x
  * @param {number} y
- * @param {number} before 0 to 1
- * @returns {number}
  */
-export function sharePulled(x, y, before) {
-  const share = shareAt(x, y) ?? before;
-  return Math.abs(share - before) > 0.5 ? Math.round(before) : share;
+function degrees(x, y) {
+  return (Math.atan2(x, -y) * 180) / Math.PI;
 }
 
 /**

@@ -3,7 +3,7 @@
 /** @typedef {import("../../urc/web/static/types.js").Instance} Instance */
 import { Setpoint, SetpointFace } from "urc/giving";
 import { attribute, drawing } from "urc/kit";
-import { arc, ray, sharePulled, shareAt } from "./dial.js";
+import { Pull, arc, ray, shareAt } from "./dial.js";
 
 /** The middle of the drawing in its box of 100 by 90, and the radius of the rail. */
 const MIDDLE = { x: 0.5, y: 50 / 90 };
@@ -19,7 +19,7 @@ export default {
     const face = new SetpointFace(el, "knob");
     const dial = el.querySelector(".knob-dial");
     const setpoint = new Setpoint(ctx, show);
-    let share = 0;
+    let pull = new Pull(0);
 
     function show() {
       face.show(setpoint);
@@ -50,8 +50,8 @@ export default {
       attribute(drawing(dial, ".knob-rail"), "d", arc(RADIUS, 0, 1));
       const at = (/** @type {PointerEvent} */ event, /** @type {boolean} */ isNew) => {
         const place = placeOf(event);
-        share = isNew ? shareAt(...place) ?? setpoint.shareOf(setpoint.from) ?? 0 : sharePulled(...place, share);
-        return setpoint.at(share);
+        if (isNew) pull = new Pull(shareAt(...place) ?? setpoint.shareOf(setpoint.from) ?? 0);
+        return setpoint.at(pull.to(...place));
       };
       face.listen(dial, setpoint, at, signal);
     }
