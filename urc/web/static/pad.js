@@ -78,14 +78,15 @@ export class Pads {
   }
 
   /**
-   * Keep where the sticks and buttons of a device are; null: as the browser says.
+   * Keep where the sticks and buttons of a device are; null: as the browser says. What is held is
+   * let go: the same hand means something else now.
    *
    * @param {string} id
    * @param {PadMap | null} map
    */
   setMap(id, map) {
     this.maps.set(id, map);
-    this.ready.clear();
+    this.used = ""; // it is met anew
     try {
       if (map) localStorage.setItem(STORED + id, JSON.stringify(map));
       else localStorage.removeItem(STORED + id);
