@@ -68,6 +68,35 @@ test("of three images that come while one is decoded, only the newest is decoded
   assert.equal(second.isClosed, true);
 });
 
+test("each reading of a counted signal is heard once, and what is missing is told", () => {
+  const store = new Store();
+  store.names = ["a", "b"];
+  store.each.begin("one");
+  const end = new AbortController();
+  /** @type {unknown[]} */
+  const heard = [];
+  for (const name of store.names) {
+    store.each.listen(name, (missed) => heard.push([name, store.samples.get(name)?.value, missed]), end.signal);
+  }
+  /** @param {number[]} i @param {number[]} v @param {Record<number, number>} [e] */
+  const frame = (i, v, e) => {
+    heard.length = 0;
+    store.values({ n: 0, i, v, a: 0, ...(e && { e }) }, 0);
+    return heard;
+  };
+  assert.deepEqual(frame([0, 1], [5, 9], { 0: 40 }), [["a", 5, 0], ["b", 9, 0]], "what was before is not missed");
+  assert.deepEqual(frame([0, 0, 1], [6, 7, 9], { 0: 41 }), [["a", 6, 0], ["a", 7, 0], ["b", 9, 0]]);
+  store.each.begin("one");
+  const before = store.samples.get("a")?.serial;
+  assert.deepEqual(frame([0], [7], { 0: 42 }), [], "told again after a cut");
+  assert.equal(store.samples.get("a")?.serial, before);
+  assert.deepEqual(frame([0, 0], [8, 8], { 0: 46 }), [["a", 8, 3], ["a", 8, 0]]);
+  store.each.begin("two");
+  assert.deepEqual(frame([0], [8], { 0: 1 }), [["a", 8, 0]], "another session counts anew");
+  end.abort();
+  assert.deepEqual(frame([0], [8], { 0: 2 }), []);
+});
+
 test("an image that is none is told, and the next one is shown", async () => {
   const faults = [];
   const shown = [];

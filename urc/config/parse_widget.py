@@ -63,6 +63,7 @@ def _input(part: Part) -> Port:
         of=_one_or_more(part.get("of")),
         size=None if size is None else int(size.data),
         is_many=part.flag("many", default=False),
+        is_each=part.flag("each", default=False),
     )
 
 

@@ -29,6 +29,8 @@ class Port(NamedTuple):
     """Of an input that takes arrays: how many elements they must have; None takes any."""
     is_many: bool = False
     """Of an input: it takes a list of signals, each of which must fit."""
+    is_each: bool = False
+    """Of an input: each reading counts, not only the newest."""
 
 
 class Widget(NamedTuple):

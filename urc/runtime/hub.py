@@ -15,6 +15,7 @@ from typing import Literal
 
 from urc.model.codec import Envelope
 from urc.model.values import Alarm, Reading, Sample, Signal
+from urc.runtime.streams import Streams
 
 __all__ = [
     "Columns",
@@ -181,6 +182,8 @@ class Hub:
         self.traffic_count = 0
         self.traffic_watchers = 0
         """Traffic is recorded while this is above 0."""
+        self.streams = Streams()
+        """Of which each reading counts; of none, unless somebody says so."""
         self._latest: dict[str, Sample] = {}
         self._changed: dict[str, int] = {}
         self._last: tuple[Sample, ...] = ()
@@ -213,6 +216,8 @@ class Hub:
                 changed[name] = revision
             self._last = taken
         self._last_revision = revision
+        if self.streams:
+            self.streams.put(taken, revision)
         for tap in self._taps:
             tap.put(taken)
         for wake in self._wakers:
@@ -284,10 +289,16 @@ class Hub:
         changed = self._changed
         return [sample for name, sample in self._latest.items() if changed[name] > revision]
 
-    def columns_since(self, revision: int) -> Columns | None:
-        """Return the same part by part; None when there is nothing."""
+    def columns_since(self, revision: int, *, joined: int = 0) -> Columns | None:
+        """Return the same part by part; None when there is nothing.
+
+        Of a signal of which each reading counts there are several, the newest last; but only those
+        after `joined`, where a reader began.
+        """
         samples: Sequence[Sample] = ()
-        if revision == self._last_revision - 1 == self.revision - 1:
+        since = max(revision, joined)
+        has_more = bool(self.streams) and self.streams.has_more(since)
+        if revision == self._last_revision - 1 == self.revision - 1 and not has_more:
             if self._batch is not None:
                 return self._batch
             samples = self._last
@@ -296,6 +307,8 @@ class Hub:
                 return (name,), (value,), (time_s,), (alarm,)
         if not samples or len({sample[0] for sample in samples}) < len(samples):
             samples = self.changed_since(revision)
+        if has_more:
+            samples = self.streams.filled(samples, since)
         if not samples:
             return None
         names, values, times, alarms = zip(*samples, strict=False)

@@ -54,6 +54,7 @@ def plain_widget(name: str, inputs: Sequence[str], folder: Path | None = None) -
             unit=known.get(each, {}).get("unit", ""),
             is_required=known.get(each, {}).get("required", True),
             is_many=known.get(each, {}).get("many", False),
+            is_each=known.get(each, {}).get("each", False),
         )
         for each in {**known, **dict.fromkeys(inputs)}
     }

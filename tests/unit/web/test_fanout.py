@@ -7,6 +7,7 @@ import pytest
 
 from urc.model.values import Sample, Signal
 from urc.runtime.hub import Hub, Note
+from urc.runtime.streams import STREAM_KEPT
 from urc.testing.clock import FakeClock, settle
 from urc.web.feed.crowd import Known, Place
 from urc.web.feed.fanout import Fanout, Pacer
@@ -109,6 +110,58 @@ def test_a_newcomer_gets_everything_with_its_age_now() -> None:
     late.take()
     assert late.values == [{"a": 1, "b": 2}]
     assert json.loads(late.texts[0])["a"] == 5000
+
+
+def readings(watcher: Watcher) -> list[tuple[list[object], object]]:
+    """Return the values of the first signal in each frame, and the number of the first of them."""
+    frames = [json.loads(text) for text in watcher.texts if text.startswith('{"t":"v"')]
+    return [
+        ([value for place, value in zip(frame["i"], frame["v"], strict=True) if place == 0],
+         frame.get("e"))
+        for frame in frames
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("at_once", [1, 10, 40], ids=["one by one", "few", "many"])
+def test_of_some_signals_every_reading_is_told(at_once: int) -> None:
+    """However they come; whoever comes later gets the newest, and then every one as well."""
+    clock = FakeClock()
+    hub = Hub({"a": Signal("a"), "b": Signal("b")})
+    fanout = Fanout(hub, clock=clock, each=["a"])
+    put(hub, clock, a=-1, b=0)
+    first = Watcher(fanout)
+    fanout.flush()
+    for begin in range(0, 40, at_once):
+        hub.put([Sample("a", value, clock.now()) for value in range(begin, begin + at_once)])
+        hub.put([Sample("b", begin, clock.now())])
+    fanout.flush()
+    assert readings(first) == [([-1], {"0": 1}), ([*range(40)], {"0": 2})]
+    assert first.values[-1]["b"] == 40 - at_once
+    late = Watcher(fanout)
+    put(hub, clock, a=40)
+    put(hub, clock, a=41)
+    fanout.flush()
+    put(hub, clock, b=1)
+    fanout.flush()
+    assert readings(late) == [([40, 41], {"0": 42}), ([], None)]
+    newest = Watcher(fanout)
+    newest.take()
+    assert readings(newest) == [([41], {"0": 43})]
+
+
+def test_readings_that_are_not_kept_are_missing_in_the_numbers() -> None:
+    """A client that takes nothing for long can tell how many it has lost."""
+    clock = FakeClock()
+    hub = Hub({"a": Signal("a")})
+    fanout = Fanout(hub, clock=clock, each=["a"])
+    client = Watcher(fanout)
+    client.is_stuck = True
+    for value in range(STREAM_KEPT + 7):
+        put(hub, clock, a=value)
+    fanout.flush()
+    client.take()
+    ((values, numbers),) = readings(client)
+    assert (values[0], len(values), numbers) == (7, STREAM_KEPT, {"0": 8})
 
 
 def test_lines_of_the_log_are_never_lost_silently() -> None:

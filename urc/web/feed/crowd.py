@@ -37,6 +37,8 @@ class Known(NamedTuple):
     """Number of the state of the sequences it has."""
     notes: int = 0
     """Log lines it has, or was told it lost."""
+    joined: int = 0
+    """Hub revision at which it came; 0 once it has what came before."""
 
 
 def _nowhere(frame: bytes) -> None:

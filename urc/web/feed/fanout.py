@@ -8,9 +8,11 @@ fell behind gets the newest values merged into one frame, and is nobody else's p
 
 import asyncio
 import os
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import partial
 
+from urc.model.values import NOTHING
 from urc.runtime.clock import Alarm, Clock, LoopClock
 from urc.runtime.hub import Columns, Hub
 from urc.web.feed.crowd import NO_NUMBER, Crowd, Known, Listener, Place, Write
@@ -23,7 +25,7 @@ from urc.web.wire.picture import as_frame
 __all__ = ["FRAMES_PER_SECOND", "Fanout", "Pacer"]
 
 _known = partial(tuple.__new__, Known)
-"""Of its four numbers, without a function of Python's."""
+"""Of its five numbers, without a function of Python's."""
 FRAMES_PER_SECOND = 60.0
 LOG_LINES_FOR_NEWCOMERS = 50
 SHARED_FOR_S = 0.005
@@ -73,7 +75,10 @@ class Fanout:
         rate_hz: float = FRAMES_PER_SECOND,
         clock: Clock | None = None,
         write: Write = os.write,
+        each: Iterable[str] = (),
     ) -> None:
+        """Begin with nobody; of signals in `each` every reading is told, of others the newest."""
+        hub.streams.keep(each)
         self.hub = hub
         self._crowds: list[Crowd] = []
         """One for each set of images that somebody shows."""
@@ -159,9 +164,9 @@ class Fanout:
             return False
         has_pictures = not self._pictures.isdisjoint(columns[0])
         plain = self._plain(columns) if has_pictures else columns
-        crowd.known = _known((hub.revision, known.links, known.progress, known.notes))
+        crowd.known = _known((hub.revision, known.links, known.progress, known.notes, 0))
         if plain is not None:
-            text = encode_values(plain, self._indexes, self._clock.now())
+            text = self._encoded(plain, self._clock.now())
             crowd.send(as_frame(text, is_text=True))
         if has_pictures:
             for picture in self.shelf.take_all(crowd.looks):
@@ -178,7 +183,8 @@ class Fanout:
     def join(self, listener: Listener) -> Place:
         """Let somebody know of each flush; return the place of one that knows nothing yet."""
         self._waiting[listener] = None
-        known = Known(notes=max(0, self.hub.notes_count - LOG_LINES_FOR_NEWCOMERS))
+        notes = max(0, self.hub.notes_count - LOG_LINES_FOR_NEWCOMERS)
+        known = Known(notes=notes, joined=self.hub.revision)
         return Place(known, listener=listener)
 
     def leave(self, place: Place) -> None:
@@ -253,26 +259,31 @@ class Fanout:
     def _make(self, known: Known, now_s: float) -> _Taken:
         hub = self.hub
         messages: list[bytes] = []
-        revision, links, progress, notes = known
+        revision, links, progress, notes, joined = known
         has_pictures = False
         if links != hub.links_count:
             messages.append(encode_links(hub.links.values(), now_s).encode())
         if revision < self._head:  # what came since the last flush waits for the next one
-            columns = hub.columns_since(revision)
-            revision = hub.revision
+            columns = hub.columns_since(revision, joined=joined)
+            revision, joined = hub.revision, 0
             if columns is not None and not self._pictures.isdisjoint(columns[0]):
                 has_pictures, columns = True, self._plain(columns)
             if columns is not None:
-                messages.append(encode_values(columns, self._indexes, now_s))
+                messages.append(self._encoded(columns, now_s))
         if hub.notes_count > notes:
             messages.append(self._take_log(hub.notes_count - notes, now_s).encode())
         if progress != hub.progress_count:
             messages.append(encode_progress(tuple(hub.progress.values())).encode())
-        after = Known(revision, hub.links_count, hub.progress_count, hub.notes_count)
+        after = Known(revision, hub.links_count, hub.progress_count, hub.notes_count, joined)
         frames = b"".join([as_frame(message, is_text=True) for message in messages])
         taken = _Taken(after, messages, frames, now_s, has_pictures)
         self._taken[known] = taken
         return taken
+
+    def _encoded(self, columns: Columns, now_s: float) -> bytes:
+        streams = self.hub.streams
+        firsts = streams.firsts(columns[0]) if streams else NOTHING
+        return encode_values(columns, self._indexes, now_s, firsts)
 
     def _plain(self, columns: Columns) -> Columns | None:
         """Return readings without the images in them, which only go to those who show them."""

@@ -36,6 +36,7 @@ __all__ = [
     "SessionFailed",
     "SessionLike",
     "Station",
+    "each_counts",
     "missing_settings",
     "needs_holding",
 ]
@@ -131,6 +132,20 @@ def needs_holding(driver: Driver, command: str) -> bool:
     """Return whether the command is motion: given once, it would never be stopped."""
     known = driver.commands.get(command)
     return known is not None and known.hold is not None
+
+
+def each_counts(profile: Profile) -> frozenset[str]:
+    """Return the signals of which a widget of the robot must hear each reading."""
+    uses = [*profile.slots.values()]
+    for interface in profile.interfaces.values():
+        uses += interface.widgets.values()
+    found: set[str] = set()
+    for use in uses:
+        widget = profile.widgets.get(use.widget)
+        for port in widget.inputs.values() if widget is not None else ():
+            if port.is_each:
+                found |= {*use.lists.get(port.name, ())} | {use.inputs.get(port.name, "")}
+    return frozenset(found & profile.driver.signals.keys())
 
 
 class Station:
@@ -275,7 +290,8 @@ class Station:
                 await self.clock.sleep(RETRY_S)
 
     async def _serve(self, session: SessionLike) -> None:
-        fanout = Fanout(session.hub, clock=self.clock)
+        each = each_counts(self.robot.profile)
+        fanout = Fanout(session.hub, clock=self.clock, each=each)
         live = Live(session, fanout, secrets.token_hex(8), asyncio.Event())
         self._coming().set_result(live)
         try:

@@ -31,6 +31,9 @@ export function contextOf(cell) {
     on: (/** @type {string} */ input, /** @type {(reading: Reading) => void} */ listener) => {
       cell.listen(input, listener);
     },
+    each: (/** @type {string} */ input, /** @type {(reading: Reading, missed: number) => void} */ listener) => {
+      each(cell, input, listener);
+    },
     send: (/** @type {string} */ output, /** @type {Record<string, Given>} */ args = {}) =>
       give(cell, output, args),
     command: (/** @type {string} */ output) => describe(cell.output(output)),
@@ -83,6 +86,25 @@ export async function give(cell, output, given) {
   } finally {
     ticket.close();
   }
+}
+
+/**
+ * @param {Cell} cell
+ * @param {string} input
+ * @param {(reading: Reading, missed: number) => void} listener
+ */
+function each(cell, input, listener) {
+  const { store } = cell.doors;
+  const bound = cell.inputs.find((one) => one.input === input);
+  bound?.signals.forEach((name, place) => {
+    const hear = (/** @type {number} */ missed) => {
+      // As it was when it was measured: what comes late is no less a reading.
+      const reading = cell.reading(bound, place, store, store.samples.get(name)?.timeMs ?? 0);
+      cell.measured(performance.now(), () => listener(reading, missed));
+    };
+    if (store.samples.has(name)) hear(0);
+    store.each.listen(name, hear, cell.end.signal);
+  });
 }
 
 /**

@@ -36,6 +36,9 @@ export function contextOf(frame, options) {
     on: (/** @type {string} */ input, /** @type {(reading: Reading) => void} */ listener) => {
       frame.listeners.set(input, [...(frame.listeners.get(input) ?? []), listener]);
     },
+    each: () => {
+      throw new Error(t("a widget in a frame cannot do that: {wish}", { wish: "each" }));
+    },
     send: async (/** @type {string} */ output, /** @type {Record<string, Given>} */ args = {}) => {
       bound(frame, output);
       lastId += 1;

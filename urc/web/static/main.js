@@ -182,6 +182,7 @@ function take(message) {
       wakeWidgets();
       return;
     case "hello":
+      store.each.begin(message.session);
       store.hello(message, nowMs);
       session = message.session;
       sequences = {};

@@ -20,6 +20,7 @@
  *
  * @typedef {{value: Held, alarm: Alarm, timeMs: number, serial: number, image?: Picture}} Sample
  */
+import { Each } from "./each.js";
 import { digitsIn } from "./figures.js";
 import { ageText, textOf } from "./texts.js";
 import { converted, factorOf, Units } from "./units.js";
@@ -67,6 +68,7 @@ export class Store {
     this.hasPictures = false;
     this.skewMs = Infinity;
     this.skewSetMs = 0;
+    this.each = new Each();
     this.units = new Units();
     /** Signals in the unit that an input asks for. @type {WeakMap<Conversion, Signal>} */
     this.wanted = new WeakMap();
@@ -118,6 +120,8 @@ export class Store {
     frame.i.forEach((index, place) => {
       const name = this.names[index];
       if (name === undefined) return;
+      const missed = this.each.take(frame.e, index, name);
+      if (missed < 0) return;
       this.serial += 1;
       this.samples.set(name, {
         value: frame.v[place] ?? null,
@@ -125,6 +129,7 @@ export class Store {
         timeMs: sentMs - (typeof frame.a === "number" ? frame.a : (frame.a[place] ?? 0)),
         serial: this.serial,
       });
+      this.each.tell(name, missed);
     });
   }
 

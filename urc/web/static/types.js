@@ -120,6 +120,8 @@
  * @property {Held[]} v
  * @property {number | number[]} a One for all where all are equally old.
  * @property {Alarm[]} [s]
+ * @property {Record<number, number>} [e] Of signals of which each reading counts: the number of the
+ *   first one in this frame, by index.
  *
  * @typedef {object} Reply
  * @property {number} id
@@ -213,6 +215,10 @@
  * @property {Readonly<Record<string, unknown>>} options
  * @property {(input: string, listener: (reading: Reading) => void) => void} on
  *   Calls the listener in the animation frame after that input has changed.
+ * @property {(input: string, listener: (reading: Reading, missed: number) => void) => void} each
+ *   Calls the listener with the reading that is known, and then with each one when it comes, as it
+ *   was then, also while the cell cannot be seen; `missed` is how many were lost before it. For
+ *   inputs that the manifest marks with `each`, of widgets that live in the page.
  * @property {(output: string, args?: Record<string, Given>) => Promise<Record<string, Value>>} send
  *   Runs the command bound to the output, with arguments by the names of the widget's manifest;
  *   rejects with an Error that says why it was not done.

@@ -7,7 +7,8 @@ Server → page, by ``t``::
 
     hello   once, first: names, what each signal means, the server's clock
     v       changed signals: i indexes, v values, a ages (one number when all are equally old),
-            s alarms (left out when all are normal)
+            s alarms (left out when all are normal). Of signals of which each reading counts there
+            may be several, oldest first; e has the number of the first one, by index
     links   the state of every transport
     log     lines, oldest first; numbers run on, so that a gap shows what was dropped
     reply   the one answer to a command
@@ -37,7 +38,7 @@ import msgspec
 
 from urc.model.driver import Command, Driver, Poll
 from urc.model.profile import Profile
-from urc.model.values import Reading, Signal
+from urc.model.values import NOTHING, Reading, Signal
 from urc.runtime.hub import Columns, LinkStatus, Note
 from urc.web.wire.ask import Agree, Arguments, Prepare, Steer
 from urc.web.wire.drive import Drive, Release, Stop, Tick
@@ -120,6 +121,7 @@ class _Values(Outbound, tag="v", frozen=True):
     a: int | Sequence[int]
     """One for all where all are equally old."""
     s: Sequence[str] | None = None
+    e: Mapping[int, int] | None = None
 
 
 class _Link(msgspec.Struct, frozen=True):
@@ -225,6 +227,10 @@ class Indexes:
         self._names: tuple[str, ...] = ()
         self._found = msgspec.Raw(b"[]")
 
+    def keyed(self, numbers: Mapping[str, int]) -> dict[int, int]:
+        """Return numbers of signals by their index instead of their name."""
+        return {self._index[name]: number for name, number in numbers.items()}
+
     def of(self, names: tuple[str, ...]) -> msgspec.Raw:
         """Return the numbers as they stand in a message."""
         if names is not self._names and names != self._names:
@@ -233,8 +239,10 @@ class Indexes:
         return self._found
 
 
-def encode_values(columns: Columns, indexes: Indexes, now_s: float) -> bytes:
-    """Return one frame with the newest reading of each changed signal."""
+def encode_values(
+    columns: Columns, indexes: Indexes, now_s: float, firsts: Mapping[str, int] = NOTHING
+) -> bytes:
+    """Return one frame with what is new; `firsts` are numbers of readings, by signal."""
     values: Sequence[object]
     names, values, times, alarms = columns
     count, first_s = len(names), times[0]
@@ -247,7 +255,9 @@ def encode_values(columns: Columns, indexes: Indexes, now_s: float) -> bytes:
         values = tuple(repaired(_plain(value)) for value in values)
     are_normal = alarms.count("") == count
     now_ms, numbers = round(now_s * 1000), indexes.of(names)
-    return encoded_bytes(_Values(now_ms, numbers, values, ages, None if are_normal else alarms))
+    told = None if are_normal else alarms
+    counted = indexes.keyed(firsts) if firsts else None
+    return encoded_bytes(_Values(now_ms, numbers, values, ages, told, counted))
 
 
 def encode_links(links: Iterable[LinkStatus], now_s: float) -> str:
