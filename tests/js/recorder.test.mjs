@@ -8,22 +8,20 @@ import { Recording, field, span } from "../../widgets/recorder/rows.js";
 /**
  * @param {string} name
  * @param {unknown} value
- * @param {number} serial
  * @param {number} time
  */
-function reading(name, value, serial, time = 100) {
-  return /** @type {Reading} */ (/** @type {unknown} */ ({ signal: { name }, value, serial, time }));
+function reading(name, value, time = 100) {
+  return /** @type {Reading} */ (/** @type {unknown} */ ({ signal: { name }, value, time }));
 }
 
 const DATE_MS = Date.UTC(2026, 0, 2, 3, 4, 5);
 
-test("each reading is kept once, with the time at which it was measured", () => {
-  const recording = new Recording(10);
-  recording.skip([reading("a", 1, 1)]);
-  assert.equal(recording.add([reading("a", 1, 1)], 100, DATE_MS), false, "it was there before");
-  assert.equal(recording.add([reading("a", 2, 2, 99.5), reading("b", "on", 1)], 100, DATE_MS), true);
-  assert.equal(recording.add([reading("a", 2, 2, 99.5), reading("b", "on", 1)], 101, DATE_MS + 1000), false);
-  assert.equal(recording.add([reading("a", 2, 3, 101)], 101, DATE_MS + 1000), true, "an equal value is news, too");
+test("each reading is a row, with the time at which it was measured", () => {
+  const recording = new Recording(10, 99.4);
+  recording.add(reading("a", 1, 99.3), 0, 100, DATE_MS); // from before
+  recording.add(reading("a", 2, 99.5), 0, 100, DATE_MS);
+  recording.add(reading("b", "on"), 0, 100, DATE_MS);
+  recording.add(reading("a", 2, 101), 0, 101, DATE_MS + 1000);
   assert.equal(
     recording.table(),
     "time,signal,value\r\n" +
@@ -32,17 +30,25 @@ test("each reading is kept once, with the time at which it was measured", () => 
 });
 
 test("what is not known is no row, and what comes too late stands where it belongs", () => {
-  const recording = new Recording(10);
-  recording.add([reading("a", null, 1)], 100, DATE_MS);
-  recording.add([reading("a", 1, 2, 100)], 100, DATE_MS);
-  recording.add([reading("b", 2, 1, 99)], 101, DATE_MS + 1000);
+  const recording = new Recording(10, 0);
+  recording.add(reading("a", null), 0, 100, DATE_MS);
+  recording.add(reading("a", 1, 100), 0, 100, DATE_MS);
+  recording.add(reading("b", 2, 99), 0, 101, DATE_MS + 1000);
   assert.deepEqual(recording.rows.map(([, name]) => name), ["a", "b"]);
   assert.match(recording.table(), /,b,2\r\n.*,a,1\r\n$/);
 });
 
+test("what was lost before a reading is counted, also where that one is not known", () => {
+  const recording = new Recording(10, 50);
+  recording.add(reading("a", 1, 49), 7, 100, DATE_MS);
+  recording.add(reading("a", null), 2, 100, DATE_MS);
+  recording.add(reading("a", 1), 3, 100, DATE_MS);
+  assert.deepEqual([recording.lost, recording.rows.length], [5, 1]);
+});
+
 test("a full recording takes nothing more", () => {
-  const recording = new Recording(2);
-  for (let serial = 1; serial < 9; serial += 1) recording.add([reading("a", serial, serial)], 100, DATE_MS);
+  const recording = new Recording(2, 0);
+  for (let value = 1; value < 9; value += 1) recording.add(reading("a", value), 0, 100, DATE_MS);
   assert.equal(recording.isFull, true);
   assert.deepEqual(recording.rows.map(([, , value]) => value), ["1", "2"]);
 });

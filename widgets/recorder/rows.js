@@ -11,13 +11,17 @@ const FORMULA = /^[=+\-@\t\r]/;
 const NUMBER = /^[+-]?[\d.]+(e[+-]?\d+)?$/i;
 
 export class Recording {
-  /** @param {number} most rows */
-  constructor(most) {
+  /**
+   * @param {number} most rows
+   * @param {number} begunS when it began, by the page's clock
+   */
+  constructor(most, begunS) {
     this.most = most;
+    this.begunS = begunS;
     /** @type {Row[]} */
     this.rows = [];
-    /** The last reading of each signal that was kept or passed over. @type {Map<string, number>} */
-    this.serials = new Map();
+    /** Readings that never reached the page. */
+    this.lost = 0;
   }
 
   get isFull() {
@@ -25,30 +29,18 @@ export class Recording {
   }
 
   /**
-   * Pass over what was said before the recording began.
+   * Keep a reading, unless it is from before the recording.
    *
-   * @param {readonly Reading[]} readings
-   */
-  skip(readings) {
-    for (const { signal, serial } of readings) this.serials.set(signal.name, serial);
-  }
-
-  /**
-   * Keep each reading that is new, and return whether there was one.
-   *
-   * @param {readonly Reading[]} readings
+   * @param {Reading} reading
+   * @param {number} missed how many were lost before it
    * @param {number} nowS the page's clock, in seconds
    * @param {number} dateMs the same moment, in milliseconds since 1970
    */
-  add(readings, nowS, dateMs) {
-    const before = this.rows.length;
-    for (const { signal, serial, value, time } of readings) {
-      if (this.serials.get(signal.name) === serial || this.isFull) continue;
-      this.serials.set(signal.name, serial);
-      if (value === null) continue;
-      this.rows.push([Math.round(dateMs - (nowS - time) * 1000), signal.name, String(value)]);
-    }
-    return this.rows.length > before;
+  add({ signal, value, time }, missed, nowS, dateMs) {
+    if (this.isFull || time < this.begunS) return;
+    this.lost += missed;
+    if (value === null) return;
+    this.rows.push([Math.round(dateMs - (nowS - time) * 1000), signal.name, String(value)]);
   }
 
   /** Return all as a table in the order of time. */

@@ -18,7 +18,7 @@ class Recorder {
     this.main = part(el, ".recorder-main");
     this.keep = /** @type {HTMLButtonElement} */ (part(el, ".recorder-save"));
     this.most = Number(options["rows"] ?? 100_000);
-    this.recording = new Recording(this.most);
+    this.recording = new Recording(this.most, Infinity);
     this.isOn = false;
     this.begunMs = 0;
     this.timer = 0;
@@ -27,22 +27,29 @@ class Recorder {
     this.main.addEventListener("click", () => (this.isOn ? this.stop() : this.begin()), { signal });
     this.keep.addEventListener("click", () => this.save(), { signal });
     signal.addEventListener("abort", () => clearInterval(this.timer));
+    ctx.each("values", (reading, missed) => this.hear(reading, missed));
   }
 
   /** @param {readonly Reading[]} readings */
   update(readings) {
     this.readings = readings;
     attribute(this.root, "data-state", worst(readings).state);
-    if (this.isOn && this.recording.add(readings, performance.now() / 1000, Date.now()) && this.recording.isFull) {
-      this.stop();
-    }
     if (!this.isOn) this.show(); // the first readings may say that there are none
   }
 
+  /**
+   * @param {Reading} reading
+   * @param {number} missed
+   */
+  hear(reading, missed) {
+    if (!this.isOn) return;
+    this.recording.add(reading, missed, performance.now() / 1000, Date.now());
+    if (this.recording.isFull) this.stop();
+  }
+
   begin() {
-    this.recording = new Recording(this.most);
-    this.recording.skip(this.readings);
     this.begunMs = performance.now();
+    this.recording = new Recording(this.most, this.begunMs / 1000);
     this.isOn = true;
     this.timer = window.setInterval(() => this.show(), EVERY_MS);
     this.show();
@@ -67,7 +74,9 @@ class Recorder {
     write(this.main, this.isOn ? t("Stop recording") : t("Record"));
     if (this.isOn) write(this.clock, span((performance.now() - this.begunMs) / 1000));
     this.keep.disabled = count === 0;
-    write(this.note, this.words(count, isFull));
+    const { lost } = this.recording;
+    const loss = lost > 0 ? t("▲ {count} lost on the way", { count: lost }) : "";
+    write(this.note, [this.words(count, isFull), loss].filter(Boolean).join(" · "));
   }
 
   /**

@@ -14,7 +14,7 @@ export default {
    * @returns {Instance}
    */
   mount(ctx) {
-    const { el, options, signal, send, follow, memory, command, t } = ctx;
+    const { el, options, signal, send, each, follow, memory, command, t } = ctx;
     const root = part(el, ".terminal");
     const note = part(el, ".terminal-note");
     const field = el.querySelector(".terminal-field");
@@ -24,7 +24,6 @@ export default {
     const hasCommand = command("typed") !== null;
     const argument = Object.values(command("typed")?.arguments ?? {})[0];
     let fault = "";
-    let serial = -1;
     /** @type {Reading | undefined} */
     let state;
     const giver = new Giver({ give: (args) => send("typed", args), show, t, signal });
@@ -102,14 +101,14 @@ export default {
       for (const line of lines.slice(from)) screen.write(`${line.source}: ${plain(line.text)}`);
       last = lines.at(-1);
     });
+    each("line", ({ value }, missed) => {
+      if (missed > 0) screen.write(t("… lines left out: {count}", { count: missed }));
+      if (value !== null) heard(String(value));
+    });
     return {
       update(readings, outputs) {
         state = readings["line"];
         isBound = state !== undefined;
-        if (state && state.value !== null && state.serial !== serial) {
-          serial = state.serial;
-          heard(String(state.value));
-        }
         if (hasCommand) giver.take(outputs["typed"]);
         else show();
       },
