@@ -20,6 +20,17 @@ test("an option narrows what a command takes, and never widens it", () => {
   assert.deepEqual(boundsOf(undefined, {}), { min: 0, max: 100, step: 1, digits: 0, unit: "" });
 });
 
+test("a bound that nobody has declared leaves room beyond the one that is", () => {
+  const ends = (/** @type {object} */ declared, options = {}) => {
+    const { min, max } = boundsOf({ ...VOLTS, min: null, max: null, ...declared }, options);
+    return [min, max];
+  };
+  assert.deepEqual([ends({ min: 200 }), ends({ max: -5 }), ends({ max: 0 })], [[200, 300], [-105, -5], [-100, 0]]);
+  assert.deepEqual([ends({ min: 5 }), ends({ max: 1000 }), ends({ min: -20 })], [[5, 100], [0, 1000], [-20, 100]]);
+  assert.deepEqual([ends({}, { min: 200 }), ends({ min: 0 }, { max: -5 })], [[200, 300], [0, 0]]);
+  assert.deepEqual(ends({ min: 0, max: 10 }, { min: 50 }), [10, 10]);
+});
+
 test("keys step, leap and go to the ends, on the grid and within the bounds", () => {
   const bounds = { min: 0, max: 10, step: 0.1 };
   assert.equal(keyed("ArrowRight", 0.2, bounds), 0.3);

@@ -5,6 +5,9 @@
  * @typedef {import("./types.js").Argument} Argument
  */
 
+/** How far a control goes where nobody has said it. */
+const ROOM = 100;
+
 /**
  * What stands between two values of a control.
  *
@@ -13,12 +16,14 @@
  * @returns {{min: number, max: number, step: number, digits: number, unit: string}}
  */
 export function boundsOf(argument, options) {
-  const pick = (/** @type {unknown} */ own, /** @type {number | null | undefined} */ theirs, /** @type {number} */ none) =>
-    typeof own === "number" ? own : (theirs ?? none);
-  const theirs = argument ?? { min: null, max: null };
+  const [least, most] = [argument?.min ?? -Infinity, argument?.max ?? Infinity];
+  const inside = (/** @type {number} */ value) => Math.min(most, Math.max(least, value));
   // An option may narrow what the command takes, and never widen it.
-  const min = Math.max(pick(options.min, theirs.min, 0), theirs.min ?? -Infinity);
-  const max = Math.min(pick(options.max, theirs.max, 100), theirs.max ?? Infinity);
+  const lowest = typeof options.min === "number" ? inside(options.min) : argument?.min;
+  const highest = typeof options.max === "number" ? inside(options.max) : argument?.max;
+  // What nobody has bounded goes from 0 to 100, or as far from the bound that there is.
+  const min = lowest ?? ((highest ?? ROOM) > 0 ? 0 : (highest ?? 0) - ROOM);
+  const max = highest ?? (min < ROOM ? ROOM : min + ROOM);
   const isWhole = argument?.type === "integer";
   const usual = isWhole ? Math.max(1, Math.round((max - min) / 100)) : niceStep((max - min) / 100);
   const step = typeof options.step === "number" && options.step > 0 ? options.step : usual;
