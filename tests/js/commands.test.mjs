@@ -89,6 +89,23 @@ test("a number is taken as people write it, and refused with the reason", () => 
   assert.deepEqual(numberOf("2.5", { ...bounds, isWhole: true }), { fault: "whole" });
 });
 
+test("a comma is a point, or parts thousands; where it may be either, nobody guesses", () => {
+  const bounds = { min: -Infinity, max: Infinity, unit: "m", isWhole: false };
+  /** @type {[string, number][]} */
+  const clear = [
+    ["1,5", 1.5], ["7,25 m", 7.25], [",500", 0.5], ["0,500", 0.5], ["1234,567", 1234.567], ["1,0000", 1],
+    ["1.000", 1], ["1.125", 1.125], ["1'000", 1000], ["1’000,5", 1000.5], ["1\u202f000,5", 1000.5], ["1'234,567", 1234.567],
+    ["1,000,000", 1e6], ["1.000.000", 1e6], ["1,234.5", 1234.5], ["1.234,5", 1234.5], ["-1,234,567.25", -1234567.25],
+  ];
+  for (const [text, value] of clear) assert.deepEqual(numberOf(text, bounds), { value }, text);
+  assert.deepEqual(numberOf("1,000", bounds), { fault: "comma", either: [1, 1000] });
+  assert.deepEqual(numberOf("−12,345 m", bounds), { fault: "comma", either: [-12.345, -12345] });
+  assert.deepEqual(numberOf("1,000", { ...bounds, max: 10, isWhole: true }), { fault: "comma", either: [1, 1000] });
+  for (const text of ["1,00,000", "1.2.3", "1,2,3", "1.000,000.5", "12.34,5", "1,5.5", "1,2345.6", "1,,5"]) {
+    assert.deepEqual(numberOf(text, bounds), { fault: "none" }, text);
+  }
+});
+
 test("bytes are pairs of digits, and control characters are shown and not obeyed", () => {
   assert.deepEqual(pairsOf("0x06, 05 fF"), { value: "06 05 ff" });
   assert.deepEqual(pairsOf(" "), { fault: "empty" });

@@ -34,12 +34,15 @@ export default {
       if (field) attribute(field, "aria-invalid", fault ? "true" : null);
     }
 
-    /** @param {string} why */
-    function words(why) {
-      const limit = { low: bounds.min, high: bounds.max }[why];
-      const figure = limit === undefined ? "" : setpoint.text(limit);
-      if (why === "low") return t("◆ not below {limit}", { limit: figure });
-      if (why === "high") return t("◆ not above {limit}", { limit: figure });
+    /** @param {Exclude<ReturnType<typeof numberOf>, {value: number}>} found */
+    function words(found) {
+      if ("either" in found) {
+        const [less, more] = found.either;
+        return t("◆ {less} or {more}? Type it without a comma", { less, more });
+      }
+      const { fault: why } = found;
+      if (why === "low") return t("◆ not below {limit}", { limit: setpoint.text(bounds.min) });
+      if (why === "high") return t("◆ not above {limit}", { limit: setpoint.text(bounds.max) });
       if (why === "whole") return t("◆ a whole number is expected");
       return why === "empty" ? t("◆ type a number") : t("◆ this is no number");
     }
@@ -61,7 +64,7 @@ export default {
       part(el, ".number-row").addEventListener("submit", (event) => {
         event.preventDefault();
         const typed = numberOf(field.value, bounds);
-        fault = "fault" in typed ? words(typed.fault) : "";
+        fault = "fault" in typed ? words(typed) : "";
         if ("value" in typed && setpoint.giver.isReady) {
           setpoint.set(typed.value);
           field.select();
