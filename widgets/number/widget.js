@@ -1,7 +1,7 @@
 // @ts-check
 /** @typedef {import("../../urc/web/static/types.js").Context} Context */
 /** @typedef {import("../../urc/web/static/types.js").Instance} Instance */
-import { Setpoint, SetpointFace } from "urc/giving";
+import { Setpoint, SetpointFace, keyed } from "urc/giving";
 import { attribute, part } from "urc/kit";
 import { numberOf } from "./typed.js";
 
@@ -28,6 +28,8 @@ export default {
     };
     setpoint.bounds = { ...bounds };
     let fault = "";
+    /** Whether something was typed that is not set yet. */
+    let isDraft = false;
 
     function show() {
       face.show(setpoint, fault);
@@ -47,39 +49,49 @@ export default {
       return why === "empty" ? t("◆ type a number") : t("◆ this is no number");
     }
 
-    /** @param {string} key */
-    function step(key) {
-      fault = "";
-      if (!Number.isFinite(bounds.min) || !Number.isFinite(bounds.max)) {
-        const way = { ArrowUp: 1, ArrowDown: -1, PageUp: 10, PageDown: -10 }[key] ?? 0;
-        const next = setpoint.from + way * bounds.step;
-        setpoint.set(Number(Math.min(bounds.max, Math.max(bounds.min, next)).toFixed(10)));
-      } else {
-        setpoint.key(key);
-      }
-      show();
+    /**
+     * @param {string} key
+     * @param {number} from
+     */
+    function next(key, from) {
+      if (Number.isFinite(bounds.min) && Number.isFinite(bounds.max)) return keyed(key, from, bounds) ?? from;
+      const way = { ArrowUp: 1, ArrowDown: -1, PageUp: 10, PageDown: -10 }[key] ?? 0;
+      return Number(Math.min(bounds.max, Math.max(bounds.min, from + way * bounds.step)).toFixed(10));
     }
 
     if (field instanceof HTMLInputElement) {
+      /** Steps go on from what was typed. @param {string} key @param {boolean} [isTyping] */
+      const step = (key, isTyping = false) => {
+        const typed = isDraft ? numberOf(field.value, bounds) : { value: setpoint.from };
+        fault = "fault" in typed ? words(typed) : "";
+        if ("value" in typed && setpoint.giver.isReady) {
+          const value = next(key, typed.value);
+          setpoint.set(value);
+          isDraft = false;
+          if (isTyping || field.value) field.value = String(value);
+        }
+        show();
+      };
       part(el, ".number-row").addEventListener("submit", (event) => {
         event.preventDefault();
         const typed = numberOf(field.value, bounds);
         fault = "fault" in typed ? words(typed) : "";
         if ("value" in typed && setpoint.giver.isReady) {
           setpoint.set(typed.value);
+          isDraft = false;
           field.select();
         }
         show();
       }, { signal });
       field.addEventListener("input", () => {
         fault = "";
+        isDraft = field.value.trim() !== "";
         show();
       }, { signal });
       field.addEventListener("keydown", (event) => {
         if (!KEYS.has(event.key)) return;
         event.preventDefault();
-        step(event.key);
-        field.value = setpoint.last === null ? "" : String(setpoint.last);
+        step(event.key, true);
       }, { signal });
       part(el, ".number-less").addEventListener("click", () => step("ArrowDown"), { signal });
       part(el, ".number-more").addEventListener("click", () => step("ArrowUp"), { signal });

@@ -144,6 +144,14 @@ async def test_each_control_gives_exactly_its_command(
         await page.fill(".number-field", "7,25 V")
         await page.keyboard.press("Enter")
         await robot.until_got("VOLT 7.25")
+        await page.fill(".number-field", "1,000")
+        await page.keyboard.press("Enter")
+        note = page.locator(".number-note", has_text="1 or 1000? Type it without a comma")
+        await note.wait_for()
+        await page.fill(".number-field", "3")
+        await page.keyboard.press("ArrowUp")
+        await robot.until_got("VOLT 3.1")
+        assert await page.input_value(".number-field") == "3.1"
 
         await page.fill(".text-field", "a\u0007b")
         await page.locator(".text-note", has_text="control characters").wait_for()
