@@ -18,6 +18,7 @@ from urc.source import Document, Path
 
 __all__ = [
     "KINDS",
+    "check_inline",
     "check_options",
     "check_shape",
     "check_source",
@@ -151,6 +152,13 @@ def check_options(
         "properties": options,
         "additionalProperties": False,
     }
+    return check_inline(document, path, value, schema)
+
+
+def check_inline(
+    document: Document, path: Path, value: object, schema: Mapping[str, Any]
+) -> list[Problem]:
+    """Return every difference between a part of a document and a schema that refers to no file."""
     if _quick().is_valid_inline(schema, value):
         return []
     from urc.config.shape_report import report

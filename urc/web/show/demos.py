@@ -19,8 +19,9 @@ from urc.model.interface import Interface, WidgetUse
 from urc.model.profile import Profile
 from urc.model.values import Limits, Signal
 from urc.model.widget import Port, Widget
-from urc.problems import UrcError
-from urc.source import read_document
+from urc.problems import ProblemsError, UrcError
+from urc.source import Document, read_document
+from urc.web.show.demo_shape import check_demo
 from urc.web.wire.messages import encode_hello
 from urc.web.wire.picture import media_type
 
@@ -48,17 +49,17 @@ def demo_states(widget: Widget) -> list[DemoState]:
     """Return the states that the widget's ``demo.yaml`` describes, in its order.
 
     Raises:
-        UrcError: the file is missing, or does not say what can be shown.
+        ProblemsError: the file is missing, or does not say what can be shown.
     """
-    file = widget.folder / "demo.yaml"
-    demo: Any = read_document(str(file)).data
-    try:
-        return [_state(widget, demo, name) for name in demo["states"]]
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
-        raise UrcError(f"{file}: {type(error).__name__}: {error}") from error
+    document = read_document(str(widget.folder / "demo.yaml"))
+    problems = check_demo(widget, document)
+    if problems:
+        raise ProblemsError(problems)
+    demo: Any = document.data
+    return [_state(widget, document, demo, name) for name in demo["states"]]
 
 
-def _state(widget: Widget, demo: Mapping[str, Any], name: str) -> DemoState:
+def _state(widget: Widget, document: Document, demo: Mapping[str, Any], name: str) -> DemoState:
     shown: Mapping[str, Any] = demo["states"][name] or {}
     signals, inputs, lists = _signals(demo.get("signals") or {})
     commands, outputs = _commands(widget, demo.get("outputs") or {})
@@ -75,9 +76,10 @@ def _state(widget: Widget, demo: Mapping[str, Any], name: str) -> DemoState:
         interfaces={"default": Interface("default")},
         widgets={widget.name: widget},
     )
+    images = _images(widget, document, name, shown)
     news = {
         "hello": json.loads(encode_hello(profile, "demo", 0.0)),
-        "readings": list(_readings(widget, shown, inputs, lists)),
+        "readings": list(_readings(shown, images, inputs, lists)),
         "history": shown.get("history") or {},
         "follow": shown.get("follow") or {},
         "replies": shown.get("replies") or {},
@@ -154,8 +156,8 @@ def _defaults(widget: Widget) -> dict[str, object]:
 
 
 def _readings(
-    widget: Widget,
     shown: Mapping[str, Any],
+    images: Mapping[str, Mapping[str, Any]],
     inputs: Mapping[str, str],
     lists: Mapping[str, tuple[str, ...]],
 ) -> Iterator[dict[str, Any]]:
@@ -172,26 +174,41 @@ def _readings(
                 "age": _nth(age_s, place),
                 "alarm": _nth(alarm, place) if many else alarm,
             }
-            yield {**one, **_value(widget, value[place] if many else value)}
+            yield {**one, **(images.get(name) or {"value": value[place] if many else value})}
 
 
 def _nth(given: Any, place: int) -> Any:
     return given[place] if isinstance(given, list) else given
 
 
-def _value(widget: Widget, value: Any) -> dict[str, Any]:
-    """Return a plain value, or an image that is made, read, or written out."""
-    if not isinstance(value, Mapping):
-        return {"value": value}
-    if set(value) == {"picture"}:
-        data = colour_bars(*value["picture"])
-    elif set(value) == {"file"}:
-        data = _file(widget.folder, str(value["file"]))
-    elif set(value) == {"base64"}:
-        data = _decoded(str(value["base64"]))
-    else:
-        return {"value": value}
-    return {"picture": base64.b64encode(data).decode(), "type": media_type(data)}
+def _images(
+    widget: Widget, document: Document, state: str, shown: Mapping[str, Any]
+) -> dict[str, dict[str, Any]]:
+    """Return the images among the values of a state, by signal."""
+    images = {}
+    for name, value in (shown.get("values") or {}).items():
+        try:
+            data = _image(widget, value)
+        except UrcError as error:
+            path = ("states", state, "values", name)
+            raise ProblemsError([document.problem(path, "bad-value", str(error))]) from error
+        if data is not None:
+            images[name] = {"picture": base64.b64encode(data).decode(), "type": media_type(data)}
+    return images
+
+
+def _image(widget: Widget, value: Any) -> bytes | None:
+    """Return an image that is made, read, or written out; None: the value is none."""
+    match value:
+        case {"picture": [int(width), int(height)], **more} if not more:
+            return colour_bars(width, height)
+        case {"picture": _, **more} if not more:
+            raise UrcError("a test picture is written as [width, height]")
+        case {"file": name, **more} if not more:
+            return _file(widget.folder, str(name))
+        case {"base64": text, **more} if not more:
+            return _decoded(str(text))
+    return None
 
 
 def _decoded(text: str) -> bytes:
@@ -205,16 +222,16 @@ def _file(folder: Path, name: str) -> bytes:
     """Return a file of the widget's folder, and of no other."""
     path = (folder / name).resolve()
     if not path.is_relative_to(folder.resolve()) or not path.is_file():
-        raise UrcError(f"{folder / 'demo.yaml'}: there is no file {name!r} in the widget's folder")
+        raise UrcError(f"there is no file {name!r} in the widget's folder")
     if path.stat().st_size > PICTURE_BYTES:
-        raise UrcError(f"{path}: longer than {PICTURE_BYTES} bytes")
+        raise UrcError(f"{name!r} is longer than {PICTURE_BYTES} bytes")
     return path.read_bytes()
 
 
 def colour_bars(width: int, height: int) -> bytes:
     """Return a PNG with colour bars over a ramp from black to white; the same at every call."""
     if not (1 <= width <= 2048 and 1 <= height <= 2048):
-        raise ValueError(f"a test picture has 1 to 2048 pixels a side, not {width} x {height}")
+        raise UrcError(f"a test picture has 1 to 2048 pixels a side, not {width} x {height}")
     bars = b"".join(bytes(_BARS[x * len(_BARS) // width]) for x in range(width))
     ramp = b"".join(bytes((x * 255 // max(1, width - 1),) * 3) for x in range(width))
     rows = b"".join(b"\0" + (bars if y < height * 2 // 3 else ramp) for y in range(height))

@@ -1,0 +1,189 @@
+"""What a widget's ``demo.yaml`` may say: a schema, made of what the widget's manifest declares.
+
+Floor 5. The gallery and `urc validate` both ask here, so that they never differ.
+"""
+
+from collections.abc import Iterable, Mapping
+from typing import Any, Final
+
+from urc.config.shape import check_inline, check_options
+from urc.model.widget import Widget
+from urc.problems import Problem
+from urc.source import Document
+
+__all__ = ["check_demo"]
+
+_TEXT: Final = {"type": "string"}
+_NUMBER: Final = {"type": "number"}
+_COUNT: Final = {"type": "integer", "minimum": 0}
+_FLAG: Final = {"type": "boolean"}
+_WORDS: Final = ("lolo", "low", "high", "hihi")
+_ALARM: Final = {
+    "if": {"type": "array"},
+    "then": {"items": {"enum": ["", *_WORDS]}},
+    "else": {"enum": _WORDS},
+}
+_ELEMENTS: Final = ["integer", "number", "boolean", "string"]
+_TYPES: Final = [*_ELEMENTS, "array", "object", "image", "blob"]
+
+
+def _mapping(title: str, properties: Mapping[str, Any], *required: str) -> dict[str, Any]:
+    """Return the schema of a mapping that has these keys and no others."""
+    return {
+        "title": title,
+        "type": "object",
+        "properties": properties,
+        "required": required,
+        "additionalProperties": False,
+    }
+
+
+_VALUE: Final = {
+    "title": _TEXT,
+    "unit": _TEXT,
+    "min": _NUMBER,
+    "max": _NUMBER,
+    "description": _TEXT,
+    "of": {"enum": _ELEMENTS},
+    "size": _COUNT,
+}
+"""What signals and arguments have in common."""
+_SIGNAL: Final = _mapping(
+    "signal of a demo",
+    {
+        **_VALUE,
+        "type": {"enum": _TYPES},
+        "precision": _COUNT,
+        "states": {"type": "object"},
+        "limits": _mapping(
+            "the limits of a signal",
+            dict.fromkeys((*_WORDS, "hysteresis", "for_s"), _NUMBER),
+        ),
+        "stale_after_s": _NUMBER,
+        "axes": {"enum": ["", "FLU", "FRD", "ENU", "NED", "bearing"]},
+        "deadband": _NUMBER,
+        "debounce_s": _NUMBER,
+    },
+)
+_ARGUMENT: Final = _mapping(
+    "argument of a demo",
+    {
+        **_VALUE,
+        "type": {"enum": [*_ELEMENTS, "array"]},
+        "choices": {"type": "array"},
+        "default": True,
+        "is_required": _FLAG,
+        "allows_control": _FLAG,
+    },
+) | {"type": ["object", "null"]}
+_OUTPUT: Final = {
+    "type": ["string", "object"],
+    "if": _TEXT,
+    "else": _mapping(
+        "output of a demo",
+        {
+            "command": _TEXT,
+            "title": _TEXT,
+            "reply": _FLAG,
+            "arguments": {"type": "object", "additionalProperties": _ARGUMENT},
+        },
+        "command",
+    ),
+}
+_FOLLOW: Final = dict.fromkeys(
+    ("links", "log", "lease", "alarms", "latency", "sequences", "theme", "stop"), True
+)
+
+
+def check_demo(widget: Widget, document: Document) -> list[Problem]:
+    """Return every difference between a demo and what its widget can be shown with.
+
+    The states speak of what the demo binds: they are looked at when that is sound.
+    """
+    data = document.data
+    problems = check_inline(document, (), data, _demo(widget, data))
+    bound = [one for one in problems if one.path.partition(".")[0] in ("signals", "outputs")]
+    if bound or not isinstance(data, dict):
+        return bound or problems
+    for name, state in _part(data, "states").items():
+        options = _part(state, "options")
+        problems += check_options(document, ("states", name, "options"), options, widget.options)
+    return sorted(problems, key=lambda one: (one.line, one.column))
+
+
+def _demo(widget: Widget, data: Any) -> dict[str, Any]:
+    signals = _part(data, "signals")
+    outputs = _part(data, "outputs")
+    state = _state(signals, outputs)
+    ports = {
+        name: {"type": "array", "items": _SIGNAL} if port.is_many else _SIGNAL
+        for name, port in widget.inputs.items()
+    }
+    states = {
+        **_mapping("the states of a demo", {"normal": state}, "normal"),
+        "additionalProperties": state,
+    }
+    parts = {
+        "signals": _mapping("the inputs of this widget", ports) | {"type": ["object", "null"]},
+        "outputs": _mapping("the outputs of this widget", dict.fromkeys(widget.outputs, _OUTPUT))
+        | {"type": ["object", "null"]},
+        "states": states,
+    }
+    return _mapping("demo", parts, "states")
+
+
+def _part(data: Any, key: str) -> dict[str, Any]:
+    found = data.get(key) if isinstance(data, dict) else None
+    return found if isinstance(found, dict) else {}
+
+
+def _state(signals: Mapping[str, Any], outputs: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the schema of a state: it speaks of what the demo binds."""
+    values = {name: _values(given) for name, given in signals.items()}
+    past = {"type": "array", "items": {"type": "array", "minItems": 2, "maxItems": 2}}
+    answered = {*outputs, *_commands(outputs.values())}
+    state = _mapping(
+        "state of a demo",
+        {
+            "values": _mapping("the signals of this demo", values),
+            "title": _TEXT,
+            "options": {"type": "object"},
+            "age_s": _ages(signals),
+            "alarms": _mapping("the signals of this demo", dict.fromkeys(signals, _ALARM)),
+            "history": _mapping("the signals of this demo", dict.fromkeys(_single(signals), past)),
+            "follow": _mapping("what a widget follows", _FOLLOW),
+            "replies": _mapping("the commands of this demo", dict.fromkeys(answered, True)),
+            "shows": {"type": "array"},
+        },
+    )
+    return state | {"type": ["object", "null"]}
+
+
+def _values(given: Any) -> dict[str, Any]:
+    """Return the schema of a value; of many signals there is one for each."""
+    if not isinstance(given, list):
+        return {}
+    return {"type": "array", "minItems": len(given), "maxItems": len(given)}
+
+
+def _ages(names: Iterable[str]) -> dict[str, Any]:
+    """Return the schema of an age, which holds for all signals or is said of each."""
+    age = {"if": {"type": "array"}, "then": {"items": _NUMBER}, "else": _NUMBER}
+    named = _mapping("the signals of this demo", dict.fromkeys(names, age))
+    return {"type": ["number", "object"], "if": {"type": "object"}, "then": named}
+
+
+def _single(signals: Mapping[str, Any]) -> list[str]:
+    """Return the names of the signals, each of a list by its own."""
+    names = []
+    for name, given in signals.items():
+        many = isinstance(given, list)
+        names += [f"{name}_{place}" for place in range(len(given))] if many else [name]
+    return names
+
+
+def _commands(outputs: Iterable[Any]) -> list[str]:
+    return [
+        str(given.get("command", "")) if isinstance(given, dict) else str(given)
+        for given in outputs
+    ]
