@@ -130,6 +130,10 @@ class Shelf:
         """Return whether there is a widget of that name, broken or not."""
         return bool(_NAME.fullmatch(name)) and (self.folder / name / "widget.yaml").is_file()
 
+    def place(self, name: str) -> FilePath:
+        """Return the folder of the widget of that name."""
+        return self.folder / name
+
     def hint(self, name: str) -> str:
         """Return what may have been meant by a name that there is not."""
         return did_you_mean(name, self.names(), "widgets")

@@ -58,3 +58,7 @@ class TwoShelves(Shelf):
     def has(self, name: str) -> bool:
         """Return whether there is a widget of that name."""
         return super().has(name) or self._brought.has(name)
+
+    def place(self, name: str) -> Path:
+        """Return the folder of the widget of that name."""
+        return super().place(name) if super().has(name) else self._brought.place(name)

@@ -21,10 +21,9 @@ from starlette.types import ASGIApp
 from starlette.websockets import WebSocket
 
 from urc import __version__
-from urc.model.widget import Widget
+from urc.model.profile import Profile
 from urc.runtime.audit import AuditLog
 from urc.runtime.latch import LatchFile
-from urc.runtime.shelves import shelf_of
 from urc.runtime.trail import Trail
 from urc.shipped import vendored
 from urc.web import words
@@ -39,7 +38,7 @@ from urc.web.fleet.garage import Garage, Workshop
 from urc.web.fleet.robots import LINGER_S, Robot, Station, missing_settings
 from urc.web.load.assets import Assets, import_map
 from urc.web.load.file_routes import FileRoutes
-from urc.web.load.foreign import OURS, Border
+from urc.web.load.foreign import Border
 from urc.web.manage.manager import Manager
 from urc.web.manage.routes import ManageRoutes
 from urc.web.manage.settings_routes import SettingsRoutes
@@ -143,7 +142,7 @@ class _Dashboard(Starlette):
         routes.dev = dev
         gallery = routes.gallery = Gallery(
             routes.modules,
-            routes.brought,
+            routes.profiles,
             is_dev=dev is not None,
             border=routes.border,
             ways=routes.ways,
@@ -207,15 +206,9 @@ class _Routes:
         manage = ManageRoutes(self.manager, self.ways, is_here)
         return [*manage.routes(), *SettingsRoutes(self.manager, manage, self.ways).routes()]
 
-    def brought(self) -> list[Widget]:
-        """Return the widgets that the robots bring, and those beside their documents."""
-        profiles = [each.profile for each in self.robots.values()]
-        shelves = [shelf_of(file) for file in dict.fromkeys(one.file for one in profiles)]
-        beside = [
-            shelf.get(name) for shelf in shelves for name in shelf.names() if name not in OURS
-        ]
-        brought = [widget for one in profiles for widget in one.widgets.values()]
-        return [*filter(None, beside), *brought]
+    def profiles(self) -> list[Profile]:
+        """Return what the robots are."""
+        return [each.profile for each in self.robots.values()]
 
     def widget_files(self) -> tuple[Assets, ...]:
         """Return what pages load of widgets: those of the robots, then those that are looked at."""

@@ -13,14 +13,14 @@ from urc.model.driver import Command, FramingSpec, TransportSpec
 from urc.model.flow import Hold
 from urc.model.profile import Profile, Setting
 from urc.motion.lease import Client as Screen
-from urc.problems import UrcError
+from urc.problems import Problem, UrcError
 from urc.runtime.hub import Note, Traffic
 from urc.testing.clock import FakeClock, settle
 from urc.testing.codec import text
 from urc.testing.dashboard import FakeRobot, dashboard_profile
 from urc.web.dev.client import BAD_MESSAGES, MESSAGES_PER_S, ROWS_KEPT, Backlog, DevClient
 from urc.web.dev.rows import Row
-from urc.web.dev.watch import ProfileWatch
+from urc.web.dev.watch import Examined, ProfileWatch
 from urc.web.fleet.robots import Robot, Station
 
 pytestmark = pytest.mark.anyio
@@ -263,3 +263,12 @@ async def test_a_version_that_cannot_be_made_changes_nothing() -> None:
         assert watch.state == "broken"
         assert "'x' is no number" in watch.told
         assert list(it.station.robot.profile.driver.commands) == ["old"]
+
+
+async def test_a_broken_version_is_told_in_the_terminal(caplog: pytest.LogCaptureFixture) -> None:
+    """In one line with its place: nobody need have the dev page open."""
+    async with scene(with_commands("old")) as it:
+        problems = (Problem("unknown-key", "'sumary' is not a key", "lamp/widget.yaml", 5),)
+        it.watch._judge(Examined(None, problems, ()))
+        assert it.watch.state == "broken"
+        assert "lamp/widget.yaml:5:1: error unknown-key" in caplog.text

@@ -206,3 +206,92 @@ def test_a_widget_of_a_robot_stands_before_the_shipped_one(tmp_path: Path) -> No
     app = build_app({"puppet": Robot(robot.profile, {}, robot.open)})
     page = TestClient(app, base_url="http://localhost").get("/widgets/battery/").text
     assert "&lt;p&gt;mine&lt;/p&gt;" in page  # for its frame
+
+
+MANIFEST = """\
+urc: 1
+kind: widget
+name: lamp
+title: Lamp
+summary: Shines.
+inputs: { level: { type: number } }
+"""
+LAMP_DEMO = """\
+signals: { level: { type: number } }
+states: { normal: { values: { level: 1 } } }
+"""
+
+
+def lamp_beside_a_robot(folder: Path, *, is_dev: bool = True) -> TestClient:
+    """Return a client of a dashboard that serves a robot beside which there is a widget."""
+    lamp = folder / "widgets" / "lamp"
+    lamp.mkdir(parents=True)
+    (lamp / "widget.yaml").write_text(MANIFEST, "utf-8")
+    (lamp / "template.html.j2").write_text("<p>lamp</p>", "utf-8")
+    (lamp / "demo.yaml").write_text(LAMP_DEMO, "utf-8")
+    widget = Shelf(lamp.parent).get("lamp")
+    assert widget is not None
+    profile = dashboard_profile(widgets=[widget])._replace(file=str(folder / "robot.yaml"))
+    robot = FakeRobot(profile)
+    served = Robot(robot.profile, {}, robot.open)
+    remake = {"puppet": lambda _: served} if is_dev else None
+    app = build_app({"puppet": served}, remake=remake)
+    return TestClient(app, base_url="http://localhost")
+
+
+@pytest.mark.parametrize(
+    ("name", "before", "after", "told"),
+    [
+        ("demo.yaml", "{ level: 1 }", "{ levl: 1 }", "demo.yaml:2:31: error unknown-key"),
+        ("demo.yaml", "states: {", "states: {{", "demo.yaml:2:9: error"),
+        ("widget.yaml", "summary:", "sumary:", "widget.yaml:5:1: error unknown-key sumary"),
+        ("widget.yaml", "inputs: {", "inputs: [", "widget.yaml:6:"),
+    ],
+)
+def test_a_page_for_developers_says_what_is_wrong_and_waits_until_it_is_mended(
+    tmp_path: Path,
+    name: str,
+    before: str,
+    after: str,
+    told: str,
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    """With the place, on the page and in the log; the stamp of the page asks for a new one."""
+    browser = lamp_beside_a_robot(tmp_path)
+    file = tmp_path / "widgets" / "lamp" / name
+    sound = file.read_text("utf-8")
+    file.write_text(sound.replace(before, after), "utf-8")
+    answer = browser.get("/widgets/lamp/")
+    assert answer.status_code == 409
+    assert told in answer.text
+    assert [told in record.getMessage() for record in caplog.records][:1] == [True]
+    stamp = browser.get("/widgets/lamp/stamp").text
+    assert f'data-stamp-now="{stamp}"' in answer.text
+    file.write_text(sound, "utf-8")
+    assert browser.get("/widgets/lamp/stamp").text != stamp
+    assert browser.get("/widgets/lamp/").status_code == 200
+
+
+def test_a_broken_widget_of_several_costs_no_other_its_place(tmp_path: Path) -> None:
+    """The page shows the rest of them."""
+    browser = lamp_beside_a_robot(tmp_path)
+    (tmp_path / "widgets" / "lamp" / "demo.yaml").write_text("states: {}", "utf-8")
+    page = browser.get("/widgets/lamp+value/").text
+    assert "missing-key states" in page
+    assert 'data-widget="value"' in page
+
+
+def test_without_dev_a_widget_is_shown_as_its_robot_knows_it(tmp_path: Path) -> None:
+    """A manifest that was broken since does not matter before URC is started anew."""
+    browser = lamp_beside_a_robot(tmp_path, is_dev=False)
+    (tmp_path / "widgets" / "lamp" / "widget.yaml").write_text("urc: 1", "utf-8")
+    page = browser.get("/widgets/lamp/")
+    assert page.status_code == 200
+    assert 'data-stamp=""' in page.text
+
+
+def test_a_broken_widget_beside_a_robot_is_in_the_list(tmp_path: Path) -> None:
+    """And says that its manifest cannot be read."""
+    browser = lamp_beside_a_robot(tmp_path)
+    (tmp_path / "widgets" / "lamp" / "widget.yaml").write_text("urc: 1", "utf-8")
+    assert "its manifest cannot be read" in browser.get("/widgets").text

@@ -12,7 +12,7 @@ from typing import Literal, NamedTuple
 
 from urc.config.load import check
 from urc.model.profile import Profile
-from urc.problems import Problem, UrcError, has_errors
+from urc.problems import Problem, ProblemsError, UrcError, has_errors
 from urc.runtime.catalog import built_in_catalog
 from urc.runtime.changes import PERIOD_S, Watched
 from urc.runtime.selftest import exercise
@@ -108,6 +108,9 @@ class ProfileWatch:
         name = self.robot.profile.name
         if found.profile is None:
             self._next = None
+            errors = [problem for problem in found.problems if problem.severity == "error"]
+            if errors:
+                log.warning("%s", ProblemsError(errors))
             self._tell("broken", "cannot be used; the version before it goes on")
         elif found.profile.name != name:
             self._next = None

@@ -5,8 +5,10 @@ Floor 5. The page itself plays the robot (``gallery.js``); no socket is opened, 
 
 import asyncio
 import hashlib
-from collections.abc import Callable, Iterable, Mapping
+import logging
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 from urllib.parse import quote
 
 from starlette.exceptions import HTTPException
@@ -14,15 +16,15 @@ from starlette.requests import Request
 from starlette.responses import HTMLResponse, PlainTextResponse, Response
 from starlette.routing import Route
 
-from urc.config.parse_widget import Shelf
+from urc.model.profile import Profile
 from urc.model.widget import Widget
-from urc.problems import UrcError
+from urc.problems import Problem, ProblemsError
 from urc.runtime.changes import Watched
-from urc.shipped import shipped
 from urc.web.load.assets import Assets, widget_assets
 from urc.web.load.foreign import Border
 from urc.web.show.cells import Cell, widget_cell
 from urc.web.show.demos import DemoState, demo_states
+from urc.web.show.lookup import Lookup
 from urc.web.show.menu import Nav, Ways
 from urc.web.show.pages import Head, render, with_words
 from urc.web.words import t
@@ -40,6 +42,9 @@ EXAMPLES = (mark("normal"), mark("stale"), mark("gone"), mark("none"), mark("hos
 SEPARATOR = "+"
 MOST_AT_ONCE = 16
 """Widgets on one page."""
+NO_WIDGET = mark("There is no widget of that name.")
+
+log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,6 +81,25 @@ class Exhibit:
     news: str
 
 
+class Shown(NamedTuple):
+    """One widget of a page."""
+
+    name: str
+    widget: Widget | None
+    states: list[DemoState]
+    problems: tuple[Problem, ...] = ()
+    """Why there are no states."""
+
+
+@dataclass(frozen=True, slots=True)
+class Fault:
+    """One finding about a widget that cannot be shown."""
+
+    line: str
+    """Where, and what was found."""
+    hint: str
+
+
 @dataclass(frozen=True, slots=True)
 class DemoPage:
     """``widget.html.j2``: widgets in the states of their demos."""
@@ -84,8 +108,12 @@ class DemoPage:
     title: str
     summary: str
     exhibits: tuple[Exhibit, ...]
+    faults: tuple[Fault, ...]
+    """Why those of them that are missing cannot be shown."""
     stamp_url: str
     """What changes when a file of theirs is saved; "" where nobody looks for that."""
+    stamp: str
+    """What stood there before they were read."""
 
 
 class Gallery:
@@ -93,7 +121,7 @@ class Gallery:
 
     Args:
         modules: the import map.
-        brought: returns the widgets that the served robots bring.
+        profiles: returns the profiles of the served robots.
         is_dev: pages load themselves anew when a file of their widgets is saved.
         ways: which pages there are beside.
         border: which widgets live in frames.
@@ -102,14 +130,14 @@ class Gallery:
     def __init__(
         self,
         modules: Mapping[str, object],
-        brought: Callable[[], Iterable[Widget]],
+        profiles: Callable[[], Iterable[Profile]],
         *,
         is_dev: bool = False,
         border: Border = Border(),  # noqa: B008  # frozen
         ways: Ways = Ways(),  # noqa: B008 - it cannot be changed
     ) -> None:
         self._modules = modules
-        self._brought = brought
+        self._lookup = Lookup(profiles, is_fresh=is_dev)
         self._is_dev = is_dev
         self._ways = ways
         self._border = border
@@ -135,37 +163,55 @@ class Gallery:
 
     async def demo(self, request: Request) -> Response:
         """Show one widget, or several with a plus between their names."""
-        widgets = await asyncio.to_thread(self._named, request.path_params["names"])
-        self.assets.files |= widget_assets(widgets).files
-        try:
-            states = [(one, await asyncio.to_thread(demo_states, one)) for one in widgets]
-        except UrcError as error:
-            raise HTTPException(409, f"{error}") from error
-        single = widgets[0] if len(widgets) == 1 else None
-        page = DemoPage(
+        names = self._names(request)
+        # Looked at before they are read: nothing may be saved in between and not be seen.
+        stamp = await asyncio.to_thread(self._stamp, names) if self._is_dev else ""
+        shown = [await asyncio.to_thread(self._shown, name) for name in names]
+        self.assets.files |= widget_assets(one.widget for one in shown if one.widget).files
+        problems = [problem for one in shown for problem in one.problems]
+        for problem in problems if self._is_dev else ():
+            log.warning("%s", problem.headline)
+        page = self._page(request, shown, problems, stamp)
+        return _answer(render("widget.html.j2", page), 409 if problems else 200)
+
+    def _page(
+        self,
+        request: Request,
+        shown: Sequence[Shown],
+        problems: Iterable[Problem],
+        stamp: str,
+    ) -> DemoPage:
+        widgets = [one.widget for one in shown if one.widget]
+        titles = [t(one.widget.title) if one.widget else one.name for one in shown]
+        is_single = len(shown) == 1
+        return DemoPage(
             head=replace(
-                self._head(request, t(single.title) if single else t("Widgets")),
+                self._head(request, titles[0] if is_single else t("Widgets")),
                 widget_styles=self._border.styles(widgets),
             ),
-            title=t(single.title) if single else ", ".join(t(one.title) for one in widgets),
-            summary=single.summary if single else "",
-            exhibits=tuple(_exhibits(states, self._border)),
+            title=", ".join(titles),
+            summary=widgets[0].summary if is_single and widgets else "",
+            exhibits=tuple(_exhibits(shown, self._border)),
+            faults=tuple(Fault(one.headline, one.hint) for one in problems),
             stamp_url="stamp" if self._is_dev else "",
+            stamp=stamp,
         )
-        return _answer(render("widget.html.j2", page))
 
     async def stamp(self, request: Request) -> Response:
         """Return a text that is another one when a file of the widgets has been saved."""
         if not self._is_dev:
             raise HTTPException(404)
-        stamp = await asyncio.to_thread(self._stamp, request.path_params["names"])
+        stamp = await asyncio.to_thread(self._stamp, self._names(request))
         return PlainTextResponse(stamp, headers={"cache-control": "no-store"})
 
-    def _stamp(self, names: str) -> str:
+    def _stamp(self, names: Iterable[str]) -> str:
+        folders = [self._lookup.folder(name) for name in names]
+        if None in folders:
+            raise HTTPException(404, t(NO_WIDGET))
         files = [
             str(path)
-            for widget in self._named(names)
-            for path in sorted(widget.folder.rglob("*"))
+            for folder in filter(None, folders)
+            for path in sorted(folder.rglob("*"))
             if path.is_file()
         ]
         states = repr((files, Watched(files).states()))
@@ -175,42 +221,42 @@ class Gallery:
         return Head(request.state.nonce, title, import_map=with_words(self._modules))
 
     def _entries(self) -> list[Entry]:
-        shelf = Shelf(shipped("widgets"))
-        brought = {widget.name: widget for widget in self._brought()}
-        found = {name: brought.get(name) or shelf.get(name) for name in {*shelf.names(), *brought}}
         entries = []
-        for name in sorted(found):
-            widget = found[name]
+        for name in self._lookup.names():
+            found = self._lookup.find(name)
+            widget = found and found.widget
             title, summary = (widget.title, widget.summary) if widget else (name, "")
             fault = "" if widget else t("its manifest cannot be read: urc validate says why")
             entries.append(Entry(name, title, summary, f"/widgets/{quote(name)}/", fault))
         return entries
 
-    def _named(self, names: str) -> list[Widget]:
-        """Return the widgets; raise 404 for one that there is not."""
-        wanted = dict.fromkeys(names.split(SEPARATOR))
+    def _names(self, request: Request) -> list[str]:
+        """Return the names in the address; raise 404 for too many."""
+        wanted = list(dict.fromkeys(request.path_params["names"].split(SEPARATOR)))
         if len(wanted) > MOST_AT_ONCE:
             raise HTTPException(404, f"A page shows {MOST_AT_ONCE} widgets at most.")
-        brought = {widget.name: widget for widget in self._brought()}
-        shelf = Shelf(shipped("widgets"))
-        found = {name: brought.get(name) or shelf.get(name) for name in wanted}
-        known = [widget for widget in found.values() if widget is not None]
-        if len(known) < len(found):
-            raise HTTPException(404, "There is no widget of that name, or its manifest is broken.")
-        return known
+        return wanted
+
+    def _shown(self, name: str) -> Shown:
+        """Return a widget with its states, or why it has none; raise 404 where there is none."""
+        found = self._lookup.find(name)
+        if found is None:
+            raise HTTPException(404, t(NO_WIDGET))
+        if found.widget is None:
+            return Shown(name, None, [], found.problems)
+        try:
+            return Shown(name, found.widget, demo_states(found.widget))
+        except ProblemsError as error:
+            return Shown(name, found.widget, [], error.problems)
 
 
-def _exhibits(
-    states: Iterable[tuple[Widget, list[DemoState]]], border: Border
-) -> Iterable[Exhibit]:
-    index = 0
-    for widget, shown in states:
-        for state in shown:
-            cell = widget_cell(index, state.use, state.profile, border)
-            label = t(state.name) if state.name in EXAMPLES else state.name
-            yield Exhibit(widget.name, state.name, label, widget.title, cell, state.news)
-            index += 1
+def _exhibits(shown: Iterable[Shown], border: Border) -> Iterable[Exhibit]:
+    every = ((one.widget, state) for one in shown if one.widget for state in one.states)
+    for index, (widget, state) in enumerate(every):
+        cell = widget_cell(index, state.use, state.profile, border)
+        label = t(state.name) if state.name in EXAMPLES else state.name
+        yield Exhibit(widget.name, state.name, label, widget.title, cell, state.news)
 
 
-def _answer(html: str) -> Response:
-    return HTMLResponse(html, headers={"cache-control": "no-store"})
+def _answer(html: str, status: int = 200) -> Response:
+    return HTMLResponse(html, status, headers={"cache-control": "no-store"})

@@ -73,17 +73,18 @@ async function frames(count) {
   }
 }
 
-/** Load the page anew when a file of its widgets has been saved. */
+/** Load the page anew when a file of its widgets has been saved since the server read them. */
 async function watch() {
   const url = gallery.dataset["stamp"];
   if (!url) return;
-  let before = "";
+  const before = gallery.dataset["stampNow"];
   for (;;) {
     try {
       const answer = await fetch(url, { cache: "no-store" });
-      const stamp = answer.ok ? await answer.text() : before;
-      if (before && stamp !== before) location.reload();
-      before = stamp;
+      if (answer.ok && (await answer.text()) !== before) {
+        location.reload();
+        return;
+      }
     } catch {
       // The server is being started anew: the next try may find it.
     }
