@@ -13,6 +13,7 @@ from urc.problems import Problem, has_errors, to_json, to_text
 
 if TYPE_CHECKING:
     from urc.config.load import Shelf
+    from urc.model.widget import Widget
     from urc.runtime.coverage import Coverage
 
 EXAMPLE = "urc validate robots/*.yaml"
@@ -62,7 +63,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Check all documents, print the report; 1 when there is an error in any of them."""
-    paths = list(dict.fromkeys(arguments.paths))
+    paths = list(dict.fromkeys(map(_document_in, arguments.paths)))
     if arguments.watch:
         return _watch(paths, arguments)
     report = _examine(paths, with_tests=not arguments.no_tests)
@@ -109,6 +110,8 @@ def _examine(paths: list[str], *, with_tests: bool) -> _Report:
         checked = check(path, catalog, _shelf_of_package(path) or shelf)
         report.add(list(checked.problems))
         report.looked_at |= dict.fromkeys(checked.files)
+        if checked.kind == "widget":
+            _examine_folder(path, checked.widget, report)
         if checked.profile is not None and with_tests:
             outcome = exercise(checked.profile)
             report.tests += len(checked.profile.tests)
@@ -116,6 +119,22 @@ def _examine(paths: list[str], *, with_tests: bool) -> _Report:
             report.add(outcome.problems)
             report.coverage.append(measure(path, checked.profile.driver, outcome.exercised))
     return report
+
+
+def _examine_folder(path: str, widget: "Widget | None", report: _Report) -> None:
+    """Add what is wrong with the files beside a widget's manifest, once that is sound."""
+    from urc.web.show.widget_check import FILES, check_widget
+
+    home = os.path.dirname(path)
+    report.looked_at |= dict.fromkeys(os.path.join(home, name) for name in FILES)
+    if widget is not None:
+        report.add(check_widget(widget))
+
+
+def _document_in(path: str) -> str:
+    """Return the document that a path means: a widget's folder stands for its manifest."""
+    manifest = os.path.join(path, "widget.yaml")
+    return manifest if os.path.isfile(manifest) else path
 
 
 def _shelf_of_package(path: str) -> "Shelf | None":

@@ -25,6 +25,7 @@ from urc.config.rules import check_profile
 from urc.model.driver import Driver
 from urc.model.interface import Interface, WidgetUse
 from urc.model.profile import DocumentTest, Profile, Setting
+from urc.model.widget import Widget
 from urc.problems import Problem, ProblemsError, has_errors
 from urc.registry import Catalog
 from urc.shipped import shipped
@@ -44,6 +45,8 @@ class Checked(NamedTuple):
     """Every document that was looked at, whether there is one or not; this one is the first."""
     pages: tuple[str, ...] = ()
     """URLs of other people's pages that its widgets show, as they are written."""
+    widget: Widget | None = None
+    """Of a widget's manifest without errors."""
 
 
 def load_profile(
@@ -90,9 +93,10 @@ def check(path: str | PathLike[str], catalog: Catalog, shelf: Shelf | None = Non
     shelf = shelf or Shelf(shipped("widgets"))
     findings = Findings()
     profile: Profile | None = None
+    widget: Widget | None = None
     uses: list[WidgetUse] = []
     if sources.kind == "widget":
-        parse_widget(sources.root.document, findings)
+        widget = parse_widget(sources.root.document, findings)
     elif sources.kind == "interface":
         interface = parse_interface(sources.root, sources.root.text("name"), findings)
         if not has_errors(findings):
@@ -107,8 +111,9 @@ def check(path: str | PathLike[str], catalog: Catalog, shelf: Shelf | None = Non
     problems += shelf.problems
     problems = _told_once(problems)
     if has_errors(problems):
-        profile = None
-    return Checked(profile, tuple(problems), sources.kind, (*files, *shelf.files), _pages(uses))
+        profile, widget = None, None
+    every = (*files, *shelf.files)
+    return Checked(profile, tuple(problems), sources.kind, every, _pages(uses), widget)
 
 
 def _pages(uses: Iterable[WidgetUse]) -> tuple[str, ...]:

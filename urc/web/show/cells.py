@@ -25,7 +25,15 @@ from urc.web.load.foreign import Border, frame_url
 from urc.web.show.markdown import markdown
 from urc.web.show.outputs import inputs_config, output_config
 
-__all__ = ["Cell", "WidgetContext", "render_widget", "spoken", "widget_cell", "widget_context"]
+__all__ = [
+    "Cell",
+    "WidgetContext",
+    "render_widget",
+    "spoken",
+    "widget_cell",
+    "widget_context",
+    "widget_environment",
+]
 
 log = logging.getLogger(__name__)
 
@@ -141,7 +149,8 @@ def spoken(name: str) -> str:
 
 
 @lru_cache(maxsize=1)
-def _widgets() -> Environment:
+def widget_environment() -> Environment:
+    """Return what the templates of widgets are compiled in."""
     widgets = ImmutableSandboxedEnvironment(
         autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
@@ -152,4 +161,4 @@ def _widgets() -> Environment:
 
 @lru_cache(maxsize=256)
 def _widget_template(source: str) -> Template:
-    return _widgets().from_string(source)
+    return widget_environment().from_string(source)

@@ -1,0 +1,97 @@
+"""`urc validate` on a widget: its template, its module and its demo count as its manifest does."""
+
+from pathlib import Path
+
+import pytest
+
+from urc.cli.main import main
+
+Output = pytest.CaptureFixture[str]
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Output) -> Path:
+    """Return the folder of a sound widget."""
+    monkeypatch.chdir(tmp_path)
+    assert main(["new", "widget", "throttle"]) == 0
+    capsys.readouterr()
+    return Path("widgets/throttle")
+
+
+def test_a_sound_widget_has_no_findings(folder: Path, capsys: Output) -> None:
+    """Named by its manifest or by its folder."""
+    assert main(["validate", str(folder / "widget.yaml"), str(folder)]) == 0
+    assert capsys.readouterr() == ("", "1 document: 0 errors, 0 warnings\n")
+
+
+@pytest.mark.parametrize(
+    ("name", "before", "after", "found"),
+    [
+        ("template.html.j2", "{% endif %}", "", ": error bad-template: "),
+        ("template.html.j2", "options.label", "optons.label", ": error unknown-name: there is no"),
+        ("template.html.j2", "options.label", "options.lable", "none of the options in the mani"),
+        ("template.html.j2", "options.label", "options['lable']", "none of the options in the"),
+        ("template.html.j2", "options.label", "options.label | upercase", "No filter named"),
+        ("template.html.j2", "options.label", "inputs.value.titel", "in the state 'normal'"),
+        ("demo.yaml", "{ value: 12.5 }, shows", "{ valu: 12.5 }, shows", "states.normal.values"),
+        ("demo.yaml", "shows:", "shws:", ":38: error unknown-key states.normal.shws: "),
+        ("demo.yaml", "  normal:", "  usual:", "error missing-key states: 'normal' is missing"),
+        ("demo.yaml", "  normal: {", "  normal: {{", "demo.yaml:"),
+        ("widget.js", "export default", "export defalt", "widget.js:6:1: error no-default-export"),
+        ("widget.js", "export default", "// export default", "widget.js:1:1: error no-default"),
+    ],
+)
+def test_a_mistake_in_any_file_is_found(
+    folder: Path, capsys: Output, name: str, before: str, after: str, found: str
+) -> None:
+    """Its line is shown, and the command fails."""
+    file = folder / name
+    text = file.read_text("utf-8")
+    assert before in text
+    file.write_text(text.replace(before, after, 1), "utf-8")
+    assert main(["validate", str(folder / "widget.yaml")]) == 1
+    first = capsys.readouterr().out.splitlines()[0]
+    assert first.startswith(f"{file}:")
+    assert found in first
+
+
+def test_the_line_of_a_fault_in_a_template_is_told(folder: Path, capsys: Output) -> None:
+    """Also where only a state of the demo brings it about."""
+    file = folder / "template.html.j2"
+    lines = file.read_text("utf-8").splitlines()
+    file.write_text("\n".join([*lines, "{{ optons }}"]), "utf-8")
+    assert main(["validate", str(folder)]) == 1
+    assert f"{file}:{len(lines) + 1}:4: error unknown-name" in capsys.readouterr().out
+    file.write_text("\n".join([*lines, "{{ inputs.value.titel }}"]), "utf-8")
+    assert main(["validate", str(folder)]) == 1
+    assert f"{file}:{len(lines) + 1}:1: error bad-template" in capsys.readouterr().out
+
+
+def test_a_name_that_is_asked_for_first_is_no_mistake(folder: Path) -> None:
+    """The template says itself that it need not be there."""
+    file = folder / "template.html.j2"
+    asking = "{% if more is defined %}x{% endif %}{{ options.other | default('') }}"
+    file.write_text(file.read_text("utf-8") + asking, "utf-8")
+    assert main(["validate", str(folder)]) == 0
+
+
+@pytest.mark.parametrize("name", ["template.html.j2", "widget.js", "demo.yaml"])
+def test_a_file_that_is_missing_is_found(folder: Path, capsys: Output, name: str) -> None:
+    """Each of them is needed."""
+    (folder / name).unlink()
+    assert main(["validate", str(folder)]) == 1
+    assert f"{folder / name}:1:1: error no-such-file" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("text", ["export { one as default };", "let a={};export default a"])
+def test_a_default_export_has_several_forms(folder: Path, text: str) -> None:
+    """None of them is refused."""
+    (folder / "widget.js").write_text(text, "utf-8")
+    assert main(["validate", str(folder)]) == 0
+
+
+def test_all_shipped_widgets_are_sound(capsys: Output) -> None:
+    """What is asked of authors holds for URC's own."""
+    root = Path(__file__).resolve().parents[3]
+    assert main(["validate", *map(str, sorted((root / "widgets").glob("*/widget.yaml")))]) == 0
+    assert capsys.readouterr().out == ""
