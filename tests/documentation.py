@@ -2,15 +2,12 @@
 
 import re
 import shlex
-import shutil
 from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
 from typing import NamedTuple
 
 import yaml
-
-from urc.shipped import shipped
 
 ROOT = Path(__file__).resolve().parents[1]
 TUTORIAL = ROOT / "docs" / "tutorial.md"
@@ -72,13 +69,12 @@ def answers() -> Iterator[tuple[list[str], Block]]:
 
 
 def write_files(folder: Path) -> Path:
-    """Write all that the pages show, as a reader would; return the folder with the widgets."""
+    """Write all that the pages show, as a reader would; return the folder with their widgets."""
     widgets = folder / "widgets"
-    shutil.copytree(shipped("widgets"), widgets)
     for block in BLOCKS:
         if block.file:
             path = widgets / block.file
-            path.parent.mkdir(exist_ok=True)
+            path.parent.mkdir(parents=True, exist_ok=True)
             path.write_text(block.text, "utf-8")
     for block in DOCUMENTS:
         if not block.file:

@@ -17,6 +17,7 @@ from urc.config.load import Shelf, check
 from urc.model.values import Limits, Signal
 from urc.runtime.catalog import built_in_catalog
 from urc.runtime.selftest import run_tests
+from urc.runtime.shelves import shelf_of
 from urc.web.show.cells import WidgetContext, render_widget
 
 COMMANDS = [
@@ -69,7 +70,7 @@ def test_there_is_something_to_check() -> None:
 def test_a_document_of_the_pages_is_without_a_finding(folder: Path, block: Block) -> None:
     """It loads with the widgets that the pages show, not even a warning, and its tests pass."""
     path = f"widgets/{block.file}" if block.file else f"{yaml.safe_load(block.text)['name']}.yaml"
-    checked = check(path, built_in_catalog(), Shelf(folder / "widgets"))
+    checked = check(path, built_in_catalog(), shelf_of(folder / "robot.yaml"))
     assert checked.problems == ()
     if checked.kind == "robot":
         assert checked.profile is not None

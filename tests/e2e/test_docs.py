@@ -14,11 +14,13 @@ from tests.documentation import Block, answers, write_files
 from tests.e2e.conftest import PageMaker
 from tests.e2e.dashboards import running_dashboard, until
 from tests.e2e.processes import UrcProcess
-from urc.config.load import Shelf, load_profile
+from urc.config.load import load_profile
 from urc.model.interface import WidgetUse
 from urc.model.values import Signal, Value
 from urc.runtime.catalog import built_in_catalog
 from urc.runtime.session import CommandFailed
+from urc.runtime.shelves import TwoShelves
+from urc.shipped import shipped
 from urc.testing.dashboard import FakeRobot, dashboard_profile
 
 pytestmark = pytest.mark.anyio
@@ -64,7 +66,7 @@ async def test_the_widget_of_the_page_lives_in_a_browser(
     tmp_path: Path, new_page: PageMaker
 ) -> None:
     """Each state of its demo shows its texts, with the module that the page shows."""
-    shelf = Shelf(write_files(tmp_path))
+    shelf = TwoShelves(shipped("widgets"), write_files(tmp_path))
     lamp = shelf.get("lamp")
     assert lamp is not None
     demo = yaml.safe_load((lamp.folder / "demo.yaml").read_text("utf-8"))
@@ -99,7 +101,7 @@ async def test_the_button_of_the_page_gives_its_command(
     tmp_path: Path, new_page: PageMaker
 ) -> None:
     """The profile of the page with its widget: what the button does, and what it says when not."""
-    shelf = Shelf(write_files(tmp_path))
+    shelf = TwoShelves(shipped("widgets"), write_files(tmp_path))
     profile = load_profile(tmp_path / "desk-lamp.yaml", built_in_catalog(), shelf)
     robot = FakeRobot(profile)
     async with running_dashboard(robot) as address:

@@ -4,6 +4,8 @@ import argparse
 import re
 from pathlib import Path
 
+from urc.shipped import shipped
+
 EXAMPLE = "urc new widget lamp"
 
 _NAME = re.compile(r"[a-z][a-z0-9-]{0,63}")
@@ -30,6 +32,8 @@ def run(arguments: argparse.Namespace) -> int:
     name: str = arguments.name
     if not _NAME.fullmatch(name):
         raise UrcError(f"a widget cannot be called {name!r}: write small letters, digits and '-'")
+    if (shipped("widgets") / name).is_dir():
+        raise UrcError(f"a widget called {name!r} ships with URC, and goes before any other")
     home: Path = arguments.into or Path("widgets")
     folder = home / name
     try:

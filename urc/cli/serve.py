@@ -87,6 +87,7 @@ def run(arguments: argparse.Namespace) -> int:
     from urc.cli.dashboard import Place, run_dashboard
     from urc.cli.settings import settings_given
     from urc.runtime.settings import resolve_settings
+    from urc.runtime.shelves import hidden_beside
 
     if arguments.dev and not is_loopback(arguments.host):
         raise Misuse(f"--dev shows all traffic and is for this machine alone, not {arguments.host}")
@@ -98,6 +99,8 @@ def run(arguments: argparse.Namespace) -> int:
     if not profiles and (arguments.settings or arguments.settings_file):
         raise Misuse("--set and --settings are for the profiles that are named; name one")
     settings_given(profiles, arguments)  # what is wrong with them is said before anything starts
+    for folder in dict.fromkeys(each for one in profiles for each in hidden_beside(one.file)):
+        complain(f"urc serve: {folder} is not used: a widget of that name ships with URC")
     if not is_loopback(arguments.host):
         _warn(arguments)
 

@@ -45,3 +45,12 @@ def test_a_name_that_no_folder_may_have_is_refused(
     assert main(["new", "widget", name, "--into", str(tmp_path)]) == 1
     assert "cannot be called" in capsys.readouterr().err
     assert not list(tmp_path.iterdir())
+
+
+def test_the_name_of_a_shipped_widget_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The new one would never be used."""
+    assert main(["new", "widget", "gauge", "--into", str(tmp_path)]) == 1
+    assert "'gauge' ships with URC" in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())

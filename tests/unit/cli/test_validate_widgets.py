@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 
+from urc.cli import dashboard
 from urc.cli.main import main
 
 Output = pytest.CaptureFixture[str]
@@ -95,3 +96,42 @@ def test_all_shipped_widgets_are_sound(capsys: Output) -> None:
     root = Path(__file__).resolve().parents[3]
     assert main(["validate", *map(str, sorted((root / "widgets").glob("*/widget.yaml")))]) == 0
     assert capsys.readouterr().out == ""
+
+
+ROBOT = """\
+urc: 1
+kind: robot
+name: bot
+transports:
+  wire: { type: tcp, host: 127.0.0.1, port: 9, framing: { type: delimiter, tx: LF, rx: LF } }
+signals:
+  battery: { type: integer }
+messages:
+  state: { regex: '^(?P<battery>[0-9]+)$' }
+widgets:
+  dial: { use: gauge, bind: { value: battery } }
+interfaces:
+  default: { grid: dial }
+"""
+
+
+def test_a_widget_that_is_never_used_is_told(
+    folder: Path, capsys: Output, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """By its own folder, by a robot that uses the shipped one in its place, and when it is served.
+
+    The dashboard itself is left out.
+    """
+    own = folder.rename(folder.parent / "gauge")
+    manifest = own / "widget.yaml"
+    manifest.write_text(manifest.read_text("utf-8").replace("name: throttle", "name: gauge"))
+    Path("bot.yaml").write_text(ROBOT, "utf-8")
+    for path in (own, Path("bot.yaml")):
+        assert main(["validate", str(path)]) == 0
+        output = capsys.readouterr().out
+        assert f"{manifest}:1:1: warning shipped-name: this widget is never used" in output
+    monkeypatch.setattr(dashboard, "run_dashboard", lambda *_, **__: 0)
+    assert main(["serve", "bot.yaml"]) == 0
+    assert capsys.readouterr().err == (
+        f"urc serve: {own} is not used: a widget of that name ships with URC\n"
+    )

@@ -9,7 +9,9 @@ from typing import Final
 
 from urc._files import read_bytes
 from urc.model.widget import Widget
-from urc.problems import Problem, ProblemsError
+from urc.problems import Problem, ProblemsError, has_errors
+from urc.runtime.shelves import hidden_widget
+from urc.web.load.foreign import OURS, Border
 from urc.web.show.cells import render_widget, widget_context
 from urc.web.show.demos import DemoState, demo_states
 from urc.web.show.template_check import TEMPLATE, TemplateCheck
@@ -29,6 +31,8 @@ _ANY: Final = re.compile(r"^export\b.*", re.MULTILINE)
 def check_widget(widget: Widget) -> list[Problem]:
     """Return what is wrong with the files of a widget whose manifest is sound."""
     problems: list[Problem] = []
+    if widget.name in OURS and Border().is_foreign(widget):
+        problems.append(hidden_widget(str(widget.folder / "widget.yaml"), widget.name))
     template: TemplateCheck | None = None
     states: list[DemoState] = []
     try:
@@ -40,7 +44,7 @@ def check_widget(widget: Widget) -> list[Problem]:
         states = demo_states(widget)
     except ProblemsError as error:
         problems += error.problems
-    if template is not None and not problems:
+    if template is not None and not has_errors(problems):
         problems += _rendered(widget, states, template)
     try:
         problems += _module(widget, _text(widget, MODULE))
