@@ -13,6 +13,7 @@ from urc.model.flow import ErrorReply
 
 __all__ = [
     "Linker",
+    "check_value",
     "find_command",
     "link_arguments",
     "link_command",
@@ -215,7 +216,7 @@ def link_arguments(
     for name, inner in given.items():
         argument = known_argument(name, inner, command, findings)
         if argument is not None and not (isinstance(inner.data, str) and "{{" in inner.data):
-            _check_value(inner, argument, findings)  # a step's template is known when it runs
+            check_value(inner, argument, findings)  # a step's template is known when it runs
     missing = [
         name
         for name, one in command.arguments.items()
@@ -232,7 +233,8 @@ def link_arguments(
         )
 
 
-def _check_value(part: Part, argument: Argument, findings: Findings) -> None:
+def check_value(part: Part, argument: Argument, findings: Findings) -> None:
+    """Check a plain value at `part` that is given for an argument."""
     value = part.data
     try:
         elements = fit_argument(value, argument.type, argument.of, argument.size)
@@ -244,7 +246,8 @@ def _check_value(part: Part, argument: Argument, findings: Findings) -> None:
         check_within(one, argument.min, argument.max, part, findings)
         if argument.choices and one not in argument.choices:
             text = f"{one!r} is not one of the choices of {argument.name!r}"
-            findings.error(part, "unknown-word", text)
+            hint = did_you_mean(str(one), map(str, argument.choices), "choices")
+            findings.error(part, "unknown-word", text, hint=hint)
 
 
 def _refusal_parts(part: Part) -> list[Part]:

@@ -7,13 +7,14 @@ from urc.config.gather import Sources
 from urc.config.link_files import link_files
 from urc.config.link_outputs import link_output
 from urc.config.link_pages import link_pages
+from urc.config.link_together import link_together
 from urc.config.parse_widget import Shelf
 from urc.config.part import Findings, Part
 from urc.config.shape import check_options
 from urc.config.suggest import did_you_mean, listed
 from urc.model.driver import Driver
 from urc.model.interface import Given, Interface, WidgetUse
-from urc.model.units import conversion
+from urc.model.units import conversion, quantity_of
 from urc.model.values import Signal
 from urc.model.widget import Port, Widget
 
@@ -115,7 +116,7 @@ def _use(
         return None  # a broken manifest is told where it stands
     bound = _bindings(part, widget, base, driver, findings)
     options, files, pages = _options(part, widget, base, findings)
-    return WidgetUse(
+    use = WidgetUse(
         slot=part.name,
         widget=name,
         inputs=bound.inputs,
@@ -127,6 +128,9 @@ def _use(
         files=files,
         pages=pages,
     )
+    if driver is not None:
+        link_together(part, use, widget, driver, findings)
+    return use
 
 
 class _Bound(NamedTuple):
@@ -267,6 +271,9 @@ def misfit(port: Port, signal: Signal) -> str:
     if port.unit and conversion(signal.unit, port.unit) is None:
         has = f"in {signal.unit!r}" if signal.unit else "without a unit"
         return f"unit {port.unit!r} is wanted, the signal is {has}"
+    measured = quantity_of(signal.unit)
+    if port.quantity and measured not in ("", port.quantity):
+        return f"unit of {port.quantity} is wanted, the signal is in {signal.unit!r}"
     return ""
 
 

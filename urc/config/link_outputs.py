@@ -1,13 +1,27 @@
 """Outputs of a widget → commands of the driver: which one, and where its values go."""
 
+from collections.abc import Mapping, Sequence
+from typing import Final
+
+from urc.config.link_flow import check_value
 from urc.config.part import Findings, Part
 from urc.config.suggest import did_you_mean, listed
 from urc.config.values import known_argument
-from urc.model.driver import Command, Driver
+from urc.model.binding import targets
+from urc.model.driver import Argument, Command, Driver
 from urc.model.interface import Given
+from urc.model.units import are_apart
 from urc.model.widget import Port, Widget
 
 __all__ = ["link_output"]
+
+_GIVERS: Final = {
+    "integer": "slider, knob, number",
+    "number": "slider, knob, number",
+    "boolean": "switch",
+    "string": "text",
+}
+"""Type of an argument → the shipped widgets that give one."""
 
 
 def link_output(
@@ -37,11 +51,10 @@ def link_output(
             hint=did_you_mean(name, driver.commands, "commands"),
         )
         return name, given
-    _check_hold(part, port, widget, command, findings)
-    if not is_short:
-        _check_targets(part, command, findings)
-    if port.is_held:
-        _check_complete(part, port, command, given, findings)
+    is_right = _check_hold(part, port, widget, command, findings)
+    is_right &= is_short or _check_targets(part, command, findings)
+    if is_right:
+        _check_values(part, port, widget, command, given, findings)
     return name, given
 
 
@@ -56,13 +69,31 @@ def _given(part: Part, port: Port, widget: Widget, findings: Findings) -> Given:
                 key=True,
                 hint=f"it gives: {listed(port.arguments)}" if port.arguments else "",
             )
+        elif inner.data in names:
+            findings.error(
+                inner,
+                "given-twice",
+                f"{source!r} goes to {inner.data!r}, where {names[inner.data]!r} goes already",
+                hint="each argument takes one value",
+            )
         names[inner.data] = source
-    return Given(names, {name: inner.data for name, inner in part.named("set").items()})
+    fixed = part.named("set")
+    for name, inner in fixed.items():
+        if name in names:
+            findings.error(
+                inner,
+                "given-twice",
+                f"{name!r} is set here, and {names[name]!r} of {port.name!r} goes there too",
+                key=True,
+                hint="each argument takes one value",
+            )
+    return Given(names, {name: inner.data for name, inner in fixed.items()})
 
 
 def _check_hold(
     part: Part, port: Port, widget: Widget, command: Command, findings: Findings
-) -> None:
+) -> bool:
+    """Return whether what holds is bound to what is held."""
     if port.is_held and command.hold is None:
         findings.error(
             part,
@@ -79,29 +110,119 @@ def _check_hold(
             f" {widget.name!r} cannot hold it",
             hint="use a widget that holds: joystick, hold-button",
         )
+    return port.is_held is (command.hold is not None)
 
 
-def _check_targets(part: Part, command: Command, findings: Findings) -> None:
-    named = [(inner, inner.data, False) for inner in part.named("args").values()]
-    named += [(inner, name, True) for name, inner in part.named("set").items()]
-    for inner, name, is_key in named:
-        known_argument(name, inner, command, findings, key=is_key)
+def _check_targets(part: Part, command: Command, findings: Findings) -> bool:
+    """Check the arguments that are named and their constants; return whether there are all."""
+    is_known = True
+    for inner in part.named("args").values():
+        is_known &= known_argument(inner.data, inner, command, findings, key=False) is not None
+    for name, inner in part.named("set").items():
+        argument = known_argument(name, inner, command, findings)
+        if argument is None:
+            is_known = False
+        else:
+            check_value(inner, argument, findings)
+    return is_known
 
 
-def _check_complete(
-    part: Part, port: Port, command: Command, given: Given, findings: Findings
+def _check_values(
+    part: Part, port: Port, widget: Widget, command: Command, given: Given, findings: Findings
 ) -> None:
-    """Report what a held command needs and nobody gives: it would never move."""
-    there = {*given.names, *given.fixed, *port.arguments}
+    """Report what the command needs and does not get, and what it gets and cannot take."""
+    if port.types and not port.arguments:
+        return  # it gives a value, and nobody says by which name
+    taken = targets(command, port, given)
     missing = [
         name
         for name, one in command.arguments.items()
-        if one.is_required and one.default is None and name not in there
+        if one.is_required and name not in taken and name not in given.fixed
     ]
     if missing:
         findings.error(
             part,
             "missing-argument",
-            f"command {command.name!r} needs {listed(missing)}",
-            hint=f"bind it as {{ command: {command.name}, args: {{ …: {missing[0]} }} }}",
+            f"{port.name!r} of widget {widget.name!r} does not give what command {command.name!r}"
+            f" needs: {listed(missing)}",
+            hint=_remedy(command, port, taken, missing),
         )
+    elif port.arguments and not taken:
+        _check_nothing(part, port, widget, command, given, findings)
+    for target, source in taken.items():
+        wrong = _misfit(port, command.arguments[target])
+        if wrong and source in port.arguments:
+            findings.error(
+                _place(part, source),
+                "wrong-unit" if wrong.startswith("unit") else "wrong-type",
+                f"{source!r} of widget {widget.name!r} does not fit argument {target!r} of command"
+                f" {command.name!r}: {wrong}",
+                hint="" if wrong.startswith("unit") else _giver(command.arguments[target]),
+            )
+
+
+def _remedy(command: Command, port: Port, taken: Mapping[str, str], missing: Sequence[str]) -> str:
+    free = [name for name in port.arguments if name not in taken.values()]
+    wrong = [name for name in missing if not _is_of_type(port, command.arguments[name])]
+    if free and wrong:
+        return _giver(command.arguments[wrong[0]])
+    pairs = [f"{source}: {name}" for source, name in zip(free, missing, strict=False)]
+    key = "args" if pairs else "set"
+    what = ", ".join(pairs or [f"{name}: …" for name in missing])
+    return f"bind it as {{ command: {command.name}, {key}: {{ {what} }} }}"
+
+
+def _giver(argument: Argument) -> str:
+    """Return which widgets give what an argument takes."""
+    widgets = "select" if argument.choices else _GIVERS.get(argument.type, "")
+    return f"use a widget that gives what {argument.name} takes: {widgets}" if widgets else ""
+
+
+def _check_nothing(
+    part: Part, port: Port, widget: Widget, command: Command, given: Given, findings: Findings
+) -> None:
+    """Report an output none of whose values goes anywhere."""
+    what = f"{port.name!r} of widget {widget.name!r} gives {listed(port.arguments)}"
+    free = [name for name in command.arguments if name not in given.fixed]
+    if free:
+        where = f"and command {command.name!r} takes {listed(command.arguments)}"
+        hint = _remedy(command, port, {}, free)
+    else:
+        where = f"and command {command.name!r} takes no value from it"
+        plain = "hold-button" if port.is_held else "button"
+        hint = f"use a widget that needs to give none: {plain}"
+    if not port.is_held or _stands_still(command, given):
+        findings.error(part, "nothing-given", f"{what}, {where}", hint=hint)
+    elif len(port.arguments) > 1:
+        findings.warn(part, "nothing-given", f"{what}, {where}", hint=hint)
+
+
+def _stands_still(command: Command, given: Given) -> bool:
+    """Return whether a held command says while it is held what it says when it is let go."""
+    release = command.hold.release if command.hold is not None else {}
+    return bool(command.arguments) and all(
+        given.fixed.get(name, one.default) == release.get(name, one.default)
+        for name, one in command.arguments.items()
+    )
+
+
+def _is_of_type(port: Port, argument: Argument) -> bool:
+    types = ("number",) if port.is_held else port.types
+    fitting = (*types, "integer") if "number" in types else types
+    return not types or argument.type in fitting
+
+
+def _misfit(port: Port, argument: Argument) -> str:
+    """Return why an argument cannot take what an output gives, or "" when it can."""
+    if not _is_of_type(port, argument):
+        given = "number" if port.is_held else " or ".join(port.types)
+        return f"it is {given}, and the argument is {argument.type}"
+    if port.unit and are_apart(port.unit, argument.unit):
+        return f"unit {port.unit!r} is given, and the argument is in {argument.unit!r}"
+    return ""
+
+
+def _place(part: Part, source: str) -> Part:
+    """Return where a binding says where a value goes, or the binding itself."""
+    args = part.get("args") if isinstance(part.data, dict) else None
+    return (args.get(source) if args is not None else None) or part

@@ -1,6 +1,7 @@
 """A widget's manifest → `Widget`, and the shelf that reads manifests by name."""
 
 import re
+from collections.abc import Iterable
 from pathlib import Path as FilePath
 
 from urc.config.part import Findings, Part
@@ -33,7 +34,7 @@ def parse_widget(document: Document, findings: Findings) -> Widget:
     options = part.get("options")
     if options is not None:
         _check_defaults(options, findings)
-    return Widget(
+    widget = Widget(
         name=name,
         title=part.text("title"),
         folder=folder,
@@ -44,7 +45,36 @@ def parse_widget(document: Document, findings: Findings) -> Widget:
         summary=part.text("summary"),
         licence=part.text("licence"),
         author=part.text("author"),
+        needs=tuple(str(inner.data) for inner in part.listed("needs")),
+        together=tuple(tuple(map(str, inner.data)) for inner in part.listed("together")),
     )
+    _check_names(part, widget, findings)
+    return widget
+
+
+def _check_names(part: Part, widget: Widget, findings: Findings) -> None:
+    """Report each name of a port or an option that the manifest does not have."""
+    ports, options = {**widget.inputs, **widget.outputs}, widget.options
+    told: list[tuple[Part, Iterable[str]]] = []
+    told += [(inner, (*ports, *options)) for inner in part.listed("needs")]
+    told += [(inner, ports) for group in part.listed("together") for inner in group.items()]
+    for inner in (*part.named("inputs").values(), *part.named("outputs").values()):
+        if "unit_of" in inner.data:
+            told.append((inner.must("unit_of"), ports))
+    for inner in part.named("options").values():
+        if "below" in inner.data:
+            told.append((inner.must("below"), options))
+        for one in (inner, inner.get("items")):
+            if one is not None and "gives" in one.data:
+                told.append((one.must("gives"), widget.outputs))
+    for inner, known in told:
+        if inner.data not in known:
+            findings.error(
+                inner,
+                "unknown-input",
+                f"this widget has no {inner.data!r}",
+                hint=did_you_mean(inner.data, known, "names"),
+            )
 
 
 def _port(part: Part) -> Port:
@@ -52,6 +82,7 @@ def _port(part: Part) -> Port:
         name=part.name,
         types=_one_or_more(part.get("type")),
         unit=part.text("unit"),
+        unit_of=part.text("unit_of"),
         is_required=part.flag("required", default=True),
         description=part.text("description"),
     )
@@ -64,6 +95,7 @@ def _input(part: Part) -> Port:
         size=None if size is None else int(size.data),
         is_many=part.flag("many", default=False),
         is_each=part.flag("each", default=False),
+        quantity=part.text("quantity"),
     )
 
 

@@ -16,7 +16,7 @@ _Check = Callable[[Any], bool]
 _ANNOTATIONS: Final = frozenset(
     (
         *("$schema", "$defs", "title", "description", "examples", "default"),
-        *("file", "page", "then", "else"),
+        *("file", "page", "local", "below", "gives", "then", "else"),
     )
 )
 

@@ -7,7 +7,7 @@ A unit that is not here fits nothing but itself.
 import math
 from typing import Final, NamedTuple
 
-__all__ = ["Scale", "conversion"]
+__all__ = ["Scale", "are_apart", "conversion", "quantity_of"]
 
 
 class Scale(NamedTuple):
@@ -126,3 +126,17 @@ def conversion(have: str, want: str) -> Scale | None:
         return None
     source, target = _KINDS[kind][have], _KINDS[kind][want]
     return Scale(source.factor / target.factor, (source.offset - target.offset) / target.factor)
+
+
+def are_apart(one: str, other: str) -> bool:
+    """Return whether a number surely means another thing in the other unit.
+
+    What has no unit may be in any.
+    """
+    scale = conversion(one, other)
+    return bool(one and other) and (scale is None or scale != (1.0, 0.0))
+
+
+def quantity_of(unit: str) -> str:
+    """Return what is measured in a unit, as ``length``; "" when nobody knows."""
+    return _KIND_OF.get(unit, "")

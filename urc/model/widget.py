@@ -14,15 +14,19 @@ class Port(NamedTuple):
 
     name: str
     types: tuple[str, ...] = ("number",)
-    """Signal types it accepts."""
+    """Signal types it accepts; of an output, types of the values it gives; () for any."""
     unit: str = ""
     """Unit it wants; "" takes any."""
+    quantity: str = ""
+    """Of an input: kind of unit it wants, in which values come as they are; "" takes any."""
+    unit_of: str = ""
+    """Input or output of the same widget that has to have the same unit; "" for none."""
     is_required: bool = True
     description: str = ""
     is_held: bool = False
     """Of an output: it is given by holding, so it may be bound to motion, and to nothing else."""
     arguments: tuple[str, ...] = ()
-    """Of an output: names of the values that it gives along, each from -1 to 1."""
+    """Of an output: names of the values that it gives along; of a held one each from -1 to 1."""
     of: tuple[str, ...] = ()
     """Of an input that takes arrays: kinds of the elements it can show; () takes any."""
     size: int | None = None
@@ -44,6 +48,10 @@ class Widget(NamedTuple):
     outputs: Mapping[str, Port] = NOTHING
     options: Mapping[str, object] = NOTHING
     """JSON Schema ``properties`` of its options."""
+    needs: tuple[str, ...] = ()
+    """Inputs, outputs and options of which at least one must be given; () for none."""
+    together: tuple[tuple[str, ...], ...] = ()
+    """Inputs or outputs that mean something only when all of a group are bound."""
     min_cells: tuple[int, int] = (1, 1)
     """Columns, rows."""
     summary: str = ""

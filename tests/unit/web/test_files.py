@@ -170,7 +170,8 @@ def test_a_page_of_the_dashboard_itself_is_not_framed(tmp_path: Path, url: str) 
 
 
 def test_no_page_has_no_address(tmp_path: Path) -> None:
-    assert linked_options(page_in(tmp_path, "{ url: '' }"), "puppet")["url"] == ""
+    use = page_in(tmp_path, "{ url: 'http://wiki.local/a' }")._replace(options={"url": ""})
+    assert linked_options(use, "puppet")["url"] == ""
 
 
 def test_whoever_installs_a_robot_or_a_layout_is_told_of_the_pages_that_it_shows(

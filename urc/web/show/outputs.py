@@ -5,6 +5,7 @@ Floor 5. Pure.
 
 from collections.abc import Mapping
 
+from urc.model.binding import targets
 from urc.model.driver import Argument, Command, Driver
 from urc.model.interface import Given, WidgetUse
 from urc.model.units import conversion
@@ -48,7 +49,7 @@ def output_config(use: WidgetUse, output: str, widget: Widget, driver: Driver) -
     is_held = hold is not None and port.is_held
     return {
         "command": name,
-        "names": _names(command, port, given, is_held=is_held),
+        "names": targets(command, port, given) if command is not None else dict(given.names),
         "fixed": dict(given.fixed),
         "ranges": _ranges(command, port, given) if is_held else {},
         "neutral": _neutral(command, port, given) if is_held else {},
@@ -62,16 +63,6 @@ def output_config(use: WidgetUse, output: str, widget: Widget, driver: Driver) -
         "steps": [step_words(one) for one in command.steps] if command is not None else [],
         "isAnswered": command is not None and (command.reply is not None or bool(command.steps)),
     }
-
-
-def _names(command: Command | None, port: Port, given: Given, *, is_held: bool) -> dict[str, str]:
-    """Return argument of the command → argument of the output."""
-    if command is None or is_held:
-        return _targets(command, port, given) if command is not None else dict(given.names)
-    open_ones = [name for name in command.arguments if name not in given.fixed]
-    if not given.names and len(port.arguments) == 1 and len(open_ones) == 1:
-        return {open_ones[0]: port.arguments[0]}  # it can only mean this one
-    return dict(given.names)
 
 
 def _arguments(command: Command | None, given: Given) -> dict[str, dict[str, object]]:
@@ -133,21 +124,12 @@ def _line(command: Command | None, driver: Driver) -> str:
     return "" if is_made_for_it else line
 
 
-def _targets(command: Command, port: Port, given: Given) -> dict[str, str]:
-    """Return argument of the command → argument of the output that moves it."""
-    renamed = set(given.names.values())
-    own = {
-        name: name for name in port.arguments if name in command.arguments and name not in renamed
-    }
-    return {**own, **given.names}
-
-
 def _ranges(command: Command | None, port: Port, given: Given) -> dict[str, dict[str, object]]:
     """Return what -1 to 1 of the widget means for each argument that has a range of its own."""
     if command is None:
         return {}
     found: dict[str, dict[str, object]] = {}
-    for target, source in _targets(command, port, given).items():
+    for target, source in targets(command, port, given).items():
         argument = command.arguments.get(target)
         if argument is None or source not in port.arguments or argument.max is None:
             continue
@@ -172,7 +154,7 @@ def _neutral(command: Command | None, port: Port, given: Given) -> dict[str, Rea
     if command is None:
         return {}
     release = _release_of(command)
-    return {name: release[name] for name in _targets(command, port, given) if name in release}
+    return {name: release[name] for name in targets(command, port, given) if name in release}
 
 
 def _release_of(command: Command) -> Mapping[str, Reading]:
