@@ -1,5 +1,6 @@
 """The last pass: rules over a whole profile. None of them is an error; all are worth a look."""
 
+import re
 from pathlib import PurePath
 from typing import Final
 
@@ -28,6 +29,7 @@ def check_profile(
     _check_name(sources, findings)
     _check_unused(sources, driver, uses, findings)
     _check_slots(sources, interfaces, findings)
+    _check_unfilled(sources, interfaces, findings)
     for part, poll in zip(sources.driver.listed("polls"), driver.polls, strict=True):
         _check_pace(part, poll, sources.driver, findings)
     _check_rate(sources.driver, driver, findings)
@@ -98,6 +100,44 @@ def _check_slots(sources: Sources, interfaces: dict[str, Interface], findings: F
                 key=True,
                 hint=did_you_mean(name, shown, "slots"),
             )
+
+
+def _check_unfilled(sources: Sources, interfaces: dict[str, Interface], findings: Findings) -> None:
+    """Warn of a slot in a robot's own picture that nothing fills.
+
+    An interface in a document of its own serves several drivers, and leaves out what one lacks.
+    """
+    for name, interface in interfaces.items():
+        part = sources.interfaces[name]
+        filled = {*sources.slots, *interface.widgets}
+        free = filled - {*interface.shown}
+        empty = {*interface.shown} - filled - {interface.background}
+        for slot in sorted(empty) if part.path else ():
+            found = _drawn(part, slot)
+            if found is not None:
+                picture, offset = found
+                findings.warn(
+                    picture,
+                    "slot-not-filled",
+                    f"no widget fills the slot {slot!r}",
+                    offset=offset,
+                    length=len(slot),
+                    hint=did_you_mean(slot, free, "slots that are not shown")
+                    if free
+                    else f"write widgets: {{ {slot}: {{ use: … }} }}, or a '.' in its place",
+                )
+
+
+def _drawn(part: Part, slot: str) -> tuple[Part, int] | None:
+    """Return the first picture of an interface that shows a slot, and where in its text."""
+    for page in (part, *part.named("tabs").values()):
+        one = page.get("grid")
+        several = [*page.named("grids").values(), *page.named("left").values()]
+        for picture in (*([one] if one is not None else []), *several):
+            found = re.search(rf"(?<!\S){re.escape(slot)}(?!\S)", picture.data)
+            if found is not None:
+                return picture, found.start()
+    return None
 
 
 def _check_pace(part: Part, poll: Poll, driver: Part, findings: Findings) -> None:
