@@ -13,6 +13,7 @@ from urc.config.link_look import misfit
 from urc.config.parse_widget import Shelf
 from urc.model.driver import Argument, Command, Driver
 from urc.model.interface import Given, WidgetUse
+from urc.model.units import are_apart
 from urc.model.values import Signal
 from urc.model.widget import Widget
 
@@ -240,7 +241,9 @@ def _with_state(use: WidgetUse, argument: Argument, driver: Driver, shelf: Shelf
     command = next(iter(use.outputs.values()))
     for name in (argument.name, command):
         signal = driver.signals.get(name)
-        if port is not None and signal is not None and not misfit(port, signal):
+        if port is None or signal is None or misfit(port, signal):
+            continue
+        if not port.unit_of or not are_apart(signal.unit, argument.unit):
             return use._replace(inputs={port.name: name})
     return use
 

@@ -37,7 +37,8 @@ WIDGETS = {
     "select": "inputs: { state: { type: string, required: false } }\n"
     "outputs: { change: { arguments: { value: V. } } }",
     "switch": "outputs: { change: { arguments: { value: V. } } }",
-    "slider": "outputs: { change: { arguments: { value: V. } } }",
+    "slider": "inputs: { state: { type: number, unit_of: change, required: false } }\n"
+    "outputs: { change: { arguments: { value: V. } } }",
     "text": "outputs: { change: { arguments: { value: V. } } }",
     "joystick": 'outputs: { moved: { hold: true, arguments: { x: X., "y": Y. } } }',
     "axis": "outputs: { moved: { hold: true, arguments: { value: V. } } }",
@@ -266,3 +267,15 @@ def ordered(interface: Interface) -> dict[str, tuple[int, int, set[Slot]]]:
         screen: (grid.rows, grid.columns, set(grid.slots))
         for screen, grid in interface.grids.items()
     }
+
+
+@pytest.mark.parametrize(("unit", "inputs"), [("V", {"state": "volts"}), ("mV", {})])
+def test_what_the_robot_says_is_shown_beside_only_in_the_same_unit(
+    unit: str, inputs: dict[str, str], tmp_path: Path
+) -> None:
+    """A slider in volts does not show millivolts as volts."""
+    argument = Argument("volts", unit="V", min=0, max=24)
+    command = Command("set_volts", "wire", WriteSpec("text"), {"volts": argument})
+    driver = Driver({}, {"volts": Signal("volts", unit=unit)}, commands={"set_volts": command})
+    slots = automatic_slots(driver, shelf(tmp_path))
+    assert slots["set_volts"].inputs == inputs
