@@ -5,7 +5,7 @@ from typing import NamedTuple, TypeVar
 
 from urc.config.gather import Sources
 from urc.config.link_files import link_files
-from urc.config.link_outputs import link_output
+from urc.config.link_outputs import link_output, takes
 from urc.config.link_pages import link_pages
 from urc.config.link_together import link_together
 from urc.config.parse_widget import Shelf
@@ -222,7 +222,9 @@ def _check_required(
                 f"{port.name!r} of widget {widget.name!r} is not bound",
                 at="bind" if "bind" in part.data else "",
                 key=True,
-                hint=_binding_hint(port, driver),
+                hint=_output_hint(port, driver)
+                if port.name in widget.outputs
+                else _binding_hint(port, driver),
             )
 
 
@@ -233,6 +235,14 @@ def _kept(bound: Mapping[str, _T], ports: Mapping[str, Port]) -> dict[str, _T]:
 def _binding_hint(port: Port, driver: Driver) -> str:
     fitting = [signal.name for signal in driver.signals.values() if not misfit(port, signal)]
     return f"signals that fit: {listed(fitting)}" if fitting else "no signal of the driver fits"
+
+
+def _output_hint(port: Port, driver: Driver) -> str:
+    fitting = [one.name for one in driver.commands.values() if takes(one, port)]
+    if fitting:
+        return f"commands that fit: {listed(fitting)}"
+    held = "a command with 'hold'" if port.is_held else "a command without 'hold'"
+    return f"no command of the driver fits: this is an output, and needs {held}"
 
 
 def _check_signal(

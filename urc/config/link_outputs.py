@@ -13,7 +13,7 @@ from urc.model.interface import Given
 from urc.model.units import are_apart
 from urc.model.widget import Port, Widget
 
-__all__ = ["link_output"]
+__all__ = ["link_output", "takes"]
 
 _GIVERS: Final = {
     "integer": "slider, knob, number",
@@ -159,6 +159,15 @@ def _check_values(
                 f" {command.name!r}: {wrong}",
                 hint="" if wrong.startswith("unit") else _giver(command.arguments[target]),
             )
+
+
+def takes(command: Command, port: Port) -> bool:
+    """Return whether a command may be bound to an output, if the binding says where values go."""
+    if port.is_held is not (command.hold is not None):
+        return False
+    if not port.arguments:
+        return bool(port.types) or not any(one.is_required for one in command.arguments.values())
+    return any(not _misfit(port, one) for one in command.arguments.values())
 
 
 def _remedy(command: Command, port: Port, taken: Mapping[str, str], missing: Sequence[str]) -> str:

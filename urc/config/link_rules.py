@@ -82,7 +82,8 @@ def _single(part: Part, signal: Signal, kind: str, findings: Findings) -> Value:
         words = [word for _, word in signal.states]
         if value not in words:
             text = f"signal {signal.name!r}: {shown(value)} is none of its states"
-            hint = did_you_mean(str(value), words, "states")
+            near = did_you_mean(str(value), words, "states")
+            hint = fit_hint(value, "string") if shown(value) in words else near
             findings.error(part, "unknown-word", text, hint=hint)
         return value
     try:
@@ -179,6 +180,8 @@ def _check_poll(linker: Linker, part: Part, rule: SimulatorRule) -> None:
 
 
 def _elsewhere(linker: Linker, part: Part, rule: SimulatorRule, transport: str) -> None:
+    if transport not in linker.driver.transports:
+        return  # it has been told of where the request stands
     text = f"{rule.request!r} goes to {transport!r}, and this rule is for {rule.transport!r}"
     linker.findings.error(part, "wrong-transport", text)
 

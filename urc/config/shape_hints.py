@@ -35,6 +35,12 @@ _OTHER_WORDS: Final = {
     "license": ("licence",),
 }
 """What other tools call a key → what it is called here."""
+_ELSEWHERE: Final = {
+    ("reply_to", "leaves"): "polls are asked at their times here, and 'feed' answers them",
+    ("signal", "command"): "an input is bound to the name of a signal alone, as level: battery;"
+    " only an output takes 'command'",
+}
+"""A key that has no place here, and one that tells where here is → what to write instead."""
 
 
 def key_hint(key: str, known: Mapping[str, Any]) -> str:
@@ -42,6 +48,9 @@ def key_hint(key: str, known: Mapping[str, Any]) -> str:
     name, colon, _ = key.partition(":")
     if colon and name in known:
         return f"put a space behind the colon: '{name}: '"
+    for (other, beside), hint in _ELSEWHERE.items():
+        if key == other and beside in known:
+            return hint
     others = [word for word in _OTHER_WORDS.get(key, ()) if word in known]
     if others:
         return f"it is called '{others[0]}' here"
