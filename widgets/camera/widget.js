@@ -105,7 +105,8 @@ class Camera {
       },
       show: (/** @type {HoldState} */ { phase, reason }) => {
         attribute(this.root, "data-phase", phase);
-        this.hand = phase === "asking" ? `… ${t("taking the controls")}` : phase === "spent" ? `◆ ${reason}` : "";
+        const why = phase !== "idle" && reason ? `◆ ${reason}` : "";
+        this.hand = phase === "asking" ? `… ${t("taking the controls")}` : why;
         this.tell();
       },
     });

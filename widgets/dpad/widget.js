@@ -4,7 +4,7 @@
 /** @typedef {import("../../urc/web/static/types.js").Instance} Instance */
 import { arrow } from "urc/curve";
 import { attribute, part } from "urc/kit";
-import { DIRECTIONS, Motion, pointed } from "urc/motion";
+import { along, DIRECTIONS, Motion, pointed } from "urc/motion";
 
 /** The middle of three fields is none. */
 const REST = 1 / 3;
@@ -41,8 +41,7 @@ export default {
       push(hand, isNew) {
         if (isNew) box = pad.getBoundingClientRect();
         const { x, y } = where(hand);
-        const kept = { x: axes === "y" ? 0 : x * level, y: axes === "x" ? 0 : y * level };
-        return { push: kept, isFine: false };
+        return { push: along(axes, { x: x * level, y: y * level }), isFine: false };
       },
       draw({ push, phase }) {
         const { x = 0, y = 0 } = push ?? {};

@@ -28,7 +28,7 @@ export default {
       attribute(root, "data-phase", isLocked ? "locked" : state.phase);
       attribute(main, "aria-pressed", String(isHeld && state.phase === "held"));
       write(word, state.phase === "spent" && !isHeld ? WORDS.idle : WORDS[state.phase]);
-      const ended = state.phase === "spent" && state.reason ? `◆ ${state.reason}` : "";
+      const ended = state.phase !== "idle" && state.reason ? `◆ ${state.reason}` : "";
       write(note, ended || (isLocked ? `◆ ${locked}` : ""));
     }
 

@@ -6,7 +6,7 @@
 /** @typedef {import("../../urc/web/static/motion.js").Look} Look */
 import { gate, settingsOf } from "urc/curve";
 import { attribute, drawing, part, write } from "urc/kit";
-import { DIRECTIONS, Motion, pointed, pulled, signed, speak } from "urc/motion";
+import { along, DIRECTIONS, Motion, pointed, pulled, signed, speak } from "urc/motion";
 
 /** How far the knob goes, and the whole face, in units of the drawing. */
 const TRAVEL = 56;
@@ -81,7 +81,7 @@ class Stick {
     if (this.axes === "y") x = 0;
     [x, y] = gate(x, y, this.shape);
     this.at = { x, y };
-    return { push: this.at, isFine: hand.kind !== "keys" };
+    return { push: along(this.axes, this.at), isFine: hand.kind !== "keys" };
   }
 
   /** Where it stays when the pointer lets go: sprung axes return. */

@@ -24,6 +24,8 @@ import { takesKeys, takesText } from "./keys.js";
 import { feel } from "./haptics.js";
 import { argumentsOf } from "./output.js";
 import { hurryMoves } from "./prompt.js";
+import { Together } from "./together.js";
+import { t } from "./words.js";
 
 /** Every kind of hand: what lets go of all. @type {Hand["kind"][]} */
 export const ANY = ["pointer", "keys", "pad", "stay"];
@@ -37,6 +39,7 @@ export class Control {
     this.command = command;
     /** @type {Set<Grip>} */
     this.grips = new Set();
+    this.together = new Together();
     /** @type {HoldPhase} */
     this.phase = "idle";
     this.reason = "";
@@ -255,15 +258,34 @@ export class Grip {
     return this.values ? argumentsOf(this.output, this.values) : {};
   }
 
+  /**
+   * What counts of what was taken: nothing of what another hand gives.
+   *
+   * @param {ReadonlySet<string>} lost arguments of the command that this hand pushes in vain
+   */
+  counted(lost) {
+    if (!this.values || lost.size === 0) return this.values;
+    const moved = Object.entries(this.output.names);
+    const isVain = (/** @type {string} */ name) => {
+      const targets = moved.filter(([, source]) => source === name);
+      return targets.length > 0 && targets.every(([target]) => lost.has(target));
+    };
+    const pairs = Object.entries(this.values).map(([name, value]) => [name, isVain(name) ? 0 : value]);
+    return /** @type {Record<string, Value>} */ (Object.fromEntries(pairs));
+  }
+
   /** @param {boolean} isForced */
   show(isForced = false) {
-    const { phase, reason } = this.control;
+    const { phase, together } = this.control;
+    const lost = together.lost(this);
+    const values = this.counted(lost);
+    const reason = this.control.reason || (lost.size > 0 ? t("another hand gives this: let go, then begin anew") : "");
     const kind = this.hand?.kind ?? "";
-    const look = `${phase} ${reason} ${kind} ${JSON.stringify(this.values)}`;
+    const look = `${phase} ${reason} ${kind} ${JSON.stringify(values)}`;
     if (look === this.shown && !isForced) return;
     this.shown = look;
     const isHeld = this.hand !== null;
-    feel(this, isHeld, phase === "spent", this.values);
-    this.spec.show({ phase: isHeld || phase === "spent" ? phase : "idle", reason, values: this.values });
+    feel(this, isHeld, phase === "spent", values);
+    this.spec.show({ phase: isHeld || phase === "spent" ? phase : "idle", reason, values });
   }
 }

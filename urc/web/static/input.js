@@ -15,7 +15,6 @@
  * @typedef {import("./output.js").Output} Output
  * @typedef {import("./types.js").GateSpec} GateSpec
  * @typedef {import("./types.js").HoldSpec} HoldSpec
- * @typedef {import("./types.js").Value} Value
  */
 import { Gate } from "./gate.js";
 import { ANY, Control, Grip } from "./grip.js";
@@ -323,10 +322,7 @@ export class Input {
    */
   tick(control, nowMs) {
     const { drive } = this;
-    /** @type {Record<string, Value>} */
-    let values = {};
-    for (const { output } of control.grips) values = { ...values, ...output.neutral };
-    for (const grip of control.grips) values = { ...values, ...grip.given() };
+    const values = control.together.values(control.grips);
     const text = JSON.stringify(values);
     if (text === control.sent && nowMs - control.sentMs < TICK_MS) return;
     if (!drive.isFree) return; // the newest goes when the line is free, not after others

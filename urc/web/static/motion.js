@@ -127,7 +127,7 @@ export class Motion {
     });
     let note = isLocked ? `◆ ${this.reason}` : "";
     if (phase === "asking") note = t("… taking the controls");
-    if (phase === "spent" && reason) note = `◆ ${reason}`;
+    else if (phase !== "idle" && reason) note = `◆ ${reason}`;
     write(this.note, note);
     const sent = phase === "held" ? /** @type {Push | null} */ (values) : null;
     this.own.draw({ phase: isLocked ? "locked" : phase, push: this.at, values: sent ?? {} });
@@ -173,6 +173,18 @@ export function speak(el, value, ahead, back) {
 export function pulled({ x, y, startX, startY }, reach) {
   const span = reach > 0 ? reach : 1;
   return { x: (startY - y) / span, y: (startX - x) / span };
+}
+
+/**
+ * Return of a push what a control with these axes has: another control of the same command may give
+ * the other one.
+ *
+ * @param {string} axes "both", "x" or "y"
+ * @param {{x: number, y: number}} push
+ * @returns {Push}
+ */
+export function along(axes, { x, y }) {
+  return axes === "x" ? { x } : axes === "y" ? { y } : { x, y };
 }
 
 /** Codes of the keys of each direction: by place, so that they are the same on every layout. */

@@ -161,8 +161,9 @@
  *
  * @typedef {object} HoldState
  * @property {HoldPhase} phase
- * @property {string} reason Why it is spent, for people.
- * @property {Record<string, Value> | null} values What was sampled last; null while nothing holds it.
+ * @property {string} reason Why it is spent, or why not all of it counts, for people.
+ * @property {Record<string, Value> | null} values What was sampled last, 0 where another hand gives
+ *   that already; null while nothing holds it.
  *
  * @typedef {object} HoldSpec
  * @property {HTMLElement} el What is held; it takes the focus.

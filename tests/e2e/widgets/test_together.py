@@ -1,0 +1,59 @@
+"""Two controls of one command, under two fingers."""
+
+import pytest
+
+from tests.e2e.conftest import PageMaker
+from tests.e2e.dashboards import until_text
+from tests.e2e.motion.driving import centre, fingers_on
+from tests.e2e.widgets.inputs import PLAIN, shown, until_values, use
+from urc.model.interface import Given
+
+pytestmark = pytest.mark.anyio
+
+LEFT, RIGHT = "[data-cell='0'] .joystick-pad", "[data-cell='1'] .joystick-pad"
+
+
+async def test_a_stick_of_one_axis_gives_nothing_for_the_other(new_page: PageMaker) -> None:
+    """Also where that is bound by its name: the other stick goes on, and says what it gives."""
+    left = use("joystick", axes="x", **PLAIN)
+    right = use("joystick", axes="y", **PLAIN)
+    right = right._replace(slot="right", given={"moved": Given({"turn": "y"})})
+    async with shown(new_page, left, right, size="tablet") as (robot, page):
+        hands = await fingers_on(page)
+        (x, y), (other_x, other_y) = [await centre(page, one) for one in (LEFT, RIGHT)]
+        await hands.put(0, x, y)
+        await hands.put(0, x, y - 300)
+        await until_values(robot, x=1.0)
+        count = len(robot.line.texts)
+        await hands.put(1, other_x, other_y)
+        await hands.put(1, other_x - 300, other_y)
+        await until_values(robot, x=1.0, turn=1.0)
+        assert all("x=1" in text for text in robot.after(count)), robot.after(count)
+        await until_text(page, "[data-cell='0'] .joystick-x", "+1.00")
+        await hands.lift(0)
+        await until_values(robot, turn=1.0)
+        await hands.lift(1)
+        await robot.until_stopped("go")
+
+
+async def test_a_second_stick_on_the_same_command_changes_nothing_by_a_touch(
+    new_page: PageMaker,
+) -> None:
+    """What one pushes is its own until it is let go; the other says that it gives nothing."""
+    first = use("joystick", **PLAIN)
+    second = use("joystick", **PLAIN)._replace(slot="second")
+    async with shown(new_page, first, second, size="tablet") as (robot, page):
+        hands = await fingers_on(page)
+        (x, y), (other_x, other_y) = [await centre(page, one) for one in (LEFT, RIGHT)]
+        await hands.put(0, x, y)
+        await hands.put(0, x, y - 300)
+        await until_values(robot, x=1.0)
+        count = len(robot.line.texts)
+        await hands.put(1, other_x, other_y)
+        await hands.put(1, other_x - 300, other_y + 300)
+        await until_values(robot, x=1.0, y=0.707)
+        assert all("x=1" in text for text in robot.after(count)), robot.after(count)
+        await until_text(page, "[data-cell='1'] .joystick-x", "0.00")
+        await until_text(page, "[data-cell='1'] .joystick-y", "+0.71")
+        await hands.lift(0)
+        await until_values(robot, y=0.707)
