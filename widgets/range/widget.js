@@ -5,7 +5,7 @@
 /** @typedef {import("./sight.js").Bounds} Bounds */
 /** @typedef {import("./sight.js").Kind} Kind */
 /** @typedef {{value: unknown, reading: Reading}} Sensor */
-import { DASH, attribute, board, colours, format, many, noteOf, number, part, svg, write } from "urc/kit";
+import { DASH, attribute, board, colours, digitsIn, format, many, noteOf, number, part, svg, write } from "urc/kit";
 import { Track, bearings, besides, kindOf, nearestOf, sector, shareOf, sideOf, zoneOf } from "./sight.js";
 
 const WINDOW_S = 60;
@@ -155,8 +155,9 @@ class View {
    */
   words(kind, value, bounds, reading) {
     const shown = (/** @type {number} */ distance) => {
-      const precision = this.options["precision"] ?? reading.signal.precision ?? 2;
-      return format(this.unit("range").factor(distance), Number(precision));
+      const precision = Number(this.options["precision"] ?? reading.signal.precision ?? 2);
+      const { factor } = this.unit("range");
+      return format(factor(distance), digitsIn(precision, factor));
     };
     if (kind === "clear") return this.t("clear");
     if (kind === "close") return `< ${shown(bounds.min ?? 0)}`;
