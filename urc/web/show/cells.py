@@ -64,7 +64,7 @@ class WidgetContext:
 
     title: str
     """What the author calls this place, else the first needed signal's, else the first command's,
-    else the widget's title."""
+    else the first signal's, else the widget's title."""
     options: Mapping[str, object]
     """Checked against the manifest; every declared option has a key, None where nothing is set."""
     inputs: Mapping[str, Signal | tuple[Signal, ...]]
@@ -100,11 +100,17 @@ def widget_context(use: WidgetUse, widget: Widget, profile: Profile, uid: str) -
 
 
 def _heading(widget: Widget, inputs: Mapping[str, Signal], outputs: Mapping[str, str]) -> str:
-    """Return what the widget is about: the first signal it needs, else its command."""
+    """Return what the widget is about: the first signal it needs, else its command.
+
+    What it can steer besides is not what it is about: a camera that can be turned is a camera.
+    """
     needed = [name for name in inputs if widget.inputs[name].is_required]
     about = [inputs[name].title or spoken(inputs[name].name) for name in (*needed, *inputs)]
+    ports = {name: widget.outputs[name] for name in outputs}
+    aside = [name for name, port in ports.items() if port.is_held and not port.is_required]
     if not needed:
-        about = [*outputs.values(), *about]
+        given = [called for name, called in outputs.items() if name not in aside]
+        about = [*given, *about, *(outputs[name] for name in aside)]
     return next(iter(about), widget.title)
 
 
