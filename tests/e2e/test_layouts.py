@@ -126,6 +126,25 @@ async def test_the_left_hand_is_kept_on_the_device(new_page: PageMaker) -> None:
         assert (await box(page, C))["x"] < (await box(page, A))["x"]
 
 
+async def test_only_a_tab_that_is_not_drawn_for_a_phone_asks_to_turn_it(
+    new_page: PageMaker,
+) -> None:
+    """The hint comes and goes with the tabs."""
+    wide = row("a", "b", "c")
+    tabs = {
+        "one": Tab("one", "One", {"wide": wide}),
+        "two": Tab("two", "Two", {"wide": wide, "phone": row("a", "b")}),
+    }
+    async with running_dashboard(gauged(Interface("x", "X", tabs=tabs))) as address:
+        page = await new_page(size="phone")
+        await page.goto(f"{address}robots/puppet/")
+        await expect(page.locator("[data-turn]")).to_be_visible()
+        await page.get_by_role("tab", name="Two").click()
+        await expect(page.locator("[data-turn]")).to_be_hidden()
+        await page.get_by_role("tab", name="One").click()
+        await expect(page.locator("[data-turn]")).to_be_visible()
+
+
 async def test_a_tab_hides_what_it_does_not_show(new_page: PageMaker) -> None:
     """Its cells get nothing; a cell that is in both goes on; the address says which is open."""
     tabs = {

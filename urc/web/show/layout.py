@@ -37,8 +37,11 @@ def grid_css(interface: Interface, slots: Sequence[str]) -> str:
     """Return the rules for the cells, which are numbered in the order of `slots`."""
     css = ""
     canvas = _Canvas(slots, interface.background if interface.background in slots else "")
+    turned = [needs_turning(page, slots) for page in interface.pages]
     for number, page in enumerate(interface.pages):
         place = f'.urc-grid[data-page="{number}"]'
+        if any(turned) and not turned[number]:
+            css += f".urc-stage:has(> {place})>.urc-turn{{display:none}}"
         right = _placed(page.grids, canvas)
         css += _screens(place, right, canvas)
         left = _left_hand(page, right, canvas)
