@@ -1,6 +1,7 @@
 """`urc new`: the files of something new, complete and sound, to be changed."""
 
 import argparse
+import os
 import re
 from pathlib import Path
 
@@ -10,6 +11,8 @@ EXAMPLE = "urc new widget lamp"
 
 _NAME = re.compile(r"[a-z][a-z0-9-]{0,63}")
 _FILES = Path(__file__).resolve().parent / "new_widget"
+_SCHEMA = shipped("schemas") / "widget.schema.json"
+_TYPES = Path(__file__).resolve().parents[1] / "web" / "static" / "types.js"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -41,7 +44,7 @@ def run(arguments: argparse.Namespace) -> int:
         folder.mkdir()
         for source in sorted(_FILES.iterdir()):
             text = source.read_text(encoding="utf-8")
-            (folder / source.name).write_text(_filled(text, name), encoding="utf-8")
+            (folder / source.name).write_text(_filled(text, name, folder), encoding="utf-8")
     except FileExistsError as error:
         raise UrcError(f"{folder} is there already") from error
     except OSError as error:
@@ -50,6 +53,17 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _filled(text: str, name: str) -> str:
+def _filled(text: str, name: str, folder: Path) -> str:
     words = name.replace("-", " ")
-    return text.replace("NEW-WIDGET", name).replace("NEW TITLE", words[:1].upper() + words[1:])
+    text = text.replace("NEW-WIDGET", name).replace("NEW TITLE", words[:1].upper() + words[1:])
+    for place, target in (("SCHEMA", _SCHEMA), ("TYPES", _TYPES)):
+        text = text.replace(f"PATH-OF-{place}", _path_to(target, folder))
+    return text
+
+
+def _path_to(target: Path, folder: Path) -> str:
+    """Return how a file in a folder names one of URC's: from there, within one checkout."""
+    home = shipped("schemas").parent.resolve()
+    if folder.resolve().is_relative_to(home):
+        return Path(os.path.relpath(target.resolve(), folder.resolve())).as_posix()
+    return target.resolve().as_posix()

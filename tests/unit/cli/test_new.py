@@ -1,5 +1,6 @@
 """`urc new widget NAME`: a folder that is complete and sound before anything is changed."""
 
+import re
 from pathlib import Path
 
 import pytest
@@ -54,3 +55,14 @@ def test_the_name_of_a_shipped_widget_is_refused(
     assert main(["new", "widget", "gauge", "--into", str(tmp_path)]) == 1
     assert "'gauge' ships with URC" in capsys.readouterr().err
     assert not list(tmp_path.iterdir())
+
+
+def test_an_editor_finds_the_schema_and_the_types(tmp_path: Path) -> None:
+    """Also outside of a checkout."""
+    assert main(["new", "widget", "lamp", "--into", str(tmp_path)]) == 0
+    manifest = (tmp_path / "lamp" / "widget.yaml").read_text("utf-8")
+    module = (tmp_path / "lamp" / "widget.js").read_text("utf-8")
+    paths = re.findall(r"\$schema=(\S+)", manifest) + re.findall(r'import\("(.+?)"\)', module)
+    assert [Path(path).name for path in paths] == ["widget.schema.json", "types.js", "types.js"]
+    for path in paths:
+        assert (tmp_path / "lamp" / path).is_file(), path

@@ -1,6 +1,6 @@
 // @ts-check
-/** @typedef {import("../../urc/web/static/types.js").Context} Context */
-/** @typedef {import("../../urc/web/static/types.js").Instance} Instance */
+/** @typedef {import("PATH-OF-TYPES").Context} Context */
+/** @typedef {import("PATH-OF-TYPES").Instance} Instance */
 import { attribute, noteOf, part, write } from "urc/kit";
 
 export default {
