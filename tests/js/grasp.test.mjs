@@ -13,7 +13,10 @@ class Element extends EventTarget {
 
   /** @returns {boolean} whether the browser may do with it what it does otherwise */
   get(type, pointerId = 1, more = {}) {
-    return this.dispatchEvent(Object.assign(new Event(type, { cancelable: true }), { pointerId, button: 0, buttons: 1, ...more }));
+    const event = new Event(type, { cancelable: true });
+    const known = Object.entries({ pointerId, button: 0, buttons: 1, ...more });
+    for (const [name, value] of known) Object.defineProperty(event, name, { value });
+    return this.dispatchEvent(event);
   }
 }
 
@@ -116,4 +119,69 @@ test("what is not drawn stays held while the page loses its focus", () => {
   page.dispatchEvent(new Event("blur"));
   assert.deepEqual(said, ["take"]);
   assert.equal(el.get("touchstart"), true);
+});
+
+/** A slide that a finger draws sideways, or a dial, with a finger on it. */
+function touched(way = "x") {
+  const made = held({ way });
+  const finger = (type, clientX = 0, clientY = 0, atMs = 0) => {
+    made.el.get(type, 1, { pointerType: "touch", clientX, clientY, timeStamp: atMs });
+  };
+  finger("pointerdown");
+  return { ...made, finger };
+}
+
+test("a finger takes hold by a tap", () => {
+  const { said, finger } = touched();
+  finger("pointermove", 3, 3);
+  assert.deepEqual(said, []);
+  finger("pointerup", 3, 3);
+  assert.deepEqual(said, ["take", "release"]);
+});
+
+test("a finger takes hold when it draws that way, and goes on any way", () => {
+  const { el, said, finger } = touched();
+  assert.equal(el.get("touchmove"), true);
+  finger("pointermove", 20, 5);
+  finger("pointermove", 20, 80);
+  assert.equal(el.get("touchmove"), false, "the page stays where it is");
+  finger("pointerup", 20, 80);
+  assert.deepEqual(said, ["take", "move", "release"]);
+});
+
+test("a finger that goes another way, or is taken away, sets nothing", () => {
+  for (const type of ["pointermove", "pointercancel"]) {
+    const { said, finger } = touched();
+    finger(type, 5, 20);
+    finger("pointermove", 80, 20);
+    finger("pointerup", 80, 20);
+    assert.deepEqual(said, []);
+  }
+});
+
+test("an upright slide is drawn up and down", () => {
+  const { said, finger } = touched("y");
+  finger("pointermove", 5, 20);
+  assert.deepEqual(said, ["take"]);
+});
+
+test("a finger that has rested on a dial draws it any way", () => {
+  for (const [atMs, taken] of [[100, []], [500, ["take"]]]) {
+    const { said, finger } = touched("round");
+    finger("pointermove", 5, 20, atMs);
+    assert.deepEqual(said, taken);
+  }
+});
+
+test("a mouse takes hold at once, whatever a finger may do there", () => {
+  const { el, said } = held({ way: "x" });
+  el.get("pointerdown", 1, { pointerType: "mouse" });
+  assert.deepEqual(said, ["take"]);
+});
+
+test("a part that loses the pointer to the whole takes nothing away", () => {
+  const { el, said } = held();
+  el.get("pointerdown");
+  el.get("lostpointercapture", 1, { target: new Element() });
+  assert.deepEqual(said, ["take"]);
 });

@@ -12,6 +12,8 @@ export const HOLD_MS = 800;
 /** Two taps that are further apart are two. */
 export const DOUBLE_MS = 500;
 const EVERY_MS = 40;
+/** A finger that scrolls the page has gone on by then; one that is still there presses. */
+const SETTLE_MS = 100;
 
 /**
  * @param {HTMLElement} el
@@ -29,6 +31,8 @@ export function listen(el, { gesture, repeatMs, isReady, done, progress, signal 
   let downMs = -1;
   /** @type {number | undefined} */
   let timer;
+  /** A finger that may yet scroll the page. @type {number | undefined} */
+  let settling;
   if (gesture === "tap" || gesture === "double") {
     el.addEventListener("click", () => {
       const nowMs = performance.now();
@@ -44,11 +48,15 @@ export function listen(el, { gesture, repeatMs, isReady, done, progress, signal 
   }
 
   function end() {
+    clearTimeout(settling);
+    settling = undefined;
     clearInterval(timer);
     downMs = -1;
     progress(0);
   }
   function begin() {
+    clearTimeout(settling);
+    settling = undefined;
     if (downMs >= 0 || !isReady()) return;
     downMs = performance.now();
     if (gesture === "repeat") {
@@ -68,8 +76,14 @@ export function listen(el, { gesture, repeatMs, isReady, done, progress, signal 
   el.addEventListener("pointerdown", (event) => {
     if (event.button !== 0) return;
     el.setPointerCapture(event.pointerId);
-    begin();
+    // A hold counts late anyway, and is broken off by the scrolling.
+    if (gesture === "hold" || event.pointerType !== "touch") begin();
+    else if (downMs < 0) settling ??= window.setTimeout(begin, SETTLE_MS);
   }, { signal });
+  el.addEventListener("pointerup", () => settling !== undefined && begin(), { signal }); // a tap
+  el.addEventListener("touchmove", (event) => {
+    if (gesture === "repeat" && downMs >= 0) event.preventDefault(); // it presses, and scrolls nothing
+  }, { signal, passive: false });
   for (const name of ["pointerup", "pointercancel", "lostpointercapture", "blur", "keyup"]) {
     el.addEventListener(name, end, { signal });
   }

@@ -53,7 +53,7 @@ export default {
         if (isNew) pull = new Pull(shareAt(...place) ?? setpoint.shareOf(setpoint.from) ?? 0);
         return setpoint.at(pull.to(...place));
       };
-      face.listen(dial, setpoint, at, signal);
+      face.listen(dial, setpoint, at, "round", signal);
     }
     return {
       update({ state }, { change }) {

@@ -36,7 +36,7 @@ export default {
       const { min, max } = setpoint.bounds;
       write(part(el, ".slider-least"), setpoint.text(min));
       write(part(el, ".slider-most"), setpoint.text(max));
-      face.listen(track, setpoint, valueAt, signal);
+      face.listen(track, setpoint, valueAt, isVertical ? "y" : "x", signal);
     }
     return {
       update({ state }, { change }) {

@@ -57,9 +57,10 @@ export class SetpointFace {
    * @param {HTMLElement} control
    * @param {Setpoint} setpoint
    * @param {(event: PointerEvent, isNew: boolean) => number} at the value under a pointer
+   * @param {import("./grasp.js").Way} way how a finger draws it; any other way it scrolls the page
    * @param {AbortSignal} signal
    */
-  listen(control, setpoint, at, signal) {
+  listen(control, setpoint, at, way, signal) {
     attribute(control, "aria-valuemin", String(setpoint.bounds.min));
     attribute(control, "aria-valuemax", String(setpoint.bounds.max));
     grasp(control, {
@@ -73,6 +74,7 @@ export class SetpointFace {
       move: (event) => setpoint.move(at(event, false)),
       release: () => setpoint.release(),
       cancel: () => setpoint.cancel(),
+      way,
       signal,
     });
     control.addEventListener("keydown", (event) => {
