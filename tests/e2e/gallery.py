@@ -14,8 +14,8 @@ from urc.web.show.demos import DemoState, demo_states
 
 __all__ = [
     *("CELLS", "CELL_SIZES", "EXHIBITS", "HIGH", "MOST_DIFFERENT", "ONLY", "PICTURES", "THEMES"),
-    *("coarse", "difference", "groups", "keep", "kept", "lasting_faults", "settled", "show"),
-    "states_of",
+    *("coarse", "difference", "groups", "keep", "kept", "lasting_faults", "resize", "settled"),
+    *("show", "states_of"),
 ]
 
 THEMES = ("dark", "light", "sunlight", "night")
@@ -59,6 +59,23 @@ async def show(page: Page, theme: str, size: str) -> None:
           }
         }""",
         [theme, size],
+    )
+
+
+async def resize(page: Page, width: int, height: int) -> None:
+    """Give all cells of the gallery another size; return when the widgets have drawn that."""
+    await page.evaluate(
+        """async ([width, height]) => {
+          for (const exhibit of document.querySelectorAll(".urc-exhibit")) {
+            exhibit.style.maxWidth = "none";
+            exhibit.style.setProperty("--urc-exhibit-width", `${width}px`);
+            exhibit.style.setProperty("--urc-exhibit-height", `${height}px`);
+          }
+          for (let frame = 0; frame < 4; frame += 1) {
+            await new Promise((resolve) => requestAnimationFrame(resolve));
+          }
+        }""",
+        [width, height],
     )
 
 

@@ -1,5 +1,5 @@
 // Run in the gallery's page, or in a robot's, with the selector of the cells. Returns per cell what
-// hangs over, which text is cut, and whether there is nothing at all. A cell that has no place on a
+// hangs over, which text, drawing or control is cut, and whether there is nothing at all. A cell that has no place on a
 // screen of this size is none. An ellipsis is meant, and so is what can be scrolled to; a text that is only for
 // screen readers is not seen; the figures of a scale that moves (data-scale) come and go at its ends.
 (selector) => {
@@ -52,6 +52,20 @@
           break;
         }
       }
+    }
+    // A canvas may be larger than what is meant to be seen of it, as a map's is.
+    for (const el of cell.querySelectorAll("svg, button, input, select, [role=slider]")) {
+      if (!el.checkVisibility({ opacityProperty: true, visibilityProperty: true })) continue;
+      if (el.closest(".urc-hidden") || el.parentElement.closest("svg")) continue;
+      const each = el.getBoundingClientRect();
+      if (each.width <= 1 || each.height <= 1) continue;
+      let up = el.parentElement;
+      while (up !== cell && !scrolls(getComputedStyle(up))) up = up.parentElement;
+      if (up !== cell) continue;
+      const cut = Math.max(room.left - each.left, room.top - each.top, each.right - room.right,
+                           each.bottom - room.bottom);
+      const called = [el.localName, ...el.classList].join(".");
+      if (cut > SLACK) found.push(`${name}: ${Math.round(cut)} px of ${called} are cut`);
     }
     if (isBlank) found.push(`${name}: nothing is shown`);
   }

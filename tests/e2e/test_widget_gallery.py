@@ -23,6 +23,7 @@ from tests.e2e.gallery import (
     keep,
     kept,
     lasting_faults,
+    resize,
     settled,
     show,
     states_of,
@@ -31,6 +32,8 @@ from urc.testing.dashboard import FakeRobot, dashboard_profile
 
 pytestmark = pytest.mark.anyio
 
+LOW_CELLS = ((126, 128), (171, 128), (229, 104), (356, 128), (305, 150), (305, 216), (248, 164))
+"""As grids of several columns have them on phones, upright and on their sides, and on desktops."""
 DIGITS = re.compile(r"\d+ px ")
 
 SHOWS = """
@@ -103,3 +106,16 @@ async def test_widgets_are_whole_and_look_as_they_did(
             if difference(before[theme], grid) > MOST_DIFFERENT
         ]
     assert not faults, "\n".join(faults)
+
+
+@pytest.mark.parametrize("widget", ["joystick", "dpad", "axis", "tilt", "keyboard"])
+async def test_widgets_are_whole_in_low_cells(new_page: PageMaker, widget: str) -> None:
+    """Whatever the shape of a cell, no drawing, control or text of it is cut."""
+    async with running_dashboard(FakeRobot(dashboard_profile())) as address:
+        page = await new_page(size="desktop")
+        await opened(page, address, widget)
+        faults = {}
+        for size in LOW_CELLS:
+            await resize(page, *size)
+            faults[size] = await lasting_faults(page, EXHIBITS)
+    assert not any(faults.values()), faults

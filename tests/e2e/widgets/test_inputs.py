@@ -3,6 +3,7 @@
 import asyncio
 
 import pytest
+from playwright.async_api import expect
 
 from tests.e2e.browser import PLAIN_HOST
 from tests.e2e.conftest import PageMaker
@@ -64,6 +65,24 @@ async def test_a_key_that_hides_when_others_come_up_lets_them_go(new_page: PageM
         await robot.until_stopped("go")
         assert "released" in robot.line.reasons
         await page.keyboard.up("Meta")
+
+
+async def test_one_button_goes_through_the_speed_steps_in_a_low_cell(new_page: PageMaker) -> None:
+    """After the fastest it begins anew; where there is room for all, it is not there."""
+    async with shown(new_page, use("joystick", **PLAIN)) as (robot, page):
+        step = page.locator(".urc-speed-next")
+        await expect(step).to_be_hidden()
+        await page.set_viewport_size({"width": 740, "height": 330})
+        await expect(page.get_by_role("button", name="Speed 30 %")).to_be_hidden()
+        assert (await step.inner_text()).endswith("100 % ›")
+        await step.click()
+        assert (await step.inner_text()).endswith("30 % ›")
+        await drag(page, ".joystick-pad", right=0, up=200)
+        await until_values(robot, x=0.3)
+        await page.mouse.up()
+        for _ in range(2):
+            await step.click()
+        assert (await step.inner_text()).endswith("100 % ›")
 
 
 async def test_slew_holds_up_speeding_up_and_never_stopping(new_page: PageMaker) -> None:

@@ -5,7 +5,8 @@
  * A widget says how far a hand pushes, and draws what was made of it. In between lie the options of
  * `urc/curve`, the speed steps with their buttons, keys and buttons of the gamepad, and the line
  * that says why nothing moves. Its template has `.NAME` with `data-phase`, `.NAME-note`, and, for the
- * speed steps, buttons with `data-speed`.
+ * speed steps, buttons with `data-speed`. Beside them comes one that goes to the next step, for cells
+ * too low for all.
  *
  * @typedef {import("./curve.js").Push} Push
  * @typedef {import("./types.js").Context} Context
@@ -57,10 +58,29 @@ export class Motion {
     for (const [index, button] of this.buttons.entries()) {
       button.addEventListener("click", () => this.choose(index), { signal: ctx.signal });
     }
+    /** What it says of the step. */
+    this.next = this.makeNext();
   }
 
   get speed() {
     return this.speeds[this.step] ?? 1;
+  }
+
+  /** One button in the place of the steps, where a cell is too low for them: it goes to the next. */
+  makeNext() {
+    const { signal, t } = this.ctx;
+    const group = this.buttons[0]?.parentElement;
+    if (!group) return null;
+    const button = document.createElement("button");
+    const [said, now, sign] = [made("urc-hidden"), made("urc-speed-now"), made("urc-speed-sign")];
+    write(said, `${t("Next speed step; now:")} `);
+    write(sign, " ›");
+    button.type = "button";
+    button.className = "urc-speed urc-speed-next";
+    button.append(said, now, sign);
+    button.addEventListener("click", () => this.choose((this.step + 1) % this.speeds.length), { signal });
+    group.append(button);
+    return now;
   }
 
   /**
@@ -125,6 +145,7 @@ export class Motion {
     this.buttons.forEach((button, index) => {
       attribute(button, "aria-pressed", String(index === this.step));
     });
+    if (this.next) write(this.next, `${Math.round(this.speed * 100)} %`);
     let note = isLocked ? `◆ ${this.reason}` : "";
     if (phase === "asking") note = t("… taking the controls");
     else if (phase !== "idle" && reason) note = `◆ ${reason}`;
@@ -132,6 +153,13 @@ export class Motion {
     const sent = phase === "held" ? /** @type {Push | null} */ (values) : null;
     this.own.draw({ phase: isLocked ? "locked" : phase, push: this.at, values: sent ?? {} });
   }
+}
+
+/** @param {string} name of its class */
+function made(name) {
+  const span = document.createElement("span");
+  span.className = name;
+  return span;
 }
 
 /**
