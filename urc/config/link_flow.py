@@ -100,6 +100,17 @@ def refuse_two_person(linker: Linker, part: Part, command: Command) -> None:
         )
 
 
+def refuse_moving(linker: Linker, part: Part, command: Command) -> None:
+    """Report what moves something by itself where nobody asks for it."""
+    if command.moves:
+        linker.findings.error(
+            part,
+            "wrong-command",
+            f"{command.name!r} moves something by itself, and here nobody asks for it",
+            hint="run a command that does not move, and let people give this one",
+        )
+
+
 def _needs_two(command: Command) -> bool:
     asked = [one for argument in command.arguments.values() for one in argument.confirm.values()]
     asked += [command.confirm] if command.confirm is not None else []
@@ -119,7 +130,7 @@ def link_poll(linker: Linker, part: Part, poll: Poll) -> None:
     command = find_command(linker, part.must("run"), poll.run)
     if command is None:
         return
-    if command.steps or command.hold is not None:
+    if command.steps or command.hold is not None or command.moves:
         what = "a sequence" if command.steps else "a motion"
         linker.findings.error(
             part.must("run"),
@@ -186,6 +197,7 @@ def link_keepalives(linker: Linker, part: Part) -> None:
         if command is not None:
             link_arguments(linker.findings, place, command, {}, "run")
             refuse_two_person(linker, place.must("run"), command)
+            refuse_moving(linker, place.must("run"), command)
 
 
 def find_command(linker: Linker, part: Part, name: str) -> Command | None:

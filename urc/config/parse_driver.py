@@ -13,6 +13,7 @@ from urc.config.parse_flow import (
     parse_choice_questions,
     parse_sequence,
     poll_with_flow,
+    with_moving_steps,
 )
 from urc.config.parse_line import parse_transport
 from urc.config.parse_reply import implied_reply, parse_reply
@@ -56,7 +57,7 @@ def parse_driver(part: Part, findings: Findings, catalog: Catalog) -> Driver:
         transports=transports,
         signals=with_ages(aged_by_lines(signals, transports, messages, polls), polls),
         # A sequence that is called like a command is reported with the names.
-        commands={**_sequences(part, lines, findings), **commands},
+        commands=with_moving_steps({**_sequences(part, lines, findings), **commands}),
         messages=messages,
         polls=polls,
         discovery=_discovery(part.get("discovery")),

@@ -26,6 +26,7 @@ from urc.model.flow import (
     Queue,
     Requirement,
     Retry,
+    RunStep,
     SendStep,
     Verify,
     all_steps,
@@ -39,6 +40,7 @@ __all__ = [
     "parse_choice_questions",
     "parse_sequence",
     "poll_with_flow",
+    "with_moving_steps",
 ]
 
 _PER_S: Final = {"s": 1.0, "m": 60.0, "h": 3600.0}
@@ -116,6 +118,8 @@ def command_with_flow(command: Command, part: Part, findings: Findings) -> Comma
         )  # fmt: skip
     if part.text("priority") == "realtime":
         refuse(part, ("coalesce", "rate_limit"), "means nothing for what never waits", findings)
+    if hold is not None:
+        refuse(part, ("moves",), "means nothing beside 'hold': a hand moves it", findings)
     return command._replace(
         priority=cast("Priority", part.text("priority", "normal")),
         is_latest_only=part.text("coalesce") == "latest",
@@ -124,6 +128,7 @@ def command_with_flow(command: Command, part: Part, findings: Findings) -> Comma
         retry=retry,
         is_idempotent=is_idempotent,
         hold=_hold(hold, findings) if hold else None,
+        moves=part.flag("moves", default=False),
         confirm=_confirm(confirm) if confirm else None,
         requires=_requires(part, findings),
         verify=_verify(verify, findings) if verify else None,
@@ -194,9 +199,30 @@ def parse_sequence(
     return sequence._replace(
         title=part.text("title", title),
         description=part.text("description"),
+        moves=part.flag("moves", default=False),
         confirm=_confirm(confirm) if confirm else None,
         requires=_requires(part, findings),
     )
+
+
+def with_moving_steps(commands: Mapping[str, Command]) -> dict[str, Command]:
+    """Return the commands; a sequence that runs what moves, or is held, moves as well."""
+    found = dict(commands)
+    moving = {name for name, one in found.items() if one.moves or one.hold is not None}
+    while True:
+        more = [
+            name
+            for name, one in found.items()
+            if name not in moving
+            and any(
+                isinstance(step, RunStep) and step.command in moving
+                for step in all_steps(one.steps)
+            )
+        ]
+        if not more:
+            return found
+        moving.update(more)
+        found |= {name: found[name]._replace(moves=True) for name in more}
 
 
 def _arguments(part: Part) -> dict[str, Reading]:

@@ -156,6 +156,9 @@ class Command(NamedTuple):
     retry: Retry = Retry()
     """How long it waits before each of them."""
     hold: Hold | None = None
+    moves: bool = False
+    """It moves something by itself, with no hand that holds it; true of a sequence that runs what
+    does, or what is held."""
     confirm: Confirm | None = None
     requires: tuple[Requirement, ...] = ()
     verify: Verify | None = None

@@ -183,6 +183,7 @@ def _sending(ask: Ask, step: SendStep) -> Action:
         ).mark(
             is_privileged=runner.privileged_on == step.transport,
             is_secret=step.is_secret,
+            unless=runner.why_over,
         )
         runner.begin()
         return line.submit(exchange, now)
@@ -240,6 +241,7 @@ def _running(step: RunStep) -> Action:
             now,
             privileged_on=runner.privileged_on,
             confirmed_by=runner.confirmed_by,
+            unless=runner.why_over,
         )
 
     return run

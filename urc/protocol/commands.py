@@ -4,13 +4,15 @@ Floor 3, pure.
 """
 
 from collections.abc import Mapping
+from functools import partial
 from typing import Final, NamedTuple
 
-from urc.expressions import ExpressionError
+from urc.expressions import COUNTERS, ExpressionError
 from urc.model.driver import Command
 from urc.model.flow import Confirm, Verify
 from urc.model.values import Reading
-from urc.protocol.exchange import Exchange, LineEvent, Outcome
+from urc.protocol.exchange import Ask, Asked, Exchange, LineEvent, Outcome, expires_at
+from urc.protocol.gate import Counters
 from urc.protocol.known import Known
 from urc.protocol.steps import Sink
 
@@ -18,6 +20,7 @@ __all__ = [
     "CommandRun",
     "Plain",
     "Verifications",
+    "exchange_of",
     "is_guarded",
     "questions",
     "why_not_allowed",
@@ -34,6 +37,8 @@ def why_not_allowed(
     command: Command, known: Known, values: Mapping[str, object], now: float
 ) -> str:
     """Return the first thing that a command requires and that does not hold, or ""."""
+    if command.moves and known.latched:
+        return known.latched
     for one in command.requires:
         try:
             if not one.condition.evaluate(known.view(now, values)):
@@ -65,7 +70,7 @@ def is_guarded(command: Command) -> bool:
     """Return whether `why_refused` may ever refuse it."""
     asked = [one for argument in command.arguments.values() for one in argument.confirm.values()]
     asked += [] if command.confirm is None else [command.confirm]
-    return bool(command.requires) or any(one.is_two_person for one in asked)
+    return command.moves or bool(command.requires) or any(one.is_two_person for one in asked)
 
 
 def why_refused(
@@ -85,6 +90,47 @@ def why_refused(
         return None
     text = f"{asked.text}: two people must confirm {command.name}, and {len(people)} did"
     return Outcome("not-confirmed", text)
+
+
+def exchange_of(
+    command: Command,
+    ask: Ask,
+    values: Mapping[str, Reading],
+    sink: Sink,
+    now: float,
+    known: Known,
+    verifications: "Verifications",
+) -> Exchange:
+    """Return one run of a command, to be submitted to its line.
+
+    Args:
+        command: no sequence.
+        ask: what it asks.
+        values: its arguments, checked.
+        sink: takes the outcome.
+        now: the time.
+        known: of the robot.
+        verifications: takes it when it is to come true after its answer.
+
+    Raises:
+        BadArgument: it cannot be written with these arguments.
+    """
+    names = values if ask.is_local else {**known.names, **values}
+    data = ask.encode({**names, COUNTERS: Counters().draw()} if ask.has_counters else names)
+    return Exchange(
+        ask,
+        (sink if type(sink) is Asked else Plain(sink))
+        if command.verify is None
+        else CommandRun(command.verify, values, sink, verifications),
+        names,
+        None if ask.has_counters else data,
+        expires_at(ask, now),
+    ).mark(
+        on_sent=sink.on_sent if isinstance(sink, Asked) else None,
+        condition=partial(why_not_allowed, command, known, values)
+        if command.requires or command.moves
+        else None,
+    )
 
 
 def _written(value: object) -> str:

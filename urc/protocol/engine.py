@@ -21,9 +21,7 @@ nothing is left but what the outside must perform.
 """
 
 from collections.abc import Mapping
-from functools import partial
 
-from urc.expressions import COUNTERS
 from urc.model.codec import Payload
 from urc.model.driver import Command, Driver
 from urc.model.values import Reading, Value
@@ -33,11 +31,9 @@ from urc.protocol.asking import Builder
 from urc.protocol.bounds import GOOD_BYE_S, calm_s, lines_of, needs_readings
 from urc.protocol.brief import briefs
 from urc.protocol.commands import (
-    CommandRun,
-    Plain,
     Verifications,
+    exchange_of,
     is_guarded,
-    why_not_allowed,
     why_refused,
 )
 from urc.protocol.encode import BadArgument, build_check
@@ -55,19 +51,16 @@ from urc.protocol.events import (
 from urc.protocol.exchange import (
     Asked,
     Ended,
-    Exchange,
     Leaving,
     LineEvent,
     Outcome,
-    expires_at,
 )
-from urc.protocol.gate import Counters
 from urc.protocol.known import Known
 from urc.protocol.line import Line
 from urc.protocol.motions import Motions
 from urc.protocol.readings import Readings
 from urc.protocol.schedule import Schedule
-from urc.protocol.steps import Runner, Sink
+from urc.protocol.steps import Runner, Sink, Unless
 from urc.protocol.times import soonest
 
 __all__ = ["Engine"]
@@ -220,6 +213,19 @@ class Engine:
         told = self._settle(events, now) if events or self._runners else []
         return told + self._ask(now)
 
+    def latch(self, reason: str, now: float) -> list[Event]:
+        """End every sequence, and begin nothing that moves by itself; "" lets it be begun again.
+
+        What makes a line usable goes on: without it no stop would reach the robot.
+        """
+        self.known.latched = reason
+        if not reason:
+            return []
+        for runner in self._runners:
+            if runner.program.label in self.programs and not runner.privileged_on:
+                runner.stop("stopped", reason)
+        return self._settle([], now)
+
     def finish(self, now: float) -> list[Event]:
         """Close every line in good order: each ends with a `Close`, after `GOOD_BYE_S` at most."""
         events: list[LineEvent] = []
@@ -242,8 +248,12 @@ class Engine:
         *,
         privileged_on: str = "",
         confirmed_by: tuple[str, ...] = (),
+        unless: Unless | None = None,
     ) -> list[LineEvent]:
-        """Run a command or sequence; its outcome goes to `sink`, exactly once."""
+        """Run a command or sequence; its outcome goes to `sink`, exactly once.
+
+        It is not sent any more once `unless` says why.
+        """
         found = self._commands.get(command)
         if found is None:
             known = ", ".join(self._commands) or "none"
@@ -259,39 +269,30 @@ class Engine:
                 return sink(refused, now)
         program = self.programs.get(command)
         if program is None:
-            return self._send(found, values, sink, now, privileged_on)
+            return self._send(found, values, sink, now, privileged_on, unless)
         if any(runner.program is program for runner in self._runners):
             return sink(Outcome("busy", f"{command} is at work already"), now)
         self._begin(Runner(self, program, sink, privileged_on, confirmed_by))
         return []
 
     def _send(
-        self, command: Command, values: Mapping[str, Reading], sink: Sink, now: float, on: str
+        self,
+        command: Command,
+        values: Mapping[str, Reading],
+        sink: Sink,
+        now: float,
+        on: str,
+        unless: Unless | None,
     ) -> list[LineEvent]:
-        ask, line = self._asks[command.name], self.lines[command.transport]
-        names = values if ask.is_local else {**self.known.names, **values}
-        try:
-            data = ask.encode({**names, COUNTERS: Counters().draw()} if ask.has_counters else names)
-        except BadArgument as error:
-            return sink(Outcome("bad-argument", str(error)), now)
         if command.verify is not None and self._verifications.is_full:
             return sink(Outcome("queue-full", "too many commands wait to be verified"), now)
-        exchange = Exchange(
-            ask,
-            (sink if type(sink) is Asked else Plain(sink))
-            if command.verify is None
-            else CommandRun(command.verify, values, sink, self._verifications),
-            names,
-            None if ask.has_counters else data,
-            expires_at(ask, now),
-        ).mark(
-            is_privileged=on == command.transport,
-            on_sent=sink.on_sent if isinstance(sink, Asked) else None,
-            condition=partial(why_not_allowed, command, self.known, values)
-            if command.requires
-            else None,
-        )
-        return line.submit(exchange, now)
+        ask = self._asks[command.name]
+        try:
+            exchange = exchange_of(command, ask, values, sink, now, self.known, self._verifications)
+        except BadArgument as error:
+            return sink(Outcome("bad-argument", str(error)), now)
+        exchange.is_privileged, exchange.unless = on == command.transport, unless
+        return self.lines[command.transport].submit(exchange, now)
 
     def _begin(self, runner: Runner) -> None:
         self._runners.append(runner)

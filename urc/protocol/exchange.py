@@ -109,6 +109,8 @@ class Exchange:
     """Its text must not appear in any message."""
     condition: Callable[[float], str] | None = None
     """Asked again before it is sent: returns why not, or ""."""
+    unless: Callable[[], str] | None = None
+    """Asked then as well: returns why nobody wants it any more, or ""."""
     waits_until = float("-inf")
     """It is not sent again before."""
     on_sent: Callable[[Payload], None] | None = None
@@ -141,13 +143,20 @@ class Exchange:
         is_secret: bool = False,
         condition: Callable[[float], str] | None = None,
         on_sent: Callable[[Payload], None] | None = None,
+        unless: Callable[[], str] | None = None,
     ) -> "Exchange":
         """Say what is special about it, and return it."""
         self.on_sent = on_sent
         self.is_privileged = is_privileged
         self.is_secret = is_secret
         self.condition = condition
+        self.unless = unless
         return self
+
+    def why_not(self, now: float) -> str:
+        """Return why it is not sent any more, or ""."""
+        unwanted = self.unless() if self.unless is not None else ""
+        return unwanted or (self.condition(now) if self.condition is not None else "")
 
     @property
     def rank(self) -> int:

@@ -19,6 +19,8 @@ class Known:
         self._signals = signals
         self.names = names
         """What is known beside signals: ``settings``."""
+        self.latched = ""
+        """Why nothing may be begun that moves by itself; "" while it may."""
         self._last: dict[str, Sample] = {}
 
     def take(self, samples: Iterable[Sample]) -> None:

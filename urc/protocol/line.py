@@ -139,8 +139,8 @@ class Line(Answering):
 
     def _send(self, exchange: Exchange, now: float) -> list[LineEvent]:
         ask = exchange.ask
-        if exchange.condition is not None:
-            why_not = exchange.condition(now)
+        if exchange.condition is not None or exchange.unless is not None:
+            why_not = exchange.why_not(now)
             if why_not:
                 return [Ended(exchange, Outcome("not-allowed", why_not))]
         data = exchange.data

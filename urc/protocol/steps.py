@@ -17,10 +17,12 @@ from urc.protocol.line import Line
 from urc.protocol.readings import Readings
 from urc.protocol.reins import PAUSE_S, Reins
 
-__all__ = ["Action", "Host", "Program", "Runner", "Sink"]
+__all__ = ["Action", "Host", "Program", "Runner", "Sink", "Unless"]
 
 Sink = Callable[[Outcome, float], list[LineEvent]]
 """Takes the outcome and the time; returns what to tell."""
+Unless = Callable[[], str]
+"""Returns why what was asked for is not wanted any more, or ""."""
 
 
 class Host(Protocol):
@@ -39,6 +41,7 @@ class Host(Protocol):
         *,
         privileged_on: str,
         confirmed_by: tuple[str, ...],
+        unless: Unless,
     ) -> list[LineEvent]:
         """Run a command or sequence; its outcome goes to `sink`."""
 
@@ -173,6 +176,10 @@ class Runner:
         self._stop_listening()
         if self._outcome is None:
             self._outcome = Outcome(code, reason)
+
+    def why_over(self) -> str:
+        """Return why nothing more of it is to be sent, or ""."""
+        return self._outcome.message if self._outcome is not None else ""
 
     # -- told by the engine
 

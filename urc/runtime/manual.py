@@ -146,6 +146,8 @@ def _commands(driver: Driver) -> Iterator[str]:
             yield f"- done when {_code(command.verify.condition.source)}, within {within}"
         if command.hold is not None:
             yield f"- held: sent every {shown_duration(command.hold.repeat_s)} while it is held"
+        if command.moves:
+            yield "- moves something by itself: not while STOP is latched, nor while others drive"
         yield ""
         yield from _arguments(command)
 

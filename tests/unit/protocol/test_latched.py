@@ -1,0 +1,109 @@
+"""An engine whose robot was stopped: what moves by itself is refused, and sequences have ended."""
+
+from tests.dialogue import Dialogue
+
+DRIVER = """
+commands:
+  ask: { send: ASK, reply: { equals: OK } }
+  fold: { send: FOLD, moves: true }
+  beep: { send: BEEP }
+sequences:
+  show:
+    - { send: A }
+    - { wait: 1s }
+    - { send: B }
+  dance:
+    - { run: beep }
+    - { run: fold }
+  twice:
+    moves: true
+    steps: [{ send: C }, { run: ask }, { send: D }]
+"""
+WHY = "stopped by ann: reset it first"
+
+
+def latch(talk: Dialogue, reason: str = WHY) -> None:
+    """Press STOP, or reset it."""
+    talk.take(talk.engine.latch(reason, talk.now))
+
+
+def test_what_moves_by_itself_is_refused_until_the_stop_is_reset() -> None:
+    """A command, a sequence that is marked, and one that runs what is marked; nothing else."""
+    talk = Dialogue(DRIVER).connect()
+    latch(talk)
+    for name in ("fold", "twice", "dance"):
+        assert talk.outcomes[talk.run(name)] == "not-allowed"
+    assert set(talk.messages) == {WHY}
+    assert talk.outcomes[talk.run("beep")] == "done"
+    assert talk.sent == ["BEEP"]
+    latch(talk, "")
+    assert (talk.outcomes[talk.run("fold")], talk.sent) == ("done", ["FOLD"])
+
+
+def test_what_moves_and_waits_to_be_sent_is_not_sent_after_the_stop() -> None:
+    """It has been taken already, and another request is in flight."""
+    talk = Dialogue(DRIVER).connect()
+    talk.run("ask")
+    talk.run("fold")
+    talk.run("beep")
+    latch(talk)
+    talk.says("OK")
+    assert talk.outcomes == {1: "done", 2: "not-allowed", 3: "done"}
+    assert talk.sent == ["ASK", "BEEP"]
+
+
+def test_a_running_sequence_ends_with_the_reason_and_sends_nothing_more() -> None:
+    """Whether it is marked or not."""
+    talk = Dialogue(DRIVER).connect()
+    talk.run("show")
+    assert talk.sent == ["A"]
+    latch(talk)
+    assert talk.outcomes == {1: "stopped"}
+    assert talk.engine.programs["show"].reins.reason == WHY
+    talk.at(5)
+    assert talk.sent == []
+
+
+def test_what_a_sequence_has_queued_is_not_sent_after_the_stop() -> None:
+    """Neither a frame of its own nor a command that it runs."""
+    for steps in ("{ send: B }", "{ run: beep }"):
+        talk = Dialogue(
+            f"""
+commands:
+  ask: {{ send: ASK, reply: {{ equals: OK }} }}
+  beep: {{ send: BEEP }}
+sequences:
+  show: [{steps}]
+"""
+        ).connect()
+        talk.run("ask")
+        talk.run("show")
+        latch(talk)
+        talk.says("OK")
+        talk.at(5)
+        assert (talk.outcomes, talk.sent) == ({1: "done", 2: "stopped"}, ["ASK"])
+
+
+def test_a_second_stop_ends_what_was_begun_while_the_first_holds() -> None:
+    """What does not move may run while a stop is latched; a stop ends it nevertheless."""
+    talk = Dialogue(DRIVER).connect()
+    latch(talk)
+    talk.run("show")
+    assert talk.sent == ["A"]
+    latch(talk)
+    assert talk.outcomes == {1: "stopped"}
+
+
+def test_steps_of_a_connection_go_on_after_the_stop() -> None:
+    """Else the stop could not reach the robot."""
+    talk = Dialogue(
+        """
+wire: on_connect: [{ send: HI }, { expect: '^YO$' }, { send: READY }]
+commands:
+  beep: { send: BEEP }
+"""
+    )
+    talk.connect()
+    latch(talk)
+    talk.says("YO")
+    assert talk.sent == ["HI", "READY"]
