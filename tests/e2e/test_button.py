@@ -21,7 +21,7 @@ from urc.model.interface import WidgetUse
 from urc.model.values import Signal, Value
 from urc.runtime.session import CommandFailed
 from urc.testing.dashboard import FakeRobot, dashboard_profile
-from urc.web.fleet.robots import HELD
+from urc.web.drive.once import HELD
 
 pytestmark = pytest.mark.anyio
 

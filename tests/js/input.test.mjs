@@ -77,3 +77,20 @@ test("what was kept back goes out with the frame", () => {
   frame();
   assert.deepEqual(told, [1, 2]);
 });
+
+test("what is given once is locked on a page that only watches, and what moves as well as STOP and others say", () => {
+  /** @param {object | null} lease @param {boolean} isMine */
+  const locks = (lease, isMine = false) => {
+    const input = new Input(/** @type {any} */ ({ lease, isMine }));
+    return [input.hindrance(), input.hindrance(true)];
+  };
+  const free = { epoch: 1, latched: "", drives: true, holder: null };
+  assert.deepEqual(locks(null), ["", "no connection to URC"]);
+  assert.deepEqual(locks(free), ["", ""]);
+  assert.deepEqual(locks({ ...free, latched: "ann" }), ["", "stopped by ann: reset it first"]);
+  const taken = { ...free, holder: { id: "s1", name: "bob" } };
+  assert.deepEqual(locks(taken), ["", "bob has the controls"]);
+  assert.deepEqual(locks(taken, true), ["", ""]);
+  const watches = "this page only watches";
+  assert.deepEqual(locks({ ...free, drives: false }), [watches, watches]);
+});

@@ -8,10 +8,11 @@ no lease and latches: nothing moves until somebody resets it on purpose, and a r
 
 from typing import Final, Literal, NamedTuple
 
-__all__ = ["Changed", "Client", "Lease", "LeaseState", "Refused", "Role"]
+__all__ = ["Changed", "Client", "Lease", "LeaseState", "Refused", "Role", "WATCHES"]
 
 Role = Literal["viewer", "driver", "engineer", "admin"]
 _RANK: Final = {"viewer": 0, "driver": 1, "engineer": 2, "admin": 3}
+WATCHES: Final = "this page only watches"
 SILENT_S: Final = 60.0
 """A holder who does not touch anything for this long gives the lease back."""
 SHORTEST_REQUEST_S: Final = 3.0
@@ -77,7 +78,7 @@ class Lease:
         """Return why motion of a client is refused, or ""."""
         state = self.state
         if state.latched_by:
-            return f"stopped by {state.latched_by}: reset it first"
+            return self.latched
         if state.holder is None:
             return "nobody has the controls: take them first"
         if state.holder.id != client:
@@ -85,6 +86,27 @@ class Lease:
         if epoch != state.epoch:
             return "the controls were taken anew meanwhile"
         return ""
+
+    def hindrance(self, client: Client) -> str:
+        """Return why a client may not begin what moves by itself, or "".
+
+        It needs no lease: nothing is held. But it goes neither against a stop, nor against whoever
+        drives.
+        """
+        state = self.state
+        if _RANK[client.role] < _RANK["driver"]:
+            return WATCHES
+        if state.latched_by:
+            return self.latched
+        if state.holder is not None and state.holder.id != client.id:
+            return f"{_called(state.holder)} has the controls"
+        return ""
+
+    @property
+    def latched(self) -> str:
+        """Why nothing moves until somebody resets it, or ""."""
+        by = self.state.latched_by
+        return f"stopped by {by}: reset it first" if by else ""
 
     def touch(self, now: float) -> None:
         """Take note that the holder is at work."""
@@ -96,7 +118,7 @@ class Lease:
         if _RANK[client.role] < _RANK["driver"]:
             return Refused("viewers cannot drive")
         if state.latched_by:
-            return Refused(f"stopped by {state.latched_by}: reset it first")
+            return Refused(self.latched)
         if state.holder is not None and state.holder.id != client.id:
             return Refused(f"{_called(state.holder)} has the controls")
         return self._give(client, now)
@@ -129,7 +151,7 @@ class Lease:
         if _RANK[client.role] < _RANK["engineer"]:
             return Refused("taking the controls by force needs an engineer")
         if self.state.latched_by:
-            return Refused(f"stopped by {self.state.latched_by}: reset it first")
+            return Refused(self.latched)
         return self._give(client, now)
 
     def leave(self, client: str) -> Changed | None:

@@ -63,6 +63,9 @@ class EngineLike(Protocol):
     def command(self, request: Request, now: float) -> Sequence[Event]:
         """Somebody wants this done."""
 
+    def latch(self, reason: str, now: float) -> Sequence[Event]:
+        """End every sequence, and begin nothing that moves by itself; "" ends that."""
+
     def finish(self, now: float) -> list[Event]:
         """Close every line in good order."""
 
@@ -197,6 +200,10 @@ class Dispatcher:
         if reins is not None:
             reins.pull(what)
             self._run(self._engine.tick)
+
+    def latch(self, reason: str) -> None:
+        """End every sequence, and begin nothing that moves by itself; "" lets it be begun again."""
+        self._run(lambda now: self._engine.latch(reason, now))
 
     def forget(self, request_id: int) -> None:
         """Nobody waits for this answer any more."""

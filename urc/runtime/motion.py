@@ -65,6 +65,7 @@ class MotionDesk:
             name: is_lossy(driver, one.transport) for name, one in self._holds.items()
         }
         self._controls = {name: control_of(driver, one) for name, one in self._holds.items()}
+        self._moves = any(one.moves for one in driver.commands.values())
         self._is_making = False
         self._screens: dict[str, _Screen] = {}
         self._unconfirmed: set[str] = set()
@@ -75,7 +76,12 @@ class MotionDesk:
 
     @property
     def can_move(self) -> bool:
-        """Whether the driver has any held command."""
+        """Whether the driver has any command that is held, or moves something by itself."""
+        return bool(self._holds) or self._moves
+
+    @property
+    def has_own_stop(self) -> bool:
+        """Whether the robot hears anything when STOP is pressed; else URC alone holds back."""
         return bool(self._holds)
 
     def holds(self, command: str) -> bool:
@@ -94,12 +100,15 @@ class MotionDesk:
 
     # -- the robot
 
-    def attach(self, frames: Frames, movers: Movers) -> None:
-        """Take a session's engine and movers; a stop that is still owed goes out."""
+    def attach(self, frames: Frames, movers: Movers | None) -> None:
+        """Take a session's engine and movers; a stop that is still owed goes out.
+
+        There are no movers where nothing is held.
+        """
         self._frames, self._movers = frames, movers
         frames.on_count, frames.on_ready = self._renew, self._ready
-        if self._unconfirmed:
-            self._movers.stop(self._stop_frames(self._holds))
+        if self._unconfirmed and movers is not None:
+            movers.stop(self._stop_frames(self._holds))
 
     def detach(self) -> None:
         """Take note that the session is over: its movers stop what moves, and nothing is armed."""

@@ -233,6 +233,14 @@ class Session:
         """
         self._dispatcher.pull(sequence, what)
 
+    def latch(self, reason: str) -> None:
+        """End every sequence of the driver, and begin nothing that moves by itself.
+
+        Args:
+            reason: why, for people; "": it may be begun again.
+        """
+        self._dispatcher.latch(reason)
+
     async def _first_attempt(self, name: str) -> None:
         """Wait until the line of a command has been tried, well or not, for as long as may take."""
         command = self.profile.driver.commands.get(name)

@@ -132,6 +132,8 @@ class FakeRobot:
         """Who said yes to each of them."""
         self.pulls: list[tuple[str, Pull]] = []
         """What was wanted of sequences."""
+        self.latched: list[str] = []
+        """Why nothing may be begun that moves by itself, each time that it was said."""
         self.frames = FakeFrames(profile.driver)
         self.movers: Movers | None = FakeMovers(self.clock)
         self.on_command: Callable[[str, Mapping[str, Reading]], Mapping[str, Value]] | None = None
@@ -171,6 +173,10 @@ class FakeRobot:
     def pull(self, sequence: str, what: Pull) -> None:
         """Keep what is wanted of a sequence."""
         self.pulls.append((sequence, what))
+
+    def latch(self, reason: str) -> None:
+        """Keep why nothing may be begun that moves by itself."""
+        self.latched.append(reason)
 
     def say(self, signal: str, value: Reading, *, alarm: Alarm = "", age_s: float = 0.0) -> None:
         """Let a reading arrive that was measured `age_s` ago."""

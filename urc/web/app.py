@@ -32,6 +32,7 @@ from urc.web.dev.routes import Dev, dev_url, no_dev_routes
 from urc.web.dev.secrets import secret_texts
 from urc.web.dev.start import DevStart, no_dev_start
 from urc.web.dev.watch import Remake
+from urc.web.drive.once import can_move
 from urc.web.drive.spare import Spare
 from urc.web.fleet.fleet import Fleet
 from urc.web.fleet.garage import Garage, Workshop
@@ -118,8 +119,7 @@ def build_app(
 
 
 def _latch(data: Path | None, robot: Robot) -> LatchFile | None:
-    can_move = any(command.hold for command in robot.profile.driver.commands.values())
-    if data is None or not can_move:
+    if data is None or not can_move(robot.profile.driver):
         return None
     folder = data / "latches"
     return LatchFile(folder / "emulated" if robot.is_emulated else folder, robot.profile.name)
@@ -287,7 +287,7 @@ class _Routes:
         if station is None:
             return JSONResponse({"error": "no robot of that name is served here"}, 404, _PAGE)
         if not station.controls.desk.can_move:
-            return JSONResponse({"error": "this robot has nothing that is held"}, 409, _PAGE)
+            return JSONResponse({"error": "this robot has nothing that moves"}, 409, _PAGE)
         station.controls.stop(guest_of(request).place or "a screen of this machine")
         is_confirmed = await station.deliver_stop()
         by = station.controls.desk.lease.state.latched_by

@@ -19,10 +19,11 @@ from urc.model.codec import Payload
 from urc.model.values import NOTHING, Reading
 from urc.runtime.session import CommandFailed
 from urc.web.drive.controls import Seat
+from urc.web.drive.once import NotAdmitted
 from urc.web.feed.crowd import Place
 from urc.web.feed.fanout import Fanout
 from urc.web.feed.line import Allowance, Flow, Guest, Line
-from urc.web.fleet.robots import HELD, Live, SessionFailed, Station, missing_settings, needs_holding
+from urc.web.fleet.robots import Live, SessionFailed, Station, missing_settings
 from urc.web.wire import messages as wire
 from urc.web.wire.ask import Agree, Prepare, Steer, encode_token
 from urc.web.wire.drive import Drive, Driving, Release, Stop, Tick
@@ -285,18 +286,16 @@ class Client:
     def _advise(self, said: Agree | Prepare | Steer, live: Live) -> None:
         if self._seat is None:
             return
+        controls, consent, who = self._station.controls, self._station.consent, self._seat.client
         if isinstance(said, Prepare):
-            self._answer(encode_token(said.id, self._station.consent.prepare(self._seat, said)))
+            self._answer(encode_token(said.id, consent.prepare(self._seat, said)))
         elif isinstance(said, Agree):
-            self._station.consent.hear(self._seat, said)
-        elif self._seat.client.role == "viewer":
-            text = "this page only watches"
-            now_s = self._station.clock.now()
-            self._station.controls.trail.refused(self._seat.client, said.command, text, now_s)
+            consent.hear(self._seat, said)
+        elif refused := controls.once.pull_refusal(who, said.command, said.verb):
+            controls.trail.refused(who, said.command, refused, self._station.clock.now())
         else:
             live.session.pull(said.command, said.verb)
-            trail = self._station.controls.trail
-            trail.ran(self._seat.client, said.command, {}, f"told to {said.verb}")
+            controls.trail.ran(who, said.command, {}, f"told to {said.verb}")
 
     def _count_bad(self, reason: str) -> None:
         self.bad_messages += 1
@@ -327,9 +326,6 @@ class Client:
         task.add_done_callback(self._commands.discard)
 
     async def _run(self, asked: wire.Run, live: Live) -> None:
-        if needs_holding(self._station.robot.profile.driver, asked.command):
-            self._reply(asked, code="refused", message=HELD)
-            return
         sent: deque[Payload] = deque(maxlen=1)  # what went out last
         try:
             people = await self._confirmed(asked)
@@ -346,6 +342,8 @@ class Client:
         except TimeoutError:
             text = f"no answer within {COMMAND_TIMEOUT_S:g} s"
             self._reply(asked, code="timed-out", message=text, sent=_last(sent))
+        except NotAdmitted as refused:
+            self._reply(asked, code=refused.code, message=refused.message, is_ours=True)
         except CommandFailed as failed:
             self._reply(asked, code=failed.code, message=failed.message, sent=_last(sent))
         else:
@@ -357,13 +355,19 @@ class Client:
         return None if known is not None and known.steps else COMMAND_TIMEOUT_S
 
     async def _confirmed(self, asked: wire.Run) -> tuple[str, ...]:
-        """Return who has said yes to a command; raise `CommandFailed` while somebody must."""
-        known = self._station.robot.profile.driver.commands.get(asked.command)
-        if known is None or self._seat is None:
+        """Return who has said yes to a command; raise `CommandFailed` where it may not be given."""
+        if self._seat is None:
             return ()
-        return await self._station.consent.people(
+        known = self._station.robot.profile.driver.commands.get(asked.command)
+        who, admit = self._seat.client, self._station.controls.once.admit
+        admit(who, asked.command)
+        if known is None:
+            return ()
+        people = await self._station.consent.people(
             self._seat, asked.id, known, asked.arguments, asked.token
         )
+        admit(who, asked.command)  # a question takes its time
+        return people
 
     def _reply(
         self,
@@ -374,13 +378,14 @@ class Client:
         message: str = "",
         people: tuple[str, ...] = (),
         sent: Payload = b"",
+        is_ours: bool = False,
     ) -> None:
         """Answer a command, and leave in the audit what it came to."""
         self._answer(wire.encode_reply(asked, values=values, code=code, message=message))
         if self._seat is None:
             return
         trail, who = self._station.controls.trail, self._seat.client
-        if code == "busy" or message is HELD:
+        if code == "busy" or is_ours:
             trail.refused(who, asked.command, message, self._station.clock.now())
         else:
             outcome = f"{code}: {message}" if code else "done"

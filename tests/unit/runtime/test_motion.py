@@ -5,8 +5,8 @@ from typing import Any
 import pytest
 
 from tests.unit.runtime.desks import DRIVER, Scene, held
-from urc.model.codec import Payload
-from urc.model.driver import Driver
+from urc.model.codec import Payload, WriteSpec
+from urc.model.driver import Command, Driver
 from urc.model.flow import WaitStep
 from urc.motion.fresh import Input
 from urc.motion.hold import Terms
@@ -347,3 +347,20 @@ def test_too_many_screens_are_turned_away() -> None:
 def test_an_unknown_verb_is_told() -> None:
     """Whoever calls the desk from Python sees it."""
     assert Scene().drive("ann", "grab") == "the controls know no 'grab'"
+
+
+def test_a_robot_of_which_only_something_moves_by_itself_can_be_stopped_without_movers() -> None:
+    """The stop is latched; nobody writes anything for it."""
+    fold = Command("fold", "wire", WriteSpec("text", {}), moves=True)
+    it = Scene(is_attached=False, driver=DRIVER._replace(commands={"fold": fold}))
+    it.desk.attach(it.frames, None)
+    assert it.desk.can_move
+    it.desk.stop("ann")
+    assert it.desk.lease.hindrance(Client("bob")) == "stopped by ann: reset it first"
+    assert not it.desk.has_own_stop
+    assert it.drive("bob", "reset") == ""
+    assert it.desk.lease.hindrance(Client("bob")) == ""
+    assert it.drive("ann", "take") == ""
+    assert it.desk.lease.hindrance(Client("bob")) == "ann has the controls"
+    assert it.desk.lease.hindrance(Client("ann")) == ""
+    assert it.desk.lease.hindrance(Client("vic", role="viewer")) == "this page only watches"

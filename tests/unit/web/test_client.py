@@ -9,7 +9,9 @@ from typing import Any
 import pytest
 from starlette.types import Message
 
+from urc.model.driver import Command
 from urc.model.profile import Setting
+from urc.motion.lease import Role
 from urc.protocol.events import Replied
 from urc.runtime.audit import Entry
 from urc.runtime.session import CommandFailed
@@ -18,7 +20,7 @@ from urc.testing.clock import FakeClock, settle
 from urc.testing.dashboard import FakeRobot, dashboard_profile
 from urc.web.feed.crowd import NO_NUMBER
 from urc.web.fleet.robots import Robot, Station
-from urc.web.socket import BAD_MESSAGES, MESSAGES_PER_S, TICKS_PER_S, Allowance, Client
+from urc.web.socket import BAD_MESSAGES, MESSAGES_PER_S, TICKS_PER_S, Allowance, Client, Guest
 from urc.web.wire.messages import CLOSE_TOO_FAST
 
 pytestmark = pytest.mark.anyio
@@ -88,26 +90,33 @@ class FakeLine:
 class Scene:
     """A client that is connected to a fake robot."""
 
-    def __init__(self, station: Station, robot: FakeRobot, clock: FakeClock) -> None:
+    def __init__(
+        self, station: Station, robot: FakeRobot, clock: FakeClock, role: Role = "driver"
+    ) -> None:
         self.robot = robot
         self.clock = clock
         self.station = station
         self.audit: list[Entry] = []
         self.line = FakeLine()
-        self.client = Client(self.line, station, self.line)
+        self.client = Client(self.line, station, self.line, Guest("", role))
         self.task = asyncio.create_task(self.client.serve())
 
 
 @asynccontextmanager
-async def scene(settings: dict[str, Setting] | None = None) -> AsyncIterator[Scene]:
+async def scene(
+    settings: dict[str, Setting] | None = None,
+    *,
+    commands: dict[str, Command] | None = None,
+    role: Role = "driver",
+) -> AsyncIterator[Scene]:
     """Serve one client; it and the station are gone after the test."""
     clock = FakeClock()
-    robot = FakeRobot(dashboard_profile(settings=settings), clock)
+    robot = FakeRobot(dashboard_profile(settings=settings, commands=commands), clock)
     audit: list[Entry] = []
     trail = Trail("puppet", audit.append, utc=lambda: 99.0)
     station = Station(Robot(robot.profile, {}, robot.open), clock=clock, trail=trail)
     running = asyncio.create_task(station.run())
-    made = Scene(station, robot, clock)
+    made = Scene(station, robot, clock, role)
     made.audit = audit
     await settle()
     try:

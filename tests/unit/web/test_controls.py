@@ -38,6 +38,9 @@ class Scene:
         self.beats: dict[str, int] = {}
         self._numbers = 0
 
+    def latch(self, reason: str) -> None:
+        """Take why nothing may be begun that moves by itself."""
+
     def sit(self, place: str = "", role: Role = "driver") -> Seat:
         """Sit down, and read what is told at once."""
         seat = self.controls.sit(place, role, lambda: None)

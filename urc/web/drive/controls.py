@@ -5,6 +5,7 @@ one line for each control, taken when its own line is free. Ticks that come fast
 takes them are thinned: the newest wins, and the last one always arrives.
 """
 
+import asyncio
 from collections.abc import Callable
 from hmac import compare_digest
 from typing import Literal
@@ -19,8 +20,9 @@ from urc.runtime.clock import Alarm, Clock
 from urc.runtime.hub import Hub, Note
 from urc.runtime.latch import LatchFile
 from urc.runtime.lateness import TOO_LATE_S, LoopWatch
-from urc.runtime.motion import MotionDesk
+from urc.runtime.motion import MotionDesk, Movers
 from urc.runtime.trail import Trail
+from urc.web.drive.once import Once
 from urc.web.drive.rehearsal import Rehearsal
 from urc.web.drive.seat import FLOOD, Drivable, Seat
 from urc.web.wire import drive as wire
@@ -70,6 +72,7 @@ class Controls:
         self._beating: Alarm | None = None
         self._expiring: Alarm | None = None
         self._rehearsal = Rehearsal(clock, lambda: self.desk)
+        self.once = Once(driver, lambda: self.desk.lease)
         self.watch = LoopWatch(clock, self._held_up)
         """Runs while the robot is connected."""
         self._heed(file)
@@ -95,6 +98,7 @@ class Controls:
                 seat.forget(command)
             seat.paces.clear()
         self._driver, self._file = driver, file
+        self.once.driver = driver
         self._heed(file)
         self.desk = self._desk(driver, kept)
         for seat in self._seats.values():
@@ -111,26 +115,33 @@ class Controls:
 
     async def serve(self, session: Drivable) -> None:
         """Let a session be driven for as long as this runs; ends by being cancelled."""
-        movers = session.movers
-        if movers is None or not self.desk.can_move:
+        if not self.desk.can_move:
             return
         self._hub = session.hub
         if self._file is not None and self._file.fault:
             self._latch_fault(self._file.fault)
         self.watch.start()
-        self.desk.attach(session.frames, movers)
+        self.desk.attach(session.frames, session.movers)
+        self.once.attach(session)
         try:
-            while True:
-                for command, reason in await movers.stops():
-                    self._stopped(command, reason)
+            await self._follow(session.movers)
         finally:
             self.watch.end()
+            self.once.detach()
             self._rehearsal.end()
             self._hub = None
             self.desk.detach()
             now = self._clock.now()
             for command in self.commands:  # its movers stop what moves, and report no more
                 self.trail.stopped(command, "the robot was disconnected", now)
+
+    async def _follow(self, movers: Movers | None) -> None:
+        if movers is None:
+            await asyncio.Event().wait()  # nothing is held: STOP alone counts
+            return
+        while True:
+            for command, reason in await movers.stops():
+                self._stopped(command, reason)
 
     # -- screens
 
@@ -168,9 +179,12 @@ class Controls:
     def take(self, seat: Seat) -> list[str]:
         """Return the messages that bring a screen up to date."""
         texts: list[str] = []
-        if self.desk.can_move and seat.seen != self._number:
+        is_told = self.desk.can_move or seat.client.role == "viewer"  # who may give nothing
+        if is_told and seat.seen != self._number:
             seat.seen = self._number
-            texts.append(self._lease_text(seat))
+            desk, now = self.desk, self._clock.now()
+            is_confirmed = desk.is_confirmed and desk.has_own_stop
+            texts.append(seat.lease(desk.lease.state, now, is_confirmed=is_confirmed))
         texts += seat.notices.values()
         seat.notices.clear()
         if seat.beat is not None:
@@ -235,6 +249,7 @@ class Controls:
             for command in list(seat.alarms):
                 seat.forget(command)
         self.desk.stop(by)
+        self.once.stopped()
 
     def _drive(self, seat: Seat, said: wire.Drive) -> None:
         now = self._clock.now()
@@ -242,6 +257,8 @@ class Controls:
         if reason:
             seat.notice(said.verb, wire.encode_refused(said.verb, "", reason))
             self.trail.refused(seat.client, said.verb, reason, now)
+        elif said.verb == "reset":
+            self.once.reset()
         self._set_expiry()
 
     def _thin(self, seat: Seat, tick: wire.Tick) -> None:
@@ -377,17 +394,6 @@ class Controls:
         self._expiring = None
         self.desk.expire(self._clock.now())
         self._set_expiry()
-
-    def _lease_text(self, seat: Seat) -> str:
-        state = self.desk.lease.state
-        left_s = state.asked_until - self._clock.now() if state.asked_by is not None else 0.0
-        return wire.encode_lease(
-            state,
-            seat.client,
-            left_s=max(0.0, left_s),
-            is_confirmed=self.desk.is_confirmed,
-            spare=seat.key,
-        )
 
 
 def _unread(entry: Entry) -> None:

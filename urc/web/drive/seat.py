@@ -8,7 +8,7 @@ from collections.abc import Callable
 from typing import Protocol
 
 from urc.motion.fresh import FirstOfTwo
-from urc.motion.lease import Client
+from urc.motion.lease import Client, LeaseState
 from urc.motion.pace import Pace
 from urc.runtime.clock import Alarm
 from urc.runtime.hub import Hub
@@ -46,6 +46,9 @@ class Drivable(Protocol):
     def hub(self) -> Hub:
         """Takes what everybody should know."""
 
+    def latch(self, reason: str) -> None:
+        """End sequences, and begin nothing that moves by itself; "" lets it be begun again."""
+
 
 class Seat:
     """One screen at the controls."""
@@ -82,6 +85,13 @@ class Seat:
         """Tell it; a newer line about the same replaces one that was not taken yet."""
         self.notices[key] = text
         self.wake()
+
+    def lease(self, state: LeaseState, now: float, *, is_confirmed: bool) -> str:
+        """Return who has the controls, as this screen is told."""
+        left_s = max(0.0, state.asked_until - now) if state.asked_by is not None else 0.0
+        return wire.encode_lease(
+            state, self.client, left_s=left_s, is_confirmed=is_confirmed, spare=self.key
+        )
 
     def is_first(self, about: str, number: int) -> bool:
         """Return whether this was not said on the other line already, or something newer."""

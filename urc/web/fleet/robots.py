@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from urc.model.codec import Payload
-from urc.model.driver import Driver
 from urc.model.profile import Profile, Setting
 from urc.model.values import Reading, Value
 from urc.problems import UrcError
@@ -29,7 +28,6 @@ from urc.web.drive.controls import Controls
 from urc.web.feed.fanout import Fanout
 
 __all__ = [
-    "HELD",
     "Glimpse",
     "Live",
     "Robot",
@@ -38,7 +36,6 @@ __all__ = [
     "Station",
     "each_counts",
     "missing_settings",
-    "needs_holding",
 ]
 
 LINGER_S = 2.0
@@ -50,7 +47,6 @@ CLOSE_TIMEOUT_S = 8.0
 STOP_WITHIN_S = 1.0
 """How long somebody who stops a robot without a socket waits to hear that it was reached."""
 _LOOK_S = 0.01
-HELD = "this command moves the robot for as long as it is held, and nothing here can hold it"
 
 log = logging.getLogger(__name__)
 
@@ -82,6 +78,9 @@ class SessionLike(Protocol):
 
     def pull(self, sequence: str, what: Pull) -> None:
         """Let a sequence pause, do one more step, go on, or end."""
+
+    def latch(self, reason: str) -> None:
+        """End sequences, and begin nothing that moves by itself; "" lets it be begun again."""
 
 
 Glimpse = bytes | Mapping[str, Reading] | None
@@ -126,12 +125,6 @@ def missing_settings(robot: Robot) -> tuple[Setting, ...]:
         for name, setting in robot.profile.settings.items()
         if robot.settings.get(name, setting.default) in (None, "")
     )
-
-
-def needs_holding(driver: Driver, command: str) -> bool:
-    """Return whether the command is motion: given once, it would never be stopped."""
-    known = driver.commands.get(command)
-    return known is not None and known.hold is not None
 
 
 def each_counts(profile: Profile) -> frozenset[str]:
@@ -226,7 +219,7 @@ class Station:
         with self.visit():
             while not desk.is_confirmed and self.clock.now() < end_s:
                 await self.clock.sleep(_LOOK_S)
-        return desk.is_confirmed
+        return desk.is_confirmed and desk.has_own_stop
 
     @property
     def is_at_rest(self) -> bool:

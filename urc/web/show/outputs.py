@@ -11,7 +11,7 @@ from urc.model.interface import Given, WidgetUse
 from urc.model.units import conversion
 from urc.model.values import Reading
 from urc.model.widget import Port, Widget
-from urc.web.fleet.robots import HELD, needs_holding
+from urc.web.drive.once import HELD, needs_holding
 from urc.web.show.step_words import step_words
 
 __all__ = ["asked_before", "inputs_config", "motion_lines", "output_config"]
@@ -56,6 +56,7 @@ def output_config(use: WidgetUse, output: str, widget: Widget, driver: Driver) -
         "line": _line(command, driver),
         "refusal": HELD if needs_holding(driver, name) and not is_held else "",
         "isHeld": is_held,
+        "moves": command is not None and command.moves,
         "leaseMs": round(hold.lease_s * 1000) if hold is not None else 0,
         "title": (command and command.title) or "",
         "arguments": _arguments(command, given),

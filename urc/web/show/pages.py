@@ -18,6 +18,7 @@ from urc.model.interface import Interface, WidgetUse
 from urc.model.profile import Profile
 from urc.shipped import shipped
 from urc.web import words
+from urc.web.drive.once import can_move
 from urc.web.load.foreign import Border
 from urc.web.show.cells import Cell, widget_cell
 from urc.web.show.interfaces import (
@@ -83,7 +84,7 @@ class RobotPage:
     stop_url: str
     """Where STOP goes when the socket is down."""
     lines: str
-    """JSON list of the transports that carry motion; "[]" for a robot that does not move."""
+    """JSON list of the transports over which STOP reaches the robot."""
     can_move: bool
     """Whether the controls and STOP are shown."""
 
@@ -156,7 +157,7 @@ def robot_page(
         ),
         stop_url=f"/api/v1/robots/{place}/stop",
         lines=json.dumps(lines),
-        can_move=bool(lines),
+        can_move=can_move(profile.driver),
     )
     return render("robot.html.j2", page)
 

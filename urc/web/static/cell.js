@@ -35,7 +35,7 @@
  * @property {(wish: import("./types.js").Wish) => void} drive
  * @property {() => void} wake asks for an animation frame
  * @property {() => void} again asks for one in which widgets are drawn, and no more
- * @property {Pick<import("./input.js").Input, "hold" | "gate" | "letGo" | "refusal" | "isDriving"> & {pads: PadDesk}} input
+ * @property {Pick<import("./input.js").Input, "hold" | "gate" | "letGo" | "refusal" | "hindrance" | "isDriving"> & {pads: PadDesk}} input
  * @property {Pick<import("./stop.js").StopButton, "press" | "follow">} stop
  * @property {Pick<import("./follow.js").Follows, "listen">} follows
  * @property {Store} store
@@ -299,9 +299,10 @@ export class Cell {
   outlets(store) {
     /** @type {Record<string, Outlet>} */
     const found = Object.create(null);
-    for (const [name, { line, refusal, isAnswered, isHeld }] of this.outputs) {
+    const { input } = this.doors;
+    for (const [name, { line, refusal, isAnswered, isHeld, moves }] of this.outputs) {
       const shared = refusal || store.hindrance(line, isHeld);
-      const reason = shared || (isHeld ? this.doors.input.refusal() : "");
+      const reason = shared || (isHeld ? input.refusal() : input.hindrance(moves));
       found[name] = { isReady: reason === "", reason, isAnswered };
     }
     return found;

@@ -140,14 +140,32 @@ export class Input {
 
   /** Why nothing can be driven now; "" when it can be asked for. */
   refusal() {
+    const refusal = this.against();
+    if (refusal) return refusal;
+    return this.gates.size === 0 || [...this.gates].some((gate) => gate.isOpen)
+      ? ""
+      : t("hold the dead-man control first");
+  }
+
+  /** Why nothing may be moved by this page now. */
+  against() {
     const { lease, isMine } = this.drive;
     if (!lease) return t("no connection to URC");
     if (lease.latched) return t("stopped by {name}: reset it first", { name: said(lease.latched) });
     if (!lease.drives) return t("this page only watches");
     if (lease.holder && !isMine) return t("{name} has the controls", { name: said(lease.holder.name) });
-    return this.gates.size === 0 || [...this.gates].some((gate) => gate.isOpen)
-      ? ""
-      : t("hold the dead-man control first");
+    return "";
+  }
+
+  /**
+   * Why a command that is given once cannot be given now: whoever only watches gives none, and what
+   * moves something by itself goes neither against STOP nor against whoever drives.
+   *
+   * @param {boolean} moves
+   */
+  hindrance(moves = false) {
+    if (moves) return this.against();
+    return this.drive.lease?.drives === false ? t("this page only watches") : "";
   }
 
   /**

@@ -71,11 +71,11 @@ const spare = new URL(address);
 spare.pathname += "/spare";
 const drive = new Drive(socket, root.dataset["stop"] ?? "", wake, spare.href);
 const input = new Input(drive);
-const stop = new StopButton(drive, input, store, JSON.parse(root.dataset["lines"] ?? "[]"));
+const bar = root.querySelector("[data-controls]");
+const stop = new StopButton(drive, input, store, JSON.parse(root.dataset["lines"] ?? "[]"), bar !== null);
 const asks = new Asks(part(root, ".urc-bar"), (message) => socket.send(message));
 /** Where sequences stand. @type {Record<string, import("./types.js").Progress>} */
 let sequences = {};
-const bar = root.querySelector("[data-controls]");
 const controls = bar instanceof HTMLElement ? new Controls(bar, drive, stop) : null;
 const log = new Log();
 const alerts = new Alerts();

@@ -15,9 +15,10 @@ export class StopButton {
    * @param {Drive} drive
    * @param {Input} input
    * @param {Store} store
-   * @param {string[]} lines the transports that carry motion
+   * @param {string[]} lines the transports over which it reaches the robot
+   * @param {boolean} hasKeys whether keys press it
    */
-  constructor(drive, input, store, lines) {
+  constructor(drive, input, store, lines, hasKeys = lines.length > 0) {
     this.drive = drive;
     this.input = input;
     this.store = store;
@@ -25,7 +26,7 @@ export class StopButton {
     /** @type {Set<(state: StopState) => void>} */
     this.listeners = new Set();
     this.seen = "";
-    if (lines.length > 0) {
+    if (hasKeys) {
       addEventListener("keydown", (event) => {
         if (event.key !== "Escape" || event.defaultPrevented || event.repeat) return;
         // A panel that lies open is closed by it, as everywhere; while something is held it is STOP.

@@ -1,0 +1,107 @@
+"""Commands that are given once: by whom, what STOP does to them, and what a session hears of it."""
+
+import asyncio
+
+import pytest
+
+from tests.unit.web.test_client import FakeLine, scene
+from urc.model.codec import WriteSpec
+from urc.model.driver import Command
+from urc.model.flow import WaitStep
+from urc.testing.clock import settle
+from urc.web.socket import Client
+from urc.web.wire.drive import Drive
+
+pytestmark = pytest.mark.anyio
+
+FOLD = {
+    "fold": Command("fold", "wire", WriteSpec("text", {}), moves=True),
+    "show": Command("show", "wire", WriteSpec("text", {}), moves=True, steps=(WaitStep(1.0),)),
+    "ask": Command("ask", "wire", WriteSpec("text", {})),
+}
+WATCHES = "this page only watches"
+
+
+def refusals(line: FakeLine) -> list[str]:
+    """Return why commands were refused."""
+    return [one["message"] for one in line.of_type("reply") if one.get("code") == "refused"]
+
+
+async def test_a_page_that_only_watches_gives_no_command_and_may_stop() -> None:
+    """Whatever the command does; nothing of it reaches the robot."""
+    async with scene(commands=FOLD, role="viewer") as it:
+        for number, command in enumerate(("ask", "fold")):
+            it.line.say({"t": "run", "id": number, "command": command})
+        for verb in ("pause", "step", "resume", "abort"):
+            it.line.say({"t": "steer", "command": "show", "verb": verb})
+        await settle()
+        assert refusals(it.line) == [WATCHES, WATCHES]
+        assert (it.robot.commands, it.robot.pulls) == ([], [])
+        assert {(one.what, one.outcome) for one in it.audit} == {("refused", WATCHES)}
+        it.line.say({"t": "stop"})
+        await settle()
+        assert it.station.controls.desk.lease.state.latched_by == "screen 1"
+
+
+async def test_what_moves_by_itself_needs_no_lease_and_is_refused_after_a_stop() -> None:
+    """Until somebody resets it; what does not move is given all the same."""
+    async with scene(commands=FOLD) as it:
+        it.line.say({"t": "run", "id": 1, "command": "fold"})
+        await settle()
+        it.line.say({"t": "stop"})
+        it.line.say({"t": "run", "id": 2, "command": "fold"})
+        it.line.say({"t": "run", "id": 3, "command": "ask"})
+        it.line.say({"t": "steer", "command": "show", "verb": "resume"})
+        it.line.say({"t": "steer", "command": "show", "verb": "abort"})
+        await settle()
+        assert refusals(it.line) == ["stopped by screen 1: reset it first"]
+        assert [name for name, _ in it.robot.commands] == ["fold", "ask"]
+        assert it.robot.pulls == [("show", "abort")]
+        it.line.say({"t": "drive", "verb": "reset"})
+        it.line.say({"t": "run", "id": 4, "command": "fold"})
+        await settle()
+        assert [name for name, _ in it.robot.commands] == ["fold", "ask", "fold"]
+
+
+async def test_what_moves_by_itself_is_refused_while_somebody_else_drives() -> None:
+    """Whoever has the controls may give it."""
+    async with scene(commands=FOLD) as it:
+        other = it.station.controls.sit("10.0.0.7", "driver", lambda: None)
+        it.station.controls.hear(other, Drive("take"))
+        it.line.say({"t": "run", "id": 1, "command": "fold"})
+        it.line.say({"t": "run", "id": 2, "command": "ask"})
+        await settle()
+        assert refusals(it.line) == ["screen 2 at 10.0.0.7 has the controls"]
+        assert [name for name, _ in it.robot.commands] == ["ask"]
+        it.station.controls.hear(other, Drive("leave"))
+        it.line.say({"t": "drive", "verb": "take"})
+        it.line.say({"t": "run", "id": 3, "command": "fold"})
+        await settle()
+        assert [name for name, _ in it.robot.commands] == ["ask", "fold"]
+
+
+async def test_the_session_is_told_of_a_stop_and_of_its_reset() -> None:
+    """It ends its sequences, and refuses what waits in it."""
+    async with scene(commands=FOLD) as it:
+        for message in ({"t": "stop"}, {"t": "stop"}, {"t": "drive", "verb": "reset"}):
+            it.line.say(message)
+        await settle()
+        why = "stopped by screen 1: reset it first"
+        assert it.robot.latched == [why, why, ""]
+
+
+async def test_a_stop_that_is_latched_holds_in_the_next_session() -> None:
+    """The robot was disconnected meanwhile."""
+    async with scene(commands=FOLD) as it:
+        it.line.say({"t": "stop"})
+        await settle()
+        it.line.leave()
+        await it.clock.advance(10)
+        assert not it.robot.is_open
+        it.robot.latched.clear()
+        line = FakeLine()
+        task = asyncio.create_task(Client(line, it.station, line).serve())
+        await settle()
+        assert it.robot.latched == ["stopped by screen 1: reset it first"]
+        line.leave()
+        await task
