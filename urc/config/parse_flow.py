@@ -119,9 +119,12 @@ def command_with_flow(command: Command, part: Part, findings: Findings) -> Comma
     if part.text("priority") == "realtime":
         refuse(part, ("coalesce", "rate_limit"), "means nothing for what never waits", findings)
     if hold is not None:
-        refuse(part, ("moves",), "means nothing beside 'hold': a hand moves it", findings)
+        refuse(part, ("moves", "stop"), "means nothing beside 'hold': a hand moves it", findings)
+    stops = part.flag("stop", default=False)
+    if stops:
+        _check_stop(command, part, findings)
     return command._replace(
-        priority=cast("Priority", part.text("priority", "normal")),
+        priority=cast("Priority", part.text("priority", "realtime" if stops else "normal")),
         is_latest_only=part.text("coalesce") == "latest",
         rate_per_s=_rate(part.get("rate_limit"), findings),
         retries=retries,
@@ -129,10 +132,28 @@ def command_with_flow(command: Command, part: Part, findings: Findings) -> Comma
         is_idempotent=is_idempotent,
         hold=_hold(hold, findings) if hold else None,
         moves=part.flag("moves", default=False),
+        stops=stops,
         confirm=_confirm(confirm) if confirm else None,
         requires=_requires(part, findings),
         verify=_verify(verify, findings) if verify else None,
     )
+
+
+def _check_stop(command: Command, part: Part, findings: Findings) -> None:
+    """Report what would keep back a command that STOP gives, or make it wait."""
+    hindering = ("moves", "confirm", "requires", "coalesce", "rate_limit")
+    refuse(part, hindering, "means nothing beside 'stop': nothing may keep it back", findings)
+    for name, one in command.arguments.items():
+        if one.confirm or (one.is_required and one.default is None):
+            what = "asks people" if one.confirm else "has no default"
+            findings.error(
+                part,
+                "missing-argument",
+                f"STOP gives it without arguments, and {name!r} {what}",
+                at="stop",
+                key=True,
+                hint="give a command that stops, and takes nothing",
+            )
 
 
 def poll_with_flow(

@@ -159,6 +159,8 @@ class Command(NamedTuple):
     moves: bool = False
     """It moves something by itself, with no hand that holds it; true of a sequence that runs what
     does, or what is held."""
+    stops: bool = False
+    """It is given once when STOP is pressed."""
     confirm: Confirm | None = None
     requires: tuple[Requirement, ...] = ()
     verify: Verify | None = None

@@ -148,6 +148,8 @@ def _commands(driver: Driver) -> Iterator[str]:
             yield f"- held: sent every {shown_duration(command.hold.repeat_s)} while it is held"
         if command.moves:
             yield "- moves something by itself: not while STOP is latched, nor while others drive"
+        if command.stops:
+            yield "- given once when STOP is pressed"
         yield ""
         yield from _arguments(command)
 

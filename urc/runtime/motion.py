@@ -65,6 +65,7 @@ class MotionDesk:
             name: is_lossy(driver, one.transport) for name, one in self._holds.items()
         }
         self._controls = {name: control_of(driver, one) for name, one in self._holds.items()}
+        self._stops = tuple(name for name, one in driver.commands.items() if one.stops)
         self._moves = any(one.moves for one in driver.commands.values())
         self._is_making = False
         self._screens: dict[str, _Screen] = {}
@@ -76,13 +77,25 @@ class MotionDesk:
 
     @property
     def can_move(self) -> bool:
-        """Whether the driver has any command that is held, or moves something by itself."""
-        return bool(self._holds) or self._moves
+        """Whether anything of the robot is held, moves by itself, or stops it."""
+        return bool(self._holds) or self._moves or bool(self._stops)
 
     @property
     def has_own_stop(self) -> bool:
         """Whether the robot hears anything when STOP is pressed; else URC alone holds back."""
-        return bool(self._holds)
+        return bool(self._holds) or bool(self._stops)
+
+    @property
+    def owed(self) -> list[str]:
+        """Commands that are to be given for a stop, and were not yet."""
+        return [name for name in self._stops if name in self._unconfirmed]
+
+    def given(self, command: str) -> None:
+        """Take note that a command of a stop has reached the robot."""
+        if command in self._unconfirmed:
+            self._unconfirmed.discard(command)
+            if self.is_confirmed:
+                self.on_change(self.lease.state)
 
     def holds(self, command: str) -> bool:
         """Return whether `command` is a held one."""
@@ -101,13 +114,10 @@ class MotionDesk:
     # -- the robot
 
     def attach(self, frames: Frames, movers: Movers | None) -> None:
-        """Take a session's engine and movers; a stop that is still owed goes out.
-
-        There are no movers where nothing is held.
-        """
+        """Take a session's engine, and movers where anything is held; an owed stop goes out."""
         self._frames, self._movers = frames, movers
         frames.on_count, frames.on_ready = self._renew, self._ready
-        if self._unconfirmed and movers is not None:
+        if movers is not None and not self._unconfirmed.isdisjoint(self._holds):
             movers.stop(self._stop_frames(self._holds))
 
     def detach(self) -> None:
@@ -161,7 +171,7 @@ class MotionDesk:
 
     def stop(self, by: str) -> None:
         """Stop the robot and latch; whoever says so, and whatever else goes on."""
-        self._unconfirmed = set(self._holds)
+        self._unconfirmed = {*self._holds, *self._stops}
         if self._movers is not None:
             self._movers.stop(self._stop_frames(self._holds))
         self._settle(self.lease.stop(by), is_stopped=True)
@@ -280,10 +290,8 @@ class MotionDesk:
         if self._is_too_early(command, control):
             control.is_owed_again = True
             return
-        if reason != "released" and command in self._unconfirmed:
-            self._unconfirmed.discard(command)
-            if self.is_confirmed:
-                self.on_change(self.lease.state)
+        if reason != "released":
+            self.given(command)
 
     # -- stops that are made anew
 

@@ -143,3 +143,23 @@ async def test_what_moves_by_itself_is_locked_while_another_screen_drives(
         await until(lambda: heard == ["BEEP"])
         await first.click(FOLD)
         await until(lambda: heard == ["BEEP", "FOLD"])
+
+
+async def test_stop_gives_the_stop_of_the_robot_past_what_waits(
+    new_page: PageMaker, tmp_path: Path
+) -> None:
+    """An answer that does not come holds nothing up; and once more at the next press."""
+    halt, ask = "  halt: { send: HALT, stop: true }", "  ask: { send: ASK, reply: { equals: OK } }"
+    profile = PROFILE.replace("sequences:", f"{halt}\n{ask}\nsequences:")
+    profile = profile.replace("press: beep", "press: ask")
+    async with served(tmp_path, profile) as (heard, address):
+        page = await opened(new_page, address)
+        await page.click(BEEP)
+        await until(lambda: heard == ["ASK"])
+        await page.click(FOLD)  # it waits behind the answer
+        await page.keyboard.press("Escape")
+        await until_text(page, "[data-stop-note]", "✓ sent ✓ confirmed ✓ latched")
+        assert heard == ["ASK", "HALT"]
+        await page.click(STOP)
+        await expect(page.locator(note(0))).to_contain_text("▲ stopped by screen 1")
+        assert heard == ["ASK", "HALT", "HALT"]

@@ -8,6 +8,8 @@ from tests.unit.web.test_client import FakeLine, scene
 from urc.model.codec import WriteSpec
 from urc.model.driver import Command
 from urc.model.flow import WaitStep
+from urc.protocol.events import Replied
+from urc.runtime.session import CommandFailed
 from urc.testing.clock import settle
 from urc.web.socket import Client
 from urc.web.wire.drive import Drive
@@ -105,3 +107,76 @@ async def test_a_stop_that_is_latched_holds_in_the_next_session() -> None:
         assert it.robot.latched == ["stopped by screen 1: reset it first"]
         line.leave()
         await task
+
+
+HALT = {"halt": Command("halt", "wire", WriteSpec("text", {}), stops=True)}
+
+
+def confirmed(line: FakeLine) -> bool:
+    """Return whether the page was told that the robot has heard the stop."""
+    return bool(line.of_type("lease")[-1]["confirmed"])
+
+
+async def test_a_robot_with_a_stop_of_its_own_is_given_it_once_for_each_press() -> None:
+    """By the server, and the page is told that the robot has heard it."""
+    async with scene(commands=FOLD | HALT) as it:
+        it.line.say({"t": "stop"})
+        await settle()
+        assert it.robot.commands == [("halt", {})]
+        assert confirmed(it.line)
+        await it.clock.advance(10)
+        assert it.robot.commands == [("halt", {})]
+        it.line.say({"t": "stop"})
+        await settle()
+        assert it.robot.commands == [("halt", {})] * 2
+        ran = [(one.who, one.command, one.outcome) for one in it.audit if one.what == "ran"]
+        assert ran == [("STOP", "halt", "done")] * 2
+
+
+async def test_a_stop_that_did_not_reach_the_robot_is_given_until_it_does() -> None:
+    """Also after a reset: it was pressed, and has not been sent."""
+    async with scene(commands=FOLD | HALT) as it:
+
+        async def lost(name: str, arguments: object, **more: object) -> Replied:
+            raise CommandFailed("disconnected", "the robot is not connected")
+
+        known, it.robot.command = it.robot.command, lost  # type: ignore[method-assign]
+        it.line.say({"t": "stop"})
+        await settle()
+        assert not confirmed(it.line)
+        it.line.say({"t": "drive", "verb": "reset"})
+        it.robot.command = known  # type: ignore[method-assign]
+        await it.clock.advance(2)
+        assert it.robot.commands == [("halt", {})]
+        assert it.station.controls.desk.is_confirmed
+
+
+async def test_a_stop_that_the_robot_refuses_has_reached_it() -> None:
+    """An arm that plays nothing has nothing to stop."""
+    async with scene(commands=FOLD | HALT) as it:
+
+        def refuse(name: str, arguments: object) -> dict[str, int]:
+            raise CommandFailed("refused", "Failed to execute: stop")
+
+        it.robot.on_command = refuse  # type: ignore[assignment]
+        it.line.say({"t": "stop"})
+        await it.clock.advance(5)
+        assert [name for name, _ in it.robot.commands] == ["halt"]
+        assert confirmed(it.line)
+
+
+async def test_a_stop_without_an_answer_is_given_again_until_somebody_resets_it() -> None:
+    """Then the one that was sent counts: a later one would stop what was begun since."""
+    async with scene(commands=FOLD | HALT) as it:
+
+        def mute(name: str, arguments: object) -> dict[str, int]:
+            raise CommandFailed("timed-out", "no answer")
+
+        it.robot.on_command = mute  # type: ignore[assignment]
+        it.line.say({"t": "stop"})
+        await it.clock.advance(1.5)
+        assert [name for name, _ in it.robot.commands] == ["halt"] * 2
+        assert not confirmed(it.line)
+        it.line.say({"t": "drive", "verb": "reset"})
+        await it.clock.advance(10)
+        assert [name for name, _ in it.robot.commands] == ["halt"] * 3

@@ -72,7 +72,7 @@ class Controls:
         self._beating: Alarm | None = None
         self._expiring: Alarm | None = None
         self._rehearsal = Rehearsal(clock, lambda: self.desk)
-        self.once = Once(driver, lambda: self.desk.lease)
+        self.once = Once(driver, lambda: self.desk, clock, self.trail)
         self.watch = LoopWatch(clock, self._held_up)
         """Runs while the robot is connected."""
         self._heed(file)
@@ -122,12 +122,13 @@ class Controls:
             self._latch_fault(self._file.fault)
         self.watch.start()
         self.desk.attach(session.frames, session.movers)
-        self.once.attach(session)
         try:
-            await self._follow(session.movers)
+            async with asyncio.TaskGroup() as group:
+                group.create_task(self.once.serve(session))
+                if session.movers is not None:
+                    group.create_task(self._follow(session.movers))
         finally:
             self.watch.end()
-            self.once.detach()
             self._rehearsal.end()
             self._hub = None
             self.desk.detach()
@@ -135,10 +136,7 @@ class Controls:
             for command in self.commands:  # its movers stop what moves, and report no more
                 self.trail.stopped(command, "the robot was disconnected", now)
 
-    async def _follow(self, movers: Movers | None) -> None:
-        if movers is None:
-            await asyncio.Event().wait()  # nothing is held: STOP alone counts
-            return
+    async def _follow(self, movers: Movers) -> None:
         while True:
             for command, reason in await movers.stops():
                 self._stopped(command, reason)

@@ -6,16 +6,24 @@ against a stop, nor against whoever drives. The engine refuses it while a stop i
 waits on a line, or in a question, must not go out after it.
 """
 
+import asyncio
 from collections.abc import Callable
 
+from urc.model.codec import Payload
 from urc.model.driver import Driver
-from urc.motion.lease import WATCHES, Client, Lease
+from urc.motion.lease import WATCHES, Client
 from urc.protocol.reins import Pull
+from urc.runtime.clock import Clock
+from urc.runtime.motion import MotionDesk
 from urc.runtime.session import CommandFailed
+from urc.runtime.trail import Trail
 from urc.web.drive.seat import Drivable
 
 __all__ = ["HELD", "NotAdmitted", "Once", "can_move", "needs_holding"]
 
+AGAIN_S = 1.0
+"""After so long a stop that has not reached the robot is given again."""
+_STOP = Client("", "STOP")
 HELD = "this command moves the robot for as long as it is held, and nothing here can hold it"
 
 
@@ -25,7 +33,7 @@ class NotAdmitted(CommandFailed):
 
 def can_move(driver: Driver) -> bool:
     """Return whether anything of the robot moves, and so STOP is shown and latches."""
-    return any(one.hold is not None or one.moves for one in driver.commands.values())
+    return any(one.hold is not None or one.moves or one.stops for one in driver.commands.values())
 
 
 def needs_holding(driver: Driver, command: str) -> bool:
@@ -37,11 +45,16 @@ def needs_holding(driver: Driver, command: str) -> bool:
 class Once:
     """Those of one robot."""
 
-    def __init__(self, driver: Driver, lease: Callable[[], Lease]) -> None:
-        """Prepare; `lease` returns the one that counts now."""
+    def __init__(
+        self, driver: Driver, desk: Callable[[], MotionDesk], clock: Clock, trail: Trail
+    ) -> None:
+        """Prepare; `desk` returns the one that counts now."""
         self.driver = driver
-        self._lease = lease
+        self._desk = desk
+        self._clock = clock
+        self._trail = trail
         self._session: Drivable | None = None
+        self._pressed = asyncio.Event()
 
     def admit(self, client: Client, command: str) -> None:
         """Raise `NotAdmitted` while this screen may not give a command or sequence."""
@@ -53,7 +66,7 @@ class Once:
         """Return why this screen may not give a command or sequence now, or ""."""
         known = self.driver.commands.get(command)
         if known is not None and known.moves:
-            return self._lease().hindrance(client)
+            return self._desk().lease.hindrance(client)
         return WATCHES if client.role == "viewer" else ""
 
     def pull_refusal(self, client: Client, sequence: str, what: Pull) -> str:
@@ -64,22 +77,54 @@ class Once:
 
     # -- the session
 
-    def attach(self, session: Drivable) -> None:
-        """Take a session; a stop that is latched holds in it."""
+    async def serve(self, session: Drivable) -> None:
+        """Let STOP reach a session; one that is latched, or still owed, does at once."""
         self._session = session
-        if self._lease().latched:
+        self._pressed.clear()
+        if self._desk().lease.latched or self._desk().owed:
             self.stopped()
-
-    def detach(self) -> None:
-        """Take note that the session is over."""
-        self._session = None
+        try:
+            async with asyncio.TaskGroup() as group:
+                giving: asyncio.Task[None] | None = None
+                while True:
+                    await self._pressed.wait()
+                    self._pressed.clear()
+                    if giving is not None:
+                        giving.cancel()  # each press is a stop of its own
+                    giving = group.create_task(self._give_stops(session))
+        finally:
+            self._session = None
 
     def stopped(self) -> None:
         """Take note that STOP was pressed."""
         if self._session is not None:
-            self._session.latch(self._lease().latched)
+            self._session.latch(self._desk().lease.latched)
+            self._pressed.set()
 
     def reset(self) -> None:
         """Take note that nothing is stopped any more."""
         if self._session is not None:
             self._session.latch("")
+
+    async def _give_stops(self, session: Drivable) -> None:
+        """Give the commands that stop the robot until it has heard of each."""
+        while owed := self._desk().owed:
+            async with asyncio.TaskGroup() as group:
+                for command in owed:
+                    group.create_task(self._give_stop(session, command))
+            if self._desk().owed:
+                await self._clock.sleep(AGAIN_S)
+
+    async def _give_stop(self, session: Drivable, command: str) -> None:
+        sent: list[Payload] = []
+        outcome, is_heard = "done", True
+        try:
+            await session.command(command, {}, on_sent=sent.append)
+        except CommandFailed as failed:
+            outcome = f"{failed.code}: {failed.message}"
+            # What the robot refuses it has heard. After a reset nobody wants another one.
+            is_heard = failed.code == "refused" or (bool(sent) and not self._desk().lease.latched)
+        if sent:
+            self._trail.ran(_STOP, command, {}, outcome, sent[-1])
+        if is_heard:
+            self._desk().given(command)

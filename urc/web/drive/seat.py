@@ -4,12 +4,15 @@ Floor 5.
 """
 
 import secrets
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Protocol
 
+from urc.model.codec import Payload
+from urc.model.values import Reading
 from urc.motion.fresh import FirstOfTwo
 from urc.motion.lease import Client, LeaseState
 from urc.motion.pace import Pace
+from urc.protocol.events import Replied
 from urc.runtime.clock import Alarm
 from urc.runtime.hub import Hub
 from urc.runtime.motion import Frames, Movers
@@ -45,6 +48,15 @@ class Drivable(Protocol):
     @property
     def hub(self) -> Hub:
         """Takes what everybody should know."""
+
+    async def command(
+        self,
+        name: str,
+        arguments: Mapping[str, Reading],
+        *,
+        on_sent: Callable[[Payload], None] | None = None,
+    ) -> Replied:
+        """Run one command and return its reply; raise `CommandFailed` when there is none."""
 
     def latch(self, reason: str) -> None:
         """End sequences, and begin nothing that moves by itself; "" lets it be begun again."""

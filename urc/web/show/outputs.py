@@ -106,8 +106,9 @@ def asked_before(command: Command | None) -> list[dict[str, object]]:
 
 
 def motion_lines(driver: Driver) -> list[str]:
-    """Return the transports that carry motion, each once."""
-    lines = [one.transport for one in driver.commands.values() if one.hold is not None]
+    """Return the transports over which STOP reaches the robot, each once."""
+    stopping = [one for one in driver.commands.values() if one.hold is not None or one.stops]
+    lines = [one.transport for one in stopping]
     return list(dict.fromkeys(lines))
 
 
