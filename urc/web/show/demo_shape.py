@@ -91,7 +91,7 @@ _OUTPUT: Final = {
     ),
 }
 _FOLLOW: Final = dict.fromkeys(
-    ("links", "log", "lease", "alarms", "latency", "sequences", "theme", "stop"), True
+    ("links", "log", "lease", "alarms", "watched", "latency", "sequences", "theme", "stop"), True
 )
 
 
