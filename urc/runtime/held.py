@@ -88,6 +88,8 @@ class Control:
     is_owed_again: bool = False
     """Its stop went out on a line that was not ready: it is repeated when it is."""
     needs_release: bool = False
+    why: str = ""
+    """What closed it, where it needs that."""
     closed_epoch: int = -1
     """Lease in which it stopped by itself: it goes on in a later one only."""
 

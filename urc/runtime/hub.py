@@ -31,7 +31,7 @@ __all__ = [
 ]
 
 LinkState = Literal["idle", "connecting", "live", "silent", "lost"]
-"""idle: nobody asked yet. silent: connected, but an answer is overdue. lost: not connected."""
+"""idle: nobody asked yet. silent: connected, but something is overdue. lost: not connected."""
 
 NOTES_KEPT = 500
 TRAFFIC_KEPT = 1000

@@ -163,7 +163,7 @@ class Link:
     def count(self, fault: Fault) -> None:
         """Count something that was not as declared, and tell of it now and then."""
         self._report.count(fault)
-        if fault.code == "reply-timeout":
+        if fault.code in ("reply-timeout", "silent"):
             self._is_overdue = True
             self._report.show("silent", fault.message)
 

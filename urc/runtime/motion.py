@@ -38,6 +38,7 @@ MOST_SCREENS = 256
 _FIRST_TICKS = 2**31
 _NO_ROBOT = "the robot is not connected"
 LET_GO = "it was stopped: let go, then begin anew"
+_CUT = "the line to the robot was cut"
 _TAKE_ANEW = "it was stopped: take the controls anew"
 
 
@@ -226,7 +227,7 @@ class MotionDesk:
         if refusal or not (counts or control.can_rehearse):
             return refusal
         if control.needs_release or epoch <= control.closed_epoch:
-            return LET_GO if control.needs_release else _TAKE_ANEW
+            return control.why if control.needs_release else _TAKE_ANEW
         frames, movers = self._frames, self._movers
         if frames is None or movers is None:
             return _NO_ROBOT
@@ -242,7 +243,7 @@ class MotionDesk:
                 self._renew_stops(control.line)
         except UrcError as error:
             if counts:
-                self._abandon(command, control, movers)
+                self._abandon(command, control, movers, str(error))
             return str(error)
         finally:
             self._is_making = False
@@ -255,11 +256,11 @@ class MotionDesk:
         self.on_moved(screen.client, epoch, command, arguments, data, now)
         return ""
 
-    def _abandon(self, command: str, control: Control, movers: Movers) -> None:
+    def _abandon(self, command: str, control: Control, movers: Movers, why: str) -> None:
         """End a motion of which no frame can be made."""
         if control.is_armed:
             movers.release(command)
-        self._close(control)
+        self._close(control, why)
 
     def release(self, client: str, command: str) -> None:
         """Take note that a control was let go; only its holder's word counts."""
@@ -286,7 +287,7 @@ class MotionDesk:
         if control.course == "ending":  # else it moves again already
             control.course = "rest"
         if reason not in ("released", "stopped"):
-            self._close(control)
+            self._close(control, _CUT if reason == "revoked" else LET_GO)
         if self._is_too_early(command, control):
             control.is_owed_again = True
             return
@@ -336,8 +337,13 @@ class MotionDesk:
                 control.stop = stop
                 movers.renew(name, stop)
 
-    def _close(self, control: Control) -> None:
-        """Take no tick of a control until it was let go, and the lease was taken anew."""
+    def _close(self, control: Control, why: str = LET_GO) -> None:
+        """Take no tick of a control until it was let go, and the lease was taken anew.
+
+        What closed it first is why: the rest follows from that.
+        """
+        if not control.needs_release:
+            control.why = why
         control.rest()
         control.course = "rest"
         control.is_armed = False

@@ -159,6 +159,23 @@ async def test_silent_robot_is_shown_and_called_anew() -> None:
         assert state_of(session) == ("live", "")
 
 
+async def test_robot_that_is_asked_nothing_and_says_nothing_any_more_is_silent() -> None:
+    """Its line says how long it may be; with the next frame it is live again."""
+    clock, line = FakeClock(), MemoryTransport()
+    profile = line_profile()
+    wire = profile.driver.transports["wire"]._replace(stale_after_s=2.0)
+    driver = profile.driver._replace(transports={"wire": wire}, polls=())
+    async with opened(line, clock, profile._replace(driver=driver)) as session:
+        line.feed(b"note hello\n")
+        await clock.advance(1.9)
+        assert state_of(session) == ("live", "")
+        await clock.advance(0.2)
+        assert state_of(session) == ("silent", "nothing received for 2 s")
+        line.feed(b"note I am back\n")
+        await settle()
+        assert state_of(session) == ("live", "")
+
+
 async def test_silent_robot_that_then_refuses_is_lost() -> None:
     """Silent means connected; a refused connection is not."""
     clock, line = FakeClock(), MemoryTransport()

@@ -48,10 +48,27 @@ def test_a_value_out_of_range_moves_nothing_and_ends_the_gesture(speed: Any) -> 
     it = Scene()
     it.drive("ann", "take")
     it.tick(speed=0.5)
-    assert "speed" in it.tick(speed=speed)
+    refused = it.tick(speed=speed)
+    assert "speed" in refused
     assert it.heard() == ["arm drive", "drive speed=0.5", "release drive"]
-    assert it.tick(speed=0.5) == LET_GO
+    assert it.tick(speed=0.5) == refused
     assert it.heard() == []
+
+
+def test_a_gesture_that_was_refused_is_told_why_for_as_long_as_it_goes_on() -> None:
+    """The first refusal is seldom told by itself: the robot has just moved."""
+    it = Scene()
+    it.drive("ann", "take")
+    assert it.tick(speed=0.5) == ""
+    it.frames.refusal = "the robot has said nothing for 2 s"
+    assert it.tick(speed=0.5) == "the robot has said nothing for 2 s"
+    it.frames.refusal = ""
+    assert it.tick(speed=0.5) == "the robot has said nothing for 2 s"
+    it.desk.stopped("drive", "released")
+    assert it.tick(speed=0.5) == "the robot has said nothing for 2 s"
+    it.desk.release("ann", "drive")
+    it.drive("ann", "take")
+    assert it.tick(speed=0.5) == ""
 
 
 def test_after_a_stop_that_nobody_made_it_takes_a_release_and_a_new_lease() -> None:

@@ -240,7 +240,8 @@ export class Input {
   }
 
   /**
-   * The server has stopped a control, or refused its ticks.
+   * The server has stopped a control, or refused its ticks. What ended the gesture first is why: the
+   * ticks that were under way are refused for that.
    *
    * @param {string} command
    * @param {string} reason
@@ -250,7 +251,7 @@ export class Input {
     if (!control) return;
     control.closedEpoch = this.drive.lease?.epoch ?? control.closedEpoch;
     control.isReleaseOwed = true;
-    this.spend(control, reason);
+    if (control.phase !== "spent" || !control.reason) this.spend(control, reason);
     if (control.grips.size === 0) this.release(control);
   }
 

@@ -1,0 +1,128 @@
+"""A robot that says nothing any more, or is cut off, under a hand that drives it."""
+
+import asyncio
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager, suppress
+from pathlib import Path
+
+import pytest
+
+from tests.e2e.conftest import PageMaker
+from tests.e2e.dashboards import until, until_text
+from tests.e2e.motion.driving import fresh, push
+from tests.e2e.processes import UrcProcess
+
+pytestmark = pytest.mark.anyio
+
+EVERY_S = 0.05
+PROFILE = r"""
+urc: 1
+kind: robot
+name: cart
+title: Cart
+transports:
+  wire:
+    { type: tcp, host: 127.0.0.1, port: PORT, stale_after: 1s,
+      framing: { type: delimiter, tx: LF, rx: LF } }
+signals: { volts: { type: number, unit: V } }
+messages: { says: { from: wire, regex: '^V (?P<volts>[\d.]+)$' } }
+commands:
+  drive:
+    send: "drive {{ x | round(2) }}"
+    args: { x: { type: number, min: -1, max: 1, default: 0 } }
+    hold: { repeat: 50ms, release: { x: 0 } }
+widgets:
+  stick: { use: joystick, bind: { moved: drive }, options: { axes: x } }
+interfaces: { default: { grid: stick } }
+"""
+NOTE = ".joystick-note"
+
+
+class Cart:
+    """It says its voltage all the time, until the test mutes it."""
+
+    def __init__(self) -> None:
+        self.is_mute = False
+        self.said: list[bytes] = []
+        self.lines: set[asyncio.StreamWriter] = set()
+
+    async def talk(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        """Serve one line."""
+        self.lines.add(writer)
+        telling = asyncio.create_task(self._tell(writer))
+        with suppress(ConnectionError):
+            while line := await reader.readline():
+                self.said.append(line)
+        telling.cancel()
+        self.lines.discard(writer)
+        writer.close()
+
+    async def _tell(self, writer: asyncio.StreamWriter) -> None:
+        while True:
+            if not self.is_mute:
+                writer.write(b"V 12.5\n")
+            await asyncio.sleep(EVERY_S)
+
+    def is_driven(self) -> bool:
+        """Return whether it was told to move just now."""
+        return bool(self.said) and self.said[-1] not in (b"drive 0\n", b"drive 0.0\n")
+
+
+@asynccontextmanager
+async def cart(
+    urc_process: Callable[..., UrcProcess], folder: Path
+) -> AsyncIterator[tuple[Cart, asyncio.Server, str]]:
+    """Serve a cart; give it, its door and its page."""
+    robot = Cart()
+    door = await asyncio.start_server(robot.talk, "127.0.0.1", 0)
+    file = folder / "cart.yaml"
+    file.write_text(PROFILE.replace("PORT", str(door.sockets[0].getsockname()[1])), "utf-8")
+    try:
+        process = urc_process("serve", str(file), "--port", "0")
+        address = (await process.wait_for_async(r"(http://\S+)"))[1]
+        yield robot, door, f"{address}robots/cart/"
+    finally:
+        door.close()
+
+
+async def test_a_robot_that_falls_silent_is_told_on_the_badge_and_on_the_stick(
+    urc_process: Callable[..., UrcProcess], tmp_path: Path, new_page: PageMaker
+) -> None:
+    """The stick says for as long as it is held why nothing moves; then all is as before."""
+    async with cart(urc_process, tmp_path) as (robot, _, address):
+        page = await fresh(new_page)
+        await page.goto(address)
+        await until_text(page, "[data-badge-text]", "Live")
+        await push(page, ".joystick-pad")
+        await until(robot.is_driven)
+        robot.is_mute = True
+        await until_text(page, "[data-badge-text]", "Robot silent")
+        await until_text(page, NOTE, "◆ the robot has said nothing for 1 s")
+        robot.is_mute = False
+        await until_text(page, "[data-badge-text]", "Live")
+        await until_text(page, NOTE, "◆ the robot has said nothing for 1 s")
+        await page.mouse.up()
+        await push(page, ".joystick-pad")
+        await until(robot.is_driven)
+        await page.mouse.up()
+
+
+async def test_a_robot_that_is_lost_is_the_reason_that_the_stick_gives(
+    urc_process: Callable[..., UrcProcess], tmp_path: Path, new_page: PageMaker
+) -> None:
+    """Not that it is to be let go, which would not help."""
+    async with cart(urc_process, tmp_path) as (robot, door, address):
+        page = await fresh(new_page)
+        await page.goto(address)
+        await until_text(page, "[data-badge-text]", "Live")
+        await push(page, ".joystick-pad")
+        await until(robot.is_driven)
+        door.close()
+        for line in list(robot.lines):
+            line.transport.abort()
+        await until_text(page, "[data-badge-text]", "Robot lost")
+        await page.wait_for_function(
+            "() => /the line to the robot was cut|the robot is not connected/"
+            f".test(document.querySelector('{NOTE}').textContent)"
+        )
+        await page.mouse.up()
