@@ -3,13 +3,18 @@
 import pytest
 
 from tests.e2e.conftest import PageMaker
-from tests.e2e.dashboards import until_text
-from tests.e2e.motion.driving import centre, fingers_on
+from tests.e2e.dashboards import until_attribute, until_text
+from tests.e2e.motion.driving import centre, fingers_on, fire
 from tests.e2e.widgets.inputs import PLAIN, shown, until_values, use
 from urc.model.interface import Given
 
 pytestmark = pytest.mark.anyio
 
+SMALL = """
+const sheet = new CSSStyleSheet();
+sheet.replaceSync(".urc-cell { width: WIDTHpx; height: 13rem; min-height: 0 !important }");
+document.adoptedStyleSheets.push(sheet);
+"""
 LEFT, RIGHT = "[data-cell='0'] .joystick-pad", "[data-cell='1'] .joystick-pad"
 
 
@@ -57,3 +62,21 @@ async def test_a_second_stick_on_the_same_command_changes_nothing_by_a_touch(
         await until_text(page, "[data-cell='1'] .joystick-y", "+0.71")
         await hands.lift(0)
         await until_values(robot, y=0.707)
+
+
+@pytest.mark.parametrize("width", [170, 200])
+async def test_a_reason_leaves_a_small_stick_where_it_is(new_page: PageMaker, width: int) -> None:
+    """The thumb is still on it: its field neither shrinks nor moves."""
+    stick = use("joystick", **PLAIN)
+    async with shown(new_page, stick, size="phone") as (_, page):
+        await fire(page, SMALL.replace("WIDTH", str(width)))
+        await page.wait_for_function(
+            f"() => document.querySelector('.urc-cell').clientWidth <= {width}"
+        )
+        hands = await fingers_on(page)
+        await hands.put(0, *await centre(page, LEFT))
+        await until_attribute(page, ".joystick", "data-phase", "held")
+        before = await page.locator(LEFT).bounding_box()
+        await fire(page, "window.dispatchEvent(new Event('blur'))")
+        await until_text(page, ".joystick-note", "◆ the window lost the focus")
+        assert await page.locator(LEFT).bounding_box() == before
