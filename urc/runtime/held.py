@@ -103,6 +103,19 @@ class Control:
         if self.slew is not None:
             self.slew.begin()
 
+    def close(self, why: str, epoch: int) -> None:
+        """Take no tick until it was let go, and the lease was taken anew after `epoch`.
+
+        What closed it first is why: the rest follows from that.
+        """
+        if not self.needs_release:
+            self.why = why
+        self.rest()
+        self.course = "rest"
+        self.is_armed = False
+        self.needs_release = True
+        self.closed_epoch = epoch
+
     def limited(self, arguments: Mapping[str, Reading], now: float) -> Mapping[str, Reading]:
         """Return what may be asked of the robot now, of what its driver wants."""
         if self.slew is None:

@@ -338,17 +338,7 @@ class MotionDesk:
                 movers.renew(name, stop)
 
     def _close(self, control: Control, why: str = LET_GO) -> None:
-        """Take no tick of a control until it was let go, and the lease was taken anew.
-
-        What closed it first is why: the rest follows from that.
-        """
-        if not control.needs_release:
-            control.why = why
-        control.rest()
-        control.course = "rest"
-        control.is_armed = False
-        control.needs_release = True
-        control.closed_epoch = self.lease.state.epoch
+        control.close(why, self.lease.state.epoch)
 
     def _terms(self, command: str, frames: Frames) -> Terms:
         control = self._controls[command]
