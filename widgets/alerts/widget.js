@@ -24,11 +24,13 @@ export default {
     const book = new Book(memory.read());
     /** @type {readonly Alert[]} */
     let alerts = [];
-    let watched = { limited: 0, known: 0 };
+    let watched = { limited: 1, known: 0 }; // until it is told
     let isUp = false;
     let isMuted = false;
 
     function look() {
+      // Before any value has come nobody knows what is over: what was acknowledged stays so.
+      if (alerts.length === 0 && watched.limited > 0 && watched.known === 0) return show();
       const fresh = book.take(alerts, Date.now());
       if (fresh.length > 0) tell(fresh);
       memory.write(book.kept());

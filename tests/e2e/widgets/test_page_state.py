@@ -82,3 +82,31 @@ async def test_no_alert_is_said_only_of_what_is_known(new_page: PageMaker) -> No
         robot.say("volts", 12.0)
         await until_text(page, ".alerts-note", "— ✓ no alert")
     await until_text(page, ".alerts-note", "— no connection to URC")
+
+
+async def test_what_was_acknowledged_stays_so_when_the_page_is_opened_anew(
+    new_page: PageMaker,
+) -> None:
+    """Before a value came nothing is over; one that is over is new the next time."""
+    volts = Signal("volts", title="Battery", limits=Limits(low=11), stale_after_s=60)
+    robot = FakeRobot(
+        dashboard_profile(uses=[WidgetUse("alerts", "alerts")], signals={"volts": volts})
+    )
+    async with running_dashboard(robot) as address:
+        page = await new_page(size="desktop")
+        await page.goto(f"{address}robots/puppet/")
+        await until(lambda: robot.is_open)
+        robot.say("volts", 9.8, alarm="low")
+        await until_text(page, ".alerts-note", "1 not acknowledged")
+        await page.click(".alerts-seen")
+        await until_text(page, ".alerts-note", "0 not acknowledged")
+        await page.goto("about:blank")
+        await until(lambda: not robot.is_open)
+        await page.goto(f"{address}robots/puppet/")
+        await until_text(page, ".alerts-note", "— values not known now: 1 of 1")
+        robot.say("volts", 9.7, alarm="low")
+        await until_text(page, ".alerts-note", "0 not acknowledged")
+        robot.say("volts", 12.0)
+        await until_text(page, ".alerts-note", "— ✓ no alert")
+        robot.say("volts", 9.7, alarm="low")
+        await until_text(page, ".alerts-note", "1 not acknowledged")
