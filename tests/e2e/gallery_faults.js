@@ -1,11 +1,24 @@
 // Run in the gallery's page, or in a robot's, with the selector of the cells. Returns per cell what
-// hangs over, which text, drawing or control is cut, and whether there is nothing at all. A cell that has no place on a
-// screen of this size is none. An ellipsis is meant, and so is what can be scrolled to; a text that is only for
-// screen readers is not seen; the figures of a scale that moves (data-scale) come and go at its ends.
+// hangs over, which text, drawing or control is cut, which word of a button is broken, and whether
+// there is nothing at all. A cell that has no place on a screen of this size is none. An ellipsis is
+// meant, and so is what can be scrolled to; a text that is only for screen readers is not seen; the
+// figures of a scale that moves (data-scale) come and go at its ends.
 (selector) => {
   const SLACK = 2;
-  const clips = (style) => [style.overflowX, style.overflowY].some((each) => each !== "visible");
+  const clips = (style) => /strict|content|paint/.test(style.contain) ||
+    [style.overflowX, style.overflowY].some((each) => each !== "visible");
   const scrolls = (style) => /auto|scroll/.test(style.overflowX + style.overflowY);
+  // A word of a button that stands in two lines, though it is short enough for one.
+  const broken = (node) => {
+    if (!node.parentElement.closest("button, label")) return [];
+    return [...node.textContent.matchAll(/(?<!\S)\p{L}{2,12}(?!\S)/gu)].flatMap(({ 0: word, index }) => {
+      const range = document.createRange();
+      range.setStart(node, index);
+      range.setEnd(node, index + word.length);
+      const lines = new Set([...range.getClientRects()].map(({ top }) => Math.round(top)));
+      return lines.size > 1 ? [word] : [];
+    });
+  };
   const found = [];
   for (const cell of document.querySelectorAll(selector)) {
     if (!cell.checkVisibility()) continue;
@@ -22,6 +35,7 @@
       if (!text || !el.checkVisibility({ opacityProperty: true, visibilityProperty: true })) continue;
       isBlank = false;
       if (el.closest(".urc-hidden, [data-scale], option, title, desc, script, style")) continue;
+      for (const word of broken(node)) found.push(`${name}: ${JSON.stringify(word)} is broken`);
       const range = document.createRange();
       range.selectNodeContents(node);
       const boxes = [...range.getClientRects()].filter(({ width, height }) => width > 1 && height > 1);
