@@ -53,11 +53,11 @@ document.addEventListener("securitypolicyviolation", (event) => {
 
 
 @asynccontextmanager
-async def running_browser() -> AsyncIterator[Browser]:
-    """Start Chromium headless; it ends with the context."""
+async def running_browser(*flags: str) -> AsyncIterator[Browser]:
+    """Start Chromium headless, with more flags if need be; it ends with the context."""
     async with async_playwright() as playwright:
         browser = await playwright.chromium.launch(
-            executable_path=NEEDS[0].find(), args=FLAGS, timeout=60_000
+            executable_path=NEEDS[0].find(), args=[*FLAGS, *flags], timeout=60_000
         )
         try:
             yield browser

@@ -32,20 +32,10 @@ from urc.testing.dashboard import FakeRobot, dashboard_profile
 
 pytestmark = pytest.mark.anyio
 
-LOW = [
-    "joystick",
-    "dpad",
-    "axis",
-    "tilt",
-    "keyboard",
-    "value",
-    "number",
-    "select",
-    "switch",
-    "text",
-    "sequence",
-    "log",
-]
+LOW = (
+    *("joystick", "dpad", "axis", "tilt", "keyboard", "value"),
+    *("number", "select", "switch", "text", "sequence", "log"),
+)
 LOW_CELLS = ((126, 128), (171, 128), (229, 104), (356, 128), (305, 150), (305, 216), (258, 202))
 """As grids of several columns have them on phones, upright and on their sides, and on desktops."""
 DIGITS = re.compile(r"\d+ px ")

@@ -69,6 +69,8 @@ export class Asks {
     const no = button(t("Cancel"));
     const yes = isHazard ? element("div", "", "") : button(t("Yes"));
     box.append(text, no, yes);
+    const { top, bottom } = cell.getBoundingClientRect();
+    box.toggleAttribute("data-up", top + bottom > innerHeight);
     cell.append(box);
     cell.classList.add("urc-asking");
     if (before && cell.contains(before)) no.focus();

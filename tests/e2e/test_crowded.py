@@ -1,0 +1,93 @@
+"""A page with little room: low screens, large text, and questions in the lowest cells."""
+
+import pytest
+from playwright.async_api import expect
+
+from tests.e2e.browser import running_browser
+from tests.e2e.conftest import PageMaker
+from tests.e2e.dashboards import running_dashboard, until
+from tests.e2e.motion.driving import CALM_LEASE_S, driven, held, number
+from urc.model.codec import WriteSpec
+from urc.model.driver import Command
+from urc.model.flow import Confirm
+from urc.model.interface import Grid, Interface, Slot, WidgetUse
+from urc.model.values import Signal
+from urc.testing.dashboard import FakeRobot, dashboard_profile
+
+pytestmark = pytest.mark.anyio
+
+SCREENS = ((320, 568), (390, 844), (667, 375), (844, 390), (1180, 820), (1440, 900))
+LEAST_ROOM = 0.3
+"""Share of the screen that header and bar leave for widgets."""
+BARS = """() => {
+  const stop = document.querySelector("[data-stop-button]");
+  const word = document.createRange();
+  word.selectNodeContents(stop);
+  const [inner, outer] = [word.getBoundingClientRect(), stop.getBoundingClientRect()];
+  const bar = document.querySelector(".urc-controls").getBoundingClientRect();
+  const header = document.querySelector(".urc-bar").getBoundingClientRect();
+  return {
+    isWhole: inner.left >= outer.left && inner.right <= outer.right && outer.right <= innerWidth,
+    lines: word.getClientRects().length,
+    room: (bar.top - header.bottom) / innerHeight,
+    isWide: document.documentElement.scrollWidth > innerWidth,
+  };
+}"""
+
+
+@pytest.mark.parametrize("size_px", [24, 32])
+async def test_large_text_leaves_stop_whole_and_room_for_widgets(size_px: int) -> None:
+    """Half as large again, or twice: STOP is one whole word, and the bars do not meet."""
+    robot = FakeRobot(
+        dashboard_profile(
+            signals={"at": Signal("at")},
+            uses=[WidgetUse("at", "value", {"value": "at"})],
+            commands={"go": held("go", number("x"), lease_s=CALM_LEASE_S)},
+        )
+    )
+    flag = f"--blink-settings=defaultFontSize={size_px}"
+    async with driven(robot=robot) as (_, address), running_browser(flag) as large:
+        page = await large.new_page()
+        await page.goto(address)
+        await page.locator("[data-stop-button]").wait_for()
+        for width, height in SCREENS:
+            await page.set_viewport_size({"width": width, "height": height})
+            bars = await page.evaluate(BARS)
+            assert bars["isWhole"], (width, height)
+            assert bars["lines"] == 1, (width, height)
+            assert not bars["isWide"], (width, height)
+            assert bars["room"] > LEAST_ROOM, (width, height)
+
+
+async def test_a_question_is_whole_in_the_lowest_cells(new_page: PageMaker) -> None:
+    """It has the height of its words and its buttons, and hangs out of no screen."""
+    asked = Confirm(level="hazardous", text="The arm will move to where it was before.")
+    commands = {
+        name: Command(name, "wire", WriteSpec("text", {}), confirm=asked, title="Play")
+        for name in ("first", "last")
+    }
+    uses = [WidgetUse(name, "button", {}, {"press": name}, title=name) for name in commands]
+    values = [WidgetUse(f"v{place}", "value", {"value": "at"}) for place in range(6)]
+    slots = ["first", *(use.slot for use in values), "last"]
+    grid = Grid(4, 2, tuple(Slot(name, *divmod(place, 2)) for place, name in enumerate(slots)))
+    profile = dashboard_profile(
+        signals={"at": Signal("at")}, uses=[*uses, *values], commands=commands
+    )
+    robot = FakeRobot(profile._replace(interfaces={"x": Interface("x", "X", {"wide": grid})}))
+    async with running_dashboard(robot) as address:
+        page = await new_page(size="phone")
+        await page.set_viewport_size({"width": 390, "height": 844})
+        await page.goto(f"{address}robots/puppet/")
+        await until(lambda: robot.is_open)
+        for name in commands:
+            cell = page.locator(".urc-cell", has=page.get_by_role("button", name=name))
+            await cell.get_by_role("button").click()
+            question = cell.locator(".urc-ask")
+            await expect(question).to_be_visible()
+            high, seen, top, bottom = await question.evaluate(
+                "(el) => [el.scrollHeight, el.clientHeight,"
+                " el.getBoundingClientRect().top, el.getBoundingClientRect().bottom]"
+            )
+            assert high <= seen, name
+            assert 0 <= top < bottom <= 844, name
+            await question.get_by_role("button", name="Cancel").click()
