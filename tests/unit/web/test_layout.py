@@ -104,10 +104,20 @@ def test_over_a_background_what_is_empty_keeps_its_size() -> None:
     """Through it the background is seen, on a phone above what is stacked."""
     wide = Grid(2, 3, (Slot("a", 0, 0), Slot("b", 0, 2)))
     text = grid_css(Interface("i", grids={"wide": wide}, background="v"), ("v", "a", "b"))
-    assert MARGIN not in text
+    assert MARGIN not in text.split("@media (max-height: 479.98px)")[0]
     phone = text.split("@media (max-width: 599.98px)")[1]
     assert '[data-cell="1"]{display:grid;grid-area:2/1/3/2}' in phone
     assert '[data-cell="0"]' not in text
+
+
+def test_on_a_low_screen_an_empty_row_gives_way_to_those_with_controls() -> None:
+    """Else what steers lies below the edge; the columns between them show the background."""
+    wide = Grid(3, 3, (Slot("a", 0, 0), Slot("b", 2, 2)))
+    text = grid_css(Interface("i", grids={"wide": wide}, background="v"), ("v", "a", "b"))
+    low = text.split("@media (max-height: 479.98px)")[1]
+    rows = "grid-template-rows:minmax(6.5rem,1fr) minmax(0,.12fr) minmax(6.5rem,1fr)"
+    assert rows in low.split(";")[0]
+    assert "minmax(5rem,1fr)" in text.split("@media")[0]
 
 
 def test_a_phone_upright_falls_back_on_the_tall_picture() -> None:

@@ -7,7 +7,8 @@ eighth of the room of one that is used. A phone has no room for margins: they ar
 Held upright it shows the ``phone`` grid, else the ``tall`` one, else the wide one; of the latter
 two it stacks more than two columns in reading order.
 
-Over a background, what is empty is a window: it keeps its full size on every screen.
+Over a background, what is empty is a window: it keeps its full size on every screen; only on a low
+one, empty rows give way to those with widgets.
 
 The pages of an interface share its cells: which page is open says ``data-page`` on the grid, and a
 cell that is in two pages stays what it is.
@@ -120,6 +121,8 @@ def _filled(grid: Grid, names: Sequence[str]) -> Grid:
 
 def _rules(place: str, grid: Grid, canvas: _Canvas, row: str) -> str:
     empty_row, empty_column = _WINDOW if canvas.background else (_MARGIN, _MARGIN)
+    if canvas.background and row == _LOW_ROW:
+        empty_row = _MARGIN  # it gives way: what steers must not lie below the edge
     used_rows = _used((slot.row, slot.row_span) for slot in grid.slots)
     used_columns = _used((slot.column, slot.column_span) for slot in grid.slots)
     rows = _tracks(grid.rows, used_rows, row, empty_row)
