@@ -34,7 +34,7 @@ pytestmark = pytest.mark.anyio
 
 LOW = (
     *("joystick", "dpad", "axis", "tilt", "keyboard", "value"),
-    *("number", "select", "switch", "text", "sequence", "log"),
+    *("button", "number", "select", "switch", "text", "sequence", "log"),
 )
 LOW_CELLS = ((126, 128), (171, 128), (229, 104), (356, 128), (305, 150), (305, 216), (258, 202))
 """As grids of several columns have them on phones, upright and on their sides, and on desktops."""
