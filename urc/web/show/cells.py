@@ -106,8 +106,8 @@ def _heading(widget: Widget, inputs: Mapping[str, Signal], outputs: Mapping[str,
     """
     needed = [name for name in inputs if widget.inputs[name].is_required]
     about = [inputs[name].title or spoken(inputs[name].name) for name in (*needed, *inputs)]
-    ports = {name: widget.outputs[name] for name in outputs}
-    aside = [name for name, port in ports.items() if port.is_held and not port.is_required]
+    ports = [port for name, port in widget.outputs.items() if name in outputs]
+    aside = [port.name for port in ports if port.is_held and not port.is_required]
     if not needed:
         given = [called for name, called in outputs.items() if name not in aside]
         about = [*given, *about, *(outputs[name] for name in aside)]
