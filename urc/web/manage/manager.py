@@ -264,6 +264,8 @@ class Manager:
             may_manage: whether who asks may change anything.
         """
         catalogue = self.catalogue
+        # First of all: answers that come meanwhile are then asked for once more, not missed.
+        is_asking = catalogue.is_asking
         locks = self.garage.store.installed()
         hits = catalogue.hits(words, kinds)
         has = {lock.root: lock.version for lock in sorted(locks, key=lambda lock: lock.number)}
@@ -273,7 +275,7 @@ class Manager:
             installed=tuple(self._installed(lock) for lock in locks if lock.key.kind in kinds),
             available=tuple(self._available(entry, has) for entry in hits[:MOST_HITS]),
             total=len(hits),
-            is_asking=catalogue.is_asking,
+            is_asking=is_asking,
             may_manage=may_manage,
             job=job.news() if job is not None else None,
         )
