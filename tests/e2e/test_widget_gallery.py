@@ -38,6 +38,8 @@ LOW = (
 )
 LOW_CELLS = ((126, 128), (171, 128), (229, 104), (356, 128), (305, 150), (305, 216), (258, 202))
 """As grids of several columns have them on phones, upright and on their sides, and on desktops."""
+REPEAT_MS = 1000
+"""So often the gallery keeps its readings as old as they are meant to be."""
 DIGITS = re.compile(r"\d+ px ")
 
 SHOWS = """
@@ -123,3 +125,15 @@ async def test_widgets_are_whole_in_low_cells(new_page: PageMaker, widget: str) 
             await resize(page, *size)
             faults[size] = await lasting_faults(page, EXHIBITS)
     assert {size: each for size, each in faults.items() if each} == {}
+
+
+async def test_a_reading_that_is_kept_alive_is_no_new_one(new_page: PageMaker) -> None:
+    """What hears each reading hears it once, however long the gallery is looked at."""
+    async with running_dashboard(FakeRobot(dashboard_profile())) as address:
+        page = await new_page(size="desktop")
+        await opened(page, address, "terminal")
+        lines = page.locator("[data-state-name='normal'] .terminal-list > li")
+        before = await lines.all_inner_texts()
+        await page.wait_for_timeout(2.5 * REPEAT_MS)
+        assert await lines.all_inner_texts() == before
+        assert await page.locator("[data-state-name='normal'] .terminal[data-state='live']").count()

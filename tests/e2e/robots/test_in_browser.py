@@ -33,11 +33,8 @@ pytestmark = pytest.mark.anyio
 
 NAMES = sorted(file.stem for file in FOLDER.glob("*.yaml"))
 DESKTOP = ViewportSize(width=1440, height=900)
-SIZES = (
-    *(ViewportSize(width=320, height=640), ViewportSize(width=390, height=844)),
-    *(ViewportSize(width=844, height=390), ViewportSize(width=1024, height=768), DESKTOP),
-)
-"""From the narrowest phone that WCAG 1.4.10 asks for."""
+SIZES = (ViewportSize(width=320, height=640), ViewportSize(width=844, height=390), DESKTOP)
+"""The narrowest phone that WCAG 1.4.10 asks for, one on its side, and a large screen."""
 DRAWN = "() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))"
 """Resolves when widgets have been told of their new size."""
 SLOWEST_S = 60.0

@@ -244,11 +244,16 @@ export class Exhibit {
       }
       this.host.frame(performance.now());
     }
-    this.repeat();
+    for (const told of this.news.readings) this.say(told);
   }
 
-  repeat() {
-    for (const told of this.news.readings) this.say(told);
+  /** Keep what was told as old as it is meant to be; it is not told anew, as a new line would be. */
+  keep() {
+    const nowMs = performance.now();
+    for (const { signal, age } of this.news.readings) {
+      const sample = this.store.samples.get(signal);
+      if (sample) sample.timeMs = nowMs - age * 1000;
+    }
   }
 
   /** @param {Told} told */

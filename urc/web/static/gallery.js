@@ -55,7 +55,7 @@ async function start() {
   }
   const mounted = exhibits.map((exhibit) => exhibit.start(chosenSystem()));
   setInterval(() => {
-    for (const exhibit of exhibits) exhibit.repeat();
+    for (const exhibit of exhibits) exhibit.keep();
     wake();
   }, REPEAT_MS);
   wake();
