@@ -21,6 +21,7 @@ from tests.e2e.browser import (
 from tests.e2e.command_line import BOT
 from tests.e2e.processes import UrcProcess
 from tests.e2e.together import Together
+from tests.e2e.transports.packets import sweep
 from tests.e2e.unhurried import unhurried
 
 LOG = logging.getLogger(__name__)
@@ -32,6 +33,12 @@ expect.set_options(timeout=PAGE_TIMEOUT_MS)
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Producer) -> Together | None:
     """Keep what belongs together in one process."""
     return Together(config, log) if config.getvalue("dist") == "loadgroup" else None
+
+
+@pytest.fixture(scope="session", autouse=True)
+def no_ports_of_the_dead() -> None:
+    """Let no run that was killed lose the packets of this one."""
+    sweep()
 
 
 @pytest.fixture(scope="session", autouse=True)

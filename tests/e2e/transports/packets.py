@@ -1,8 +1,19 @@
-"""Loses packets on loopback: the only honest way to make a half-open line. Needs root."""
+"""Loses packets on loopback: the only honest way to make a half-open line. Needs root.
+
+A run that is killed cannot take its rules away, and whoever is given such a port by the system
+later waits there for good. So each rule says whose it is, and a new run takes away those of the
+dead.
+"""
 
 import asyncio
+import os
+import re
+import subprocess
 
-__all__ = ["Loss"]
+__all__ = ["Loss", "sweep"]
+
+_MARK = "urc-test"
+_OURS = re.compile(rf'^-A (INPUT .*--comment "?{_MARK}:(\d+)"? .*)$', re.MULTILINE)
 
 
 class Loss:
@@ -10,8 +21,9 @@ class Loss:
 
     def __init__(self, port: int, protocol: str = "tcp") -> None:
         """Choose the port; `begin` loses packets."""
+        whose = ["-m", "comment", "--comment", f"{_MARK}:{os.getpid()}"]
         self._rules = [
-            ["INPUT", "-i", "lo", "-p", protocol, f"--{side}", str(port), "-j", "DROP"]
+            ["INPUT", "-i", "lo", "-p", protocol, f"--{side}", str(port), *whose, "-j", "DROP"]
             for side in ("dport", "sport")
         ]
         self._begun: list[list[str]] = []
@@ -39,3 +51,21 @@ async def _iptables(*arguments: str) -> None:
     )
     said, _ = await process.communicate()
     assert process.returncode == 0, said.decode()
+
+
+def sweep() -> None:
+    """Take away the rules of runs that are no more; whoever may not look has made none."""
+    listed = _run("-S", "INPUT")
+    for rule, pid in _OURS.findall(listed):
+        if not os.path.exists(f"/proc/{pid}"):
+            _run("-D", *rule.replace('"', "").split())
+
+
+def _run(*arguments: str) -> str:
+    command = ["iptables", "-w", "5", *arguments]
+    try:
+        return subprocess.run(
+            command, capture_output=True, text=True, check=False, timeout=10
+        ).stdout
+    except (OSError, subprocess.TimeoutExpired):
+        return ""
