@@ -14,6 +14,7 @@ import { fixed, rough } from "./figures.js";
 import { mark } from "./words.js";
 
 export { digitsIn, figure } from "./figures.js";
+export { wordOf } from "./texts.js";
 export { mark, t } from "./words.js";
 
 /** "None": what is not known is never shown as 0. */
@@ -227,19 +228,6 @@ export function format(value, digits) {
 export function number(reading) {
   const value = reading?.value;
   return typeof value === "number" && Number.isFinite(value) ? value : null;
-}
-
-/**
- * Return the word by which people know a value: where a signal has `states`, its values are words, and
- * a command takes what the robot says.
- *
- * @param {Pick<Signal, "states"> | undefined} signal
- * @param {unknown} value as the robot says it, or a word already
- */
-export function wordOf(signal, value) {
-  const states = signal?.states ?? {};
-  const text = String(value);
-  return Object.hasOwn(states, text) ? (states[text] ?? text) : text;
 }
 
 /**

@@ -19,18 +19,24 @@ export function textOf(value, signal, factor) {
   if (value === null) return DASH;
   if (Array.isArray(value)) return value.map((each) => textOf(each, signal, factor)).join(", ");
   if (typeof value === "number") {
-    const word = signal.precision === undefined ? wordOf(figure(value, undefined), signal) : undefined;
-    return word ?? figure(value, signal.precision, factor);
+    const own = figure(value, undefined);
+    const word = signal.precision === undefined ? wordOf(signal, own) : own;
+    return word === own ? figure(value, signal.precision, factor) : word;
   }
-  return typeof value === "object" ? JSON.stringify(value) : (wordOf(String(value), signal) ?? String(value));
+  return typeof value === "object" ? JSON.stringify(value) : wordOf(signal, value);
 }
 
 /**
- * @param {string} text
- * @param {Signal} signal
+ * Return the word by which people know a value: where a signal has `states`, its values are words, and
+ * a command takes what the robot says.
+ *
+ * @param {Pick<Signal, "states"> | undefined} signal
+ * @param {unknown} value as the robot says it, or a word already
  */
-function wordOf(text, { states }) {
-  return states && Object.hasOwn(states, text) ? states[text] : undefined;
+export function wordOf(signal, value) {
+  const states = signal?.states ?? {};
+  const text = String(value);
+  return Object.hasOwn(states, text) ? (states[text] ?? text) : text;
 }
 
 /**
