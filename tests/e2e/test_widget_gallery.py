@@ -42,6 +42,13 @@ REPEAT_MS = 1000
 """So often the gallery keeps its readings as old as they are meant to be."""
 DIGITS = re.compile(r"\d+ px ")
 
+TERMINAL_GROUND = """
+() => [".xterm-scrollable-element", ".terminal-list"].map(
+  (part) => getComputedStyle(document.querySelector(part)).backgroundColor,
+)
+"""
+"""Returns the colour that the terminal has drawn, and the page's."""
+
 SHOWS = """
 ([widget, state, texts]) => {
   const cell = document.querySelector(`[data-widget="${widget}"][data-state-name="${state}"]`);
@@ -137,3 +144,14 @@ async def test_a_reading_that_is_kept_alive_is_no_new_one(new_page: PageMaker) -
         await page.wait_for_timeout(2.5 * REPEAT_MS)
         assert await lines.all_inner_texts() == before
         assert await page.locator("[data-state-name='normal'] .terminal[data-state='live']").count()
+
+
+async def test_a_theme_is_shown_at_once(new_page: PageMaker) -> None:
+    """Also by what draws its colours itself; not when the gallery happens to draw again."""
+    async with running_dashboard(FakeRobot(dashboard_profile())) as address:
+        page = await new_page(size="desktop")
+        await opened(page, address, "terminal")
+        for theme in THEMES * 3:
+            await show(page, theme, "tablet")
+            drawn, wanted = await page.evaluate(TERMINAL_GROUND)
+            assert drawn == wanted, theme

@@ -4,6 +4,7 @@
  *
  * What is held runs through the same modules as on the live page; only the socket is played.
  *
+ * @typedef {import("./follow.js").Themes} Themes
  * @typedef {import("./types.js").Alarm} Alarm
  * @typedef {import("./types.js").Held} Held
  * @typedef {import("./types.js").Hello} Hello
@@ -110,9 +111,11 @@ export class Exhibit {
    * @param {HTMLElement} bar where questions of others would stand
    * @param {() => void} wake
    * @param {(state: string, text: string) => void} tell
+   * @param {Themes} themes
    */
-  constructor(el, bar, wake, tell) {
+  constructor(el, bar, wake, tell, themes) {
     this.el = el;
+    this.themes = themes;
     /** @type {News} */
     this.news = JSON.parse(el.dataset["news"] ?? "{}");
     const state = el.dataset["stateName"] ?? "";
@@ -206,11 +209,7 @@ export class Exhibit {
         return { look: JSON.stringify([lease, refusal]), value: { lease, isMine, refusal } };
       };
     }
-    // Colours are the page's own, whatever is played.
-    made.theme = () => {
-      const name = document.documentElement.dataset["theme"] ?? "";
-      return { look: name, value: { name } };
-    };
+    made.theme = () => this.themes.news(); // colours are the page's own, whatever is played
     return made;
   }
 

@@ -11,6 +11,7 @@
 import { part } from "./badge.js";
 import { t } from "./kit.js";
 import { Exhibit } from "./exhibit.js";
+import { Themes } from "./follow.js";
 import { chosenSystem } from "./units.js";
 
 /** What stands there must not grow old by itself. */
@@ -50,8 +51,9 @@ function wake() {
 }
 
 async function start() {
+  const themes = new Themes(wake);
   for (const el of gallery.querySelectorAll("[data-news]")) {
-    if (el instanceof HTMLElement) exhibits.push(new Exhibit(el, bar, wake, tell));
+    if (el instanceof HTMLElement) exhibits.push(new Exhibit(el, bar, wake, tell, themes));
   }
   const mounted = exhibits.map((exhibit) => exhibit.start(chosenSystem()));
   setInterval(() => {
