@@ -36,7 +36,7 @@ sequences:
   show:
     title: Show
     moves: true
-    steps: [{ send: A }, { wait: 300ms }, { send: B }, { wait: 300ms }, { send: C }]
+    steps: [{ send: A }, { wait: 1s }, { send: B }, { wait: 1s }, { send: C }]
 widgets:
   fold: { use: button, bind: { press: fold } }
   beep: { use: button, bind: { press: beep } }
@@ -103,13 +103,15 @@ async def test_stop_holds_back_what_moves_by_itself_and_ends_sequences(
         await until(lambda: heard == ["FOLD", "A"])
         await page.click(STOP)
         await until_text(page, "[data-stop-note]", "✓ sent ✓ latched")
+        before = list(heard)  # a busy machine may have sent B, too
+        assert "C" not in before
         await expect(page.locator(note(0))).to_have_text(LOCKED)
         await expect(page.locator(note(2))).to_contain_text("reset it first")
         await page.click(FOLD, force=True)
         await page.click(BEEP)
         await until(lambda: "BEEP" in heard)
-        await asyncio.sleep(0.8)  # longer than the sequence would have taken
-        assert heard == ["FOLD", "A", "BEEP"]
+        await asyncio.sleep(1.2)  # longer than it would have taken to the next step
+        assert heard == [*before, "BEEP"]
         await page.click("[data-verb='reset']")
         await expect(page.locator(note(0))).not_to_have_text(LOCKED)
         await page.click(FOLD)
@@ -159,7 +161,10 @@ async def test_stop_gives_the_stop_of_the_robot_past_what_waits(
         await page.click(FOLD)  # it waits behind the answer
         await page.keyboard.press("Escape")
         await until_text(page, "[data-stop-note]", "✓ sent ✓ confirmed ✓ latched")
-        assert heard == ["ASK", "HALT"]
+        # A page that hears late that it stopped says so twice, and the robot stops twice.
+        assert heard in (["ASK", "HALT"], ["ASK", "HALT", "HALT"])
+        before = len(heard)
         await page.click(STOP)
         await expect(page.locator(note(0))).to_contain_text("▲ stopped by screen 1")
-        assert heard == ["ASK", "HALT", "HALT"]
+        await until(lambda: len(heard) > before)
+        assert set(heard[before:]) == {"HALT"}
