@@ -51,12 +51,15 @@ class _Screen:
 class MotionDesk:
     """The controls of one robot."""
 
-    def __init__(self, driver: Driver, *, kept: LeaseState | None = None) -> None:
+    def __init__(
+        self, driver: Driver, *, kept: LeaseState | None = None, is_owed: bool = False
+    ) -> None:
         """Begin with nobody at the controls, and no robot connected.
 
         Args:
             driver: its commands with ``hold`` are the controls.
             kept: the lease as it was before a restart: a latched stop stays latched.
+            is_owed: whether the robot has not heard of the last stop, and is to hear of it first.
         """
         self.lease = Lease(kept)
         self._frames: Frames | None = None
@@ -70,7 +73,7 @@ class MotionDesk:
         self._moves = any(one.moves for one in driver.commands.values())
         self._is_making = False
         self._screens: dict[str, _Screen] = {}
-        self._unconfirmed: set[str] = set()
+        self._unconfirmed = {*self._holds, *self._stops} if is_owed else set[str]()
         self.on_change: Callable[[LeaseState], None] = _ignore
         """Told of every new state of the lease, and when a stop is confirmed."""
         self.on_moved: Moved = _unseen

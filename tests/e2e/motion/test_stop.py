@@ -189,7 +189,7 @@ async def test_a_latched_stop_holds_over_a_restart(new_page: PageMaker, tmp_path
         await touch(page)
         await until_text(page, NOTE, DONE)
         kept = tmp_path / "latches" / "puppet.latch.json"
-        await until(lambda: kept.exists() and json.loads(kept.read_text())["latched_by"] != "")
+        await until(lambda: kept.exists() and json.loads(kept.read_text())["owed"] is False)
     async with calmly_driven(tmp_path) as (robot, address):
         page = await opened_latched(new_page, address)
         await push(page)

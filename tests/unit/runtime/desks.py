@@ -78,10 +78,11 @@ class Scene:
         self,
         kept: LeaseState | None = None,
         *,
+        is_owed: bool = False,
         is_attached: bool = True,
         driver: Driver = DRIVER,
     ) -> None:
-        self.desk = MotionDesk(driver, kept=kept)
+        self.desk = MotionDesk(driver, kept=kept, is_owed=is_owed)
         self.movers = Movers()
         self.frames = FakeFrames(driver)
         if is_attached:

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from urc.motion.lease import Client, LeaseState
-from urc.runtime.latch import LatchFile
+from urc.runtime.latch import Latch, LatchFile
 
 pytestmark = pytest.mark.anyio
 
@@ -19,32 +19,49 @@ BEFORE = ", before a restart"
 async def test_what_was_kept_is_found_again(tmp_path: Path) -> None:
     """The latch and the epoch; nobody keeps the controls over a restart."""
     file = LatchFile(tmp_path / "new" / "folder", "puppet")
-    assert file.load() == LeaseState()
-    file.keep(LeaseState(7, Client("a"), None, 0.0, "ann"))
+    assert file.load() == Latch(LeaseState())
+    file.keep(Latch(LeaseState(7, Client("a"), None, 0.0, "ann")))
     await file.settle()
     found = LatchFile(tmp_path / "new" / "folder", "puppet").load()
-    assert found == LeaseState(7, latched_by=f"ann{BEFORE}")
+    assert found == Latch(LeaseState(7, latched_by=f"ann{BEFORE}"))
     assert len(list((tmp_path / "new" / "folder").iterdir())) == 1, "no half file is left behind"
 
 
 async def test_who_stopped_it_in_another_run_is_none_of_this_ones_screens(tmp_path: Path) -> None:
     """They are numbered from one again: screen 1 of now stopped nothing. However many runs ago."""
     file = LatchFile(tmp_path, "puppet")
-    state = LeaseState(7, latched_by="screen 1")
+    kept = Latch(LeaseState(7, latched_by="screen 1"))
     for _ in range(3):
-        file.keep(state)
+        file.keep(kept)
         await file.settle()
-        state = file.load()
-        assert state.latched_by == f"screen 1{BEFORE}"
+        kept = file.load()
+        assert kept.state.latched_by == f"screen 1{BEFORE}"
+
+
+@pytest.mark.parametrize("is_owed", [True, False])
+async def test_whether_the_robot_heard_of_the_stop_is_kept(tmp_path: Path, is_owed: bool) -> None:
+    """Whether it is latched or was reset since."""
+    file = LatchFile(tmp_path, "puppet")
+    for by in ("ann", ""):
+        file.keep(Latch(LeaseState(7, latched_by=by), is_owed))
+        await file.settle()
+        assert file.load().is_owed is is_owed
+
+
+@pytest.mark.parametrize(("by", "is_owed"), [("ann", True), ("", False)])
+def test_a_record_of_an_older_urc_does_not_say_so(tmp_path: Path, by: str, is_owed: bool) -> None:
+    """The robot hears a latched stop once more."""
+    (tmp_path / "puppet.latch.json").write_text(json.dumps({"epoch": 3, "latched_by": by}))
+    assert LatchFile(tmp_path, "puppet").load().is_owed is is_owed
 
 
 async def test_of_many_states_the_newest_is_kept(tmp_path: Path) -> None:
     """A slow disk writes fewer of them, and the last one."""
     file = LatchFile(tmp_path, "puppet")
     for epoch in range(200):
-        file.keep(LeaseState(epoch))
+        file.keep(Latch(LeaseState(epoch)))
     await file.settle()
-    assert file.load().epoch == 199
+    assert file.load().state.epoch == 199
 
 
 @pytest.mark.parametrize(
@@ -60,7 +77,9 @@ async def test_of_many_states_the_newest_is_kept(tmp_path: Path) -> None:
 def test_a_file_that_says_nothing_means_stopped(tmp_path: Path, text: str) -> None:
     """Nobody knows whether it was latched, so it is."""
     (tmp_path / "puppet.latch.json").write_text(text)
-    assert "cannot be read" in LatchFile(tmp_path, "puppet").load().latched_by
+    found = LatchFile(tmp_path, "puppet").load()
+    assert "cannot be read" in found.state.latched_by
+    assert found.is_owed, "nor does anybody know whether the robot heard of it"
 
 
 async def test_a_full_disk_is_told_and_harms_nothing(
@@ -69,7 +88,7 @@ async def test_a_full_disk_is_told_and_harms_nothing(
     """The old file stays whole, and the next write that can be made is made."""
     file, told = LatchFile(tmp_path, "puppet"), list[str]()
     file.on_fault = told.append
-    file.keep(LeaseState(1, latched_by="ann"))
+    file.keep(Latch(LeaseState(1, latched_by="ann")))
     await file.settle()
 
     def full(descriptor: int) -> None:
@@ -78,15 +97,15 @@ async def test_a_full_disk_is_told_and_harms_nothing(
     with monkeypatch.context() as patched:
         patched.setattr("os.fsync", full)
         for epoch in (2, 2, 2):
-            file.keep(LeaseState(epoch))
+            file.keep(Latch(LeaseState(epoch)))
             await file.settle()
         assert told == ["No space left on device"], "once, however often it fails"
         assert file.fault == "No space left on device"
     assert json.loads((tmp_path / "puppet.latch.json").read_text())["epoch"] == 1
     assert len(list(tmp_path.iterdir())) == 1
-    file.keep(LeaseState(3))
+    file.keep(Latch(LeaseState(3)))
     await file.settle()
-    assert (file.fault, file.load().epoch) == ("", 3)
+    assert (file.fault, file.load().state.epoch) == ("", 3)
     assert told == ["No space left on device", ""]
 
 
@@ -106,7 +125,7 @@ async def test_what_could_not_be_written_is_tried_again(
             raise faults.pop()
 
     monkeypatch.setattr("os.fsync", full)
-    file.keep(LeaseState(2, latched_by="ann"))
+    file.keep(Latch(LeaseState(2, latched_by="ann")))
     async with asyncio.timeout(10):
         await well.wait()
-    assert file.load().latched_by == f"ann{BEFORE}"
+    assert file.load().state.latched_by == f"ann{BEFORE}"

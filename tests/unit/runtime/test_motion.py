@@ -185,6 +185,17 @@ def test_a_latch_that_was_kept_holds_and_is_no_news_to_the_robot() -> None:
     assert it.heard() == []
 
 
+def test_a_stop_that_the_robot_did_not_hear_of_before_a_restart_is_its_first_news() -> None:
+    """Nobody was told that it had: it is confirmed when the line has taken it."""
+    it = Scene(LeaseState(epoch=41, latched_by="ann"), is_attached=False, is_owed=True)
+    assert not it.desk.is_confirmed
+    it.desk.attach(it.frames, it.movers)
+    assert it.heard() == ["stop drive lift"]
+    for command in ("drive", "lift"):
+        it.desk.stopped(command, "stopped")
+    assert it.desk.is_confirmed
+
+
 def test_a_session_that_ends_leaves_nothing_armed() -> None:
     """The next one moves only after a new gesture in a new lease."""
     it = Scene()

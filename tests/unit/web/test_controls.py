@@ -326,9 +326,9 @@ async def test_a_latch_that_cannot_be_written_is_told_and_stops_all_the_same(
     tmp_path: Path,
 ) -> None:
     """In the log of the page, and to everybody at a screen, once; and when all is well again."""
-    (tmp_path / "latches").write_text("a file where the folder should be")
     file = LatchFile(tmp_path / "latches", "rover")
     async with scene(file) as it:
+        (tmp_path / "latches").write_text("a file where the folder should be")
         ann, bob = it.sit(), it.sit()
         it.say(ann, "take")
         it.tick(ann)
@@ -347,6 +347,22 @@ async def test_a_latch_that_cannot_be_written_is_told_and_stops_all_the_same(
         it.say(bob, "reset")
         await file.settle()
         assert it.hub.notes[-1].text == "STOP outlasts a restart of the server again"
+
+
+async def test_a_stop_that_is_owed_stays_so_with_another_driver_and_after_a_restart(
+    tmp_path: Path,
+) -> None:
+    """It was pressed while the robot was away: whoever connects it next lets it hear of it."""
+    file = LatchFile(tmp_path, "rover")
+    controls = Scene(file).controls
+    controls.stop("ann")
+    controls.renew(DRIVER, file)
+    await file.settle()
+    assert not controls.desk.is_confirmed
+    async with scene(LatchFile(tmp_path, "rover")) as it:
+        assert it.movers.texts == ["drive stop", "lift stop"]
+        assert it.controls.desk.is_confirmed
+    await file.settle()
 
 
 async def test_a_flood_costs_no_more_than_its_thinned_rate() -> None:

@@ -18,7 +18,7 @@ from urc.motion.pace import Pace
 from urc.runtime.audit import Entry
 from urc.runtime.clock import Alarm, Clock
 from urc.runtime.hub import Hub, Note
-from urc.runtime.latch import LatchFile
+from urc.runtime.latch import Latch, LatchFile
 from urc.runtime.lateness import TOO_LATE_S, LoopWatch
 from urc.runtime.motion import MotionDesk, Movers
 from urc.runtime.trail import Trail
@@ -60,7 +60,7 @@ class Controls:
             trail: takes note of what happens; None: nobody does.
         """
         self.trail = trail or Trail("", _unread, utc=lambda: 0.0)
-        self.desk = self._desk(driver, file.load() if file is not None else None)
+        self.desk = self._desk(driver, file.load() if file is not None else Latch(LeaseState()))
         self._driver = driver
         self._clock = clock
         self._file = file
@@ -90,9 +90,10 @@ class Controls:
     def renew(self, driver: Driver, file: LatchFile | None) -> None:
         """Go on with another version of the driver, between two sessions.
 
-        A latched stop holds; nobody has the controls, and nothing that was armed still is.
+        A latched stop holds, and one that the robot has not heard of is still owed; nobody has the
+        controls, and nothing that was armed still is.
         """
-        kept = self.desk.lease.state
+        kept = Latch(self.desk.lease.state, not self.desk.is_confirmed)
         for seat in self._seats.values():
             for command in list(seat.alarms):
                 seat.forget(command)
@@ -105,8 +106,8 @@ class Controls:
             self.desk.join(seat.client)
         self._changed(self.desk.lease.state)
 
-    def _desk(self, driver: Driver, kept: LeaseState | None) -> MotionDesk:
-        desk = MotionDesk(driver, kept=kept)
+    def _desk(self, driver: Driver, kept: Latch) -> MotionDesk:
+        desk = MotionDesk(driver, kept=kept.state, is_owed=kept.is_owed)
         desk.on_change = self._changed
         desk.on_moved = self.trail.moved
         return desk
@@ -360,7 +361,7 @@ class Controls:
     def _changed(self, state: LeaseState) -> None:
         self._number += 1
         if self._file is not None:
-            self._file.keep(state)
+            self._file.keep(Latch(state, not self.desk.is_confirmed))
         for seat in self._seats.values():
             seat.wake()
         self.trail.leased(state, self._clock.now())
