@@ -132,7 +132,8 @@ def calmly_driven(data: Path | None = None) -> AbstractAsyncContextManager[tuple
 async def fresh(new_page: PageMaker, size: str = "desktop") -> Page:
     """Return an empty page, which may outlive the server by a moment."""
     page = await new_page(size=size)  # type: ignore[arg-type]
-    new_page.allow(page, lambda text: "WebSocket" in text and "ERR_CONNECTION_REFUSED" in text)
+    # Refused, or reset while it was being let in.
+    new_page.allow(page, lambda text: "WebSocket" in text and "ERR_CONNECTION_RE" in text)
     return page
 
 

@@ -13,7 +13,7 @@ from urc.guard.process import Door
 from urc.motion.hold import Terms
 from urc.transports.tcp import TcpTransport
 
-pytestmark = [pytest.mark.anyio, pytest.mark.alone]
+pytestmark = pytest.mark.anyio
 
 STOP = b"stop\n"
 BOUND_S = 30.0

@@ -33,7 +33,7 @@ from tests.e2e.motion.driving import (
 from tests.e2e.motion.ways import WAYS, start_over
 from tests.effort import IS_THOROUGH
 
-pytestmark = [pytest.mark.anyio, pytest.mark.alone]
+pytestmark = pytest.mark.anyio
 
 LATE_S = 0.15
 """One loop plays the server, the robot and the test here; the 50 ms are held by the rig's tests."""
@@ -194,6 +194,7 @@ async def test_a_gamepad_moves_only_while_its_shoulder_button_is_held(
         await stays_still(robot)
 
 
+@pytest.mark.alone
 async def test_a_dialog_stops_within_the_lease_and_nothing_resumes(new_page: PageMaker) -> None:
     """While `alert` is open the page draws nothing, so it sends nothing."""
     async with driven() as (robot, address), lateness() as late:
@@ -217,6 +218,7 @@ async def test_a_dialog_stops_within_the_lease_and_nothing_resumes(new_page: Pag
         await stays_still(robot)
 
 
+@pytest.mark.alone
 async def test_a_page_that_is_busy_stops_within_the_lease(new_page: PageMaker) -> None:
     """Three seconds of work on the page's thread: no tick, and none of them caught up on."""
     async with driven() as (robot, address), lateness() as late:
@@ -267,6 +269,7 @@ def is_below(process: int, ancestor: int) -> bool:
 
 
 @pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="needs /proc to find a renderer")
+@pytest.mark.alone
 async def test_a_renderer_that_stands_still_stops_within_the_lease() -> None:
     """SIGSTOP is what a device that goes to sleep does to a page; the robot does not wait."""
     async with driven() as (robot, address), running_browser() as browser, lateness() as late:

@@ -9,7 +9,7 @@ from tests.e2e.conftest import PageMaker
 from tests.e2e.dashboards import until, until_text
 from tests.e2e.motion.driving import LEFT, calmly_driven, fresh, moved, opened, push, text_of
 
-pytestmark = [pytest.mark.anyio, pytest.mark.alone]
+pytestmark = pytest.mark.anyio
 
 WHO = "[data-who]"
 

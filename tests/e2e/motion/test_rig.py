@@ -13,7 +13,6 @@ from urc.testing.rig import SERVER_ADDRESS, Operators, Program, Relay, Robots
 from urc.testing.rig_relay import ports_of
 
 pytestmark = [
-    pytest.mark.alone,
     pytest.mark.skipif("sys.platform != 'linux'", reason="the rig is for Linux"),
 ]
 

@@ -11,7 +11,7 @@ from tests.e2e.conftest import PageMaker
 from tests.e2e.dashboards import until, until_attribute, until_text
 from tests.e2e.motion.driving import LEFT, STOP, calmly_driven, centre, fresh, moved, opened, push
 
-pytestmark = [pytest.mark.anyio, pytest.mark.alone]
+pytestmark = pytest.mark.anyio
 
 NOTE = "[data-stop-note]"
 DONE = "✓ sent ✓ confirmed ✓ latched"
