@@ -72,6 +72,10 @@ class Scene {
     /** @type {Readonly<Record<string, Reading>>} */
     this.readings = {};
     this.seen = "";
+    /** How it stood when that was known last. @type {Quaternion} */
+    this.turned = [0, 0, 0, 1];
+    /** @type {[number, number, number]} */
+    this.at = [0, 0, 0];
     /** Of those that are drawn; -1 while there are none. */
     this.pointsSerial = -1;
     const view = VIEWS.find((each) => each === options["view"]) ?? "orbit";
@@ -179,9 +183,10 @@ class Scene {
     const { readings, stage, model } = this;
     if (!stage) return;
     const values = this.jointValues();
-    const turn = this.turn();
-    const place = ["x", "y", "z"].map((name) => number(readings[name]) ?? 0);
-    const look = JSON.stringify([values, turn, place]);
+    const turn = (this.turned = this.turn() ?? this.turned);
+    const [x, y, z] = this.at;
+    this.at = [number(readings["x"]) ?? x, number(readings["y"]) ?? y, number(readings["z"]) ?? z];
+    const look = JSON.stringify([values, turn, this.at]);
     if (look === this.seen) return;
     this.seen = look;
     const given = this.options["joint_names"];
@@ -190,8 +195,7 @@ class Scene {
       const name = names[index];
       if (model && name !== undefined && value !== null) model.set(name, value);
     });
-    const [x = 0, y = 0, z = 0] = place;
-    stage.setPose([x, y, z], turn ?? [0, 0, 0, 1], turn ? angles(turn).yaw : 0);
+    stage.setPose(this.at, turn, angles(turn).yaw);
   }
 
   /** @returns {(number | null)[]} */
@@ -202,14 +206,15 @@ class Scene {
     return [...first, ...singles];
   }
 
-  /** @returns {Quaternion | null} */
+  /** How it is turned; null when a part of that is not known. @returns {Quaternion | null} */
   turn() {
     const { readings, convention } = this;
     const whole = fromOrientation(readings["orientation"]?.value, convention);
     if (whole) return whole;
-    const [roll, pitch, yaw] = ["roll", "pitch", "yaw"].map((name) => number(readings[name]));
-    if ((roll ?? pitch ?? yaw ?? null) === null) return null;
-    return fromAngles(roll ?? 0, pitch ?? 0, yaw ?? 0, convention);
+    const bound = ["roll", "pitch", "yaw"].filter((name) => readings[name] !== undefined);
+    if (bound.length === 0 || bound.some((name) => number(readings[name]) === null)) return null;
+    const [roll = 0, pitch = 0, yaw = 0] = ["roll", "pitch", "yaw"].map((name) => number(readings[name]) ?? 0);
+    return fromAngles(roll, pitch, yaw, convention);
   }
 
   setPoints() {
@@ -226,6 +231,8 @@ class Scene {
     const { worst, model, t } = this;
     const turn = this.turn();
     const words = turn ? posture(turn).map(({ text, degrees }) => t(text, { n: degrees })) : [];
+    const isTurned = ["orientation", "roll", "pitch", "yaw"].some((name) => this.readings[name] !== undefined);
+    attribute(this.root, "data-pose", isTurned && !turn ? "unknown" : null);
     const joints = this.jointValues().filter((each) => each !== null).length;
     const isShown = worst !== undefined && (worst.state === "live" || worst.state === "stale");
     const level = turn && words.length === 0 ? t("level") : "";

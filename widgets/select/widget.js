@@ -27,7 +27,7 @@ export default {
 class Select {
   /** @param {Context} ctx */
   constructor(ctx) {
-    const { el, options, signal, send, t } = ctx;
+    const { el, options, signal, t } = ctx;
     this.ctx = ctx;
     this.root = part(el, ".select");
     this.now = part(el, ".select-now");
@@ -43,7 +43,7 @@ class Select {
     /** @type {Value} */
     this.chosen = null;
     const show = () => this.show();
-    this.giver = new Giver({ give: () => send("change", { value: this.chosen }), show, t, signal });
+    this.giver = new Giver({ give: (args) => this.give(args), show, t, signal });
     this.wish = new Wish({
       withinMs: 1000 * Number(options["echo_s"] ?? 3),
       show,
@@ -52,8 +52,8 @@ class Select {
     });
     this.place?.addEventListener("change", (event) => {
       const at = event.target;
-      if (at instanceof HTMLSelectElement) void this.choose(this.choices[Number(at.value)]);
-      if (at instanceof HTMLInputElement) void this.choose(this.choices[Number(at.value)]);
+      if (at instanceof HTMLSelectElement) this.choose(this.choices[Number(at.value)]);
+      if (at instanceof HTMLInputElement) this.choose(this.choices[Number(at.value)]);
     }, { signal });
   }
 
@@ -78,15 +78,24 @@ class Select {
     this.giver.take(change);
   }
 
-  /** @param {Choice | undefined} choice */
-  async choose(choice) {
-    if (!choice || !this.giver.isReady || this.giver.isPending) return this.show();
-    this.chosen = choice.value;
-    if (this.state) this.wish.make(choice.value, this.state);
+  /** What is chosen while the robot is asked is given next; the newest only. @param {Choice | undefined} choice */
+  choose(choice) {
+    if (choice && this.giver.isReady) {
+      this.chosen = choice.value;
+      this.giver.newest({ value: choice.value });
+    }
     this.show();
-    if (!(await this.giver.once())) {
+  }
+
+  /** @param {Record<string, Value>} args */
+  async give(args) {
+    if (this.state) this.wish.make(args["value"] ?? null, this.state);
+    this.show();
+    try {
+      await this.ctx.send("change", args);
+    } catch (error) {
       this.wish.drop();
-      this.show();
+      throw error;
     }
   }
 
@@ -102,7 +111,7 @@ class Select {
     const now = this.choices.find(({ value }) => this.word(value) === shown);
     const sign = wish.isWaiting ? " …" : wish.isMissed ? " ≠" : "";
     write(this.now, (state ? (now?.label ?? state.text) : "—") + sign);
-    this.mark(shown, !giver.isReady || giver.isPending);
+    this.mark(shown, !giver.isReady);
     const wished = this.choices.find(({ value }) => value === wish.value)?.label ?? "";
     const missed = wish.isMissed ? ctx.t("≠ asked for {wish}, the robot says otherwise", { wish: wished }) : "";
     write(this.note, giver.note(missed, state ? noteOf(state, ctx.t) : ""));
@@ -116,7 +125,11 @@ class Select {
     const place = this.choices.findIndex(({ value }) => this.word(value) === shown);
     const list = this.place?.querySelector("select");
     if (list) {
-      if (list.value !== String(place)) list.value = String(place);
+      // While the robot is asked the hand is where it went: the next arrow key goes on from there.
+      const isAsked = this.giver.isPending || this.giver.next !== null;
+      const wished = isAsked ? this.chosen : this.wish.isWaiting ? this.wish.value : null;
+      const hand = wished === null ? place : this.choices.findIndex(({ value }) => value === wished);
+      if (list.value !== String(hand)) list.value = String(hand);
       lock(list, isLocked);
     }
     for (const radio of this.place?.querySelectorAll("input") ?? []) {

@@ -28,7 +28,7 @@ signals:
   lamp: { type: boolean }
   mode: { type: string }
   volts: { type: number }
-  gear: { type: integer, states: { "0": low, "1": high } }
+  gear: { type: integer, states: { "0": low, "1": high, "2": top } }
   pump: { type: string, states: { P0: still, P1: running } }
 messages:
   geared: { regex: '^gear (?P<gear>\\d) (?P<pump>P\\d)$' }
@@ -48,7 +48,7 @@ commands:
     reply: { equals: OK }
   set_gear:
     send: "GEAR {{ gear }}"
-    args: { gear: { type: integer, choices: [0, 1] } }
+    args: { gear: { type: integer, choices: [0, 1, 2] } }
     reply: { equals: OK }
   set_pump:
     send: "PUMP {{ pump }}"

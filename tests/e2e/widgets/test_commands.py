@@ -69,6 +69,36 @@ async def test_choosing_by_keys_keeps_the_focus(
             robot.lines.clear()
 
 
+@pytest.mark.parametrize(
+    "control", ["select.select-list", "[data-cell='0'] .select-radio >> nth=0"]
+)
+async def test_what_is_chosen_while_the_robot_is_asked_is_given_next(
+    new_page: PageMaker,
+    urc_process: Callable[..., UrcProcess],
+    tmp_path: Path,
+    control: str,
+) -> None:
+    """Arrow keys go on from what was chosen last, however slow the robot is; the last one counts."""
+    async with crane(urc_process, tmp_path, WORDED) as (robot, address):
+        page = await new_page(size="desktop")
+        await page.goto(address)
+        await ready(page, "[data-cell='0'] .select-radio")
+        await robot.tell_gear(0, "P0")
+        await until_text(page, ".select-now", "low")
+        robot.holds = True
+        await page.focus(control)
+        await page.keyboard.press("ArrowDown")
+        await until_attribute(page, ".select:has(:focus)", "data-phase", "pending")
+        await page.keyboard.press("ArrowDown")
+        await page.keyboard.press("ArrowUp")
+        await page.keyboard.press("ArrowDown")
+        robot.release()
+        await robot.until_got("GEAR 1", "GEAR 2")
+        await robot.tell_gear(2, "P0")
+        await until_text(page, ".select:has(:focus) .select-now", "top")
+        assert await page.locator("[data-wish=missed], [data-wish=waiting]").count() == 0
+
+
 CONTROLS = """
   lamp: { use: switch, bind: { state: lamp, change: set_lamp } }
   mode: { use: select, bind: { state: mode, change: set_mode }, options: { look: segmented } }

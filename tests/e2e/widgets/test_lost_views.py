@@ -83,3 +83,33 @@ async def test_points_that_have_gone_are_not_drawn(new_page: PageMaker) -> None:
         robot.link("live")
         await until_attribute(page, ".scene3d", "data-state", "live")
         assert apart(full, await look()) < 5
+
+
+async def test_a_pose_that_is_not_known_stays_as_it_was_last(new_page: PageMaker) -> None:
+    """It does not stand up straight because an angle is missing; its words say nothing then."""
+    tilt = {name: Signal(name, "number", unit="rad", stale_after_s=60) for name in ("r", "p")}
+    use = WidgetUse("s", "scene3d", {"roll": "r", "pitch": "p"})
+    page = await new_page(size="desktop")
+    async with shown(page, tilt, use) as robot:
+        await page.wait_for_selector(".scene3d[data-model='box']")
+        await page.eval_on_selector(
+            ".scene3d-picture", "(el) => (el.style = 'filter: none; opacity: 1')"
+        )
+
+        async def look() -> list[list[int]]:
+            await page.evaluate(RESTED)
+            return (await coarse(page, [".scene3d-picture"]))[0]
+
+        robot.say("r", 0.0)
+        robot.say("p", 0.0)
+        await until_text(page, ".scene3d-text", "level")
+        level = await look()
+        robot.say("r", 0.7)
+        robot.say("p", -0.4)
+        await until_text(page, ".scene3d-text", "right side down 40° · nose up 23°")
+        tilted = await look()
+        assert apart(level, tilted) > 20
+        robot.say("p", -0.4, age_s=700)
+        await until_text(page, ".scene3d-text", "—")
+        await until_attribute(page, ".scene3d", "data-pose", "unknown")
+        assert apart(tilted, await look()) < 10  # its note has a line more

@@ -6,11 +6,13 @@ own cell.
 
 import json
 import logging
+import traceback
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
+from typing import Final
 
-from jinja2 import Environment, StrictUndefined, Template
+from jinja2 import Environment, StrictUndefined, Template, TemplateSyntaxError
 from jinja2.sandbox import ImmutableSandboxedEnvironment
 from markupsafe import Markup
 
@@ -26,14 +28,20 @@ from urc.web.show.markdown import markdown
 from urc.web.show.outputs import inputs_config, output_config
 
 __all__ = [
+    "TEMPLATE",
     "Cell",
     "WidgetContext",
+    "fault_line",
     "render_widget",
     "spoken",
     "widget_cell",
     "widget_context",
     "widget_environment",
 ]
+
+TEMPLATE: Final = "template.html.j2"
+_CODE: Final = "<template>"
+"""What Jinja calls the file of a template that it was given as text."""
 
 log = logging.getLogger(__name__)
 
@@ -134,8 +142,9 @@ def widget_cell(
     try:
         html = render_widget(widget, context)
     except Exception as problem:  # a supervisor: a widget costs its own cell
-        log.warning("widget %s: its template failed: %s", widget.name, problem)
-        error = f"{type(problem).__name__}: {problem}"
+        place = f"{TEMPLATE}:{fault_line(problem)}"
+        error = f"{place}: {type(problem).__name__}: {problem}"
+        log.warning("widget %s: %s", widget.name, error)
     config = {
         "slot": use.slot,
         "widget": use.widget,
@@ -146,6 +155,15 @@ def widget_cell(
     }
     frame = frame_url(widget) if border.is_foreign(widget) else ""
     return Cell(index, json.dumps(config), html, error, is_background, frame)
+
+
+def fault_line(fault: Exception) -> int:
+    """Return the line of a widget's template in which it failed, from 1."""
+    if isinstance(fault, TemplateSyntaxError):
+        return fault.lineno
+    frames = traceback.extract_tb(fault.__traceback__)
+    lines = [frame.lineno or 1 for frame in frames if frame.filename == _CODE]
+    return lines[-1] if lines else 1
 
 
 def spoken(name: str) -> str:

@@ -4,9 +4,7 @@ Floor 5. Only what is certain is told; what a template does with a name that the
 in the states of the demo shows.
 """
 
-import traceback
 from collections.abc import Iterable, Iterator
-from typing import Final
 
 from jinja2 import TemplateSyntaxError, nodes
 from jinja2.meta import find_undeclared_variables
@@ -14,13 +12,9 @@ from jinja2.meta import find_undeclared_variables
 from urc.config.suggest import did_you_mean
 from urc.model.widget import Widget
 from urc.problems import Problem
-from urc.web.show.cells import WidgetContext, widget_environment
+from urc.web.show.cells import TEMPLATE, WidgetContext, fault_line, widget_environment
 
-__all__ = ["TEMPLATE", "TemplateCheck"]
-
-TEMPLATE: Final = "template.html.j2"
-_CODE: Final = "<template>"
-"""What Jinja calls the file of a template that it was given as text."""
+__all__ = ["TemplateCheck"]
 
 
 class TemplateCheck:
@@ -53,10 +47,8 @@ class TemplateCheck:
 
     def fault(self, error: Exception, where: str) -> Problem:
         """Return what it raised when it was rendered, at its line."""
-        frames = traceback.extract_tb(error.__traceback__)
-        lines = [frame.lineno or 1 for frame in frames if frame.filename == _CODE]
         text = str(error).partition("\n")[0] or type(error).__name__
-        return self._problem("bad-template", f"{text}{where}", lines[-1] if lines else 1)
+        return self._problem("bad-template", f"{text}{where}", fault_line(error))
 
     def _names(
         self, tree: nodes.Template, asked: set[int], known: Iterable[str]
