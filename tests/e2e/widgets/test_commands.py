@@ -13,6 +13,7 @@ from tests.e2e.widgets.cranes import crane, ready
 
 pytestmark = pytest.mark.anyio
 
+RADIO = "[data-cell='0'] .select-radio >> nth=0"
 WORDED = """
   gear: { use: select, bind: { state: gear, change: set_gear }, options: { look: radio } }
   gears: { use: select, bind: { state: gear, change: set_gear } }
@@ -78,7 +79,7 @@ async def test_what_is_chosen_while_the_robot_is_asked_is_given_next(
     tmp_path: Path,
     control: str,
 ) -> None:
-    """Arrow keys go on from what was chosen last, however slow the robot is; the last one counts."""
+    """Arrow keys go on from what was chosen last; of all that is chosen meanwhile the newest."""
     async with crane(urc_process, tmp_path, WORDED) as (robot, address):
         page = await new_page(size="desktop")
         await page.goto(address)
