@@ -81,6 +81,24 @@ def test_motion_says_what_the_robot_does_when_commands_stop(file: Path) -> None:
         assert "fail-safe" in profile.summary.lower()
 
 
+def test_what_steers_it_is_seen_on_a_phone_that_lies(file: Path) -> None:
+    """Two rows fit there; whatever is held on a wide screen is in them."""
+    profile = profile_of(file)
+    holds = {name for name, one in profile.driver.commands.items() if one.hold is not None}
+    steers = {
+        name for name, use in profile.slots.items() if not holds.isdisjoint(use.outputs.values())
+    }
+    pages = [page for interface in profile.interfaces.values() for page in interface.pages]
+    assert pages
+    for page in pages:
+        shown = page.grids.get("low", page.grids["wide"])
+        filled = [slot for slot in shown.slots if slot.name in profile.slots]
+        rows = {row for slot in filled for row in range(slot.row, slot.row + slot.row_span)}
+        assert len(rows) <= 2
+        wide = {slot.name for slot in page.grids["wide"].slots}
+        assert steers & wide <= {slot.name for slot in filled}
+
+
 def test_its_page_is_made_with_every_slot_of_each_interface(file: Path) -> None:
     """The default interface and all others, the one for finding faults among them."""
     profile = profile_of(file)

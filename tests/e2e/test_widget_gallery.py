@@ -36,7 +36,16 @@ LOW = (
     *("joystick", "dpad", "axis", "tilt", "keyboard", "value"),
     *("button", "number", "select", "switch", "text", "sequence", "log"),
 )
-LOW_CELLS = ((126, 128), (171, 128), (229, 104), (356, 128), (305, 150), (305, 216), (258, 202))
+LOW_CELLS = (
+    (126, 128),
+    (171, 128),
+    (229, 104),
+    (356, 128),
+    (305, 150),
+    (305, 216),
+    (258, 202),
+    (226, 248),
+)
 """As grids of several columns have them on phones, upright and on their sides, and on desktops."""
 REPEAT_MS = 1000
 """So often the gallery keeps its readings as old as they are meant to be."""

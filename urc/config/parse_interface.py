@@ -112,7 +112,7 @@ def _pictures(part: Part, findings: Findings, *, is_tab: bool) -> dict[str, Grid
 
 
 def _by_screen(several: Part, findings: Findings) -> dict[str, Grid]:
-    pictures = {screen: several.get(screen) for screen in ("wide", "tall", "phone")}
+    pictures = {screen: several.get(screen) for screen in ("wide", "tall", "phone", "low")}
     return {
         screen: _grid(picture, findings)
         for screen, picture in pictures.items()

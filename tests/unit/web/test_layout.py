@@ -51,6 +51,19 @@ def test_a_drawn_phone_grid_is_kept_and_hides_what_it_leaves_out() -> None:
     assert '[data-cell="1"]{display:none}' in rules
 
 
+def test_a_low_screen_has_a_picture_of_its_own_where_one_is_drawn() -> None:
+    """Without its margins; else it shows the wide one, in lower rows."""
+    wide = Grid(3, 1, (Slot("a", 0, 0), Slot("b", 1, 0), Slot("c", 2, 0)))
+    low = Grid(1, 3, (Slot("c", 0, 0), Slot("a", 0, 2)))
+    rule = "@media (max-height: 479.98px)"
+    drawn = css(("wide", wide), ("low", low), slots=("a", "b", "c")).split(rule)[1]
+    assert '[data-cell="0"]{display:grid;grid-area:1/2/2/3}' in drawn
+    assert '[data-cell="1"]{display:none}' in drawn.split("@media")[0]
+    assert '[data-cell="2"]{display:grid;grid-area:1/1/2/2}' in drawn
+    other = css(("wide", wide), slots=("a", "b", "c")).split(rule)[1]
+    assert f"grid-template-rows:{' '.join(['minmax(6.5rem,1fr)'] * 3)};" in other
+
+
 def test_slots_that_nobody_fills_take_no_room() -> None:
     """One interface serves many drivers."""
     wide = Grid(1, 2, (Slot("a", 0, 0), Slot("camera", 0, 1)))

@@ -5,7 +5,8 @@ Floor 5. Pure. The rules hold numbers only, so nothing out of a document can end
 A row or column in which no slot stands is a margin: it keeps its place in the picture, and gets an
 eighth of the room of one that is used. A phone has no room for margins: they are left out there.
 Held upright it shows the ``phone`` grid, else the ``tall`` one, else the wide one; of the latter
-two it stacks more than two columns in reading order.
+two it stacks more than two columns in reading order. On its side it shows the ``low`` grid, else the
+wide one.
 
 Over a background, what is empty is a window: it keeps its full size on every screen; only on a low
 one, empty rows give way to those with widgets.
@@ -96,7 +97,7 @@ def _placed(grids: Mapping[str, Grid], canvas: _Canvas) -> dict[str, Grid]:
     placed = {"base": base}
     if "tall" in grids:
         placed[TALL] = _filled(grids["tall"], canvas.slots)
-    placed[SHORT] = crop(base)
+    placed[SHORT] = crop(_filled(grids["low"], canvas.slots) if "low" in grids else base)
     upright = grids.get("phone") or grids.get("tall") or wide
     phone = crop(_filled(upright, canvas.slots))
     if "phone" not in grids and phone.columns > PHONE_COLUMNS:
