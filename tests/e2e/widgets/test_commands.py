@@ -9,7 +9,7 @@ from playwright.async_api import Locator, Page
 from tests.e2e.conftest import PageMaker
 from tests.e2e.dashboards import until_attribute, until_text
 from tests.e2e.processes import UrcProcess
-from tests.e2e.widgets.cranes import crane, ready
+from tests.e2e.widgets.cranes import Crane, crane, ready
 
 pytestmark = pytest.mark.anyio
 
@@ -22,16 +22,22 @@ WORDED = """
 """
 
 
+async def in_low_gear(new_page: PageMaker, robot: Crane, address: str) -> Page:
+    """Open the page, and let the robot say that it is in low gear."""
+    page = await new_page(size="desktop")
+    await page.goto(address)
+    await ready(page, "[data-cell='0'] .select-radio")
+    await robot.tell_gear(0, "P0")
+    await until_text(page, ".select-now", "low")
+    return page
+
+
 async def test_a_signal_with_words_is_chosen_and_switched_by_what_the_robot_says(
     new_page: PageMaker, urc_process: Callable[..., UrcProcess], tmp_path: Path
 ) -> None:
     """People read the words, the robot is told its own; the mark stands where it says it is."""
     async with crane(urc_process, tmp_path, WORDED) as (robot, address):
-        page = await new_page(size="desktop")
-        await page.goto(address)
-        await ready(page, "[data-cell='0'] .select-radio")
-        await robot.tell_gear(0, "P0")
-        await until_text(page, ".select-now", "low")
+        page = await in_low_gear(new_page, robot, address)
         assert await page.get_by_role("radio", name="low").is_checked()
         assert await page.input_value("select.select-list") == "0"
         assert await page.inner_text(".state-shape") == "◆"
@@ -55,11 +61,7 @@ async def test_choosing_by_keys_keeps_the_focus(
 ) -> None:
     """While the robot is asked, too: a key that fell to the page could drive it."""
     async with crane(urc_process, tmp_path, WORDED) as (robot, address):
-        page = await new_page(size="desktop")
-        await page.goto(address)
-        await ready(page, "[data-cell='0'] .select-radio")
-        await robot.tell_gear(0, "P0")
-        await until_text(page, ".select-now", "low")
+        page = await in_low_gear(new_page, robot, address)
         for control in ("select.select-list", "[data-cell='0'] .select-radio"):
             robot.holds = True
             await page.focus(control)
@@ -81,11 +83,7 @@ async def test_what_is_chosen_while_the_robot_is_asked_is_given_next(
 ) -> None:
     """Arrow keys go on from what was chosen last; of all that is chosen meanwhile the newest."""
     async with crane(urc_process, tmp_path, WORDED) as (robot, address):
-        page = await new_page(size="desktop")
-        await page.goto(address)
-        await ready(page, "[data-cell='0'] .select-radio")
-        await robot.tell_gear(0, "P0")
-        await until_text(page, ".select-now", "low")
+        page = await in_low_gear(new_page, robot, address)
         robot.holds = True
         await page.focus(control)
         await page.keyboard.press("ArrowDown")

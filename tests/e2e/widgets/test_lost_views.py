@@ -1,6 +1,7 @@
 """What the widgets that look at the world show of what has gone."""
 
 import pytest
+from playwright.async_api import Page
 
 from tests.e2e.conftest import PageMaker
 from tests.e2e.dashboards import until_attribute, until_text
@@ -54,6 +55,16 @@ def apart(one: list[list[int]], other: list[list[int]]) -> int:
     return max(abs(a - b) for row, beside in pairs for a, b in zip(row, beside, strict=True))
 
 
+async def look(page: Page) -> list[list[int]]:
+    """Return how the scene looks; in colour whatever its state: only what is drawn differs."""
+    await page.wait_for_selector(".scene3d[data-model='box']")
+    await page.eval_on_selector(
+        ".scene3d-picture", "(el) => (el.style = 'filter: none; opacity: 1')"
+    )
+    await page.evaluate(RESTED)
+    return (await coarse(page, [".scene3d-picture"]))[0]
+
+
 async def test_points_that_have_gone_are_not_drawn(new_page: PageMaker) -> None:
     """The scene is then as it was before there were any; they come back with the line."""
     signals = {"seen": Signal("seen", "array", of="number", unit="m", stale_after_s=60)}
@@ -62,27 +73,17 @@ async def test_points_that_have_gone_are_not_drawn(new_page: PageMaker) -> None:
     plane = tuple(part for x in steps for y in steps for part in (x, y, 1.0))
     page = await new_page(size="desktop")
     async with shown(page, signals, use) as robot:
-        await page.wait_for_selector(".scene3d[data-model='box']")
-        # In colour whatever its state, so that only what is drawn differs.
-        await page.eval_on_selector(
-            ".scene3d-picture", "(el) => (el.style = 'filter: none; opacity: 1')"
-        )
-
-        async def look() -> list[list[int]]:
-            await page.evaluate(RESTED)
-            return (await coarse(page, [".scene3d-picture"]))[0]
-
-        before = await look()
+        before = await look(page)
         robot.say("seen", plane)  # type: ignore[arg-type]
         await until_attribute(page, ".scene3d", "data-state", "live")
-        full = await look()
+        full = await look(page)
         assert apart(before, full) > 20
         robot.link("lost", age_s=120)
         await until_attribute(page, ".scene3d", "data-state", "gone")
-        assert apart(before, await look()) < 5
+        assert apart(before, await look(page)) < 5
         robot.link("live")
         await until_attribute(page, ".scene3d", "data-state", "live")
-        assert apart(full, await look()) < 5
+        assert apart(full, await look(page)) < 5
 
 
 async def test_a_pose_that_is_not_known_stays_as_it_was_last(new_page: PageMaker) -> None:
@@ -91,25 +92,16 @@ async def test_a_pose_that_is_not_known_stays_as_it_was_last(new_page: PageMaker
     use = WidgetUse("s", "scene3d", {"roll": "r", "pitch": "p"})
     page = await new_page(size="desktop")
     async with shown(page, tilt, use) as robot:
-        await page.wait_for_selector(".scene3d[data-model='box']")
-        await page.eval_on_selector(
-            ".scene3d-picture", "(el) => (el.style = 'filter: none; opacity: 1')"
-        )
-
-        async def look() -> list[list[int]]:
-            await page.evaluate(RESTED)
-            return (await coarse(page, [".scene3d-picture"]))[0]
-
         robot.say("r", 0.0)
         robot.say("p", 0.0)
         await until_text(page, ".scene3d-text", "level")
-        level = await look()
+        level = await look(page)
         robot.say("r", 0.7)
         robot.say("p", -0.4)
         await until_text(page, ".scene3d-text", "right side down 40° · nose up 23°")
-        tilted = await look()
+        tilted = await look(page)
         assert apart(level, tilted) > 20
         robot.say("p", -0.4, age_s=700)
         await until_text(page, ".scene3d-text", "—")
         await until_attribute(page, ".scene3d", "data-pose", "unknown")
-        assert apart(tilted, await look()) < 10  # its note has a line more
+        assert apart(tilted, await look(page)) < 10  # its note has a line more
