@@ -8,8 +8,10 @@ from urc.model.interface import Grid, Interface, Slot, WidgetUse
 
 __all__ = ["default_interface"]
 
-_COLUMNS: Final = {"wide": 4, "phone": 2}
+_COLUMNS: Final = {"wide": 4, "phone": 2, "low": 7}
 """Most columns of a made grid."""
+_LOW_ROWS: Final = 2
+"""So many are seen on a phone that lies."""
 _BIG: Final = frozenset(
     (
         *("attitude", "camera", "depth", "dpad", "image", "joystick", "log", "map", "pano360"),
@@ -23,28 +25,34 @@ def default_interface(slots: Mapping[str, WidgetUse], title: str) -> Interface:
     """Return an interface named ``default`` that shows every slot.
 
     What is looked at stands on top, the large before the small; what is steered with is at the
-    bottom right, where the thumb is, and other controls take the places that are left.
+    bottom right, where the thumb is, and other controls take the places that are left. On a phone
+    that lies what steers comes first, at the right and at the left: the rest may be scrolled to.
     """
     return Interface(
         name="default",
         title=title,
-        grids={screen: _grid(slots, most) for screen, most in _COLUMNS.items()},
+        grids={screen: _grid(slots, screen) for screen in _COLUMNS},
     )
 
 
-def _grid(slots: Mapping[str, WidgetUse], most: int) -> Grid:
+def _grid(slots: Mapping[str, WidgetUse], screen: str) -> Grid:
+    is_low = screen == "low"
     sizes = {name: 2 if use.widget in _BIG else 1 for name, use in slots.items()}
     area = sum(size * size for size in sizes.values())
-    columns = max(1, min(most, math.ceil(math.sqrt(area))), *sizes.values())
+    wanted = math.ceil(area / _LOW_ROWS if is_low else math.sqrt(area))
+    columns = max(1, min(_COLUMNS[screen], wanted), *sizes.values())
     taken: set[tuple[int, int]] = set()
     placed: dict[str, Slot] = {}
     ranks = {name: _rank(use) for name, use in slots.items()}
     # Where nothing fits beside what steers, that comes last: at the bottom, and nothing below it.
-    last = {name: rank if columns > 2 or rank != _STEERED else 4 for name, rank in ranks.items()}
-    for name in sorted(slots, key=lambda name: last[name]):
+    steered = -1 if is_low else _STEERED if columns > 2 else 4
+    order = {name: steered if rank == _STEERED else rank for name, rank in ranks.items()}
+    for number, name in enumerate(sorted(slots, key=lambda name: order[name])):
         is_steered = ranks[name] == _STEERED
-        first = max((row for row, _ in taken), default=-1) + 1 if is_steered else 0
-        row, column = _free(taken, columns, sizes[name], first, is_from_right=is_steered)
+        is_last = is_steered and not is_low
+        first = max((row for row, _ in taken), default=-1) + 1 if is_last else 0
+        is_right = is_steered and not (is_low and number % 2)
+        row, column = _free(taken, columns, sizes[name], first, is_from_right=is_right)
         taken |= _cells(row, column, sizes[name])
         placed[name] = Slot(name, row, column, sizes[name], sizes[name])
     rows = max((row for row, _ in taken), default=0) + 1

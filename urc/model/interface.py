@@ -62,7 +62,10 @@ class Grid(NamedTuple):
 
 
 class Tab(NamedTuple):
-    """One page of an interface. `grids` has an entry per screen: ``wide``, ``tall``, ``phone``, ``low``."""
+    """One page of an interface.
+
+    `grids` has an entry per screen: ``wide``, ``tall``, ``phone``, ``low``.
+    """
 
     name: str = ""
     """"" of the only page of an interface without tabs."""

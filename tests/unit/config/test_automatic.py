@@ -230,6 +230,21 @@ def test_the_grid_has_the_stick_at_the_bottom_right() -> None:
     assert grids["phone"].columns == 2
 
 
+def test_a_phone_that_lies_has_the_sticks_under_both_thumbs() -> None:
+    """In the two rows that are seen, whatever else there is."""
+    sticks = (use("drive", "joystick", "m"), use("look", "joystick", "m"))
+    shown = (use("cam", "camera"), *(use(f"v{place}", "value") for place in range(8)))
+    slots = {one.slot: one for one in (*shown, *sticks)}
+    low = default_interface(slots, "T").grids["low"]
+    places = {slot.name: slot for slot in low.slots}
+    assert places["drive"] == Slot("drive", 0, 5, 2, 2)
+    assert places["look"] == Slot("look", 0, 0, 2, 2)
+    assert places["cam"] == Slot("cam", 0, 2, 2, 2)
+    assert (low.rows, low.columns) == (3, 7)
+    few = default_interface({"a": shown[1], "drive": sticks[0]}, "T").grids["low"]
+    assert (few.rows, few.columns) == (2, 3)
+
+
 DOCUMENT = (
     head("robot", "bot")
     + WIRE

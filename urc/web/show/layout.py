@@ -5,8 +5,8 @@ Floor 5. Pure. The rules hold numbers only, so nothing out of a document can end
 A row or column in which no slot stands is a margin: it keeps its place in the picture, and gets an
 eighth of the room of one that is used. A phone has no room for margins: they are left out there.
 Held upright it shows the ``phone`` grid, else the ``tall`` one, else the wide one; of the latter
-two it stacks more than two columns in reading order. On its side it shows the ``low`` grid, else the
-wide one.
+two it stacks more than two columns in reading order. On its side it shows the ``low`` grid, else
+the wide one.
 
 Over a background, what is empty is a window: it keeps its full size on every screen; only on a low
 one, empty rows give way to those with widgets.
