@@ -218,12 +218,21 @@ def test_without_an_interface_the_widgets_are_laid_out(checked: Checker) -> None
 
 
 @pytest.mark.parametrize(
-    ("signals", "wide", "phone"), [(1, (1, 1), (1, 1)), (3, (2, 2), (2, 2)), (20, (5, 4), (10, 2))]
+    ("signals", "wide", "phone", "low"),
+    [
+        (1, (1, 1), (1, 1), (1, 1)),
+        (3, (2, 2), (2, 2), (2, 2)),
+        (20, (5, 4), (10, 2), (3, 7)),
+    ],
 )
 def test_without_any_look_each_signal_is_shown(
-    checked: Checker, signals: int, wide: tuple[int, int], phone: tuple[int, int]
+    checked: Checker,
+    signals: int,
+    wide: tuple[int, int],
+    phone: tuple[int, int],
+    low: tuple[int, int],
 ) -> None:
-    """At most four columns, two on a phone."""
+    """At most four columns, two on a phone, seven on one that lies."""
     names = [f"s{number}" for number in range(signals)]
     profile = checked.profile(
         HEAD + WIRE + "signals:\n" + "".join(f"  {name}: {{ unit: V }}\n" for name in names)
@@ -232,6 +241,7 @@ def test_without_any_look_each_signal_is_shown(
     assert {name: (grid.rows, grid.columns) for name, grid in grids.items()} == {
         "wide": wide,
         "phone": phone,
+        "low": low,
     }
     assert [slot.name for slot in grids["wide"].slots] == names
     assert profile.slots["s0"] == WidgetUse("s0", "value", {"value": "s0"}, title="S0")
