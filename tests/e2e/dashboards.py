@@ -73,9 +73,10 @@ async def until_closed(line: ClientConnection) -> int | None:
 
 
 async def until_text(page: Page, selector: str, text: str) -> None:
-    """Wait until an element of the page says exactly `text`."""
+    """Wait until an element of the page says exactly `text`, wherever its lines may break."""
     await page.wait_for_function(
-        "([selector, text]) => document.querySelector(selector)?.textContent.trim() === text",
+        "([selector, text]) => document.querySelector(selector)?.textContent"
+        ".trim().replaceAll('\u00a0', ' ') === text",
         arg=[selector, text],
     )
 

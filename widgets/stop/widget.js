@@ -3,6 +3,7 @@
 /** @typedef {import("../../urc/web/static/types.js").Instance} Instance */
 /** @typedef {import("../../urc/web/static/types.js").StopState} StopState */
 import { whenPressed } from "urc/giving";
+import { inTurn } from "urc/kit";
 
 export default {
   /**
@@ -33,8 +34,8 @@ export default {
 function words({ phase, isLatched, isConfirmed, fault }, isCut, t) {
   if (phase === "failed") return t("▲ NO LINK: stop it by hand");
   if (isCut) return t("▲ NO LINK: {reason}", { reason: fault });
-  if (isConfirmed) return [t("✓ sent"), t("✓ confirmed"), t("✓ latched")].join(" ");
-  if (isLatched) return [t("✓ sent"), t("✓ latched")].join(" ");
+  if (isConfirmed) return inTurn([t("✓ sent"), t("✓ confirmed"), t("✓ latched")]);
+  if (isLatched) return inTurn([t("✓ sent"), t("✓ latched")]);
   if (phase === "") return "—";
   return phase === "sent" ? t("✓ sent") : t("… sending");
 }

@@ -9,6 +9,7 @@
  */
 import { part } from "./badge.js";
 import { whenPressed } from "./press.js";
+import { inTurn } from "./texts.js";
 import { said, t } from "./words.js";
 
 /** @type {Verb[]} */
@@ -93,11 +94,11 @@ export class Controls {
     const isSent = phase !== "" && phase !== "sending" && phase !== "failed";
     this.stop.dataset["phase"] = fault && !isConfirmed ? "fault" : phase;
     const steps = [
-      isSent && t("✓ sent"),
-      isConfirmed && t("✓ confirmed"),
-      isLatched && t("✓ latched"),
+      isSent ? t("✓ sent") : "",
+      isConfirmed ? t("✓ confirmed") : "",
+      isLatched ? t("✓ latched") : "",
     ].filter(Boolean);
-    let note = steps.join(" ");
+    let note = inTurn(steps);
     if (phase === "sending") note = t("… sending");
     if (phase === "failed" || (fault && !isConfirmed)) {
       if (phase === "failed") note = t("▲ NO LINK: stop it by hand");

@@ -14,7 +14,7 @@ import { fixed, rough } from "./figures.js";
 import { mark } from "./words.js";
 
 export { digitsIn, figure } from "./figures.js";
-export { wordOf } from "./texts.js";
+export { inTurn, wordOf } from "./texts.js";
 export { mark, t } from "./words.js";
 
 /** "None": what is not known is never shown as 0. */

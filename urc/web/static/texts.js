@@ -40,6 +40,15 @@ export function wordOf(signal, value) {
 }
 
 /**
+ * Return short words one after the other; where there is no room, the line breaks between them.
+ *
+ * @param {readonly string[]} words
+ */
+export function inTurn(words) {
+  return words.map((each) => each.replaceAll(" ", "\u00a0")).join(" ");
+}
+
+/**
  * Whole numbers only: a reader wants to know "old", not tenths.
  *
  * @param {number} seconds
