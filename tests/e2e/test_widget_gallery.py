@@ -45,6 +45,7 @@ LOW_CELLS = (
     (305, 216),
     (258, 202),
     (226, 248),
+    (165, 236),
 )
 """As grids of several columns have them on phones, upright and on their sides, and on desktops."""
 REPEAT_MS = 1000
