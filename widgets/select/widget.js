@@ -27,7 +27,7 @@ export default {
 class Select {
   /** @param {Context} ctx */
   constructor(ctx) {
-    const { el, options, signal, t } = ctx;
+    const { el, options, signal, t, onStop } = ctx;
     this.ctx = ctx;
     this.root = part(el, ".select");
     this.now = part(el, ".select-now");
@@ -43,7 +43,7 @@ class Select {
     /** @type {Value} */
     this.chosen = null;
     const show = () => this.show();
-    this.giver = new Giver({ give: (args) => this.give(args), show, t, signal });
+    this.giver = new Giver({ give: (args) => this.give(args), show, t, signal, onStop });
     this.wish = new Wish({
       withinMs: 1000 * Number(options["echo_s"] ?? 3),
       show,

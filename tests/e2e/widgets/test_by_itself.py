@@ -11,7 +11,7 @@ from tests.e2e.dashboards import until, until_text
 from tests.e2e.motion.driving import STOP, centre, driven, fresh
 from tests.e2e.widgets.inputs import Inputs, use
 from urc.model.codec import WriteSpec
-from urc.model.driver import Command
+from urc.model.driver import Argument, Command
 from urc.model.interface import WidgetUse
 from urc.model.values import Reading
 from urc.protocol.events import Replied
@@ -28,8 +28,8 @@ PLAIN = {
 class Slow(Inputs):
     """Its first command is under way until the test says that it is done."""
 
-    def __init__(self, *uses: WidgetUse) -> None:
-        super().__init__(*uses, **PLAIN)
+    def __init__(self, *uses: WidgetUse, **commands: Command) -> None:
+        super().__init__(*uses, **{**PLAIN, **commands})
         self.done = asyncio.Event()
 
     async def command(self, name: str, arguments: Mapping[str, Reading], **how: Any) -> Replied:
@@ -54,6 +54,41 @@ async def test_stop_ends_a_list_of_steps(new_page: PageMaker) -> None:
         slow.done.set()
         await until_text(page, ".sequence-note", "▲ STOP was pressed")
         assert slow.commands == [("unlock", {})]
+
+
+TUNE = Command("unlock", "wire", WriteSpec("text"), {"value": Argument("value", min=0, max=9)})
+
+
+@pytest.mark.parametrize(
+    ("widget", "control", "options"),
+    [
+        ("select", "select.select-list", {"choices": ["1", "2", "3"]}),
+        ("slider", ".slider-track", {"step": 1}),
+    ],
+)
+async def test_stop_ends_what_waits_for_the_robot(
+    new_page: PageMaker, widget: str, control: str, options: Mapping[str, Any]
+) -> None:
+    """What was chosen while the robot was asked is not given after STOP; what is chosen then is."""
+    key = "ArrowDown" if widget == "select" else "ArrowRight"
+    slow = Slow(STICK, WidgetUse("tune", widget, {}, {"change": "unlock"}, options), unlock=TUNE)
+    async with driven(robot=slow) as (_, address):
+        page = await fresh(new_page)
+        await page.goto(address)
+        await page.wait_for_selector(f"{control}[aria-disabled='false']")
+        await page.focus(control)
+        await page.keyboard.press(key)
+        await until(lambda: len(slow.commands) == 1)
+        await page.keyboard.press(key)
+        await asyncio.sleep(0.3)
+        await page.keyboard.press("Escape")
+        await until_text(page, "[data-who]", "■ Stopped by you")
+        slow.done.set()
+        await page.wait_for_selector(f".{widget}[data-phase='done']")
+        await asyncio.sleep(0.3)
+        assert len(slow.commands) == 1
+        await page.keyboard.press(key)
+        await until(lambda: len(slow.commands) == 2)
 
 
 async def repeating(new_page: PageMaker, robot: Inputs, address: str) -> Any:

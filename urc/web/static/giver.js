@@ -3,6 +3,7 @@
  * One command that a widget gives, and what became of it. Knows no socket and no store.
  *
  * @typedef {import("./types.js").Outlet} Outlet
+ * @typedef {import("./types.js").StopState} StopState
  * @typedef {import("./types.js").Value} Value
  * @typedef {(text: string, names?: Record<string, string | number>) => string} T
  * @typedef {"" | "pending" | "done" | "failed"} Phase
@@ -20,8 +21,10 @@ export class Giver {
    * @param {T} spec.t
    * @param {AbortSignal} spec.signal
    * @param {number} [spec.everyMs] `newest` gives no more often
+   * @param {(listener: (state: StopState) => void) => void} [spec.onStop] by which `newest` learns of
+   *   STOP: what still waits then is not given
    */
-  constructor({ give, show, t, signal, everyMs = 100 }) {
+  constructor({ give, show, t, signal, everyMs = 100, onStop }) {
     this.give = give;
     this.show = show;
     this.t = t;
@@ -39,6 +42,9 @@ export class Giver {
     this.telling = undefined;
     /** @type {number | undefined} */
     this.pacing = undefined;
+    onStop?.(({ phase }) => {
+      if (phase !== "") this.next = null;
+    });
     signal.addEventListener("abort", () => {
       this.isOver = true;
       this.next = null;

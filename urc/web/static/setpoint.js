@@ -3,6 +3,7 @@
  * A number that a hand sets: what is given when, what is shown, and what the robot says about it.
  * Draws nothing; a slider, a knob and a number field are three looks of it.
  *
+ * @typedef {import("./types.js").Value} Value
  * @typedef {import("./types.js").Context} Context
  * @typedef {import("./types.js").Outlet} Outlet
  * @typedef {import("./types.js").Reading} Reading
@@ -18,7 +19,7 @@ export class Setpoint {
    * @param {() => void} show called when anything has changed
    */
   constructor(ctx, show) {
-    const { options, signal, send, t } = ctx;
+    const { options, signal, send, t, onStop } = ctx;
     this.ctx = ctx;
     this.show = show;
     this.isLive = options["send"] !== "release";
@@ -31,7 +32,8 @@ export class Setpoint {
     /** @type {Reading | undefined} */
     this.state = undefined;
     const everyMs = Number(options["every_ms"] ?? 100);
-    this.giver = new Giver({ give: (args) => this.sent(send("change", args)), show, t, signal, everyMs });
+    const give = (/** @type {Record<string, Value>} */ args) => this.sent(send("change", args));
+    this.giver = new Giver({ give, show, t, signal, everyMs, onStop });
     this.wish = new Wish({
       withinMs: 1000 * Number(options["echo_s"] ?? 3),
       show,
