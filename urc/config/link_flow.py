@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Mapping
 from typing import Protocol
 
+from urc.config.moving import link_moves, refuse_moving, runs_what_moves
 from urc.config.part import Findings, Part
 from urc.config.suggest import did_you_mean
 from urc.config.values import check_within, fit_argument, fit_hint, known_argument
@@ -52,6 +53,7 @@ def link_command(linker: Linker, part: Part, command: Command) -> None:
     if command.reply is not None and "reply" in part.data:
         link_reply(linker, part.must("reply"), command.reply, command.arguments, command.send)
     link_requirements(linker, part, command)
+    link_moves(linker.findings, part, command)
     if command.verify is not None:
         linker.template(part.must("verify").must("expr"), command.verify.condition, known)
     if command.hold is not None:
@@ -100,17 +102,6 @@ def refuse_two_person(linker: Linker, part: Part, command: Command) -> None:
         )
 
 
-def refuse_moving(linker: Linker, part: Part, command: Command) -> None:
-    """Report what moves something by itself where nobody asks for it."""
-    if command.moves:
-        linker.findings.error(
-            part,
-            "wrong-command",
-            f"{command.name!r} moves something by itself, and here nobody asks for it",
-            hint="run a command that does not move, and let people give this one",
-        )
-
-
 def _needs_two(command: Command) -> bool:
     asked = [one for argument in command.arguments.values() for one in argument.confirm.values()]
     asked += [command.confirm] if command.confirm is not None else []
@@ -130,7 +121,7 @@ def link_poll(linker: Linker, part: Part, poll: Poll) -> None:
     command = find_command(linker, part.must("run"), poll.run)
     if command is None:
         return
-    if command.steps or command.hold is not None or command.moves:
+    if command.steps or command.hold is not None or runs_what_moves(command, poll.arguments):
         what = "a sequence" if command.steps else "a motion"
         linker.findings.error(
             part.must("run"),
@@ -197,7 +188,7 @@ def link_keepalives(linker: Linker, part: Part) -> None:
         if command is not None:
             link_arguments(linker.findings, place, command, {}, "run")
             refuse_two_person(linker, place.must("run"), command)
-            refuse_moving(linker, place.must("run"), command)
+            refuse_moving(linker.findings, place.must("run"), command, {})
 
 
 def find_command(linker: Linker, part: Part, name: str) -> Command | None:

@@ -6,9 +6,9 @@ from urc.config.link_flow import (
     link_arguments,
     link_refusals,
     link_requirements,
-    refuse_moving,
     refuse_two_person,
 )
+from urc.config.moving import refuse_moving
 from urc.config.part import Part
 from urc.expressions import COUNTERS, Template
 from urc.model.driver import Driver
@@ -156,7 +156,7 @@ class _Walk:
         link_arguments(self._linker.findings, part, command, given, "run")
         if not self._is_named:
             refuse_two_person(self._linker, part.must("run"), command)
-            refuse_moving(self._linker, part.must("run"), command)
+            refuse_moving(self._linker.findings, part.must("run"), command, step.arguments)
         if command.reply is not None:
             reads = [command.reply.read, *(one.read for one in command.reply.stages)]
             self._known |= {f"_{name.lstrip('_')}" for read in reads for name in read.fields}

@@ -5,6 +5,7 @@ from typing import Any
 
 from urc.config.beside_form import with_collected
 from urc.config.forms import FormContext, parse_read, parse_write
+from urc.config.moving import with_moving_steps
 from urc.config.parse_flow import (
     NOTHING_SENT,
     aged_by_lines,
@@ -13,7 +14,6 @@ from urc.config.parse_flow import (
     parse_choice_questions,
     parse_sequence,
     poll_with_flow,
-    with_moving_steps,
 )
 from urc.config.parse_line import parse_transport
 from urc.config.parse_reply import implied_reply, parse_reply

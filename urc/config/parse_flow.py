@@ -6,6 +6,7 @@ from typing import Final, Literal, cast
 
 from urc.config.forms import FormContext, parse_write
 from urc.config.messaging import MESSAGING
+from urc.config.moving import parse_moves
 from urc.config.parse_reply import refuse
 from urc.config.parse_steps import StepContext, parse_steps
 from urc.config.part import Findings, Part
@@ -26,7 +27,6 @@ from urc.model.flow import (
     Queue,
     Requirement,
     Retry,
-    RunStep,
     SendStep,
     Verify,
     all_steps,
@@ -40,7 +40,6 @@ __all__ = [
     "parse_choice_questions",
     "parse_sequence",
     "poll_with_flow",
-    "with_moving_steps",
 ]
 
 _PER_S: Final = {"s": 1.0, "m": 60.0, "h": 3600.0}
@@ -123,6 +122,7 @@ def command_with_flow(command: Command, part: Part, findings: Findings) -> Comma
     stops = part.flag("stop", default=False)
     if stops:
         _check_stop(command, part, findings)
+    moves, moves_if = parse_moves(part, findings)
     return command._replace(
         priority=cast("Priority", part.text("priority", "realtime" if stops else "normal")),
         is_latest_only=part.text("coalesce") == "latest",
@@ -131,7 +131,8 @@ def command_with_flow(command: Command, part: Part, findings: Findings) -> Comma
         retry=retry,
         is_idempotent=is_idempotent,
         hold=_hold(hold, findings) if hold else None,
-        moves=part.flag("moves", default=False),
+        moves=moves,
+        moves_if=moves_if,
         stops=stops,
         confirm=_confirm(confirm) if confirm else None,
         requires=_requires(part, findings),
@@ -224,26 +225,6 @@ def parse_sequence(
         confirm=_confirm(confirm) if confirm else None,
         requires=_requires(part, findings),
     )
-
-
-def with_moving_steps(commands: Mapping[str, Command]) -> dict[str, Command]:
-    """Return the commands; a sequence that runs what moves, or is held, moves as well."""
-    found = dict(commands)
-    moving = {name for name, one in found.items() if one.moves or one.hold is not None}
-    while True:
-        more = [
-            name
-            for name, one in found.items()
-            if name not in moving
-            and any(
-                isinstance(step, RunStep) and step.command in moving
-                for step in all_steps(one.steps)
-            )
-        ]
-        if not more:
-            return found
-        moving.update(more)
-        found |= {name: found[name]._replace(moves=True) for name in more}
 
 
 def _arguments(part: Part) -> dict[str, Reading]:

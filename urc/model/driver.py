@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Final, Literal, NamedTuple
 
-from urc.expressions import Template
+from urc.expressions import ExpressionError, Template
 from urc.model.codec import FramingSpec, ReadSpec, WriteSpec
 from urc.model.flow import (
     Confirm,
@@ -159,6 +159,8 @@ class Command(NamedTuple):
     moves: bool = False
     """It moves something by itself, with no hand that holds it; true of a sequence that runs what
     does, or what is held."""
+    moves_if: Template | None = None
+    """Over its arguments: only then it does. None: whatever they are."""
     stops: bool = False
     """It is given once when STOP is pressed."""
     confirm: Confirm | None = None
@@ -167,6 +169,16 @@ class Command(NamedTuple):
     steps: tuple[Step, ...] = ()
     """Of a sequence: what it does instead of sending. `transport` is then the first that it uses,
     and `send` is empty."""
+
+    def moves_with(self, arguments: Mapping[str, object]) -> bool:
+        """Return whether it moves something with these; what cannot be told does."""
+        if self.moves_if is None or not self.moves:
+            return self.moves
+        defaults = {name: one.default for name, one in self.arguments.items()}
+        try:
+            return bool(self.moves_if.evaluate({**defaults, **arguments}))
+        except ExpressionError:
+            return True
 
 
 class Poll(NamedTuple):

@@ -37,7 +37,7 @@ def why_not_allowed(
     command: Command, known: Known, values: Mapping[str, object], now: float
 ) -> str:
     """Return the first thing that a command requires and that does not hold, or ""."""
-    if command.moves and known.latched:
+    if known.latched and command.moves_with(values):
         return known.latched
     for one in command.requires:
         try:

@@ -147,7 +147,9 @@ def _commands(driver: Driver) -> Iterator[str]:
         if command.hold is not None:
             yield f"- held: sent every {shown_duration(command.hold.repeat_s)} while it is held"
         if command.moves:
-            yield "- moves something by itself: not while STOP is latched, nor while others drive"
+            where = f" where {_code(command.moves_if.source)}" if command.moves_if else ""
+            until = "not while STOP is latched, nor while others drive"
+            yield f"- moves something by itself{where}: {until}"
         if command.stops:
             yield "- given once when STOP is pressed"
         yield ""

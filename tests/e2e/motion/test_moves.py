@@ -168,3 +168,32 @@ async def test_stop_gives_the_stop_of_the_robot_past_what_waits(
         await expect(page.locator(note(0))).to_contain_text("▲ stopped by screen 1")
         await until(lambda: len(heard) > before)
         assert set(heard[before:]) == {"HALT"}
+
+
+async def test_a_choice_that_moves_is_refused_after_stop_and_one_that_ends_motion_is_given(
+    new_page: PageMaker, tmp_path: Path
+) -> None:
+    """The list stays free: what is chosen decides, and the server says why not."""
+    mode = """\
+  mode:
+    send: "MODE {{ mode }}"
+    args: { mode: { type: string, choices: [hold, auto] } }
+    moves: mode == 'auto'
+"""
+    profile = PROFILE.replace("sequences:", f"{mode}sequences:")
+    profile = profile.replace(
+        "{ use: button, bind: { press: beep } }", "{ use: select, bind: { change: mode } }"
+    )
+    async with served(tmp_path, profile) as (heard, address):
+        page = await opened(new_page, address)
+        choice = page.locator("[data-cell='1'] select")
+        await choice.select_option("auto")
+        await until(lambda: heard == ["MODE auto"])
+        await page.click(STOP)
+        await until_text(page, "[data-stop-note]", "✓ sent ✓ latched")
+        await choice.select_option("hold")
+        await until(lambda: heard == ["MODE auto", "MODE hold"])
+        await choice.select_option("auto")
+        await expect(page.locator("[data-cell='1']")).to_contain_text("reset it first")
+        await choice.select_option("hold")
+        await until(lambda: heard == ["MODE auto", "MODE hold", "MODE hold"])

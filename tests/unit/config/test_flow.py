@@ -78,6 +78,25 @@ polls:
     assert (driver.commands["both"].title, driver.commands["both"].transport) == ("Both", "wire")
 
 
+@pytest.mark.parametrize(("mode", "is_told"), [("4", False), ("10", True), ("'{{ 2 * 2 }}'", True)])
+def test_what_nobody_asks_for_may_end_motion_and_not_begin_it(
+    mode: str, is_told: bool, tmp_path: object
+) -> None:
+    """A value that is known tells; what is only known when it runs counts as moving."""
+    text = f"""
+transports:
+  wire:
+    type: tcp
+    host: 127.0.0.1
+    port: 6789
+    framing: {{ type: delimiter, tx: LF, rx: LF }}
+    on_connect: [{{ run: set_mode, args: {{ mode: {mode} }} }}]
+commands:
+  set_mode: {{ send: "M {{{{ mode }}}}", args: {{ mode: {{ type: integer }} }}, moves: mode == 10 }}
+"""
+    assert codes(text, tmp_path) == ({"wrong-command"} if is_told else set())
+
+
 def test_a_document_with_a_login_can_test_its_frames(tmp_path: object) -> None:
     """Tests of single frames need no login, no condition and no fresh signal."""
     text = """

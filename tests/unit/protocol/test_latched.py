@@ -7,7 +7,10 @@ commands:
   ask: { send: ASK, reply: { equals: OK } }
   fold: { send: FOLD, moves: true }
   beep: { send: BEEP }
+  climb: { send: "CLIMB {{ on }}", args: { on: { type: boolean, default: true } }, moves: "on" }
 sequences:
+  level: [{ run: climb, args: { on: false } }]
+  upstairs: [{ run: climb }]
   show:
     - { send: A }
     - { wait: 1s }
@@ -38,6 +41,29 @@ def test_what_moves_by_itself_is_refused_until_the_stop_is_reset() -> None:
     assert talk.sent == ["BEEP"]
     latch(talk, "")
     assert (talk.outcomes[talk.run("fold")], talk.sent) == ("done", ["FOLD"])
+
+
+def test_a_command_that_moves_for_some_values_is_refused_for_those_only() -> None:
+    """So the one that ends motion is given; a default counts as what is given."""
+    talk = Dialogue(DRIVER).connect()
+    latch(talk)
+    assert talk.outcomes[talk.run("climb", on=True)] == "not-allowed"
+    assert talk.outcomes[talk.run("climb")] == "not-allowed"
+    assert talk.outcomes[talk.run("climb", on=False)] == "done"
+    assert talk.outcomes[talk.run("upstairs")] == "not-allowed"
+    assert talk.outcomes[talk.run("level")] == "done"
+    assert talk.sent == ["CLIMB false", "CLIMB false"]
+
+
+def test_what_waits_and_moves_for_its_values_is_not_sent_after_the_stop() -> None:
+    """Beside it waits what ends the motion."""
+    talk = Dialogue(DRIVER).connect()
+    talk.run("ask")
+    up, down = talk.run("climb", on=True), talk.run("climb", on=False)
+    latch(talk)
+    talk.says("OK")
+    assert (talk.outcomes[up], talk.outcomes[down]) == ("not-allowed", "done")
+    assert talk.sent == ["ASK", "CLIMB false"]
 
 
 def test_what_moves_and_waits_to_be_sent_is_not_sent_after_the_stop() -> None:

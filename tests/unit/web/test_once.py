@@ -5,8 +5,9 @@ import asyncio
 import pytest
 
 from tests.unit.web.test_client import FakeLine, scene
+from urc.expressions import compile_expression
 from urc.model.codec import WriteSpec
-from urc.model.driver import Command
+from urc.model.driver import Argument, Command
 from urc.model.flow import WaitStep
 from urc.protocol.events import Replied
 from urc.runtime.session import CommandFailed
@@ -80,6 +81,24 @@ async def test_what_moves_by_itself_is_refused_while_somebody_else_drives() -> N
         it.line.say({"t": "run", "id": 3, "command": "fold"})
         await settle()
         assert [name for name, _ in it.robot.commands] == ["ask", "fold"]
+
+
+async def test_what_moves_for_some_values_is_refused_for_those_while_somebody_else_drives() -> None:
+    """As the robot is given them; what it cannot be given is the engine's to refuse."""
+    mode = Argument("mode", "integer", choices=(4, 10))
+    moves_if = compile_expression("mode == 10")
+    text = WriteSpec("text", {})
+    command = Command("steer", "wire", text, {"mode": mode}, moves=True, moves_if=moves_if)
+    async with scene(commands={"steer": command}) as it:
+        other = it.station.controls.sit("10.0.0.7", "driver", lambda: None)
+        it.station.controls.hear(other, Drive("take"))
+        for number, given in enumerate((4, 10, 10.0, "fast")):
+            it.line.say(
+                {"t": "run", "id": number, "command": "steer", "arguments": {"mode": given}}
+            )
+        await settle()
+        assert refusals(it.line) == ["screen 2 at 10.0.0.7 has the controls"] * 2
+        assert [values["mode"] for _, values in it.robot.commands] == [4, "fast"]
 
 
 async def test_the_session_is_told_of_a_stop_and_of_its_reset() -> None:

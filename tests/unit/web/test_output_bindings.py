@@ -2,6 +2,7 @@
 
 from typing import Any
 
+from urc.expressions import compile_expression
 from urc.model.codec import WriteSpec
 from urc.model.driver import Argument, Command, Driver, TransportSpec
 from urc.model.flow import Confirm, RunStep, WaitStep
@@ -50,6 +51,16 @@ def test_a_page_knows_the_bounds_of_what_it_may_set() -> None:
     told = config(put(VOLTS, CHANNEL), Given(fixed={"channel": 2}))["arguments"]
     assert list(told) == ["volts"]
     assert (told["volts"]["min"], told["volts"]["max"], told["volts"]["unit"]) == (0, 10, "V")
+
+
+def test_a_page_knows_what_moves_whatever_is_given_to_it() -> None:
+    """Where that depends on what somebody chooses, the server says no to the choice."""
+    climb = Argument("climb", "boolean")
+    stairs = put(climb, moves=True, moves_if=compile_expression("climb"))
+    assert config(put(climb, moves=True))["moves"]
+    assert not config(stairs)["moves"]
+    assert config(stairs, Given(fixed={"climb": True}))["moves"]
+    assert not config(stairs, Given(fixed={"climb": False}))["moves"]
 
 
 def test_a_page_knows_what_people_are_asked() -> None:

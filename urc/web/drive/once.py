@@ -7,11 +7,13 @@ waits on a line, or in a question, must not go out after it.
 """
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 from urc.model.codec import Payload
-from urc.model.driver import Driver
+from urc.model.driver import Command, Driver
+from urc.model.values import NOTHING
 from urc.motion.lease import WATCHES, Client
+from urc.protocol.encode import BadArgument, check_arguments
 from urc.protocol.reins import Pull
 from urc.runtime.clock import Clock
 from urc.runtime.motion import MotionDesk
@@ -42,6 +44,16 @@ def needs_holding(driver: Driver, command: str) -> bool:
     return known is not None and known.hold is not None
 
 
+def _moves(command: Command, arguments: Mapping[str, object]) -> bool:
+    """Return whether it moves something with what a page gives, as the robot is given it."""
+    if command.moves_if is None:
+        return command.moves
+    try:
+        return command.moves_with(check_arguments(command, arguments))
+    except BadArgument:
+        return False  # nothing is sent of it; the engine says what is wrong
+
+
 class Once:
     """Those of one robot."""
 
@@ -56,16 +68,21 @@ class Once:
         self._session: Drivable | None = None
         self._pressed = asyncio.Event()
 
-    def admit(self, client: Client, command: str) -> None:
+    def admit(
+        self, client: Client, command: str, arguments: Mapping[str, object] = NOTHING
+    ) -> None:
         """Raise `NotAdmitted` while this screen may not give a command or sequence."""
-        reason = HELD if needs_holding(self.driver, command) else self.refusal(client, command)
+        is_held = needs_holding(self.driver, command)
+        reason = HELD if is_held else self.refusal(client, command, arguments)
         if reason:
             raise NotAdmitted("refused", reason)
 
-    def refusal(self, client: Client, command: str) -> str:
+    def refusal(
+        self, client: Client, command: str, arguments: Mapping[str, object] = NOTHING
+    ) -> str:
         """Return why this screen may not give a command or sequence now, or ""."""
         known = self.driver.commands.get(command)
-        if known is not None and known.moves:
+        if known is not None and _moves(known, arguments):
             return self._desk().lease.hindrance(client)
         return WATCHES if client.role == "viewer" else ""
 

@@ -56,7 +56,7 @@ def output_config(use: WidgetUse, output: str, widget: Widget, driver: Driver) -
         "line": _line(command, driver),
         "refusal": HELD if needs_holding(driver, name) and not is_held else "",
         "isHeld": is_held,
-        "moves": command is not None and command.moves,
+        "moves": command is not None and _moves(command, given),
         "leaseMs": round(hold.lease_s * 1000) if hold is not None else 0,
         "title": (command and command.title) or "",
         "arguments": _arguments(command, given),
@@ -64,6 +64,16 @@ def output_config(use: WidgetUse, output: str, widget: Widget, driver: Driver) -
         "steps": [step_words(one) for one in command.steps] if command is not None else [],
         "isAnswered": command is not None and (command.reply is not None or bool(command.steps)),
     }
+
+
+def _moves(command: Command, given: Given) -> bool:
+    """Return whether it moves something by itself, whatever is given to it here.
+
+    Where that depends on what somebody chooses, the server says so when it is chosen.
+    """
+    condition = command.moves_if
+    is_told = condition is None or condition.names <= given.fixed.keys()
+    return is_told and command.moves_with(given.fixed)
 
 
 def _arguments(command: Command | None, given: Given) -> dict[str, dict[str, object]]:

@@ -1,0 +1,78 @@
+"""What moves something by itself: how it is said, which sequences do, and who may not run it."""
+
+from collections.abc import Mapping
+
+from urc.config.part import Findings, Part
+from urc.config.suggest import did_you_mean
+from urc.expressions import Template
+from urc.model.driver import Command
+from urc.model.flow import RunStep, all_steps
+from urc.model.values import Reading
+
+__all__ = ["link_moves", "parse_moves", "refuse_moving", "runs_what_moves", "with_moving_steps"]
+
+
+def parse_moves(part: Part, findings: Findings) -> tuple[bool, Template | None]:
+    """Return whether a command moves something, and for which arguments; None: for all."""
+    said = part.get("moves")
+    if said is None or isinstance(said.data, bool):
+        return bool(said and said.data), None
+    return True, findings.expression(said)
+
+
+def link_moves(findings: Findings, part: Part, command: Command) -> None:
+    """Report what the condition under ``moves`` cannot know: everything but the arguments."""
+    condition = command.moves_if
+    if condition is None:
+        return
+    for name in sorted(condition.names - command.arguments.keys()):
+        findings.error(
+            part.must("moves"),
+            "unknown-name",
+            f"{name!r} is no argument of {command.name!r}",
+            offset=condition.source.find(name),
+            hint=did_you_mean(name, command.arguments, "arguments"),
+        )
+
+
+def runs_what_moves(command: Command, arguments: Mapping[str, Template | Reading]) -> bool:
+    """Return whether a command with these arguments moves something, as far as a document tells."""
+    is_told = not any(isinstance(value, Template) for value in arguments.values())
+    return command.moves_with(arguments) if is_told else command.moves
+
+
+def with_moving_steps(commands: Mapping[str, Command]) -> dict[str, Command]:
+    """Return the commands; a sequence that runs what moves, or is held, moves as well."""
+    found = dict(commands)
+
+    def does(step: object) -> bool:
+        if not isinstance(step, RunStep) or step.command not in found:
+            return False
+        command = found[step.command]
+        return command.hold is not None or runs_what_moves(command, step.arguments)
+
+    while True:
+        more = [
+            name
+            for name, one in found.items()
+            if not one.moves and any(map(does, all_steps(one.steps)))
+        ]
+        if not more:
+            return found
+        found |= {name: found[name]._replace(moves=True) for name in more}
+
+
+def refuse_moving(
+    findings: Findings,
+    part: Part,
+    command: Command,
+    arguments: Mapping[str, Template | Reading],
+) -> None:
+    """Report what moves something by itself where nobody asks for it."""
+    if runs_what_moves(command, arguments):
+        findings.error(
+            part,
+            "wrong-command",
+            f"{command.name!r} moves something by itself, and here nobody asks for it",
+            hint="run a command that does not move, and let people give this one",
+        )
