@@ -66,3 +66,15 @@ test("STOP that nobody could be told is told as soon as URC is back", async () =
   drive.setLease(/** @type {any} */ ({ ...lease, epoch: 4, latched: "screen 1" }), nowMs);
   assert.deepEqual([sent, drive.phase, drive.isLatched], [["stop"], "", true]);
 });
+
+test("a stop is told by how often it was pressed, also when it was reset before the page heard of it", () => {
+  const socket = { unsent: 0, tripMs: 2, send: () => true };
+  const drive = new Drive(/** @type {any} */ (socket), "", () => {});
+  const lease = { you: "s1", epoch: 3, stops: 4, holder: null, asker: null, latched: "", confirmed: false, drives: true, left: 0 };
+  const set = (/** @type {object} */ news) => drive.setLease(/** @type {any} */ ({ ...lease, ...news }), nowMs);
+  assert.equal(set({}), false, "what was before the page came is nothing to it");
+  assert.equal(set({ epoch: 4 }), false, "the controls were taken");
+  assert.equal(set({ epoch: 5, stops: 5, latched: "ann" }), true);
+  assert.equal(set({ epoch: 6, stops: 5 }), false, "reset");
+  assert.equal(set({ epoch: 9, stops: 6 }), true, "stopped and reset");
+});

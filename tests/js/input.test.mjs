@@ -48,7 +48,7 @@ function held() {
     hand.x = x;
     input.moved(/** @type {any} */ (grip));
   };
-  return { told, frame, move };
+  return { told, frame, move, input, control };
 }
 
 test("a move goes out at once, also right behind the tick of a frame", () => {
@@ -76,6 +76,31 @@ test("what was kept back goes out with the frame", () => {
   nowMs += 1;
   frame();
   assert.deepEqual(told, [1, 2]);
+});
+
+test("a gesture that still asks for the controls ends with STOP, and does not move when they come", () => {
+  const { told, frame, input, control } = held();
+  control.phase = "asking";
+  input.spendAll("STOP");
+  frame();
+  assert.deepEqual([told, control.phase, control.reason], [[], "spent", "STOP"]);
+  input.spendAll("another");
+  assert.equal(control.reason, "STOP", "what ended it first is why");
+});
+
+test("while a dead-man does not stand, nothing can be driven", () => {
+  const free = { epoch: 1, latched: "", drives: true, holder: null };
+  const input = new Input(/** @type {any} */ ({ lease: free, isMine: true }));
+  assert.equal(input.refusal(), "");
+  const cell = /** @type {any} */ ({});
+  input.gated.add(cell);
+  assert.equal(input.refusal(), "hold the dead-man control first");
+  input.gates.add(/** @type {any} */ ({ isOpen: true }));
+  assert.equal(input.refusal(), "");
+  input.gates.clear(); // it has failed
+  assert.equal(input.refusal(), "hold the dead-man control first");
+  input.gated.delete(cell); // its interface was left
+  assert.equal(input.refusal(), "");
 });
 
 test("what is given once is locked on a page that only watches, and what moves as well as STOP and others say", () => {

@@ -42,6 +42,7 @@ def parse_widget(document: Document, findings: Findings) -> Widget:
         outputs={key: _output(inner) for key, inner in part.named("outputs").items()},
         options={key: inner.data for key, inner in part.named("options").items()},
         min_cells=(smallest[0], smallest[1]) if smallest else (1, 1),
+        is_gate=part.flag("gate", default=False),
         summary=part.text("summary"),
         licence=part.text("licence"),
         author=part.text("author"),

@@ -24,6 +24,7 @@ from urc.patterns import Pattern
 
 __all__ = [
     "MOST_ELEMENTS",
+    "STOPPED",
     "Argument",
     "Backoff",
     "Command",
@@ -132,6 +133,10 @@ class Argument(NamedTuple):
     """Elements of an array; None: any number up to `MOST_ELEMENTS`."""
     confirm: Mapping[str, Confirm] = NOTHING
     """Value, as it is written → the question before it is sent."""
+
+
+STOPPED: Final = "STOP was pressed meanwhile: give it anew"
+"""Why what moves is not sent when it was wished before a stop."""
 
 
 class Command(NamedTuple):

@@ -54,6 +54,8 @@ class Widget(NamedTuple):
     """Inputs or outputs that mean something only when all of a group are bound."""
     min_cells: tuple[int, int] = (1, 1)
     """Columns, rows."""
+    is_gate: bool = False
+    """Whether it is a dead-man: while it does not stand, nothing is driven."""
     summary: str = ""
     licence: str = ""
     """SPDX identifier, as the manifest says."""

@@ -8,6 +8,8 @@ no lease and latches: nothing moves until somebody resets it on purpose, and a r
 
 from typing import Final, Literal, NamedTuple
 
+from urc.model.driver import STOPPED
+
 __all__ = ["Changed", "Client", "Lease", "LeaseState", "Refused", "Role", "WATCHES"]
 
 Role = Literal["viewer", "driver", "engineer", "admin"]
@@ -40,6 +42,9 @@ class LeaseState(NamedTuple):
     asked_until: float = 0.0
     latched_by: str = ""
     """Who pressed STOP; "" while nothing is latched."""
+    stops: int = 0
+    """How often STOP was pressed in this run of the server: what was wished before the last time is
+    over, also when it was reset since."""
 
 
 class Changed(NamedTuple):
@@ -63,7 +68,7 @@ class Lease:
     def __init__(self, state: LeaseState | None = None) -> None:
         """Go on from `state`, as kept over a restart: the latch holds, the holder does not."""
         kept = state or LeaseState()
-        self.state = LeaseState(epoch=kept.epoch + 1, latched_by=kept.latched_by)
+        self.state = LeaseState(kept.epoch + 1, latched_by=kept.latched_by, stops=kept.stops)
         self._touched_at = 0.0
 
     @property
@@ -87,17 +92,23 @@ class Lease:
             return "the controls were taken anew meanwhile"
         return ""
 
-    def hindrance(self, client: Client) -> str:
+    def hindrance(self, client: Client, stops: int | None = None) -> str:
         """Return why a client may not begin what moves by itself, or "".
 
         It needs no lease: nothing is held. But it goes neither against a stop, nor against whoever
         drives.
+
+        Args:
+            client: who gives it.
+            stops: of the state in which it was wished; None: it is wished now.
         """
         state = self.state
         if _RANK[client.role] < _RANK["driver"]:
             return WATCHES
         if state.latched_by:
             return self.latched
+        if stops is not None and stops != state.stops:
+            return STOPPED
         if state.holder is not None and state.holder.id != client.id:
             return f"{_called(state.holder)} has the controls"
         return ""
@@ -158,7 +169,7 @@ class Lease:
         """Take note that a client gave the lease back, or is gone; None when it had no part."""
         state = self.state
         if state.holder is not None and state.holder.id == client:
-            self.state = LeaseState(epoch=state.epoch + 1, latched_by=state.latched_by)
+            self.state = self._next(latched_by=state.latched_by)
             return Changed(self.state, must_stop=True)
         if state.asked_by is not None and state.asked_by.id == client:
             self.state = state._replace(asked_by=None, asked_until=0.0)
@@ -168,7 +179,8 @@ class Lease:
     def stop(self, by: str) -> Changed:
         """Stop and latch: never refused."""
         state = self.state
-        self.state = LeaseState(epoch=state.epoch + 1, latched_by=state.latched_by or by)
+        by = state.latched_by or by
+        self.state = self._next(latched_by=by)._replace(stops=state.stops + 1)
         return Changed(self.state, must_stop=True)
 
     def reset(self, client: Client) -> Changed | Refused:
@@ -177,7 +189,7 @@ class Lease:
             return Refused("viewers can stop the robot, and cannot reset it")
         if not self.state.latched_by:
             return Refused("nothing is stopped")
-        self.state = LeaseState(epoch=self.state.epoch + 1)
+        self.state = self._next()
         return Changed(self.state, must_stop=False)
 
     def expire(self, now: float) -> Changed | None:
@@ -193,8 +205,14 @@ class Lease:
 
     def _give(self, client: Client, now: float) -> Changed:
         self._touched_at = now
-        self.state = LeaseState(epoch=self.state.epoch + 1, holder=client)
+        self.state = self._next(holder=client)
         return Changed(self.state, must_stop=True)
+
+    def _next(self, holder: Client | None = None, latched_by: str = "") -> LeaseState:
+        """Return a later epoch, in which nobody has asked for anything yet."""
+        return LeaseState(
+            self.state.epoch + 1, holder, latched_by=latched_by, stops=self.state.stops
+        )
 
 
 def _called(client: Client) -> str:

@@ -8,7 +8,7 @@ from functools import partial
 from typing import Final, NamedTuple
 
 from urc.expressions import COUNTERS, ExpressionError
-from urc.model.driver import Command
+from urc.model.driver import STOPPED, Command
 from urc.model.flow import Confirm, Verify
 from urc.model.values import Reading
 from urc.protocol.exchange import Ask, Asked, Exchange, LineEvent, Outcome, expires_at
@@ -34,11 +34,25 @@ _BOTH: Final = 2
 
 
 def why_not_allowed(
-    command: Command, known: Known, values: Mapping[str, object], now: float
+    command: Command,
+    known: Known,
+    values: Mapping[str, object],
+    now: float,
+    *,
+    stops: int | None = None,
 ) -> str:
-    """Return the first thing that a command requires and that does not hold, or ""."""
-    if known.latched and command.moves_with(values):
-        return known.latched
+    """Return the first thing that a command requires and that does not hold, or "".
+
+    Args:
+        command: as declared.
+        known: of the robot.
+        values: its arguments, checked.
+        now: the time.
+        stops: how often it had been stopped when this was asked for; None: that is now.
+    """
+    is_of_before = stops is not None and stops != known.stops
+    if (known.latched or is_of_before) and command.moves_with(values):
+        return known.latched or STOPPED
     for one in command.requires:
         try:
             if not one.condition.evaluate(known.view(now, values)):
@@ -127,7 +141,7 @@ def exchange_of(
         expires_at(ask, now),
     ).mark(
         on_sent=sink.on_sent if isinstance(sink, Asked) else None,
-        condition=partial(why_not_allowed, command, known, values)
+        condition=partial(why_not_allowed, command, known, values, stops=known.stops)
         if command.requires or command.moves
         else None,
     )

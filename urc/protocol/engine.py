@@ -218,7 +218,7 @@ class Engine:
 
         What makes a line usable goes on: without it no stop would reach the robot.
         """
-        self.known.latched = reason
+        self.known.latch(reason)
         if not reason:
             return []
         for runner in self._runners:

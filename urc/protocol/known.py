@@ -21,7 +21,14 @@ class Known:
         """What is known beside signals: ``settings``."""
         self.latched = ""
         """Why nothing may be begun that moves by itself; "" while it may."""
+        self.stops = 0
+        """How often it was stopped: what moves and was asked for before is not sent."""
         self._last: dict[str, Sample] = {}
+
+    def latch(self, reason: str) -> None:
+        """Take note of a stop, or of its reset: ""."""
+        self.latched = reason
+        self.stops += reason != ""
 
     def take(self, samples: Iterable[Sample]) -> None:
         """Keep new readings."""

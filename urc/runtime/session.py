@@ -10,7 +10,7 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Literal
 
 from urc.model.codec import Payload
-from urc.model.driver import Driver
+from urc.model.driver import STOPPED, Driver
 from urc.model.profile import Profile
 from urc.model.values import NOTHING, Reading, Value
 from urc.problems import UrcError
@@ -131,6 +131,7 @@ class Session:
             )
             self._dispatcher.attach(name, link)
             self._links[name] = link
+        self._stops = 0
         self._untried = {name: Turnstile(link.tried) for name, link in self._links.items()}
         """Lines whose first attempt may not have ended yet: commands wait for it, in order."""
         self._numbers = count(1)
@@ -212,9 +213,10 @@ class Session:
         Raises:
             CommandFailed: it was refused here or by the robot, timed out, or the robot is gone.
         """
+        given = arguments or NOTHING
         if self._untried:
-            await self._first_attempt(name)
-        number, given = next(self._numbers), arguments or NOTHING
+            await self._first_attempt(name, given)
+        number = next(self._numbers)
         request = new(Request, (number, name, given, confirmed_by, on_sent))
         try:
             outcome = await self._dispatcher.command(request)
@@ -239,11 +241,16 @@ class Session:
         Args:
             reason: why, for people; "": it may be begun again.
         """
+        self._stops += reason != ""
         self._dispatcher.latch(reason)
 
-    async def _first_attempt(self, name: str) -> None:
-        """Wait until the line of a command has been tried, well or not, for as long as may take."""
-        command = self.profile.driver.commands.get(name)
+    async def _first_attempt(self, name: str, given: Mapping[str, Reading]) -> None:
+        """Wait until the line of a command has been tried, well or not, for as long as may take.
+
+        Raises:
+            CommandFailed: it moves something, and STOP was pressed meanwhile.
+        """
+        command, stops = self.profile.driver.commands.get(name), self._stops
         turnstile = self._untried.get(command.transport) if command is not None else None
         if command is None or turnstile is None:
             return
@@ -253,6 +260,8 @@ class Session:
                 await turnstile.wait()
         if turnstile.is_open:
             self._untried.pop(command.transport, None)
+        if stops != self._stops and command.moves_with(given):
+            raise CommandFailed("not-allowed", STOPPED)
 
 
 def _limit_s(driver: Driver, name: str) -> float:

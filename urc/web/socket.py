@@ -360,13 +360,13 @@ class Client:
             return ()
         known = self._station.robot.profile.driver.commands.get(asked.command)
         who, admit = self._seat.client, self._station.controls.once.admit
-        admit(who, asked.command, asked.arguments)
+        admit(who, asked.command, asked.arguments, asked.stops)
         if known is None:
             return ()
         people = await self._station.consent.people(
             self._seat, asked.id, known, asked.arguments, asked.token
         )
-        admit(who, asked.command, asked.arguments)  # a question takes its time
+        admit(who, asked.command, asked.arguments, asked.stops)  # a question takes its time
         return people
 
     def _reply(

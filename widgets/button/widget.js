@@ -59,7 +59,7 @@ class Button {
     const isReady = () => this.isFree;
     if (gesture === "slide") {
       const label = part(el, ".button-label").textContent;
-      slide(this.main, { label, isReady, done: () => this.press(), signal });
+      slide(this.main, { label, isReady, done: () => this.press(), onStop: ctx.onStop, signal });
     } else if (gesture === "tap" || gesture === "double" || gesture === "hold" || gesture === "repeat") {
       const fill = part(el, ".button-fill");
       const end = listen(this.main, {

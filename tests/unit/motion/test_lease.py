@@ -93,6 +93,19 @@ def test_stop_latches_until_somebody_resets_it_on_purpose() -> None:
     assert isinstance(lease.take(ANNA, 2.0), Changed)
 
 
+def test_what_was_wished_before_a_stop_is_refused_also_when_it_was_reset() -> None:
+    """By whoever; what is wished after it is not."""
+    lease = Lease()
+    before = lease.state.stops
+    assert lease.hindrance(ANNA, before) == ""
+    lease.stop("ben")
+    lease.reset(ANNA)
+    lease.take(ANNA, 1.0)
+    assert lease.hindrance(ANNA, before) == "STOP was pressed meanwhile: give it anew"
+    assert lease.hindrance(ANNA, lease.state.stops) == ""
+    assert lease.hindrance(ANNA) == ""
+
+
 def test_a_latch_survives_a_restart_and_a_holder_does_not() -> None:
     lease = Lease()
     lease.take(ANNA, 0.0)

@@ -78,6 +78,30 @@ def test_what_moves_and_waits_to_be_sent_is_not_sent_after_the_stop() -> None:
     assert talk.sent == ["ASK", "BEEP"]
 
 
+def test_what_moves_and_waited_is_not_sent_after_the_stop_was_reset_either() -> None:
+    """It was wished before the stop; the same command given anew is sent."""
+    talk = Dialogue(DRIVER).connect()
+    talk.run("ask")
+    old, beep = talk.run("fold"), talk.run("beep")
+    latch(talk)
+    latch(talk, "")
+    new = talk.run("fold")
+    talk.says("OK")
+    assert [talk.outcomes[each] for each in (old, beep, new)] == ["not-allowed", "done", "done"]
+    assert talk.sent == ["ASK", "BEEP", "FOLD"]
+
+
+def test_what_moves_is_not_tried_again_after_a_stop() -> None:
+    """Its answer was lost; it was sent once, before the stop."""
+    again = "idempotent: true, retries: 2, reply: { equals: OK, timeout: 1s }"
+    talk = Dialogue(f"commands: {{ fold: {{ send: FOLD, moves: true, {again} }} }}").connect()
+    fold = talk.run("fold")
+    latch(talk)
+    latch(talk, "")
+    talk.at(10)
+    assert (talk.sent, talk.outcomes[fold]) == (["FOLD"], "not-allowed")
+
+
 def test_a_running_sequence_ends_with_the_reason_and_sends_nothing_more() -> None:
     """Whether it is marked or not."""
     talk = Dialogue(DRIVER).connect()

@@ -118,6 +118,27 @@ async def test_a_command_that_asks_is_refused_when_nobody_was_asked() -> None:
         ]
 
 
+async def test_stop_ends_questions_and_takes_back_what_was_agreed_to() -> None:
+    """Whether it was reset since or not: nobody says yes to what was wished before it."""
+    async with screens() as it:
+        asker, other = await it.come(), await it.come()
+        token = await token_for(asker, "dock")
+        await run(asker, "beam")
+        await settle()
+        (asked,) = other.of_type("ask")
+        it.station.controls.stop("screen 2")
+        await settle()
+        assert other.of_type("asked")[0]["n"] == asked["n"]
+        other.say({"t": "agree", "n": asked["n"], "yes": True})
+        give(asker, "dock", token)
+        await settle()
+        assert it.robot.commands == []
+        assert [reply["message"] for reply in asker.of_type("reply")] == [
+            "STOP was pressed meanwhile: give it anew",
+            "the yes is used up or too old: Dock now?",
+        ]
+
+
 async def test_a_second_screen_says_yes() -> None:
     """Every screen that may drive is asked, the asker is told, and the audit has both."""
     async with screens() as it:

@@ -83,6 +83,23 @@ async def test_what_moves_by_itself_is_refused_while_somebody_else_drives() -> N
         assert [name for name, _ in it.robot.commands] == ["ask", "fold"]
 
 
+async def test_what_was_given_before_a_stop_and_came_late_is_refused_after_the_reset() -> None:
+    """What does not move is given all the same."""
+    async with scene(commands=FOLD) as it:
+        (lease,) = it.line.of_type("lease")
+        for verb in ({"t": "stop"}, {"t": "drive", "verb": "reset"}):
+            it.line.say(verb)
+        for number, name in enumerate(("fold", "ask")):
+            said = {"id": number, "command": name, "stops": lease["stops"]}
+            it.line.say({"t": "run", **said})
+        await settle()
+        assert refusals(it.line) == ["STOP was pressed meanwhile: give it anew"]
+        now = it.line.of_type("lease")[-1]["stops"]
+        it.line.say({"t": "run", "id": 3, "command": "fold", "stops": now})
+        await settle()
+        assert [name for name, _ in it.robot.commands] == ["ask", "fold"]
+
+
 async def test_what_moves_for_some_values_is_refused_for_those_while_somebody_else_drives() -> None:
     """As the robot is given them; what it cannot be given is the engine's to refuse."""
     mode = Argument("mode", "integer", choices=(4, 10))

@@ -17,7 +17,7 @@ from typing import Final, NamedTuple
 
 import msgspec
 
-from urc.model.driver import Command
+from urc.model.driver import STOPPED, Command
 from urc.model.flow import Confirm
 from urc.model.values import Reading
 from urc.protocol.commands import questions
@@ -119,7 +119,8 @@ class Consent:
             confirm: the question.
 
         Raises:
-            CommandFailed: nobody did, in time; somebody said no; or the asker took it back.
+            CommandFailed: nobody did, in time; somebody said no; the asker took it back; or STOP
+                was pressed.
         """
         if len(self._questions) >= _MOST:
             raise CommandFailed("busy", f"{_MOST} questions wait for a second person already")
@@ -142,6 +143,13 @@ class Consent:
         if second is None:
             raise CommandFailed("not-confirmed", f"{confirm.text}: somebody said no")
         return second.client.name
+
+    def stop(self) -> None:
+        """End every question, and forget every yes: STOP was pressed."""
+        self._tokens.clear()
+        for one in self._questions.values():
+            if not one.answer.done():
+                one.answer.set_exception(CommandFailed("not-confirmed", STOPPED))
 
     def welcome(self, seat: Seat) -> None:
         """Tell a screen that has just come what is asked."""

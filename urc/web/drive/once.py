@@ -66,24 +66,37 @@ class Once:
         self._clock = clock
         self._trail = trail
         self._session: Drivable | None = None
+        self.on_stopped: Callable[[], None] = _nobody
+        """Called at each press of STOP."""
         self._pressed = asyncio.Event()
 
     def admit(
-        self, client: Client, command: str, arguments: Mapping[str, object] = NOTHING
+        self, client: Client, command: str, arguments: Mapping[str, object], stops: int | None
     ) -> None:
         """Raise `NotAdmitted` while this screen may not give a command or sequence."""
         is_held = needs_holding(self.driver, command)
-        reason = HELD if is_held else self.refusal(client, command, arguments)
+        reason = HELD if is_held else self.refusal(client, command, arguments, stops)
         if reason:
             raise NotAdmitted("refused", reason)
 
     def refusal(
-        self, client: Client, command: str, arguments: Mapping[str, object] = NOTHING
+        self,
+        client: Client,
+        command: str,
+        arguments: Mapping[str, object] = NOTHING,
+        stops: int | None = None,
     ) -> str:
-        """Return why this screen may not give a command or sequence now, or ""."""
+        """Return why this screen may not give a command or sequence now, or "".
+
+        Args:
+            client: the screen.
+            command: what it gives.
+            arguments: with these.
+            stops: how many it knew of when it was wished; None: it is wished now.
+        """
         known = self.driver.commands.get(command)
         if known is not None and _moves(known, arguments):
-            return self._desk().lease.hindrance(client)
+            return self._desk().lease.hindrance(client, stops)
         return WATCHES if client.role == "viewer" else ""
 
     def pull_refusal(self, client: Client, sequence: str, what: Pull) -> str:
@@ -114,6 +127,7 @@ class Once:
 
     def stopped(self) -> None:
         """Take note that STOP was pressed."""
+        self.on_stopped()
         if self._session is not None:
             self._session.latch(self._desk().lease.latched)
             self._pressed.set()
@@ -145,3 +159,7 @@ class Once:
             self._trail.ran(_STOP, command, {}, outcome, sent[-1])
         if is_heard:
             self._desk().given(command)
+
+
+def _nobody() -> None:
+    """Nobody wants to know."""

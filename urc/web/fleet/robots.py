@@ -166,6 +166,7 @@ class Station:
         self.clock: Clock = clock or LoopClock()
         self.controls = Controls(robot.profile.driver, self.clock, latch, trail)
         self.consent = Consent(lambda: self.controls.seats, self.clock)
+        self.controls.once.on_stopped = self.consent.stop
         self._linger_s = linger_s
         self._visitors = 0
         self._stirred = asyncio.Event()

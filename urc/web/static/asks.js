@@ -45,6 +45,8 @@ export class Asks {
     this.waiting = new Map();
     /** Questions of others. @type {Map<number, HTMLElement>} */
     this.others = new Map();
+    /** How each question that stands in a cell is taken back. @type {Set<(why: string) => void>} */
+    this.standing = new Set();
   }
 
   /**
@@ -85,9 +87,12 @@ export class Asks {
     return new Promise((resolve, reject) => {
       const askedMs = performance.now();
       const refuse = (/** @type {string} */ why) => {
+        this.standing.delete(refuse);
         close();
         reject(cancelled(why));
       };
+      this.standing.add(refuse);
+      end.signal.addEventListener("abort", () => this.standing.delete(refuse));
       let expiring = window.setTimeout(() => refuse(t("nobody said yes")), isHazard ? HAZARD_MS : ASK_MS);
       const agree = () => {
         clearTimeout(expiring);
@@ -184,6 +189,11 @@ export class Asks {
       return;
     }
     if (!this.others.has(message.n)) this.show(message);
+  }
+
+  /** STOP was pressed: nobody says yes to what was wished before it. @param {string} why */
+  stopped(why) {
+    for (const refuse of [...this.standing]) refuse(why);
   }
 
   /** The page has lost the server: its questions are over. */

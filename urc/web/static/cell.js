@@ -25,6 +25,7 @@
  *   it becomes what the input asks for; left out where nothing has to be done.
  * @property {Record<string, Output>} outputs
  * @property {Record<string, unknown>} options
+ * @property {boolean} [gate] Whether it is a dead-man.
  *
  * @typedef {(command: string, args: Record<string, Given>, ticket?: import("./asks.js").Ticket) => Promise<Record<string, Value>>} Run
  *
@@ -35,7 +36,7 @@
  * @property {(wish: import("./types.js").Wish) => void} drive
  * @property {() => void} wake asks for an animation frame
  * @property {() => void} again asks for one in which widgets are drawn, and no more
- * @property {Pick<import("./input.js").Input, "hold" | "gate" | "letGo" | "refusal" | "hindrance" | "isDriving"> & {pads: PadDesk}} input
+ * @property {Pick<import("./input.js").Input, "hold" | "gate" | "gated" | "letGo" | "refusal" | "hindrance" | "isDriving"> & {pads: PadDesk}} input
  * @property {Pick<import("./stop.js").StopButton, "press" | "follow">} stop
  * @property {Pick<import("./follow.js").Follows, "listen">} follows
  * @property {Store} store

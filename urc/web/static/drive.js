@@ -38,6 +38,8 @@ export class Drive {
     this.changed = changed;
     /** @type {Lease | null} */
     this.lease = null;
+    /** How often STOP was pressed, as the server said last; null while it has not. @type {number | null} */
+    this.stops = null;
     /** Newest number that the server has told this page; 0 while it has not. */
     this.beat = 0;
     this.beatMs = 0;
@@ -75,9 +77,12 @@ export class Drive {
   /**
    * @param {Lease} lease
    * @param {number} nowMs
+   * @returns {boolean} whether STOP was pressed since the last one, be it that it is reset already
    */
   setLease(lease, nowMs) {
     const wasMine = this.isMine;
+    const isStopped = this.stops !== null && lease.stops !== this.stops;
+    this.stops = lease.stops;
     this.lease = lease;
     this.handedMs = nowMs + lease.left;
     if (!this.isMine) this.beat = this.beatMs = 0;
@@ -88,6 +93,7 @@ export class Drive {
     this.double();
     if (isOwed) this.stop(); // pressed when nobody could be told: it is told now
     else this.changed();
+    return isStopped;
   }
 
   /**

@@ -59,6 +59,7 @@ const FREE = {
   asker: null,
   left: 0,
   latched: "",
+  stops: 0,
   confirmed: false,
   drives: true,
   forces: true,

@@ -88,7 +88,7 @@ export class Gate {
     this.isOpen = false;
     this.reason = reason;
     this.show();
-    this.keeper.letGo(t("the dead-man was let go"));
+    this.keeper.letGo(reason || t("the dead-man was let go"));
   }
 
   /** One frame. @param {number} nowMs */

@@ -71,6 +71,7 @@ export class Host {
     this.cells.set(cell.el, cell);
     this.sight.observe(cell.el);
     this.sizes.observe(cell.el);
+    if (cell.config.gate) this.doors.input.gated.add(cell.el);
     return cell.mount();
   }
 
@@ -96,6 +97,7 @@ export class Host {
       this.sight.unobserve(el);
       this.sizes.unobserve(el);
       this.waiting.delete(cell);
+      this.doors.input.gated.delete(cell.el);
       cell.unmount();
     }
   }

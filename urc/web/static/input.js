@@ -37,6 +37,8 @@ export class Input {
     this.grips = new Set();
     /** @type {Set<Gate>} */
     this.gates = new Set();
+    /** Cells of dead-man controls, also of those that do not stand yet, or have failed. @type {Set<HTMLElement>} */
+    this.gated = new Set();
     this.pads = new Pads(() => this.run());
     this.isRunning = false;
     this.frameMs = 0;
@@ -142,9 +144,9 @@ export class Input {
   refusal() {
     const refusal = this.against();
     if (refusal) return refusal;
-    return this.gates.size === 0 || [...this.gates].some((gate) => gate.isOpen)
-      ? ""
-      : t("hold the dead-man control first");
+    const isGated = this.gates.size + this.gated.size > 0;
+    const isOpen = [...this.gates].some((gate) => gate.isOpen);
+    return isGated && !isOpen ? t("hold the dead-man control first") : "";
   }
 
   /** Why nothing may be moved by this page now. */
@@ -234,8 +236,9 @@ export class Input {
 
   /** STOP was pressed, or the line is gone: no gesture survives that. @param {string} reason */
   spendAll(reason) {
+    for (const gate of this.gates) if (!gate.spec.isHeld) gate.close(reason);
     for (const control of this.controls.values()) {
-      if (control.grips.size > 0) this.spend(control, reason);
+      if (control.grips.size > 0 && control.phase !== "spent") this.spend(control, reason);
     }
   }
 

@@ -74,6 +74,7 @@ const input = new Input(drive);
 const bar = root.querySelector("[data-controls]");
 const stop = new StopButton(drive, input, store, JSON.parse(root.dataset["lines"] ?? "[]"), bar !== null);
 const asks = new Asks(part(root, ".urc-bar"), (message) => socket.send(message));
+stop.onPressed = forgetQuestions;
 /** Where sequences stand. @type {Record<string, import("./types.js").Progress>} */
 let sequences = {};
 const controls = bar instanceof HTMLElement ? new Controls(bar, drive, stop) : null;
@@ -212,7 +213,10 @@ function take(message) {
       settle(message);
       break;
     case "lease":
-      drive.setLease(message, nowMs);
+      if (drive.setLease(message, nowMs)) {
+        input.spendAll(input.against() || t("STOP was pressed meanwhile: give it anew"));
+        stop.heard();
+      }
       input.leaseChanged();
       break;
     case "beat":
@@ -251,7 +255,7 @@ function run(command, args, ticket) {
   const id = lastId;
   return new Promise((resolve, reject) => {
     waiting.set(id, { resolve, reject });
-    const said = { id, command, arguments: args };
+    const said = { id, command, arguments: args, stops: drive.stops };
     ticket?.began(id);
     if (ticket) meant.set(id, { atMs: performance.now(), said });
     if (!socket.send({ t: ticket ? "prepare" : "run", ...said })) {
@@ -275,6 +279,14 @@ function give({ id, token }) {
   if (isLate || !socket.send({ t: "run", ...yes.said, token })) {
     settle({ id, ok: false, message: t("it took too long: not sent") });
   }
+}
+
+/** STOP was pressed: nobody says yes to what was wished before it, and no yes counts. */
+function forgetQuestions() {
+  const why = t("STOP was pressed meanwhile: give it anew");
+  asks.stopped(why);
+  for (const id of [...meant.keys()]) settle({ id, ok: false, message: why });
+  meant.clear();
 }
 
 /** @param {Reply} reply */

@@ -27,6 +27,8 @@ export class Setpoint {
     this.bounds = boundsOf(Object.values(ctx.command("change")?.arguments ?? {})[0], options);
     /** Where the hand is; null when there is none. @type {number | null} */
     this.hand = null;
+    /** Takes the hand away. Set by what the hand is on. */
+    this.drop = () => this.cancel();
     /** What was given last. @type {number | null} */
     this.last = null;
     /** @type {Reading | undefined} */
@@ -39,6 +41,9 @@ export class Setpoint {
       show,
       signal,
       isSame: (wished, said) => Math.abs(Number(wished) - Number(said)) <= this.bounds.step / 2,
+    });
+    onStop(({ phase }) => {
+      if (phase !== "" && this.hand !== null) this.drop(); // what it draws from now on sets nothing
     });
   }
 
@@ -87,6 +92,7 @@ export class Setpoint {
     this.state = state;
     this.wish.take(state);
     this.giver.take(change);
+    if (!this.giver.isReady && this.hand !== null) this.drop();
   }
 
   /** @param {number} value where the hand is now */

@@ -63,7 +63,7 @@ export class SetpointFace {
   listen(control, setpoint, at, way, signal) {
     attribute(control, "aria-valuemin", String(setpoint.bounds.min));
     attribute(control, "aria-valuemax", String(setpoint.bounds.max));
-    grasp(control, {
+    const hold = grasp(control, {
       take(event) {
         if (!setpoint.giver.isReady) return false;
         event.preventDefault();
@@ -77,6 +77,7 @@ export class SetpointFace {
       way,
       signal,
     });
+    setpoint.drop = () => hold.drop();
     control.addEventListener("keydown", (event) => {
       if (setpoint.key(event.key)) event.preventDefault();
     }, { signal });

@@ -20,9 +20,11 @@ const WAY = 0.75;
  * @param {() => void} spec.done
  * @param {() => void} [spec.touched] called when somebody begins
  * @param {() => boolean} [spec.isReady]
+ * @param {import("./types.js").Context["onStop"]} [spec.onStop] by which it learns of STOP: what is drawn
+ *   then is not done
  * @param {AbortSignal} spec.signal
  */
-export function slide(el, { label, done, touched, isReady = () => true, signal }) {
+export function slide(el, { label, done, touched, isReady = () => true, onStop, signal }) {
   const fill = document.createElement("span");
   fill.className = "urc-slide-fill";
   const knob = document.createElement("span");
@@ -100,6 +102,11 @@ export function slide(el, { label, done, touched, isReady = () => true, signal }
     hold.drop();
     forget();
   }, { signal });
+  onStop?.(({ phase }) => {
+    if (phase === "") return;
+    hold.drop();
+    forget();
+  });
   signal.addEventListener("abort", () => clearInterval(resting));
   put(0);
 }

@@ -26,17 +26,27 @@ export class StopButton {
     /** @type {Set<(state: StopState) => void>} */
     this.listeners = new Set();
     this.seen = "";
+    /** Called at each press, here or elsewhere. */
+    this.onPressed = () => {};
     if (hasKeys) {
       addEventListener("keydown", (event) => {
         if (event.key !== "Escape" || event.defaultPrevented || event.repeat) return;
-        // A panel that lies open is closed by it, as everywhere; while something is held it is STOP.
-        if (document.querySelector(":popover-open") && !this.input.isDriving()) return;
+        if (document.querySelector(":popover-open")) return; // it is closed by it, as everywhere
         event.preventDefault();
         this.press();
       });
-      // Before anything that has the focus: while something is held, Space is STOP wherever it is.
+      // Before anything that has the focus: while something is held, both are STOP wherever it is.
       addEventListener("keydown", (event) => this.space(event), { capture: true });
+      addEventListener("keydown", (event) => this.escape(event), { capture: true });
     }
+  }
+
+  /** While something is held, Escape means nothing else. @param {KeyboardEvent} event */
+  escape(event) {
+    if (event.key !== "Escape" || event.repeat || !this.input.isDriving()) return;
+    event.preventDefault();
+    event.stopImmediatePropagation();
+    this.press();
   }
 
   /** Space is STOP; with nothing held it still presses a button that has the focus. @param {KeyboardEvent} event */
@@ -60,8 +70,7 @@ export class StopButton {
   press() {
     this.input.spendAll("STOP");
     this.drive.stop();
-    this.seen = ""; // pressed anew, it is told anew: what goes on by itself ends with each press
-    this.frame();
+    this.heard();
   }
 
   /**
@@ -88,6 +97,18 @@ export class StopButton {
     if (!this.store.isUp && !this.drive.isConfirmed) return t("no connection to URC");
     const lost = this.lines.filter((line) => this.store.links.get(line)?.state === "lost");
     return lost.length > 0 ? t("the robot is not connected") : "";
+  }
+
+  /**
+   * It was pressed, here or elsewhere: who follows it hears so at once, since a page that is hidden
+   * draws no frames, and also when it is reset already.
+   */
+  heard() {
+    this.onPressed();
+    const state = this.state();
+    if (state.phase === "") for (const listener of this.listeners) listener({ ...state, phase: "latched" });
+    this.seen = ""; // told anew: what goes on by itself ends with each press
+    this.frame();
   }
 
   frame() {

@@ -138,6 +138,7 @@
  * @property {{id: string, name: string} | null} asker
  * @property {number} left Milliseconds until the asker gets them.
  * @property {string} latched Who pressed STOP; "" while nothing is latched.
+ * @property {number} stops How often it was pressed.
  * @property {boolean} confirmed Whether the robot's lines have taken the stop.
  * @property {boolean} drives Whether this page may drive.
  * @property {boolean} forces Whether it may take the controls from whoever has them.

@@ -42,6 +42,7 @@ const SENTENCES = [
   mark("the robot is not connected"),
   mark("the robot has said nothing for {n} s"),
   mark("this page only watches"),
+  mark("STOP was pressed meanwhile: give it anew"),
   mark("no answer within {n} s"),
   mark("nobody waited for the answer"),
   mark("the robot's session ended"),

@@ -77,6 +77,8 @@ class Prepare(
     id: int
     command: str
     arguments: Arguments = {}
+    stops: int | None = None
+    """As of `Run`, which is what counts."""
 
 
 class Steer(msgspec.Struct, tag_field="t", tag="steer", forbid_unknown_fields=True, frozen=True):

@@ -47,6 +47,8 @@ class _Lease(Outbound, tag="lease", omit_defaults=False, frozen=True):
     """Milliseconds until the asker gets the controls."""
     latched: str
     """Who pressed STOP; "" while nothing is latched."""
+    stops: int
+    """How often it was pressed."""
     confirmed: bool
     """Whether the robot's lines have taken the stop."""
     drives: bool
@@ -144,6 +146,7 @@ def encode_lease(
             asker=_person(state.asked_by),
             left=milliseconds(left_s),
             latched=state.latched_by,
+            stops=state.stops,
             confirmed=is_confirmed,
             drives=you.role != "viewer",
             forces=you.role in ("engineer", "admin"),

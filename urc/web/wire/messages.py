@@ -185,6 +185,8 @@ class Run(msgspec.Struct, tag_field="t", tag="run", forbid_unknown_fields=True, 
     arguments: Arguments = {}
     token: str = ""
     """Answer to `Prepare`, where the driver wants people to be asked: somebody said yes to this."""
+    stops: int | None = None
+    """Of the lease that the page knew when somebody wished it; None: nobody looks."""
 
 
 Inbound = Ping | Run | Show | Agree | Prepare | Steer | Drive | Tick | Release | Stop
