@@ -73,3 +73,19 @@ async def test_full_screen_where_a_browser_has_it(new_page: PageMaker) -> None:
         await expect(button).to_have_attribute("aria-pressed", "true")
         await button.click()
         await expect(button).to_have_attribute("aria-pressed", "false")
+
+
+async def test_no_log_moves_what_steers(new_page: PageMaker) -> None:
+    """However much is told: it scrolls in its panel, and the page stays as high as the screen."""
+    robot = FakeRobot(dashboard_profile())
+    async with running_dashboard(robot) as address:
+        page = await new_page()
+        await page.goto(f"{address}robots/puppet/")
+        cell = page.locator("[data-cell='0']")
+        await cell.wait_for()
+        before = await cell.bounding_box()
+        for number in range(60):
+            robot.tell(f"line {number} of a robot that is silent now and then")
+        await page.locator("[data-log] > li").nth(59).wait_for()
+        assert await cell.bounding_box() == before
+        assert await page.evaluate("document.documentElement.scrollHeight <= innerHeight")

@@ -1,8 +1,10 @@
 """`urc send`: one command, its reply as JSON."""
 
 import argparse
+import asyncio
 import re
 from collections.abc import Mapping
+from contextlib import suppress
 from typing import TYPE_CHECKING
 
 from urc.cli.arguments import add_profile, load, what_it_has
@@ -19,6 +21,8 @@ if TYPE_CHECKING:
 EXAMPLE = "urc send my-robot.yaml set_speed speed=3 --set host=192.168.1.20"
 
 _WHOLE = re.compile(r"[+-]?[0-9]{1,300}")
+KNOWN_S = 3.0
+"""How long what a command requires may take to be read."""
 _WRONG_USE = ("bad-argument", "unknown-command")
 """Codes of a failure that lies in what was typed."""
 
@@ -40,6 +44,11 @@ def run(arguments: argparse.Namespace) -> int:
     if command is None:
         hint = what_it_has(arguments.command, profile.driver.commands)
         raise Misuse(f"{profile.name} has no command {arguments.command!r}; {hint}")
+    if command.hold is not None:
+        raise Misuse(
+            f"{command.name} moves the robot for as long as it is held, and nothing holds it here:"
+            " give it on the dashboard"
+        )
     values = _arguments(command, arguments.words)
     settings = complete_settings(profile, arguments)
     return run_loop(_send(profile, settings, command, values))
@@ -105,6 +114,7 @@ async def _send(
     from urc.runtime.session import CommandFailed, Session
 
     async with Session(profile, settings, built_in_catalog().transports) as session:
+        await _known(session, command)
         try:
             replied = await session.command(command.name, values)
         except CommandFailed as failed:
@@ -112,6 +122,23 @@ async def _send(
             raise (Misuse if failed.code in _WRONG_USE else UrcError)(text) from failed
     print(json_text({"command": command.name, "values": dict(replied.values)}))
     return 0
+
+
+async def _known(session: "Session", command: "Command") -> None:
+    """Wait for the first reading of what the command requires, for as long as may take."""
+    wanted = {name for one in command.requires for name in one.condition.names}
+    wanted &= session.profile.driver.signals.keys()
+
+    def is_known() -> bool:
+        return all(session.hub.latest(name) is not None for name in wanted)
+
+    if is_known():
+        return
+    with session.hub.tap() as tap, suppress(TimeoutError):  # then the engine says what is not known
+        async with asyncio.timeout(KNOWN_S):
+            while not is_known():
+                await tap.filled()
+                tap.take()
 
 
 def _why(session: "Session", command: "Command", failed: "CommandFailed") -> str:

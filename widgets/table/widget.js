@@ -71,7 +71,11 @@ class Table {
     const rows = shown(this.rows, { sort, least, filter: this.filter?.value ?? "" });
     const worse = this.rows.filter(({ level }) => level === "error" || level === "warn").length;
     const { t } = this.ctx;
-    write(this.count, this.rows.length === 0 ? "" : worse > 0 ? t("{count} not OK", { count: worse }) : t("all OK"));
+    // What is old, or was never read, is not OK, though nothing is known to be wrong with it.
+    const isOld = this.root.dataset["state"] !== "live" || this.rows.some(({ level }) => level === "stale");
+    const isOk = this.rows.every(({ level }) => level === "ok");
+    const words = worse > 0 ? t("{count} not OK", { count: worse }) : isOld ? t("not known") : isOk ? t("all OK") : "";
+    write(this.count, this.rows.length === 0 ? "" : words);
     attribute(this.root, "data-alarm", rows.some(({ level }) => level === "error") ? "hihi" : worse > 0 ? "high" : "");
     while (this.body.children.length > Math.max(1, rows.length)) this.body.lastElementChild?.remove();
     rows.forEach((row, place) => {

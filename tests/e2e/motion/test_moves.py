@@ -45,7 +45,7 @@ interfaces:
   default: { grid: fold beep show }
 """
 FOLD, BEEP, SHOW = (f"[data-cell='{place}'] .button-main" for place in range(3))
-LOCKED = "◆ stopped by screen 1: reset it first"
+LOCKED = "◆ stopped: reset it first"
 WATCHES = "◆ this page only watches"
 
 

@@ -168,7 +168,7 @@ async def test_an_attitude_without_one_of_its_angles_is_not_level(new_page: Page
             (2, "side", "rear"),
         ):
             note = page.locator(f"[data-cell='{cell}'] .attitude-note")
-            await note.filter(has_text="pitch: last seen").wait_for()
+            await note.filter(has_text="pitch: seen").wait_for()
             await until_text(page, f"[data-cell='{cell}'] .attitude-words", "—")
             assert not await page.is_visible(f"[data-cell='{cell}'] .attitude-{hidden}")
             assert await page.is_visible(f"[data-cell='{cell}'] .attitude-{seen}")

@@ -39,12 +39,12 @@ async def test_a_sensor_that_says_nothing_looks_dead(new_page: PageMaker) -> Non
         await page.locator(f"{first}-note", has_text="ahead · behind: ").wait_for()
         await until_attribute(page, first, "data-state", "live")
         robot.say("rear", 3.0, age_s=700)
-        await page.locator(f"{first}-note", has_text="ahead · behind: last seen").wait_for()
+        await page.locator(f"{first}-note", has_text="ahead · behind: seen").wait_for()
         await until_text(page, f"{first}-text", "2.00")
         # Its three places stay theirs, so what stands to the right is still there.
         robot.say("rear", 1.0)
         robot.say("around", (3.0, 2.0, 4.0), age_s=700)  # type: ignore[arg-type]
-        lost = page.locator(f"{second}-note", has_text="ahead, left, behind: last seen")
+        lost = page.locator(f"{second}-note", has_text="ahead, left, behind: seen")
         await lost.wait_for()
         assert (await lost.inner_text()).startswith("right · ")
 

@@ -193,7 +193,7 @@ def _choices(
 
 
 def _about(setting: Setting) -> str:
-    parts = [setting.description] if setting.description else []
+    parts = [setting.description.rstrip(".")] if setting.description else []
     low, high = setting.min, setting.max
     if setting.type == "port":
         parts.append(t("a port, 1 to 65535"))

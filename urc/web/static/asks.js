@@ -71,8 +71,9 @@ export class Asks {
     const no = button(t("Cancel"));
     const yes = isHazard ? element("div", "", "") : button(t("Yes"));
     box.append(text, no, yes);
-    const { top, bottom } = cell.getBoundingClientRect();
+    const { top, bottom, left, right } = cell.getBoundingClientRect();
     box.toggleAttribute("data-up", top + bottom > innerHeight);
+    box.toggleAttribute("data-left", left + right > innerWidth);
     cell.append(box);
     cell.classList.add("urc-asking");
     if (before && cell.contains(before)) no.focus();

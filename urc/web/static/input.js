@@ -153,6 +153,7 @@ export class Input {
   against() {
     const { lease, isMine } = this.drive;
     if (!lease) return t("no connection to URC");
+    if (lease.latched && lease.latched === lease.name) return t("stopped: reset it first");
     if (lease.latched) return t("stopped by {name}: reset it first", { name: said(lease.latched) });
     if (!lease.drives) return t("this page only watches");
     if (lease.holder && !isMine) return t("{name} has the controls", { name: said(lease.holder.name) });

@@ -272,7 +272,7 @@ export function many(readings) {
  */
 export function noteOf({ state, age, alarm }, t) {
   if (state === "none") return t("no value yet");
-  if (state === "gone") return t("last seen {age} ago", { age });
+  if (state === "gone") return t("seen {age} ago", { age });
   const old = state === "stale" ? t("{age} old", { age }) : "";
   return [alarm ? t(ALARMS[alarm]) : "", old].filter(Boolean).join(" · ");
 }

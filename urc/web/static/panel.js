@@ -101,8 +101,8 @@ function linkElement(link) {
   el.append(element("span", "urc-link-more", link.address));
   if (link.detail) el.append(element("span", "urc-link-more", link.detail));
   const counts = [
-    link.attempts > 0 ? t("{n} failed attempts", { n: link.attempts }) : "",
-    link.faults > 0 ? t("{n} faults", { n: link.faults }) : "",
+    link.attempts === 1 ? t("1 failed attempt") : link.attempts > 0 ? t("{n} failed attempts", { n: link.attempts }) : "",
+    link.faults === 1 ? t("1 fault") : link.faults > 0 ? t("{n} faults", { n: link.faults }) : "",
     link.state === "lost" && link.since >= 1000 ? t("for {age}", { age: ageText(link.since / 1000) }) : "",
   ].filter(Boolean);
   if (counts.length > 0) el.append(element("span", "urc-link-more", counts.join(" · ")));
