@@ -202,6 +202,9 @@ def test_what_is_wrong_is_refused_in_one_line(
     assert "; --allow-warnings publishes it all the same" in told
     told = anna.refuses("publish", car, *lab.to, "--allow-warnings")
     assert "the token 'x' may publish" in told
+    module = (lab.home / "widgets/dial/widget.js").rename(lab.home / "kept.js")
+    assert "widget.js" in anna.refuses("publish", dial, *lab.to)
+    module.rename(lab.home / "widgets/dial/widget.js")
     (lab.home / "widgets/dial/notes.txt").write_text("more")
     assert "listed with other bytes" in anna.refuses("publish", dial, *lab.to)
     (lab.home / "widgets/dial/notes.py").write_text("more")

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from urc.packages.notes import Provenance
     from urc.packages.sources import FileSource
+    from urc.problems import Problem
 
 _TOLD_MOST = 5
 EXAMPLE = "urc publish lab/drivers/puppet --to https://robots.example/ --token-file token.txt"
@@ -102,11 +103,14 @@ def _look(source: "FileSource", document: Path, arguments: argparse.Namespace) -
         PackageError: the errors, and the warnings unless they are allowed.
     """
     from urc.packages.names import PackageError
+    from urc.problems import has_errors
     from urc.runtime.examine import findings
 
     if not source.is_folder:
         return
     found = findings(document)
+    if document.name == "widget.yaml" and not has_errors(found):
+        found += _of_files(document)
     if arguments.allow_warnings:
         found = [one for one in found if one.severity == "error"]
     if found:
@@ -114,3 +118,14 @@ def _look(source: "FileSource", document: Path, arguments: argparse.Namespace) -
         only = all(one.severity == "warning" for one in found)
         hint = "; --allow-warnings publishes it all the same" if only else ""
         raise PackageError(f"{told}{hint}")
+
+
+def _of_files(manifest: Path) -> "list[Problem]":
+    """Return what is wrong with the files beside a widget's manifest."""
+    from urc.config.load import Shelf, check
+    from urc.runtime.catalog import built_in_catalog
+    from urc.shipped import shipped
+    from urc.web.show.widget_check import check_widget
+
+    widget = check(manifest, built_in_catalog(), Shelf(shipped("widgets"))).widget
+    return [] if widget is None else check_widget(widget, with_demo=False)

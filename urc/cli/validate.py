@@ -13,6 +13,7 @@ from urc.problems import Problem, has_errors, to_json, to_text
 
 if TYPE_CHECKING:
     from urc.config.load import Shelf
+    from urc.model.profile import Profile
     from urc.model.widget import Widget
     from urc.runtime.coverage import Coverage
 
@@ -112,6 +113,8 @@ def _examine(paths: list[str], *, with_tests: bool) -> _Report:
         report.looked_at |= dict.fromkeys(checked.files)
         if checked.kind == "widget":
             _examine_folder(path, checked.widget, report)
+        if checked.profile is not None:
+            _examine_own_widgets(checked.profile, report)
         if checked.profile is not None and with_tests:
             outcome = exercise(checked.profile)
             report.tests += len(checked.profile.tests)
@@ -121,14 +124,26 @@ def _examine(paths: list[str], *, with_tests: bool) -> _Report:
     return report
 
 
-def _examine_folder(path: str, widget: "Widget | None", report: _Report) -> None:
+def _examine_folder(
+    path: str, widget: "Widget | None", report: _Report, *, with_demo: bool = True
+) -> None:
     """Add what is wrong with the files beside a widget's manifest, once that is sound."""
     from urc.web.show.widget_check import FILES, check_widget
 
     home = os.path.dirname(path)
     report.looked_at |= dict.fromkeys(os.path.join(home, name) for name in FILES)
     if widget is not None:
-        report.add(check_widget(widget))
+        report.add(check_widget(widget, with_demo=with_demo))
+
+
+def _examine_own_widgets(profile: "Profile", report: _Report) -> None:
+    """Add what is wrong with the files of a document's widgets, but for those that ship."""
+    from urc.shipped import shipped
+
+    home = shipped("widgets").resolve()
+    for widget in profile.widgets.values():
+        if widget.folder.resolve().parent != home:
+            _examine_folder(str(widget.folder / "widget.yaml"), widget, report, with_demo=False)
 
 
 def _document_in(path: str) -> str:

@@ -135,3 +135,24 @@ def test_a_widget_that_is_never_used_is_told(
     assert capsys.readouterr().err == (
         f"urc serve: {own} is not used: a widget of that name ships with URC\n"
     )
+
+
+def test_what_is_wrong_with_the_widgets_of_a_robot_is_found_with_the_robot(
+    folder: Path, capsys: Output
+) -> None:
+    """Nobody has to name each folder: its page would show a card in that place."""
+    Path("bot.yaml").write_text(
+        "urc: 1\nkind: robot\nname: bot\n"
+        "transports: { wire: { type: tcp, host: 127.0.0.1, port: 1,"
+        " framing: { type: delimiter, tx: LF, rx: LF } } }\n"
+        "signals: { level: { type: number } }\n"
+        "messages: { level: { regex: '^L (?P<level>[0-9]+)$' } }\n"
+        "widgets: { tank: { use: throttle, bind: { value: level } } }\n"
+        "interfaces: { default: { grid: tank } }\n",
+        "utf-8",
+    )
+    main(["validate", "bot.yaml"])
+    assert "throttle" not in capsys.readouterr().out
+    (folder / "widget.js").unlink()
+    assert main(["validate", "bot.yaml"]) == 1
+    assert "widgets/throttle/widget.js" in capsys.readouterr().out

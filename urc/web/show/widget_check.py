@@ -28,8 +28,13 @@ _EXPORT: Final = re.compile(
 _ANY: Final = re.compile(r"^export\b.*", re.MULTILINE)
 
 
-def check_widget(widget: Widget) -> list[Problem]:
-    """Return what is wrong with the files of a widget whose manifest is sound."""
+def check_widget(widget: Widget, *, with_demo: bool = True) -> list[Problem]:
+    """Return what is wrong with the files of a widget whose manifest is sound.
+
+    Args:
+        widget: it may have come from anywhere.
+        with_demo: its author wants to know of the demo; a page that shows the widget needs none.
+    """
     problems: list[Problem] = []
     if widget.name in OURS and Border().is_foreign(widget):
         problems.append(hidden_widget(str(widget.folder / "widget.yaml"), widget.name))
@@ -41,7 +46,7 @@ def check_widget(widget: Widget) -> list[Problem]:
     except ProblemsError as error:
         problems += error.problems
     try:
-        states = demo_states(widget)
+        states = demo_states(widget) if with_demo else []
     except ProblemsError as error:
         problems += error.problems
     if template is not None and not has_errors(problems):

@@ -161,7 +161,8 @@ export class Overlays {
         pace: (way) => warden.post({ t: "pace", id, way }),
         page: () => overlay.page,
         sample: (hand, dtS) => overlay.sample(hand, dtS),
-        show: (state) => warden.post({ t: "held", id, state }),
+        // What the frame has not answered yet was not sampled: it is no empty sample.
+        show: (state) => warden.post({ t: "held", id, state: overlay.values ? state : { ...state, values: null } }),
       },
       warden.life.signal,
     );
