@@ -122,7 +122,9 @@ def _unknown_keys(document: Document, path: Path, error: _Error) -> list[Problem
 
 def _missing_keys(document: Document, path: Path, error: _Error) -> list[Problem]:
     known = error.schema.get("properties", {})
-    misspelt = [key_hint(key, known) for key in error.value if known and key not in known]
+    # Where any key may stand, none of them is told as unknown.
+    is_closed = bool(known) and error.schema.get("additionalProperties") is False
+    misspelt = [key_hint(key, known) for key in error.value if is_closed and key not in known]
     missing = [
         f"'{name}'"
         for name in error.limit

@@ -37,6 +37,7 @@ def test_a_sound_widget_has_no_findings(folder: Path, capsys: Output) -> None:
         ("demo.yaml", "{ value: 12.5 }, shows", "{ valu: 12.5 }, shows", "states.normal.values"),
         ("demo.yaml", "shows:", "shws:", ":38: error unknown-key states.normal.shws: "),
         ("demo.yaml", "  normal:", "  usual:", "error missing-key states: 'normal' is missing"),
+        ("demo.yaml", "  normal:", "  norm:", "error missing-key states: 'normal' is missing"),
         ("demo.yaml", "  normal: {", "  normal: {{", "demo.yaml:"),
         ("widget.js", "export default", "export defalt", "widget.js:6:1: error no-default-export"),
         ("widget.js", "export default", "// export default", "widget.js:1:1: error no-default"),
