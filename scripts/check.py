@@ -87,7 +87,7 @@ TESTS = (
             *(*PYTEST, "tests/e2e", "-m", "not alone"),
             *("-n", "3", "--dist", "loadgroup"),
         ),
-        timeout_s=700,
+        timeout_s=900,
     ),
     # They measure how soon a robot stops.
     Step("tests motion", (*PYTEST, "tests/e2e/motion", "-m", "alone"), timeout_s=420),
