@@ -5,17 +5,26 @@ import zlib
 
 from playwright.async_api import Page
 
-__all__ = ["BLUE", "GREEN", "GREY", "RED", "plain", "png", "until_pixel"]
+__all__ = ["BLUE", "GREEN", "GREY", "PIXELS_OF", "RED", "plain", "png", "until_pixel"]
 
 RED, BLUE, GREEN, GREY = (200, 0, 0), (0, 0, 200), (0, 200, 0), (90, 90, 90)
 
-PIXEL = """
-([selector, x, y]) => {
-  const canvas = document.querySelector(selector);
+PIXELS_OF = """
+(canvas) => {
   const { width, height } = canvas;
-  const place = [Math.floor(x * width), Math.floor(y * height), 1, 1];
-  return [...canvas.getContext("2d").getImageData(...place).data];
+  const pen = new OffscreenCanvas(width, height).getContext("2d");
+  pen.drawImage(canvas, 0, 0);
+  return { width, height, data: pen.getImageData(0, 0, width, height).data };
 }
+"""
+"""What a canvas shows, however it was drawn; a WebGL one only in the frame in which it was."""
+
+PIXEL = f"""
+([selector, x, y]) => {{
+  const {{ width, height, data }} = ({PIXELS_OF})(document.querySelector(selector));
+  const place = 4 * (Math.floor(y * height) * width + Math.floor(x * width));
+  return [...data.slice(place, place + 4)];
+}}
 """
 
 

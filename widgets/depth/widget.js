@@ -8,6 +8,7 @@
 import { grasp } from "urc/giving";
 import { DASH, attribute, clamp, colours, format, noteOf, part, style, write } from "urc/kit";
 import { palette, pixel } from "urc/palette";
+import { Sheet } from "urc/sheet";
 import { arrayField, paint, pixelAt, probe, readField } from "./field.js";
 
 const STEP = 0.02;
@@ -40,10 +41,8 @@ class Depth {
     this.text = part(el, ".depth-text");
     this.note = part(el, ".depth-note");
     const [data, bar] = el.querySelectorAll("canvas");
-    const pen = data?.getContext("2d");
-    if (!data || !bar || !pen) throw new Error("this browser draws no canvas");
-    this.canvas = data;
-    this.pen = pen;
+    if (!data || !bar) throw new Error("the template has no canvas");
+    this.sheet = new Sheet(data);
     this.clip = { near: Number(options["near"] ?? 0.3), far: Number(options["far"] ?? 5) };
     this.palette = palette(options["palette"] === "grey" ? "grey" : "cividis");
     /** Where it is measured, in shares of the picture. */
@@ -66,10 +65,12 @@ class Depth {
 
   /** @param {HTMLCanvasElement} bar */
   legend(bar) {
-    const pen = bar.getContext("2d");
+    const sheet = new Sheet(bar);
     const image = new ImageData(256, 1);
     new Uint32Array(image.data.buffer).set(this.palette.toReversed());
-    pen?.putImageData(image, 0, 0);
+    sheet.resize(256, 1);
+    sheet.pen.putImageData(image, 0, 0);
+    sheet.show();
     write(part(this.root, ".depth-near"), `≤ ${format(this.clip.near)} m`);
     write(part(this.root, ".depth-far"), `≥ ${format(this.clip.far)} m`);
   }
@@ -106,7 +107,7 @@ class Depth {
   /** Where the picture lies in the page: its own shape, within or beyond the box of the canvas. */
   box() {
     const { left, top, width, height } = this.face.getBoundingClientRect();
-    const { width: columns, height: rows } = this.canvas;
+    const { width: columns, height: rows } = this.sheet.canvas;
     const [across, down] = [width / columns, height / rows];
     const scale = this.options["fit"] === "cover" ? Math.max(across, down) : Math.min(across, down);
     const [wide, high] = [columns * scale || 1, rows * scale || 1];
@@ -194,15 +195,17 @@ class Depth {
   }
 
   paint() {
-    const { field, canvas } = this;
+    const { field, sheet } = this;
     if (field) {
+      const { canvas } = sheet;
       const isNew = canvas.width !== field.width || canvas.height !== field.height;
-      if (isNew) [canvas.width, canvas.height] = [field.width, field.height];
+      sheet.resize(field.width, field.height);
       const image = new ImageData(field.width, field.height);
       // What is not known looks like the box behind it, and is no colour of the scale.
       const { surface } = colours(this.root, ["surface"]);
       paint(field, this.clip, this.palette, pixel(surface), new Uint32Array(image.data.buffer));
-      this.pen.putImageData(image, 0, 0);
+      sheet.pen.putImageData(image, 0, 0);
+      sheet.show();
       if (isNew) this.mark();
     }
     this.show();

@@ -2,6 +2,7 @@
 /** @typedef {import("../../urc/web/static/types.js").Context} Context */
 /** @typedef {import("../../urc/web/static/types.js").Instance} Instance */
 import { attribute, noteOf, part, write } from "urc/kit";
+import { Sheet } from "urc/sheet";
 import { pictureOf } from "./source.js";
 
 export default {
@@ -16,6 +17,7 @@ export default {
     const note = part(el, ".image-note");
     const words = String(options["words"] || part(el, ".image-title").textContent);
     const canvas = document.createElement("canvas");
+    const sheet = new Sheet(canvas);
     canvas.className = "image-picture";
     canvas.setAttribute("role", "img");
     canvas.setAttribute("aria-label", words);
@@ -30,9 +32,9 @@ export default {
 
     ctx.picture("picture", (bitmap) => {
       // The style sheet fits it into the cell, so it keeps its own size.
-      if (canvas.width !== bitmap.width) canvas.width = bitmap.width;
-      if (canvas.height !== bitmap.height) canvas.height = bitmap.height;
-      canvas.getContext("2d")?.drawImage(bitmap, 0, 0);
+      sheet.resize(bitmap.width, bitmap.height);
+      sheet.pen.drawImage(bitmap, 0, 0);
+      sheet.show();
       if (canvas.parentElement !== place) place.replaceChildren(canvas);
     });
 

@@ -34,13 +34,8 @@ class Plot {
     this.legend = part(el, ".plot-legend");
     this.pauseButton = part(el, ".plot-pause");
     this.place = part(el, ".plot-history");
-    const canvas = part(el, ".plot-canvas");
-    const newest = part(el, ".plot-newest");
-    if (!(canvas instanceof HTMLCanvasElement) || !(newest instanceof HTMLCanvasElement)) {
-      throw new Error("the template has no canvas");
-    }
     this.windowS = seconds(options["window"]);
-    this.live = new Live(canvas, newest, this.windowS);
+    this.live = new Live(part(el, ".plot-picture"), this.windowS);
     /** @type {readonly Reading[]} */
     this.readings = [];
     /** @type {number[]} */
@@ -134,8 +129,10 @@ class Plot {
       colour: "",
       dash: [...(DASHES[Math.floor(place / COLOURS.length) % DASHES.length] ?? [])],
       isShown: traces.get(`${name} ${unit}`)?.isShown ?? true,
+      kept: 0,
+      keptWay: 0,
       drawn: 0,
-      way: 0,
+      drawnWay: 0,
     }));
     this.list();
     this.paint();

@@ -6,6 +6,7 @@
 /** @typedef {import("./paint.js").Ink} Ink */
 import { DASH, attribute, colours, format, noteOf, number, part, write } from "urc/kit";
 import { palette, pixel } from "urc/palette";
+import { Sheet } from "urc/sheet";
 import { Overlay } from "./overlay.js";
 import { arc, band, chart, dots, graph, view } from "./paint.js";
 import { directions, measured, nearest, rayOfPixels, raysOfColumns, reachOfPixels, sideOf } from "./rays.js";
@@ -51,11 +52,8 @@ class Scan {
     this.note = part(el, ".scan-note");
     const [data, over] = el.querySelectorAll("canvas");
     if (!data || !over) throw new Error("the template has no canvas");
-    this.canvas = data;
+    this.sheet = new Sheet(data);
     this.overlay = new Overlay(over);
-    const pen = data.getContext("2d");
-    if (!pen) throw new Error("this browser draws no canvas");
-    this.pen = pen;
     this.view = VIEWS.find((each) => each === options["view"]) ?? "polar";
     this.palette = palette();
     /** @type {Reading | undefined} */
@@ -183,7 +181,8 @@ class Scan {
     this.size(across, isFlat ? Math.max(16, Math.round(height * scale)) : across);
     this.makeTables(isFlat);
     this.paint(Array.isArray(reading.value) ? reading.value : []);
-    this.pen.putImageData(this.image, 0, 0);
+    this.sheet.pen.putImageData(this.image, 0, 0);
+    this.sheet.show();
   }
 
   /**
@@ -192,8 +191,7 @@ class Scan {
    */
   size(width, height) {
     if (this.image.width === width && this.image.height === height) return;
-    this.canvas.width = width;
-    this.canvas.height = height;
+    this.sheet.resize(width, height);
     this.image = new ImageData(width, height);
     this.pixels = new Uint32Array(this.image.data.buffer);
   }

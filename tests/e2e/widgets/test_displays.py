@@ -11,6 +11,7 @@ from playwright.async_api import Page
 
 from tests.e2e.conftest import PageMaker
 from tests.e2e.dashboards import running_dashboard, until, until_attribute, until_text
+from tests.e2e.drawn import PIXELS_OF
 from tests.e2e.ports import free_port
 from urc.model.codec import WriteSpec
 from urc.model.driver import Argument, Command
@@ -231,17 +232,17 @@ LINES = 10
 LAST_VALUE_IS = """
 (text) => document.querySelector("li:last-child .plot-value")?.textContent === text
 """
-COLOURS = """
-() => {
-  const canvas = document.querySelector(".plot-canvas");
-  const { width, height } = canvas;
-  const pixels = canvas.getContext("2d").getImageData(0, 0, width, height).data;
+COLOURS = f"""
+() => {{
   const found = new Set();
-  for (let place = 0; place < pixels.length; place += 4) {
-    if (pixels[place + 3] === 255) found.add(pixels.slice(place, place + 3).join());
-  }
+  for (const canvas of document.querySelectorAll(".plot-strip")) {{
+    const {{ data }} = ({PIXELS_OF})(canvas);
+    for (let place = 0; place < data.length; place += 4) {{
+      if (data[place + 3] === 255) found.add(data.slice(place, place + 3).join());
+    }}
+  }}
   return found.size;
-}
+}}
 """
 
 
@@ -290,7 +291,7 @@ async def test_a_plot_draws_each_signal_and_can_be_looked_at(
         assert sorted(float(row[10]) for row in rows[1:] if row[10]) == [9.0] * 3 + [9.5] * 3
 
         await page.click(".plot-pause")
-        await page.wait_for_selector(".plot-canvas", state="visible")
+        await page.wait_for_selector(".plot-picture", state="visible")
         assert await page.locator(".plot-history .u-over").count() == 0
         robot.say("m0", 40.0)  # far above the scale, which grows at once
         await page.wait_for_function(

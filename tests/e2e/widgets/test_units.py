@@ -11,6 +11,7 @@ from playwright.async_api import Page
 
 from tests.e2e.conftest import PageMaker
 from tests.e2e.dashboards import running_dashboard, until, until_text
+from tests.e2e.drawn import PIXELS_OF
 from urc.model.interface import WidgetUse
 from urc.model.values import Signal
 from urc.testing.dashboard import FakeRobot, dashboard_profile
@@ -28,17 +29,17 @@ SIGNALS = {
 }
 
 
-LINE_TOPS = """
-() => {
-  const canvas = document.querySelector(".plot-canvas");
-  const { width, height } = canvas;
-  const pixels = canvas.getContext("2d").getImageData(0, 0, width, height).data;
+LINE_TOPS = f"""
+() => {{
   const rows = new Set();
-  for (let place = 0; place < width * height; place += 1) {
-    if (pixels[4 * place + 3] === 255) rows.add(Math.floor(place / width));
-  }
+  for (const canvas of document.querySelectorAll(".plot-strip")) {{
+    const {{ width, height, data }} = ({PIXELS_OF})(canvas);
+    for (let place = 0; place < width * height; place += 1) {{
+      if (data[4 * place + 3] === 255) rows.add(Math.floor(place / width));
+    }}
+  }}
   return rows.size ? Math.max(...rows) - Math.min(...rows) : null;
-}
+}}
 """
 """How many rows of pixels apart the highest and the lowest piece of the line are."""
 

@@ -7,7 +7,7 @@ import pytest
 
 from tests.e2e.conftest import PageMaker
 from tests.e2e.dashboards import until, until_attribute, until_text
-from tests.e2e.drawn import BLUE, GREEN, GREY, RED, plain, png, until_pixel
+from tests.e2e.drawn import BLUE, GREEN, GREY, PIXELS_OF, RED, plain, png, until_pixel
 from tests.e2e.gallery import coarse, difference
 from tests.e2e.motion.driving import CALM_LEASE_S, Wire, centre, driven, fresh, held, number
 from tests.e2e.widgets.inputs import drag
@@ -293,13 +293,13 @@ async def test_a_panorama_is_looked_around_in(new_page: PageMaker) -> None:
         await until(lambda: robot.commands == [("take", {})])
 
 
-COLOUR = """
-([face, x, wanted]) => {
-  const canvas = document.querySelector(`${face} canvas`);
-  const place = [Math.floor(canvas.width * x), Math.floor(canvas.height / 2), 1, 1];
-  const [r, g, b] = canvas.getContext("2d").getImageData(...place).data;
+COLOUR = f"""
+([face, x, wanted]) => {{
+  const {{ width, height, data }} = ({PIXELS_OF})(document.querySelector(`${{face}} canvas`));
+  const place = 4 * (Math.floor(height / 2) * width + Math.floor(width * x));
+  const [r, g, b] = data.slice(place, place + 3);
   return wanted === "g" ? g > 150 && r < 60 && b < 60 : r > 150 && g < 60;
-}
+}}
 """
 
 

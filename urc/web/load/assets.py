@@ -20,7 +20,7 @@ from urc.problems import UrcError
 __all__ = ["Assets", "folder_assets", "import_map", "script", "widget_assets"]
 
 STATIC = Path(__file__).resolve().parents[1] / "static"
-KIT = ("curve", "giving", "kit", "meter", "motion", "padmap", "palette", "scale", "stroke")
+KIT = ("curve", "giving", "kit", "meter", "motion", "padmap", "palette", "scale", "sheet", "stroke")
 """Modules of ours that widgets import as ``urc/…``."""
 WIDGET_FILES = ("widget.js", "widget.css")
 MOST_FILES = 200

@@ -11,6 +11,7 @@
  */
 
 import { fixed, rough } from "./figures.js";
+import { Sheet } from "./sheet.js";
 import { mark } from "./words.js";
 
 export { digitsIn, figure } from "./figures.js";
@@ -293,24 +294,28 @@ export function worst(readings) {
   return { state: found?.state ?? "none", age: found?.age ?? "", alarm };
 }
 
+/** What `board` draws on. @type {WeakMap<HTMLCanvasElement, Sheet>} */
+const sheets = new WeakMap();
+
 /**
- * Return a canvas's context, sized to the box it has in the page and to the screen's pixels, and
- * wiped. Call it in `resize` and when drawing: it sets the size on change only.
+ * Return what draws on a canvas, sized to the box it has in the page and to the screen's pixels, and
+ * wiped. Call it whenever all is drawn anew, and draw at once: it is shown when the code that runs
+ * has ended.
  *
  * @param {HTMLCanvasElement} canvas
  * @param {{width: number, height: number}} size in CSS pixels
  * @returns {CanvasRenderingContext2D}
  */
 export function board(canvas, { width, height }) {
-  const context = canvas.getContext("2d");
-  if (!context) throw new Error("this browser draws no canvas");
+  const sheet = sheets.get(canvas) ?? new Sheet(canvas);
+  sheets.set(canvas, sheet);
   const density = Math.min(3, globalThis.devicePixelRatio || 1);
-  const [across, down] = [Math.max(1, Math.round(width * density)), Math.max(1, Math.round(height * density))];
-  if (canvas.width !== across) canvas.width = across;
-  if (canvas.height !== down) canvas.height = down;
-  context.setTransform(density, 0, 0, density, 0, 0);
-  context.clearRect(0, 0, width, height);
-  return context;
+  sheet.resize(Math.max(1, Math.round(width * density)), Math.max(1, Math.round(height * density)));
+  const { pen } = sheet;
+  pen.setTransform(density, 0, 0, density, 0, 0);
+  pen.clearRect(0, 0, width + 1, height + 1);
+  sheet.showSoon();
+  return pen;
 }
 
 /**
