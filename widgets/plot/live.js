@@ -63,10 +63,11 @@ export class Live {
     if (shift === 0 && !this.isStale && nowS - this.drawnS < WAIT_S) return;
     this.column = column;
     this.drawnS = nowS;
-    if (this.isStale || shift >= width || shift < 0) this.begin(nowS - this.spanS);
-    if (this.isStale || !this.fits(perSecond)) this.keep(perSecond);
-    else this.draw(perSecond);
+    const isAnew = this.isStale || shift >= width || shift < 0;
     this.isStale = false;
+    if (isAnew) this.begin(nowS - this.spanS);
+    if (isAnew || !this.fits(perSecond)) this.keep(perSecond);
+    else this.draw(perSecond);
     this.picture.show(column);
   }
 
@@ -77,7 +78,6 @@ export class Live {
       trace.kept = trace.ring.since(startS);
       trace.keptWay = 0;
     }
-    this.isStale = true;
   }
 
   /** Whether all that is new has its place on the narrow canvas. @param {number} perSecond */

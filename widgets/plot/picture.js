@@ -28,6 +28,7 @@ export class Picture {
     // One more where the first and the last are seen in part, and one that begins at the right end.
     this.strips = Array.from({ length: STRIPS + 2 }, made);
     this.newest = made();
+    this.all = [...this.strips, this.newest];
     place.replaceChildren(...this.all.map(({ sheet }) => sheet.canvas));
     this.width = 1;
     this.height = 1;
@@ -38,10 +39,6 @@ export class Picture {
     /** Which column was at the right end when all were put in their places. */
     this.base = 0;
     this.shift = NaN;
-  }
-
-  get all() {
-    return [...this.strips, this.newest];
   }
 
   /**

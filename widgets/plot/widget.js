@@ -177,6 +177,8 @@ class Plot {
     attribute(button, "aria-pressed", String(trace.isShown));
     this.history?.show(place, trace.isShown);
     this.fit(true);
+    this.live.spoil(); // also where the scale stays as it is
+    this.soon();
   }
 
   /** Take the colours of the theme. */

@@ -313,7 +313,7 @@ export function board(canvas, { width, height }) {
   sheet.resize(Math.max(1, Math.round(width * density)), Math.max(1, Math.round(height * density)));
   const { pen } = sheet;
   pen.setTransform(density, 0, 0, density, 0, 0);
-  pen.clearRect(0, 0, width + 1, height + 1);
+  pen.clearRect(0, 0, width, height);
   sheet.showSoon();
   return pen;
 }

@@ -30,7 +30,7 @@ export class Sheet {
    * @param {number} height
    */
   resize(width, height) {
-    for (const one of new Set([this.surface, this.canvas])) {
+    for (const one of [this.surface, this.canvas]) {
       if (one.width !== width) one.width = width;
       if (one.height !== height) one.height = height;
     }
