@@ -243,7 +243,7 @@ class Reins:
         dues = [one.deadline for one in self._movers.values() if one.state != "idle"]
         at_s = min((due for due in dues if due is not None), default=float("inf"))
         at_s = max(at_s, now + _LOOK_S)
-        if self._doubtful or not self.lane.is_idle:
+        if self._is_watched or not self.lane.is_idle:
             # The end of a line's time is looked for when it comes, not a look later.
             stalled_s = self._watch.deadline or at_s
             at_s = min(at_s, now + self._look_s, max(stalled_s, now))
@@ -271,11 +271,24 @@ class Reins:
         since = self.lane.busy_since_s
         if since is not None and now - since >= self._watch.limit_s:
             return True
-        if not self._doubtful or self._unsent is None:
+        if self._unsent is None or not self._is_watched:
             return False
         unsent = self._unsent()
         if not unsent and self.lane.is_idle:
             self._doubtful.clear()
-        is_wanted = any(mover.is_waiting for mover in self._movers.values())
-        self._look_s = _LOOK_S if is_wanted else min(2 * self._look_s, _LONGEST_LOOK_S)
+        self._look_s = _LOOK_S if self._is_wanted else min(2 * self._look_s, _LONGEST_LOOK_S)
         return self._watch.saw(unsent, now)
+
+    @property
+    def _is_wanted(self) -> bool:
+        """Whether motion waits to be written."""
+        return any(mover.is_waiting for mover in self._movers.values())
+
+    @property
+    def _is_watched(self) -> bool:
+        """Whether bytes that do not leave matter: motion is among them, or waits for all of them.
+
+        The second is so where opening is dear: a ping that fell into a cut would hold a robot up
+        for as long as that lasts, and let it go on afterwards, as if nothing had been.
+        """
+        return bool(self._doubtful) or (self._is_strict and self._is_wanted)

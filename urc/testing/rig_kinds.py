@@ -77,7 +77,7 @@ commands:
     send: {send}
     args: {{ t: {{ type: integer, min: 0 }} }}
     hold: {{ repeat: 50ms, lease: 250ms, release: {{ t: 0 }}, watchdog: none }}
-"""
+{polls}"""
 _LINES = "framing: { type: delimiter, tx: LF, rx: LF }"
 _TEXT = '"M {{ t }}"'
 _OPTIONS: Final = {
@@ -97,6 +97,11 @@ _SENDS: Final = {
     "mqtt": '{ publish: { topic: go, text: "M {{ t }}" } }',
     "rosbridge": '{ publish: { topic: /go, type: std_msgs/Int64, json: { data: "{{ t }}" } } }',
 }
+_ASIDE: Final = {
+    "mqtt": "{ publish: { topic: aside, text: here } }",
+    "rosbridge": "{ publish: { topic: /aside, type: std_msgs/String, json: { data: here } } }",
+}
+"""What is no motion, on lines where motion waits for it, too; these robots do not hear it."""
 
 
 class Counterpart(Program):
@@ -129,7 +134,10 @@ def document(kind: str, lane: int, port: int, other: Counterpart | None) -> str:
         options = options.replace("OTHER", str(other.port))
         for name, value in other.options.items():
             options = options.replace(name, value)
-    return _DOCUMENT.format(lane=lane, options=options, send=_SENDS.get(kind, _TEXT))
+    aside = _ASIDE.get(kind)
+    polls = f"polls:\n  - {{ every: 60ms, send: {aside} }}\n" if aside else ""
+    send = _SENDS.get(kind, _TEXT)
+    return _DOCUMENT.format(lane=lane, options=options, send=send, polls=polls)
 
 
 def start_counterpart(

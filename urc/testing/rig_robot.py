@@ -2,9 +2,9 @@
 
 ``python rig_robot.py tcp:127.0.0.1:0 udp:127.0.0.1:0 …`` is one robot for each argument. ``ws`` is
 a WebSocket whose messages are the lines, ``bridge`` one that takes messages as rosbridge does and
-hears ``M NUMBER`` for ``{"data": NUMBER}``; ``mqtt:HOST:PORT`` listens to the topic ``go`` of a
-broker there. What they hear is told on standard output, one line each, with times of the monotonic
-clock in nanoseconds::
+hears ``M NUMBER`` for ``{"data": NUMBER}`` on ``/go``; ``mqtt:HOST:PORT`` listens to the topic
+``go`` of a broker there. What they hear is told on standard output, one line each, with times of
+the monotonic clock in nanoseconds::
 
     ready 40001 40002 …     their ports, once
     open ROBOT TIME         a connection was made; a broker has taken the subscription
@@ -120,9 +120,10 @@ class BridgeEar(WebEar):
     """What is published through a rosbridge."""
 
     def read(self, body: bytes) -> list[str]:
-        """Return a line for what is published, nothing for all else."""
+        """Return a line for what is published on the topic of motion, nothing for all else."""
         said = json.loads(body)
-        return [f"M {said['msg']['data']}"] if said["op"] == "publish" else []
+        is_motion = said["op"] == "publish" and said["topic"] == "/go"
+        return [f"M {said['msg']['data']}"] if is_motion else []
 
 
 class BrokerEar(Ear):

@@ -1,34 +1,16 @@
 """A line in the guard: motion where it is clear, and stops before anything else."""
 
 import asyncio
-from collections.abc import AsyncIterator
 
 import pytest
 
-from tests.unit.guard.lines import STOP, TERMS, CountedWire, Rig, SlowWire, Wire
+from tests.unit.guard.lines import STOP, TERMS, CountedWire, Rig, Wire
 from urc.guard import proxy, wire
 from urc.model.codec import Envelope
-from urc.motion.stall import AFRESH_S, SHORTEST_CUT_S, STOP_WITHIN_S
 from urc.testing.clock import settle
-from urc.transports.base import ConnectFailed, PeerClosed
+from urc.transports.base import ConnectFailed
 
 pytestmark = pytest.mark.anyio
-
-
-@pytest.fixture
-async def rigs() -> AsyncIterator[list[Rig]]:
-    made: list[Rig] = []
-    yield made
-    for rig in made:
-        finishing = asyncio.ensure_future(rig.guard.finish())
-        while not finishing.done():
-            await rig.clock.advance(0.1)
-
-
-@pytest.fixture
-async def rig(rigs: list[Rig]) -> Rig:
-    rigs.append(Rig(CountedWire()))
-    return rigs[-1]
 
 
 async def test_tick_is_written_at_once(rig: Rig) -> None:
@@ -109,93 +91,6 @@ async def test_owed_stop_is_the_newest_too(rig: Rig) -> None:
     rig.robot.cut()
     await rig.clock.advance(0.1)
     assert rig.robot.written == [b"go 1", b"stop 2"]
-
-
-@pytest.mark.parametrize("began_s", [0.0, 0.013, 0.049, 0.05])
-async def test_cut_of_a_fifth_of_a_second_is_followed_by_the_stop_in_a_tenth(
-    rig: Rig, began_s: float
-) -> None:
-    """However it falls between two ticks: the line is open afresh by then, with time left."""
-    robot = rig.robot
-    assert isinstance(robot, CountedWire)
-    await rig.drive()
-    await rig.clock.advance(0.05 - began_s)
-    cut_s = rig.clock.now()
-    robot.is_stuck = True
-    await rig.clock.advance(began_s)
-    while STOP not in robot.written:
-        rig.tick(b"go %d" % len(robot.written))
-        for _ in range(50):
-            await rig.clock.advance(0.001)
-            if STOP in robot.written:
-                break
-    assert rig.clock.now() - cut_s <= SHORTEST_CUT_S + STOP_WITHIN_S - AFRESH_S + 0.0011
-    assert robot.aborts == 1
-
-
-async def test_newest_waits_while_bytes_are_unsent(rig: Rig) -> None:
-    """For a moment they may be: acknowledgements are put off. Then nothing more is written."""
-    robot = rig.robot
-    assert isinstance(robot, CountedWire)
-    robot.is_stuck = True
-    await rig.drive()
-    for number in range(2, 6):
-        await rig.clock.advance(0.04)
-        rig.tick(b"go %d" % number)
-    await settle()
-    assert robot.written == [b"go 1", b"go 2", b"go 3", b"go 4"]
-    robot.stuck_bytes = 0
-    robot.is_stuck = False
-    await rig.clock.advance(0.01)
-    assert robot.written[-1] == b"go 5"
-
-
-async def test_nothing_at_all_may_be_unsent_where_opening_is_dear(rigs: list[Rig]) -> None:
-    robot = CountedWire()
-    rig = Rig(robot, stalled_s=1.0, is_strict=True)
-    rigs.append(rig)
-    robot.is_stuck = True
-    await rig.drive()
-    await rig.clock.advance(0.04)
-    rig.tick(b"go 2")
-    assert robot.written == [b"go 1"]
-    await rig.clock.advance(0.4)
-    assert robot.written == [b"go 1", STOP], "the stop goes out with it"
-    assert robot.aborts == 0
-
-
-async def test_stalled_line_is_reset_and_the_stop_is_first(rig: Rig) -> None:
-    robot = rig.robot
-    assert isinstance(robot, CountedWire)
-    await rig.drive()
-    robot.is_stuck = True
-    for number in range(2, 9):
-        await rig.clock.advance(0.05)
-        rig.tick(b"go %d" % number)
-    await rig.clock.advance(0.05)
-    assert robot.aborts == 1
-    assert robot.written.index(STOP) == len(robot.written) - 1
-    assert robot.opens == 2
-    with pytest.raises(PeerClosed, match="has taken nothing for 220 ms while it moved"):
-        await rig.transport.receive()
-    assert await rig.stops() == [("drive", "revoked")]
-
-
-async def test_line_that_only_waits_is_reset_too(rigs: list[Rig]) -> None:
-    robot = SlowWire()
-    rig = Rig(robot)
-    rigs.append(rig)
-    await rig.drive()
-    assert robot.written == [b"go 1"]
-    robot.flowing.clear()
-    rig.tick(b"go 2")
-    for _ in range(8):
-        await rig.clock.advance(0.05)
-        rig.tick(b"go 3")
-    robot.flowing.set()
-    await rig.clock.advance(0.1)
-    assert robot.opens == 2
-    assert robot.written == [b"go 1", STOP]
 
 
 async def test_cut_line_is_opened_by_the_guard_itself(rig: Rig) -> None:
