@@ -109,6 +109,10 @@ export class Host {
    */
   frame(nowMs) {
     let left = this.pace.begin(this.cells.size);
+    if (left === 0) {
+      this.doors.again();
+      return;
+    }
     let drawn = 0;
     const draw = (/** @type {Cell} */ cell) => {
       const news = cell.news(this.store, nowMs);

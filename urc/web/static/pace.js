@@ -29,32 +29,34 @@ export class Pace {
     this.most = Infinity;
     /** Whether widgets are drawn in every second frame only. */
     this.isHalved = false;
-    /** Whether this frame is a free one. */
-    this.isFree = false;
     /** Whether the last frame drew widgets, and many had something new. */
     this.isLastFull = false;
   }
 
   /**
-   * Begin a frame; return how many widgets may be drawn in it.
+   * Begin a frame; return how many widgets may be drawn in it. In a free one nothing is, not even
+   * what waits for no turn: all that is new has its frame with the next one.
    *
    * @param {number} count how many there are
    */
   begin(count) {
-    this.isFree = this.isHalved && this.isLastFull;
-    return this.isFree ? 0 : Math.max(1, Math.ceil(count / LONGEST_TURN), Math.floor(this.most));
+    if (this.isHalved && this.isLastFull) {
+      this.isLastFull = false;
+      return 0;
+    }
+    return Math.max(1, Math.ceil(count / LONGEST_TURN), Math.floor(this.most));
   }
 
   /**
-   * End a frame; return whether it is worth learning from. Those that wait count as well: where turns
-   * are short, few are drawn in each frame, and it could never be found out that there is room for
-   * more. A free frame draws only what cannot wait, and the next is for the others.
+   * End a frame that was not free; return whether it is worth learning from. Those that wait count as
+   * well: where turns are short, few are drawn in each frame, and it could never be found out that
+   * there is room for more.
    *
    * @param {number} drawn how many widgets it drew
    * @param {number} waiting how many wait for their turn
    */
   end(drawn, waiting) {
-    this.isLastFull = !this.isFree && drawn > 0 && drawn + waiting >= FEW;
+    this.isLastFull = drawn > 0 && drawn + waiting >= FEW;
     return this.isLastFull;
   }
 
