@@ -95,7 +95,7 @@ async def _look_all(
 ) -> list[list[tuple[float, float, float]]]:
     """Return for each frame of each round: when, what the needle shows, and what the figure."""
     looks: list[list[tuple[float, float, float]]] = []
-    async with running_browser() as browser:
+    async with running_browser(is_whole=True) as browser:
         for _ in range(rounds):
             async with opened(browser, address) as one:
                 await one.page.wait_for_function(READY)

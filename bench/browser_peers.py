@@ -86,7 +86,7 @@ def _leave_out(name: str, why: str) -> None:
 
 async def _look_all(addresses: Mapping[str, str], seconds: float, rounds: int) -> Ages:
     taken: Ages = {name: [] for name in addresses}
-    async with running_browser() as browser:
+    async with running_browser(is_whole=True) as browser:
         for _ in range(rounds):
             for name in [*taken]:
                 try:

@@ -80,7 +80,7 @@ async def _compare(
 ) -> list[Result]:
     pairs: list[tuple[Cost, Cost]] = []
     costs: Costs = {}
-    async with running_browser() as browser:
+    async with running_browser(is_whole=True) as browser:
         for _ in range(rounds):
             base = await _naive(browser, naive, seconds) if naive else None
             for rate, address in ours.items():

@@ -99,7 +99,7 @@ def run(*, full: bool) -> Sequence[Result]:
 async def _compare(naive: str, ours: str, seconds: float, rounds: int) -> list[Result]:
     pairs: list[tuple[Cost, Cost]] = []
     normal: list[Cost] = []
-    async with running_browser() as browser:
+    async with running_browser(is_whole=True) as browser:
         for _ in range(rounds):
             base = await _naive(browser, naive)
             async with opened(browser, ours) as one:

@@ -117,7 +117,10 @@ def run(*, full: bool) -> Sequence[Result]:
 
 async def _let_go(address: str, server: int, robots: Robots, each: int) -> dict[str, list[Trial]]:
     found: dict[str, list[Trial]] = {way: [] for way in WAYS}
-    async with running_browser() as browser, opened(browser, address, script=STAMP) as one:
+    async with (
+        running_browser(is_whole=True) as browser,
+        opened(browser, address, script=STAMP) as one,
+    ):
         await one.page.wait_for_selector(LEFT)
         await one.page.wait_for_selector(".joystick[data-phase='idle']")
         watched = [f"pid:{number}" for number in (server, *renderers_of(os.getpid()))]

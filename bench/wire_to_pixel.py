@@ -123,7 +123,7 @@ async def _measure(
 ) -> list[Result]:
     shown: dict[str, list[list[float]]] = {name: [] for name in pages}
     ways: dict[str, list[list[float]]] = {name: [] for name in sticks}
-    async with running_browser() as browser:
+    async with running_browser(is_whole=True) as browser:
         for _ in range(rounds):
             for name, address in pages.items():
                 shown[name].append(await _written(browser, name, address, seconds))

@@ -1,6 +1,6 @@
 """The programs beside Python that the tests use, and how they come onto this machine.
 
-As root they come from apt; the browser also from npm, for those without root. Whatever could not
+As root they come from apt; a browser also from npm, for those without root. Whatever could not
 be brought is returned, never passed over: the summary of ``./dev test`` lists it.
 """
 
@@ -63,8 +63,17 @@ NEEDS = (
         name="chromium",
         executables=("chromium", "chromium-browser", "google-chrome", "google-chrome-stable"),
         package="chromium",
-        purpose="the browser tests",
+        purpose="the tests of frames in processes of their own, of sensors, and the benchmarks",
         variable="URC_CHROMIUM",
+    ),
+    Need(
+        # The same browser without windows: a page takes half the time. Where it is missing, the
+        # whole one does as well.
+        name="headless-shell",
+        executables=("chromium-headless-shell", "chrome-headless-shell"),
+        package="chromium-headless-shell",
+        purpose="the browser tests",
+        variable="URC_HEADLESS_SHELL",
     ),
     Need(
         name="netcat",
@@ -249,16 +258,21 @@ def bring(needs: Sequence[Need] = NEEDS) -> Brought:
         _apt_install([name for need in missing for name in need.package.split()])
         missing = [need for need in missing if need.find() is None]
     brought = Brought(playwright_environment())
-    chromium = next((need for need in needs if need.name == "chromium"), None)
-    browser = chromium and (chromium.find() or _chromium_from_npm())
-    if browser:
-        brought.environment["URC_CHROMIUM"] = browser
-    brought.left_out = [need for need in missing if need.name != "chromium" or not browser]
+    if any(need.name == "headless-shell" for need in missing) and (shell := _shell_of(needs)):
+        brought.environment["URC_HEADLESS_SHELL"] = shell
+        missing = [need for need in missing if need.name != "headless-shell"]
+    brought.left_out = missing
     brought.environment["URC_LEFT_OUT"] = ",".join(need.name for need in brought.left_out)
     return brought
 
 
-def _chromium_from_npm() -> str | None:
+def _shell_of(needs: Sequence[Need]) -> str | None:
+    """Return what does for the browser without windows where that is missing."""
+    whole = next(
+        (path for need in needs if need.name == "chromium" and (path := need.find())), None
+    )
+    if whole is not None:
+        return whole
     try:
         return bring_chromium()
     except BringError as error:
@@ -269,22 +283,26 @@ def _chromium_from_npm() -> str | None:
 def _apt_install(packages: list[str]) -> None:
     """Install Debian packages; what fails shows, and is missing afterwards."""
     print(f"installing {' '.join(packages)} ...", flush=True)
+    _apt("update")
+    if not _apt("install", "--no-install-recommends", *packages) and len(packages) > 1:
+        for package in packages:  # one that this system does not know keeps back no other
+            _apt("install", "--no-install-recommends", package)
+
+
+def _apt(*arguments: str) -> bool:
+    command = ["apt-get", "-q", "-y", "-o", "Dpkg::Use-Pty=0", *arguments]
     environment = os.environ | {"DEBIAN_FRONTEND": "noninteractive"}
-    options = ["-q", "-y", "-o", "Dpkg::Use-Pty=0"]
-    for command in (
-        ["apt-get", *options, "update"],
-        ["apt-get", *options, "install", "--no-install-recommends", *packages],
-    ):
-        try:
-            done = subprocess.run(
-                command, env=environment, capture_output=True, text=True,
-                timeout=APT_TIMEOUT_S, check=False,
-            )  # fmt: skip
-        except subprocess.TimeoutExpired:
-            print(f"{' '.join(command)}: no end within {APT_TIMEOUT_S} s", flush=True)
-            return
-        if done.returncode != 0:
-            print(f"{' '.join(command)}:\n{done.stdout[-2000:]}{done.stderr[-2000:]}", flush=True)
+    try:
+        done = subprocess.run(
+            command, env=environment, capture_output=True, text=True,
+            timeout=APT_TIMEOUT_S, check=False,
+        )  # fmt: skip
+    except subprocess.TimeoutExpired:
+        print(f"{' '.join(command)}: no end within {APT_TIMEOUT_S} s", flush=True)
+        return False
+    if done.returncode != 0:
+        print(f"{' '.join(command)}:\n{done.stdout[-2000:]}{done.stderr[-2000:]}", flush=True)
+    return done.returncode == 0
 
 
 def _is_root() -> bool:

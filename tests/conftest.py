@@ -1,7 +1,7 @@
 """What all tests share: one kind of event loop, a time-out, the rule for missing programs.
 
 A test that needs a program beside Python says so with ``@pytest.mark.needs("netcat")``, a name of
-the table in scripts/needs.py; one that uses a browser fixture needs "chromium" by that alone.
+the table in scripts/needs.py; one that uses a browser fixture needs a browser by that alone.
 ``./dev test`` names what it could not bring in ``URC_LEFT_OUT``; only then are those tests skipped,
 and its summary lists them. With ``CI=true`` a run in which anything was skipped fails.
 """
@@ -27,7 +27,8 @@ settings.register_profile("urc", max_examples=examples(100), deadline=None)
 settings.load_profile("urc")
 
 PROGRAMS = {need.name: need for need in NEEDS}
-BROWSER_FIXTURES = {"browser", "new_page"}
+BROWSERS = {"browser": ("headless-shell", "chromium"), "whole_browser": ("chromium",)}
+"""Fixture → the programs that it starts: the first that is there."""
 
 # Well below the limit in pyproject.toml, which ends the whole run: here only the one test fails.
 TEST_TIMEOUT_S = 120
@@ -87,8 +88,9 @@ def alarm(seconds: float) -> Iterator[None]:
 def needs_of(item: pytest.Item) -> set[str]:
     """Return the names of the programs that the test needs."""
     named = {str(mark.args[0]) for mark in item.iter_markers("needs")}
-    uses_browser = BROWSER_FIXTURES & set(getattr(item, "fixturenames", ()))
-    return named | ({"chromium"} if uses_browser else set())
+    browsers = [BROWSERS[name] for name in getattr(item, "fixturenames", ()) if name in BROWSERS]
+    found = [[name for name in names if PROGRAMS[name].find()] or names for names in browsers]
+    return named | {names[0] for names in found}
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

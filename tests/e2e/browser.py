@@ -52,12 +52,24 @@ document.addEventListener("securitypolicyviolation", (event) => {
 """
 
 
+_WHOLE, _SHELL = (
+    next(need for need in NEEDS if need.name == name) for name in ("chromium", "headless-shell")
+)
+
+
 @asynccontextmanager
-async def running_browser(*flags: str) -> AsyncIterator[Browser]:
-    """Start Chromium headless, with more flags if need be; it ends with the context."""
+async def running_browser(*flags: str, is_whole: bool = False) -> AsyncIterator[Browser]:
+    """Start Chromium headless; it ends with the context.
+
+    Args:
+        flags: more of them, if need be.
+        is_whole: the one that people have. Else the one without windows, in which a page takes half
+            the time, and in which frames have no processes of their own, and devices no sensors.
+    """
+    found = _WHOLE.find() if is_whole else _SHELL.find() or _WHOLE.find()
     async with async_playwright() as playwright:
         browser = await playwright.chromium.launch(
-            executable_path=NEEDS[0].find(), args=[*FLAGS, *flags], timeout=60_000
+            executable_path=found, args=[*FLAGS, *flags], timeout=60_000
         )
         try:
             yield browser

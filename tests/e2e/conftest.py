@@ -50,8 +50,15 @@ def no_hurry() -> Iterator[None]:
 
 @pytest.fixture(scope="session")
 async def browser(anyio_backend: str) -> AsyncIterator[Browser]:
-    """One Chromium for the whole session."""
+    """One Chromium for the whole session, the one without windows."""
     async with running_browser() as started:
+        yield started
+
+
+@pytest.fixture(scope="session")
+async def whole_browser(anyio_backend: str) -> AsyncIterator[Browser]:
+    """One Chromium as people have it: a module that needs it lets its `browser` be this one."""
+    async with running_browser(is_whole=True) as started:
         yield started
 
 

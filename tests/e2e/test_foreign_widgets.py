@@ -5,7 +5,7 @@ import shutil
 from pathlib import Path
 
 import pytest
-from playwright.async_api import FrameLocator, Page, expect
+from playwright.async_api import Browser, FrameLocator, Page, expect
 
 from tests.e2e.conftest import PageMaker
 from tests.e2e.dashboards import running_dashboard, until, until_text
@@ -144,6 +144,12 @@ CARDS = {
     "leaving": "it went to another page",
     "endless": "it stopped answering",
 }
+
+
+@pytest.fixture(scope="session")
+def browser(whole_browser: Browser) -> Browser:
+    """Let frames have processes of their own: one that spins would hold up its page else."""
+    return whole_browser
 
 
 def made(folder: Path, name: str, script: str, template: str = "<p>—</p>") -> Widget:

@@ -1,6 +1,7 @@
 """`./dev test`, `./dev bench` and `./dev docs`: what counts as a failure, and how it is told."""
 
 import ast
+from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -8,7 +9,8 @@ import pytest
 
 from bench import __main__ as bench
 from scripts import check, docs, needs
-from scripts.needs import NEEDS, Brought
+from scripts.chromium.bring import BringError
+from scripts.needs import NEEDS, Brought, Need
 
 OK = check.Outcome("lint", "", 0.1)
 BAD = check.Outcome("tests", "exit code 1", 2.0)
@@ -105,6 +107,42 @@ def test_a_benchmark_without_its_program_is_left_out_by_name(
     remedy = Brought(left_out=browser).remedy
     line = f"bench: wire_to_pixel left out: no chromium; to bring it: {remedy}"
     assert said.err.splitlines() == [line]
+
+
+def browsers(*, is_whole_there: bool) -> list[Need]:
+    """Return the two browsers: no shell, and the whole one or not."""
+    whole, shell = (need for need in NEEDS if need.name in ("chromium", "headless-shell"))
+    here = ("python3",) if is_whole_there else ()
+    return [replace(whole, executables=here, variable=""), replace(shell, executables=())]
+
+
+def test_the_whole_browser_does_where_there_is_none_without_windows(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Nothing is left out for it; the tests only take longer."""
+    monkeypatch.setattr(needs, "_is_root", lambda: False)
+    monkeypatch.delenv("URC_HEADLESS_SHELL", raising=False)
+    both = browsers(is_whole_there=True)
+    brought = needs.bring(both)
+    assert brought.left_out == []
+    assert brought.environment["URC_HEADLESS_SHELL"] == both[0].find()
+
+
+def test_the_browser_of_npm_has_no_windows(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What needs the whole one is left out by name; without npm all that needs any is."""
+    monkeypatch.setattr(needs, "_is_root", lambda: False)
+    monkeypatch.delenv("URC_HEADLESS_SHELL", raising=False)
+    monkeypatch.setattr(needs, "bring_chromium", lambda: "/of/npm")
+    both = browsers(is_whole_there=False)
+    brought = needs.bring(both)
+    assert brought.environment["URC_HEADLESS_SHELL"] == "/of/npm"
+    assert brought.left_out == both[:1]
+
+    def fail() -> str:
+        raise BringError("no Node")
+
+    monkeypatch.setattr(needs, "bring_chromium", fail)
+    assert needs.bring(both).left_out == both
 
 
 def test_a_benchmark_asks_for_no_program_that_it_does_not_need(

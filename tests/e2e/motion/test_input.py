@@ -270,9 +270,14 @@ def is_below(process: int, ancestor: int) -> bool:
 
 @pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="needs /proc to find a renderer")
 @pytest.mark.alone
+@pytest.mark.needs("chromium")
 async def test_a_renderer_that_stands_still_stops_within_the_lease() -> None:
     """SIGSTOP is what a device that goes to sleep does to a page; the robot does not wait."""
-    async with driven() as (robot, address), running_browser() as browser, lateness() as late:
+    async with (
+        driven() as (robot, address),
+        running_browser(is_whole=True) as browser,
+        lateness() as late,
+    ):
         page = await (await browser.new_context(locale=LOCALE)).new_page()
         page.set_default_timeout(PAGE_TIMEOUT_MS)
         await page.goto(address)

@@ -316,30 +316,3 @@ async def test_a_strange_gamepad_is_learnt_kept_and_driven(new_page: PageMaker) 
         await fire(page, "pad.axes[3] = 1")
         await until_text(page, ".gamepad-axis:nth-child(4)", "3: +1.00")
         assert robot.after(count) == [], "it needs a new press"
-
-
-TILT = (
-    "dispatchEvent(new DeviceOrientationEvent('deviceorientation',"
-    " {{ alpha: 0, beta: {beta}, gamma: {gamma} }}))"
-)
-
-
-async def test_tilt_drives_while_the_pad_is_held_and_so_does_dragging(new_page: PageMaker) -> None:
-    """How it was held when the pad was touched is the middle, anew at each press."""
-    async with shown(new_page, use("tilt", range=20.0, **PLAIN)) as (robot, page):
-        await fire(page, TILT.format(beta=40, gamma=0))
-        await drag(page, ".tilt-pad", 0, 400)
-        await until_values(robot, x=1.0)
-        await page.mouse.up()
-        await robot.until_stopped("go")
-        await page.get_by_role("button", name="Use tilt").click()
-        await until_text(page, ".tilt-state", "Hold the pad and tilt the device.")
-        await fire(page, TILT.format(beta=60, gamma=0))
-        count = len(robot.line.written)
-        await drag(page, ".tilt-pad", 0, 50)
-        await until(lambda: len(robot.after(count)) > 3)
-        assert not any(robot.values("go").values()), "the middle is where it is"
-        await fire(page, TILT.format(beta=50, gamma=-10))
-        await until_values(robot, x=0.5, y=0.5)
-        await page.mouse.up()
-        await robot.until_stopped("go")
