@@ -48,7 +48,8 @@ MOVES, MOVES_IF_FULL = 50, 300
 ROUNDS, ROUNDS_IF_FULL = 3, 9
 LEAST_SHARE = 0.5
 GOLDEN = 0.6180339887
-HELD_S = 15.0
+HELD_S = 5.0
+PRESSES = 4
 STEPS = 20
 STICK = """\
 commands:
@@ -177,14 +178,23 @@ async def _push(
     if box is None:
         raise SystemExit("bench: wire_to_pixel: the page has no stick")
     x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
-    await page.mouse.move(x, y)
-    await page.mouse.down()
-    await page.mouse.move(x, y - STEPS)
 
     def is_moving() -> bool:
         return any(not line.text.endswith(" 0") for line in heard[begun:])
 
-    await asyncio.to_thread(robots.wait_until, is_moving, HELD_S, "the stick moves the robot")
+    for tries_left in reversed(range(PRESSES)):
+        await page.mouse.move(x, y)
+        await page.mouse.down()
+        await page.mouse.move(x, y - STEPS)
+        try:
+            what = "the stick moves the robot"
+            await asyncio.to_thread(robots.wait_until, is_moving, HELD_S, what)
+            break
+        except AssertionError as problem:
+            # A gesture that was stopped, as on a machine that stood still, is begun anew by hand.
+            await page.mouse.up()
+            if not tries_left:
+                raise SystemExit(f"bench: wire_to_pixel: {problem}") from problem
     await page.evaluate("() => { window.benchMoves = []; }")
     for number in range(moves):
         await page.mouse.move(x, y - STEPS - 2 * (number % STEPS + 1))
