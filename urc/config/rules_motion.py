@@ -33,6 +33,7 @@ def check_motion(part: Part, driver: Driver, findings: Findings) -> None:
         if (hold := driver.commands[name].hold) is not None
     ]
     for inner, command, hold in held:
+        _check_line(inner, driver.transports.get(command.transport), findings)
         _check_watchdog(inner, command, hold, findings)
         _check_lease(inner, hold, findings)
     for name, spec in driver.transports.items():
@@ -48,6 +49,18 @@ def check_motion(part: Part, driver: Driver, findings: Findings) -> None:
             " and nothing is asked",
             key=True,
             hint="write stale_after: beside its transport, or poll something that it answers",
+        )
+
+
+def _check_line(part: Part, spec: TransportSpec | None, findings: Findings) -> None:
+    if spec is not None and spec.connection == "per_request":
+        findings.error(
+            part,
+            "motion-unconnected",
+            f"what is held needs a line that stays open, and {spec.name!r} connects anew for each"
+            " request",
+            key=True,
+            hint="leave out 'connection: per_request', or send it by another transport",
         )
 
 

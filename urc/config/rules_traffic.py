@@ -1,9 +1,9 @@
-"""Rules about what a line carries: motion that must wait, and talk that is too fast or too slow.
+"""Rules about what a line carries: motion that comes late, and talk that is too fast or too slow.
 
 All are warnings, and speak only where somebody has decided something: never about a default.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 
 from urc.config.part import Findings, Part, shown_duration
 from urc.expressions import Template
@@ -18,7 +18,6 @@ def check_traffic(part: Part, driver: Driver, findings: Findings) -> None:
         command = driver.commands[name]
         spec = driver.transports.get(command.transport)
         if command.hold is not None and spec is not None:
-            _check_waiting(inner.must("hold"), command, spec, driver, findings)
             _check_pace(inner.must("hold"), command, spec, findings)
             _check_kept(inner.must("send"), command, findings)
     for inner, poll in zip(part.listed("polls"), driver.polls, strict=True):
@@ -61,28 +60,6 @@ def _written(value: object) -> str:
     return value.source if isinstance(value, Template) else str(value)
 
 
-def _check_waiting(
-    part: Part, command: Command, spec: TransportSpec, driver: Driver, findings: Findings
-) -> None:
-    """Warn of motion that would wait until the answer to something else has come."""
-    if command.priority == "realtime":
-        return
-    if spec.connection == "persistent" and spec.queue.in_flight > 1:
-        return
-    others = sorted(_answered_s(spec, driver), key=lambda one: -one[1])
-    if not others:
-        return
-    name, longest_s = others[0]
-    findings.warn(
-        part,
-        "motion-waits",
-        f"while the answer to {name!r} is awaited, for up to {shown_duration(longest_s)},"
-        f" {command.name!r} must wait, and so must its release",
-        key=True,
-        hint=_way_out(command, spec),
-    )
-
-
 def _check_kept(part: Part, command: Command, findings: Findings) -> None:
     """Report motion that a broker would keep, or say again."""
     attributes = command.send.options.get("attributes")
@@ -99,25 +76,6 @@ def _check_kept(part: Part, command: Command, findings: Findings) -> None:
             key=True,
             hint=f"take '{key}' away: motion that comes late moves a robot that nobody drives",
         )
-
-
-def _way_out(command: Command, spec: TransportSpec) -> str:
-    if spec.connection != "persistent":
-        return "make the connection persistent, and write priority: realtime beside 'hold'"
-    if command.is_latest_only or command.rate_per_s is not None:
-        return "write priority: realtime beside 'hold', in place of 'coalesce' and 'rate_limit'"
-    return "write priority: realtime beside 'hold'"
-
-
-def _answered_s(spec: TransportSpec, driver: Driver) -> Iterator[tuple[str, float]]:
-    """Yield what is answered on a line, and how long that may take."""
-    asked = [(one.name, one.transport, one.reply) for one in driver.commands.values()]
-    asked += [(one.run or one.name, one.transport, one.reply) for one in driver.polls]
-    for name, transport, reply in asked:
-        if transport == spec.name and reply is not None:
-            seconds = [reply.timeout_s, *(one.timeout_s for one in reply.stages)]
-            reply_s = spec.timeouts.reply_s
-            yield name, sum(reply_s if one is None else one for one in seconds)
 
 
 def _check_pace(part: Part, command: Command, spec: TransportSpec, findings: Findings) -> None:

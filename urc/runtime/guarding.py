@@ -14,8 +14,8 @@ from urc.motion.stall import STALLED_S, WAITED_S
 from urc.problems import UrcError
 from urc.registry import Table
 from urc.runtime.clock import Clock
+from urc.runtime.held import is_lossy, period_of
 from urc.runtime.lines import Made, make_lines
-from urc.runtime.motion import is_lossy
 from urc.transports.base import Transport
 
 __all__ = ["GuardedMovers", "take_reins"]
@@ -103,9 +103,8 @@ class GuardedMovers:
         if terms is not None:
             terms = self._armed[command] = terms._replace(stop=frame)
         else:
-            period_s = known.hold.repeat_s if known.hold is not None else STALLED_S
             lossy = is_lossy(self._driver, known.transport)
-            terms = Terms(frame, period_s=period_s, is_lossy=lossy)
+            terms = Terms(frame, period_s=period_of(self._driver, known), is_lossy=lossy)
         return known.transport, command, terms
 
 

@@ -10,8 +10,9 @@ from urc.model.flow import Hold
 from urc.model.values import Reading
 from urc.motion.hold import Reason, Terms
 from urc.motion.slew import Slew
+from urc.motion.stall import STALLED_S
 
-__all__ = ["Control", "Frames", "Movers", "control_of", "is_lossy"]
+__all__ = ["Control", "Frames", "Movers", "control_of", "is_lossy", "period_of"]
 
 
 class Frames(Protocol):
@@ -73,6 +74,8 @@ class Control:
 
     line: str
     hold: Hold
+    period_s: float
+    """Between two of its frames, at least."""
     slew: Slew | None
     defaults: Mapping[str, Reading]
     """Of the arguments that it limits."""
@@ -134,7 +137,17 @@ def control_of(driver: Driver, command: Command) -> Control:
         rest = {name: one.default for name, one in command.arguments.items()} | dict(hold.release)
         slew = Slew(hold.slew, rest, hold.repeat_s)
     greeted = bool(driver.transports[command.transport].on_connect)
-    return Control(command.transport, hold, slew, defaults, greeted)
+    return Control(command.transport, hold, period_of(driver, command), slew, defaults, greeted)
+
+
+def period_of(driver: Driver, command: Command) -> float:
+    """Return the shortest time between two frames of a held command: what may be sent at all."""
+    hold = command.hold
+    repeat_s = STALLED_S if hold is None else hold.repeat_s
+    rate_s = 1 / command.rate_per_s if command.rate_per_s else 0.0
+    is_realtime = command.priority == "realtime"
+    gap_s = 0.0 if is_realtime else driver.transports[command.transport].min_gap_s
+    return max(repeat_s, rate_s, gap_s)
 
 
 _LOSSY = frozenset(("udp", "serial", "mqtt", "rosbridge"))

@@ -348,7 +348,7 @@ class MotionDesk:
         control.stop = stop = frames.stop_frame(command)
         return Terms(
             stop,
-            period_s=control.hold.repeat_s,
+            period_s=control.period_s,
             lease_s=control.hold.lease_s,
             is_lossy=self._is_lossy[command],
         )
