@@ -43,7 +43,8 @@ class Reins:
 
         Args:
             transport: where everything goes. It may have ``unsent()``, the bytes that have not left
-                for good, and ``offer(data)``, which hands over without waiting.
+                for good, ``offer(data)``, which hands over without waiting, and ``forget()``, where
+                what is sent later may arrive sooner: it gives up what is unsent.
             clock: the time.
             stalled_s: age of unsent bytes at which the line counts as stalled.
             is_strict: motion waits until nothing at all is unsent.
@@ -53,7 +54,8 @@ class Reins:
         self._clock = clock
         self._unsent: Callable[[], int] | None = getattr(transport, "unsent", None)
         self._offer: Callable[[bytes], bool] | None = getattr(transport, "offer", None)
-        self._is_strict = is_strict
+        self._forget: Callable[[], None] | None = getattr(transport, "forget", None)
+        self._is_strict = is_strict or self._forget is not None
         self._told = told
         self._failed = failed
         self._watch = StallWatch(stalled_s)
@@ -205,6 +207,9 @@ class Reins:
     def _write(self, control: str, data: Payload, now: float, *, is_stop: bool) -> None:
         if is_stop and self._unsent is not None:
             self._watch.saw(self._unsent(), now)
+        if is_stop and self._forget is not None:
+            self._forget()  # motion that is still on its way would come after its stop
+            self._watch.gave_up()
         offer = self._offer
         if offer is None or type(data) is not bytes or not self.lane.is_idle or not offer(data):
             self._doubtful.add(control)
@@ -274,6 +279,9 @@ class Reins:
         if self._unsent is None or not self._is_watched:
             return False
         unsent = self._unsent()
+        if not unsent and self._forget is not None and not self.lane.is_idle:
+            # What was given up has left nothing, and what came after it has no connection yet.
+            return self._watch.age_s(now) >= self._watch.limit_s
         if not unsent and self.lane.is_idle:
             self._doubtful.clear()
         self._look_s = _LOOK_S if self._is_wanted else min(2 * self._look_s, _LONGEST_LOOK_S)

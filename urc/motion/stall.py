@@ -5,6 +5,7 @@ acknowledged, in that order; so from its course follows when the oldest of them 
 what counts: on a line that is written to all the time there may always be some.
 """
 
+import sys
 from collections import deque
 from typing import Final
 
@@ -83,6 +84,14 @@ class StallWatch:
         """Take note that so many bytes were written; `saw` puts right what is not known better."""
         self._written += size
         self._mark(now)
+
+    def gave_up(self) -> None:
+        """Take note that what is unsent never leaves: what follows it counts as old as that."""
+        if self._marks:
+            began = self._marks[0][0]
+            self._marks.clear()
+            self._marks.append((began, sys.maxsize))
+        self._written = self._taken = 0
 
     def reset(self) -> None:
         """Begin anew: nothing is unsent."""

@@ -31,8 +31,9 @@ KINDS: Final = (
     "serial",
     "mqtt",
     "rosbridge",
+    "http",
 )
-_AT_ONCE: Final = ("tcp", "telnet", "websocket")
+_AT_ONCE: Final = ("tcp", "telnet", "websocket", "http")
 FIRST_PORT: Final = {"ssh": 2200, "mqtt": 18830}
 """Of programs of others, in a namespace where nobody else listens; one a robot."""
 
@@ -92,10 +93,12 @@ _OPTIONS: Final = {
     "serial": 'type: serial, port: "socket://HOST:PORT", baud: 115200, ' + _LINES,
     "mqtt": "type: mqtt, host: HOST, port: OTHER",
     "rosbridge": "type: rosbridge, host: HOST, port: PORT, ros: 2",
+    "http": 'type: http, url: "http://HOST:PORT/"',
 }
 _SENDS: Final = {
     "mqtt": '{ publish: { topic: go, text: "M {{ t }}" } }',
     "rosbridge": '{ publish: { topic: /go, type: std_msgs/Int64, json: { data: "{{ t }}" } } }',
+    "http": '{ request: { path: "/go?t={{ t }}" } }',
 }
 _ASIDE: Final = {
     "mqtt": "{ publish: { topic: aside, text: here } }",
@@ -123,7 +126,8 @@ def place_of(kind: str, lane: int) -> str:
         return f"mqtt:127.0.0.1:{FIRST_PORT[kind] + lane}"
     if kind == "ssh":
         return "tcp:127.0.0.1:0"
-    door = {"udp": "udp", "websocket": "ws", "rosbridge": "bridge"}.get(kind, "tcp")
+    doors = {"udp": "udp", "websocket": "ws", "rosbridge": "bridge", "http": "http"}
+    door = doors.get(kind, "tcp")
     return f"{door}:{SERVER_ADDRESS}:0"
 
 

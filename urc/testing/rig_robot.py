@@ -2,9 +2,10 @@
 
 ``python rig_robot.py tcp:127.0.0.1:0 udp:127.0.0.1:0 …`` is one robot for each argument. ``ws`` is
 a WebSocket whose messages are the lines, ``bridge`` one that takes messages as rosbridge does and
-hears ``M NUMBER`` for ``{"data": NUMBER}`` on ``/go``; ``mqtt:HOST:PORT`` listens to the topic
-``go`` of a broker there. What they hear is told on standard output, one line each, with times of
-the monotonic clock in nanoseconds::
+hears ``M NUMBER`` for ``{"data": NUMBER}`` on ``/go``, ``http`` a server that hears it when
+``/go?t=NUMBER`` is asked for; ``mqtt:HOST:PORT`` listens to the topic ``go`` of a broker there.
+What they hear is told on standard output, one line each, with times of the monotonic
+clock in nanoseconds::
 
     ready 40001 40002 …     their ports, once
     open ROBOT TIME         a connection was made; a broker has taken the subscription
@@ -126,6 +127,16 @@ class BridgeEar(WebEar):
         return [f"M {said['msg']['data']}"] if is_motion else []
 
 
+class HttpEar(Ear):
+    """Requests without a body, as ``GET /go?t=5``; each is answered, and the connection is kept."""
+
+    def take(self, data: bytes) -> list[str]:
+        """Return ``M 5`` for each whole request."""
+        *heads, self.rest = (self.rest + data).split(b"\r\n\r\n")
+        self.reply += b"HTTP/1.1 200 OK\r\nContent-Length: 2\r\n\r\nok" * len(heads)
+        return [f"M {head.split(b' ')[1].decode().rpartition('=')[2]}" for head in heads]
+
+
 class BrokerEar(Ear):
     """A subscriber of MQTT 3.1.1."""
 
@@ -151,7 +162,9 @@ class BrokerEar(Ear):
         return found
 
 
-EARS = {"tcp": Ear, "udp": Ear, "ws": WebEar, "bridge": BridgeEar, "mqtt": BrokerEar}
+EARS = {
+    "tcp": Ear, "udp": Ear, "ws": WebEar, "bridge": BridgeEar, "http": HttpEar, "mqtt": BrokerEar,
+}  # fmt: skip
 
 
 @dataclass

@@ -173,10 +173,16 @@ class Stream(asyncio.BufferedProtocol):
 
     async def reset(self) -> None:
         """Close at once and let the kernel forget what it has not sent: nothing comes late."""
+        self.drop()
+        await self._gone.wait()
+
+    def drop(self) -> None:
+        """Do what `reset` does, without waiting until the socket is closed."""
         line: socket.socket | None = self._transport.get_extra_info("socket")
         if line is not None:
             forget_unsent(line)
-        await self.abort()
+        self.end(CLOSED)
+        self._transport.abort()
 
     def end(self, why: str) -> None:
         """Let everybody who waits know that it is over; the first reason stays."""

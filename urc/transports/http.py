@@ -109,8 +109,23 @@ class HttpTransport:
             raise PeerClosed(CLOSED)
         await self._talk.send(data)
 
+    def unsent(self) -> int:
+        """Return the bytes of requests that have not left this machine for good."""
+        return 0 if self._talk is None else self._talk.unsent()
+
+    def forget(self) -> None:
+        """Give up every request of which bytes are unsent.
+
+        Each has a connection of its own: it would come after those that are made from now on.
+        """
+        if self._talk is not None:
+            self._talk.forget()
+
     async def close(self) -> None:
-        """Close every connection at once. Never raises, may be called twice."""
+        """Close every connection at once; what is unsent is never sent.
+
+        Never raises, may be called twice.
+        """
         talk, self._talk = self._talk, None
         if talk is not None:
             await talk.close()
@@ -128,6 +143,7 @@ class _Talk:
         self.inbox = Inbox()
         self.pulse = Pulse()
         self._client = client
+        self.unsent, self.forget = client.unsent, client.forget
         self._most = most
         self._answer_s = answer_s
         self._max_bytes = max_body_bytes

@@ -7,7 +7,7 @@ names are looked up as the TCP transport does it, in no thread that the program 
 
 import asyncio
 import ssl
-from collections.abc import AsyncIterator, Iterable, Mapping
+from collections.abc import AsyncIterator, Callable, Iterable, Mapping
 from contextlib import asynccontextmanager, suppress
 from typing import Any
 
@@ -142,8 +142,16 @@ class Client:
             where = self._place.authority
             raise HttpFault(f"what {where} answers is not understood ({_short(fault)})") from fault
 
+    def unsent(self) -> int:
+        """Return the bytes of all requests that have not left this machine for good."""
+        return self._backend.unsent()
+
+    def forget(self) -> None:
+        """Close the connections on which bytes are unsent: the robot never gets these."""
+        self._backend.forget()
+
     async def close(self) -> None:
-        """Close every connection. Never raises."""
+        """Close every connection; what is unsent is never sent. Never raises."""
         await self._backend.close()
         with suppress(Exception):  # of connections that are broken already
             await self._client.aclose()
@@ -206,6 +214,21 @@ class _Backend(httpcore2.AsyncNetworkBackend):
     def __init__(self, dialer: Dialer) -> None:
         self._dialer = dialer
         self._spare: ByteStream | None = None
+        self._connections: set[_Connection] = set()
+        """All that are open and in the library's hands."""
+
+    def unsent(self) -> int:
+        return sum(one.unsent() for one in self._connections)
+
+    def forget(self) -> None:
+        for one in list(self._connections):
+            if one.unsent():
+                one.drop()
+
+    def _lent(self, stream: ByteStream) -> "_Connection":
+        made = _Connection(stream, self._connections.discard)
+        self._connections.add(made)
+        return made
 
     async def reach(self, timeout_s: float) -> None:
         await self.close()
@@ -226,12 +249,12 @@ class _Backend(httpcore2.AsyncNetworkBackend):
     ) -> httpcore2.AsyncNetworkStream:
         spare, self._spare = self._spare, None
         if spare is not None:
-            connection = _Connection(spare)
+            connection = self._lent(spare)
             if not connection.is_readable():  # else the robot did not want to wait
                 return connection
             await connection.aclose()
         try:
-            return _Connection(await self._dialer.stream(timeout or CONNECT_S))
+            return self._lent(await self._dialer.stream(timeout or CONNECT_S))
         except ConnectFailed as fault:
             raise httpcore2.ConnectError(str(fault)) from fault
 
@@ -242,8 +265,9 @@ class _Backend(httpcore2.AsyncNetworkBackend):
 class _Connection(httpcore2.AsyncNetworkStream):
     """One of our streams, as the library's pool wants it."""
 
-    def __init__(self, stream: ByteStream) -> None:
+    def __init__(self, stream: ByteStream, ended: Callable[["_Connection"], None]) -> None:
         self._stream = stream
+        self._ended = ended
         self._early = b""
 
     async def read(self, max_bytes: int, timeout: float | None = None) -> bytes:
@@ -271,7 +295,22 @@ class _Connection(httpcore2.AsyncNetworkStream):
         except PeerClosed as ended:
             raise httpcore2.WriteError(str(ended)) from ended
 
+    def unsent(self) -> int:
+        """Return the bytes that have not left this machine for good; 0 where nobody knows."""
+        count = getattr(self._stream, "unsent", None)
+        return int(count()) if count is not None else 0
+
+    def drop(self) -> None:
+        """End it now: what is unsent is never sent. Whoever waits for it is told."""
+        self._ended(self)
+        drop = getattr(self._stream, "drop", None)
+        if drop is not None:
+            drop()
+
     async def aclose(self) -> None:
+        if self.unsent():  # a request that was given up would come late, after newer ones
+            self.drop()
+        self._ended(self)
         await self._stream.abort()
 
     async def start_tls(

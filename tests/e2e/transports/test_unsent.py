@@ -18,15 +18,19 @@ from tests.e2e.transports.test_contract import (
     robot,
     within,
 )
+from urc.model.codec import Envelope
 from urc.transports.base import Transport, TransportError
 
 pytestmark = pytest.mark.anyio
 
-COUNTED = ("tcp", "tcp with tls", "websocket", "telnet", "rosbridge", "mqtt", "ssh", "serial")
+COUNTED = (
+    *("tcp", "tcp with tls", "websocket", "telnet", "rosbridge", "mqtt", "ssh", "serial"),
+    "http",
+)
 """Lines that must tell: a robot that moves over one of them may be cut off."""
 
-HELD_UP = tuple(kind for kind in COUNTED if class_of(kind).traits.pushes_back)
-"""Those on which a robot can hold up the sender."""
+HELD_UP = tuple(kind for kind in COUNTED if class_of(kind).traits.pushes_back and kind != "http")
+"""Those on which a robot can hold up the sender for good; http gives the oldest request up."""
 
 
 def unsent_of(transport: Transport) -> int:
@@ -101,3 +105,22 @@ async def test_aborted_line_is_closed_and_may_be_opened_again(kind: str) -> None
         await transport.open(OPEN_S)
         await within(WAIT_S, transport.send(peer.ask))
         await hears(transport, peer.answer)
+
+
+async def test_request_that_is_forgotten_never_arrives() -> None:
+    """Each has a connection of its own, on which it would come after newer ones."""
+    async with robot("http", "deaf") as (peer, transport):
+        await transport.open(OPEN_S)
+        body = bytes(16_000_000)  # more than this machine keeps for somebody who does not listen
+        request = large(peer.ask)
+        assert isinstance(request, Envelope)
+        sending = asyncio.ensure_future(transport.send(request._replace(body=body)))
+        async with asyncio.timeout(WAIT_S):
+            while not unsent_of(transport):  # noqa: ASYNC110 - nobody tells
+                await asyncio.sleep(0.01)
+        forget = getattr(transport, "forget", None)
+        assert forget is not None
+        forget()
+        assert unsent_of(transport) == 0
+        await within(WAIT_S, sending)  # it was handed over; its answer says that there is none
+        await transport.close()

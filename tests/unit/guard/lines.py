@@ -10,7 +10,7 @@ from urc.motion.stall import STALLED_S
 from urc.testing.clock import FakeClock, settle
 from urc.transports.base import ConnectFailed, PeerClosed, Transport, TransportError
 
-__all__ = ["STOP", "TERMS", "CountedWire", "Rig", "SlowWire", "Wire"]
+__all__ = ["STOP", "TERMS", "CountedWire", "Rig", "ScatteredWire", "SlowWire", "Wire"]
 
 STOP = b"stop"
 TERMS = Terms(STOP, period_s=0.02)
@@ -78,6 +78,18 @@ class CountedWire(Wire):
         self.stuck_bytes = 0
         self.is_stuck = False
         await self.close()
+
+
+class ScatteredWire(CountedWire):
+    """One on which each thing goes by a connection of its own, so that order is not kept."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.forgotten_bytes = 0
+
+    def forget(self) -> None:
+        self.forgotten_bytes += self.stuck_bytes
+        self.stuck_bytes = 0
 
 
 class SlowWire(Wire):

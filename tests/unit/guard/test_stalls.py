@@ -2,7 +2,7 @@
 
 import pytest
 
-from tests.unit.guard.lines import STOP, CountedWire, Rig, SlowWire
+from tests.unit.guard.lines import STOP, CountedWire, Rig, ScatteredWire, SlowWire
 from urc.motion.stall import AFRESH_S, SHORTEST_CUT_S, STOP_WITHIN_S
 from urc.testing.clock import settle
 from urc.transports.base import PeerClosed
@@ -115,3 +115,36 @@ async def test_line_that_only_waits_is_reset_too(rigs: list[Rig]) -> None:
     await rig.clock.advance(0.1)
     assert robot.opens == 2
     assert robot.written == [b"go 1", STOP]
+
+
+async def test_motion_by_a_connection_of_its_own_does_not_come_after_its_stop(
+    rigs: list[Rig],
+) -> None:
+    """One at a time is on its way, and it is given up before the stop goes."""
+    robot = ScatteredWire()
+    rig = Rig(robot)
+    rigs.append(rig)
+    robot.is_stuck = True
+    await rig.drive()
+    await rig.clock.advance(0.05)
+    rig.tick(b"go 2")
+    await settle()
+    assert robot.written == [b"go 1"]
+    rig.guard.release("drive")
+    await settle()
+    assert (robot.written, robot.forgotten_bytes) == ([b"go 1", STOP], len(b"go 1"))
+    assert robot.aborts == 0
+
+
+async def test_line_is_not_younger_for_what_was_given_up(rigs: list[Rig]) -> None:
+    """A stop that has no connection yet waits no longer than the motion before it would have."""
+    robot = ScatteredWire()
+    rig = Rig(robot)
+    rigs.append(rig)
+    robot.is_stuck = True
+    await rig.drive()
+    await rig.clock.advance(0.2)
+    rig.guard.release("drive")
+    await rig.clock.advance(0.04)
+    assert (robot.aborts, robot.opens) == (1, 2)
+    assert robot.written == [b"go 1", STOP, STOP]
