@@ -64,6 +64,8 @@ class Reins:
         self._movers: dict[str, Mover] = {}
         self._numbers: dict[str, int] = {}
         self._doubtful: set[str] = set()
+        self._is_stop_under_way = False
+        """Whether a stop is among what may not have arrived."""
         self._is_open = False
         self._alarm: Ring | None = None
         self._alarm_s = 0.0
@@ -147,7 +149,11 @@ class Reins:
     def look(self) -> None:
         """Take note of what has arrived by now; only of a line that works."""
         if self._unsent is not None and self.lane.is_idle and not self._unsent():
-            self._doubtful.clear()
+            self._all_arrived()
+
+    def _all_arrived(self) -> None:
+        self._doubtful.clear()
+        self._is_stop_under_way = False
 
     # -- the line
 
@@ -168,7 +174,7 @@ class Reins:
                 self._doubtful.add(control)
         for control, mover in self._movers.items():
             mover.cut(is_doubtful=control in self._doubtful)
-        self._doubtful.clear()
+        self._all_arrived()
         if self._alarm is not None:
             self._alarm.cancel()
             self._alarm = None
@@ -201,15 +207,18 @@ class Reins:
         unsent = self._unsent()
         self._watch.saw(unsent, now)
         if not unsent:
-            self._doubtful.clear()
+            self._all_arrived()
         return not unsent or (not self._is_strict and self._watch.age_s(now) < IN_FLIGHT_S)
 
     def _write(self, control: str, data: Payload, now: float, *, is_stop: bool) -> None:
         if is_stop and self._unsent is not None:
             self._watch.saw(self._unsent(), now)
-        if is_stop and self._forget is not None:
-            self._forget()  # motion that is still on its way would come after its stop
+        if is_stop and self._forget is not None and not self._is_stop_under_way:
+            # Motion that is still on its way would come after its stop. Where another stop is, no
+            # motion has gone since, and that one is not to be given up.
+            self._forget()
             self._watch.gave_up()
+        self._is_stop_under_way |= is_stop
         offer = self._offer
         if offer is None or type(data) is not bytes or not self.lane.is_idle or not offer(data):
             self._doubtful.add(control)
@@ -283,7 +292,7 @@ class Reins:
             # What was given up has left nothing, and what came after it has no connection yet.
             return self._watch.age_s(now) >= self._watch.limit_s
         if not unsent and self.lane.is_idle:
-            self._doubtful.clear()
+            self._all_arrived()
         self._look_s = _LOOK_S if self._is_wanted else min(2 * self._look_s, _LONGEST_LOOK_S)
         return self._watch.saw(unsent, now)
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from tests.unit.guard.lines import STOP, CountedWire, Rig, ScatteredWire, SlowWire
+from tests.unit.guard.lines import STOP, TERMS, CountedWire, Rig, ScatteredWire, SlowWire
 from urc.motion.stall import AFRESH_S, SHORTEST_CUT_S, STOP_WITHIN_S
 from urc.testing.clock import settle
 from urc.transports.base import PeerClosed
@@ -148,3 +148,29 @@ async def test_line_is_not_younger_for_what_was_given_up(rigs: list[Rig]) -> Non
     await rig.clock.advance(0.04)
     assert (robot.aborts, robot.opens) == (1, 2)
     assert robot.written == [b"go 1", STOP, STOP]
+
+
+async def test_a_stop_that_is_on_its_way_is_not_given_up_for_the_next_one(rigs: list[Rig]) -> None:
+    """Two sticks that are let go of, one after the other; or STOP that is pressed twice."""
+    robot = ScatteredWire()
+    rig = Rig(robot)
+    rigs.append(rig)
+    lift = TERMS._replace(stop=b"down")
+    await rig.drive()
+    rig.guard.arm("wire", "lift", lift)
+    rig.guard.tick("lift", b"up")
+    await rig.clock.advance(0.01)
+    robot.is_stuck = True
+    rig.guard.release("drive")
+    await rig.clock.advance(0.01)
+    rig.guard.release("lift")
+    await settle()
+    assert robot.written == [b"go 1", b"up", STOP, b"down"]
+    assert (robot.stuck_bytes, robot.forgotten_bytes) == (len(STOP) + len(b"down"), 0)
+    robot.is_stuck, robot.stuck_bytes = False, 0
+    await rig.clock.advance(0.05)
+    robot.is_stuck = True
+    rig.guard.tick("drive", b"go 2")
+    rig.guard.release("drive")
+    await settle()
+    assert robot.forgotten_bytes == len(b"go 2"), "motion that came since is"
