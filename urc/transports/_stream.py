@@ -165,6 +165,11 @@ class Stream(asyncio.BufferedProtocol):
             with suppress(OSError):  # the loop sees it, too
                 os.write(self._number, b"")
 
+    @property
+    def has_ended(self) -> bool:
+        """Whether nothing more will come, and nothing more goes."""
+        return self._ended is not None
+
     def unsent(self) -> int:
         """Return the bytes handed over that the other side has not acknowledged."""
         # Asked before each motion: what is writable has nothing in its own buffer.

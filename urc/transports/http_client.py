@@ -296,15 +296,23 @@ class _Connection(httpcore2.AsyncNetworkStream):
             raise httpcore2.WriteError(str(ended)) from ended
 
     def unsent(self) -> int:
-        """Return the bytes that have not left this machine for good; 0 where nobody knows."""
+        """Return the bytes that have not left this machine for good; 0 where nobody knows.
+
+        The robot may have closed a connection that the library still keeps: that holds nothing up.
+        """
         count = getattr(self._stream, "unsent", None)
-        return int(count()) if count is not None else 0
+        if count is None or getattr(self._stream, "has_ended", False):
+            return 0
+        return int(count())
 
     def drop(self) -> None:
-        """End it now: what is unsent is never sent. Whoever waits for it is told."""
-        self._ended(self)
+        """End it now: what is unsent is never sent. Whoever waits for it is told.
+
+        What goes through another transport keeps its order, and stays.
+        """
         drop = getattr(self._stream, "drop", None)
         if drop is not None:
+            self._ended(self)
             drop()
 
     async def aclose(self) -> None:

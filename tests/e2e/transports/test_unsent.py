@@ -19,7 +19,8 @@ from tests.e2e.transports.test_contract import (
     within,
 )
 from urc.model.codec import Envelope
-from urc.transports.base import Transport, TransportError
+from urc.transports.base import Setup, Transport, TransportError
+from urc.transports.http import from_setup
 
 pytestmark = pytest.mark.anyio
 
@@ -123,4 +124,32 @@ async def test_request_that_is_forgotten_never_arrives() -> None:
         forget()
         assert unsent_of(transport) == 0
         await within(WAIT_S, sending)  # it was handed over; its answer says that there is none
+        await transport.close()
+
+
+async def test_connection_that_a_robot_has_closed_holds_nothing_up() -> None:
+    """Small robots close idle ones after a while, and the next motion does not wait for that."""
+    closed = asyncio.Event()
+
+    async def answer(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        try:
+            await reader.readuntil(b"\r\n\r\n")
+            writer.write(b"HTTP/1.1 200 OK\r\nContent-Length: 2\r\n\r\nok")
+            await writer.drain()
+            await asyncio.sleep(0.05)
+        except asyncio.IncompleteReadError:
+            return
+        finally:
+            writer.close()
+            closed.set()
+
+    async with await asyncio.start_server(answer, "127.0.0.1", 0) as server:
+        port = server.sockets[0].getsockname()[1]
+        transport = from_setup(Setup("web", {"url": f"http://127.0.0.1:{port}/"}))
+        await transport.open(OPEN_S)
+        await transport.send(Envelope("request", {"path": "/go"}, None))
+        await within(WAIT_S, transport.receive())
+        await within(WAIT_S, closed.wait())
+        await asyncio.sleep(0.1)
+        assert unsent_of(transport) == 0
         await transport.close()
