@@ -23,13 +23,13 @@ from starlette.websockets import WebSocket
 from urc import __version__
 from urc.model.profile import Profile
 from urc.runtime.audit import AuditLog
+from urc.runtime.blanking import secret_texts
 from urc.runtime.latch import LatchFile
 from urc.runtime.trail import Trail
 from urc.shipped import vendored
 from urc.web import words
 from urc.web.api_document import DOCUMENT, document
 from urc.web.dev.routes import Dev, dev_url, no_dev_routes
-from urc.web.dev.secrets import secret_texts
 from urc.web.dev.start import DevStart, no_dev_start
 from urc.web.dev.watch import Remake
 from urc.web.drive.once import can_move

@@ -17,13 +17,13 @@ from urc.config.messaging import MESSAGING
 from urc.model.profile import Profile
 from urc.model.values import Value
 from urc.problems import UrcError
+from urc.runtime.blanking import Blanker, stand_ins
 from urc.runtime.clock import within
 from urc.runtime.hub import Note, Tap, Traffic
 from urc.runtime.selftest import sample_settings
 from urc.web.dev import wire
 from urc.web.dev.preview import Preview, preview
 from urc.web.dev.rows import Row, held_row, note_row, traffic_row
-from urc.web.dev.secrets import Blanker, stand_ins
 from urc.web.dev.tryout import pasted_bytes, try_out
 from urc.web.dev.watch import ProfileWatch
 from urc.web.fleet.robots import Robot, SessionFailed, missing_settings

@@ -8,8 +8,8 @@ import json
 import msgspec
 
 from urc.model.codec import Envelope
+from urc.runtime.blanking import Blanker
 from urc.runtime.hub import Note, Traffic
-from urc.web.dev.secrets import Blanker
 from urc.web.wire.text import cut
 
 __all__ = [

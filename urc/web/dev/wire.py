@@ -20,9 +20,9 @@ import msgspec
 from urc.model.codec import Envelope
 from urc.model.driver import Argument, Command, Driver
 from urc.problems import Problem, to_text
+from urc.runtime.blanking import Blanker
 from urc.web.dev.preview import Preview, Written
 from urc.web.dev.rows import SHOWN_BYTES, Row, fill, grouped
-from urc.web.dev.secrets import Blanker
 from urc.web.dev.tryout import Finding, Piece, Taker
 from urc.web.wire.messages import INBOUND_BYTES, BadMessage, Ping
 from urc.web.wire.text import Outbound, cut, encoded, milliseconds

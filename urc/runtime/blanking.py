@@ -1,6 +1,6 @@
-"""The values of secret settings, taken out of what a developer is shown of the traffic.
+"""The values of secret settings, taken out of traffic that is shown or kept.
 
-Floor 5, pure. The engine says which frames are secret and the hub blanks them; a robot that echoes
+Floor 4, pure. The engine says which frames are secret and the hub blanks them; a robot that echoes
 a password, or a command that carries a token, is blanked here. A stream may bring an echo letter by
 letter: what may be the beginning of a secret is held back until more of it has come, or nothing has
 for a while.

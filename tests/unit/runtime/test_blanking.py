@@ -5,10 +5,10 @@ import base64
 import pytest
 
 from urc.model.codec import Envelope
+from urc.runtime.blanking import Blanker
 from urc.runtime.hub import Note, Traffic
 from urc.runtime.report import REDACTED
 from urc.web.dev.rows import Row, note_row, traffic_row
-from urc.web.dev.secrets import Blanker
 
 HIDDEN = "hunter2"
 KEY = ("wire", "received")
