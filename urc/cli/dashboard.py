@@ -18,6 +18,7 @@ from urc.model.profile import Profile
 from urc.model.values import Value
 from urc.problems import UrcError
 from urc.runtime.catalog import built_in_catalog
+from urc.runtime.hub import Note
 from urc.runtime.kept import Kept
 from urc.runtime.selftest import sample_settings
 from urc.runtime.session import Motion, Session
@@ -60,6 +61,8 @@ class Place:
     """Whether the robots and drivers that are installed are on the menu."""
     trusted: Sequence[str] = ()
     """Widgets that do not ship with URC, and share the page all the same."""
+    recordings: Path | None = None
+    """Folder in which each session is kept; None: none is."""
 
 
 def run_dashboard(
@@ -117,7 +120,7 @@ async def _serve(
                 redirected = await stack.enter_async_context(
                     stand_in(robot.profile, robot.settings, twin)
                 )
-                robot = _robot(_motion(place), None, redirected, robot.settings)
+                robot = _robot(place, None, redirected, robot.settings)
                 robot = replace(robot, glimpse=partial(_seen, twin), is_emulated=True)
             robots[profile.name] = robot
         if faulty is not None:
@@ -156,8 +159,8 @@ def workshop_of(
     """Return what makes the robots of a dashboard while it runs; `faulty`: they are emulated."""
     return Workshop(
         place.data or data_folder(),
-        make=partial(_robot, _motion(place), faulty),
-        tried=partial(_session, "none", faulty),
+        make=partial(_robot, place, faulty),
+        tried=partial(_session, "none", None, faulty),
         given=given,
         shows_installed=place.shows_installed,
         is_open=place.is_managed,
@@ -178,11 +181,11 @@ def _first(garage: Garage, profile: Profile) -> Robot:
 
 
 def _robot(
-    motion: Motion, faulty: Faulty | None, profile: Profile, values: Mapping[str, Value]
+    place: Place, faulty: Faulty | None, profile: Profile, values: Mapping[str, Value]
 ) -> Robot:
     """Return a robot whose session is opened when somebody looks at it."""
     settings = values if faulty is None else _complete(profile, values)
-    opened = partial(_session, motion, faulty, profile, settings)
+    opened = partial(_session, _motion(place), place.recordings, faulty, profile, settings)
     return Robot(profile, settings, opened, is_emulated=faulty is not None)
 
 
@@ -194,7 +197,11 @@ def _seen(twin: Twin) -> Glimpse:
 
 @asynccontextmanager
 async def _session(
-    motion: Motion, faulty: Faulty | None, profile: Profile, values: Mapping[str, Value]
+    motion: Motion,
+    recordings: Path | None,
+    faulty: Faulty | None,
+    profile: Profile,
+    values: Mapping[str, Value],
 ) -> AsyncIterator[Session]:
     """Open a session with a robot, or with its twin, which lives as long as the session."""
     transports = built_in_catalog().transports
@@ -205,7 +212,31 @@ async def _session(
             twin = Twin(profile, settings)
             stack.enter_context(faulty.watch(profile.name, twin))
             profile = await stack.enter_async_context(stand_in(profile, settings, twin))
-        yield await stack.enter_async_context(Session(profile, settings, transports, motion=motion))
+        session = Session(profile, settings, transports, motion=motion)
+        if recordings is not None:
+            # First in, last out: what is said at both ends of the session is recorded, too.
+            await stack.enter_async_context(_kept(session, recordings))
+        yield await stack.enter_async_context(session)
+
+
+@asynccontextmanager
+async def _kept(session: Session, folder: Path) -> AsyncIterator[None]:
+    """Record a session; where that cannot be, it is said, and the robot is driven all the same."""
+    from urc.runtime.recording.recorder import file_in, recorded  # most record nothing
+
+    async with AsyncExitStack() as stack:
+        profile = session.profile
+        try:
+            file = file_in(folder, profile.name)
+            recording = recorded(session.hub, file, profile, session.settings)
+            await stack.enter_async_context(recording)
+            text = f"all that happens is recorded in {file.name}"
+            session.hub.note(Note(time.monotonic(), "info", "recording", text))
+        except UrcError as error:
+            text = f"nothing is recorded: {error}"
+            session.hub.note(Note(time.monotonic(), "warning", "recording", text))
+            complain(f"urc: {profile.name}: {text}")
+        yield
 
 
 def _complete(profile: Profile, values: Mapping[str, Value]) -> dict[str, Value]:

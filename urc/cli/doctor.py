@@ -31,6 +31,7 @@ OPTIONAL = {
     "paho-mqtt": "robots behind an MQTT broker (pip install 'urc[mqtt]')",
     "cbor2": "images from rosbridge without detours (pip install 'urc[cbor]')",
     "zeroconf": "robots that announce themselves, for urc discover (pip install 'urc[mdns]')",
+    "mcap": "recordings of sessions (pip install 'urc[record]')",
     "google-re2": "patterns that are not provably fast; without it they are refused",
     "uvloop": "a faster event loop; without it, ticks take a little longer to the robot",
 }

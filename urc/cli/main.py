@@ -20,6 +20,8 @@ VERBS: dict[str, str] = {
     "simulate": "the emulated robot of a profile, on its real ports",
     "watch": "print a robot's signals as JSON lines",
     "send": "run one command and print its reply",
+    "record": "keep all that happens with a robot in a file, until Ctrl-C",
+    "replay": "the dashboard on a recording, as if the robot told it now",
     "new": "the files of a new widget, to be changed",
     "repo": "repositories of packages: add, list, search, serve one; tokens and keys",
     "install": "get a package with all that it needs, after showing what it may do",

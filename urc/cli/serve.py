@@ -72,6 +72,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="pictures of maps, as FOLDER/z/x/y.png, for the option tiles of the widget map",
     )
     parser.add_argument(
+        "--record",
+        dest="recordings",
+        metavar="FOLDER",
+        type=Path,
+        help="keep each session with a robot in a file there, for 'urc replay'",
+    )
+    parser.add_argument(
         "--trust-widget",
         dest="trusted",
         metavar="NAME",
@@ -95,6 +102,10 @@ def run(arguments: argparse.Namespace) -> int:
         raise Misuse("--fault is for emulated robots: add --simulate")
     if arguments.tiles and not arguments.tiles.is_dir():
         raise Misuse(f"--tiles names a folder of map pictures; {arguments.tiles} is none")
+    if arguments.recordings:
+        from urc.runtime.recording.recorder import check_installed
+
+        check_installed()  # said now, not when somebody drives
     profiles = [load(word) for word in arguments.profiles]
     if not profiles and (arguments.settings or arguments.settings_file):
         raise Misuse("--set and --settings are for the profiles that are named; name one")
@@ -128,6 +139,7 @@ def run(arguments: argparse.Namespace) -> int:
             arguments.manage,
             arguments.installed or not profiles,
             tuple(arguments.trusted),
+            arguments.recordings,
         ),
         is_simulated=arguments.simulate,
         on_ready=_print_address,

@@ -11,17 +11,21 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
-from typing import Literal
+from typing import TYPE_CHECKING, Literal, TypeAlias
 
 from urc.model.codec import Envelope
 from urc.model.values import Alarm, Reading, Sample, Signal
 from urc.runtime.streams import Streams
+
+if TYPE_CHECKING:
+    from urc.runtime.audit import Entry
 
 __all__ = [
     "Columns",
     "Hub",
     "LinkState",
     "LinkStatus",
+    "Moved",
     "Note",
     "Progress",
     "Subscription",
@@ -124,7 +128,16 @@ class Progress:
     """Why it ended without success; "" when it did not."""
 
 
-Tapped = Sample | Note | Traffic
+@dataclass(frozen=True, slots=True)
+class Moved:
+    """A tick of a held command that was taken; only told while somebody keeps all that happens."""
+
+    time_s: float
+    command: str
+    arguments: Mapping[str, Reading]
+
+
+Tapped: TypeAlias = "Sample | Note | Traffic | LinkStatus | Moved | Entry"
 """What a tap gives."""
 
 
@@ -248,6 +261,8 @@ class Hub:
         self.links[status.transport] = status
         self.links_count += 1
         self.revision += 1
+        for tap in self._taps:
+            tap.put((status,))
         self._wake()
 
     def set_progress(self, progress: Progress) -> None:
@@ -258,6 +273,16 @@ class Hub:
         self.progress_count += 1
         self.revision += 1
         self._wake()
+
+    @property
+    def is_tapped(self) -> bool:
+        """Whether somebody is given all that happens."""
+        return bool(self._taps)
+
+    def tell(self, done: "Moved | Entry") -> None:
+        """Take what somebody did with the robot: only taps hear of it."""
+        for tap in self._taps:
+            tap.put((done,))
 
     def note(self, note: Note) -> None:
         """Take one line for the log."""

@@ -18,6 +18,7 @@ from urc.model.values import NOTHING, Reading
 from urc.motion.lease import Client, LeaseState
 from urc.runtime.audit import Entry, shown
 from urc.runtime.disguise import HIDDEN, Disguises
+from urc.runtime.hub import Hub, Moved
 
 __all__ = ["Trail"]
 
@@ -92,6 +93,8 @@ class Trail:
         self.is_faulty = False
         """Whether anything could not be noted because of a mistake in URC."""
         self._note = note
+        self.hub: Hub | None = None
+        """Of the session, while the robot is connected; its taps hear of all this."""
         self._utc = utc
         self._secrets: tuple[str, ...] = ()
         self._disguises = Disguises()
@@ -120,6 +123,8 @@ class Trail:
         now: float,
     ) -> None:
         """Take note of a tick that was taken, and the frame that it became."""
+        if self.hub is not None and self.hub.is_tapped:
+            self.hub.tell(Moved(now, command, arguments))
         motion = self._motions.get(command)
         if motion is None or motion.client != client or motion.epoch != epoch:
             self.stopped(command, "taken over", now)
@@ -242,6 +247,8 @@ class Trail:
             lasted_s=lasted_s,
         )
         self._note(entry)
+        if self.hub is not None:
+            self.hub.tell(entry)
 
     def _arguments(self, arguments: Mapping[str, Reading]) -> str:
         return self._hidden(_json(arguments))

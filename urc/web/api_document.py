@@ -26,6 +26,8 @@ from urc.web.manage.wire import (
     Shelf,
     Started,
     Stopped,
+    TapeAsked,
+    TapeState,
     Timeline,
     Url,
 )
@@ -108,6 +110,18 @@ _CALLS: Final = (
         Timeline,
         is_post=False,
         query=("last", "since"),
+    ),
+    _Call(
+        "/api/v1/robots/{name}/recording",
+        "Where the recording stands that is shown in place of a robot.",
+        TapeState,
+        is_post=False,
+    ),
+    _Call(
+        "/api/v1/robots/{name}/recording/move",
+        "Let it run, stand, or go on from somewhere else.",
+        TapeState,
+        TapeAsked,
     ),
     _Call(
         "/api/v1/robots/{name}/dev/start",

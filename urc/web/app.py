@@ -37,6 +37,7 @@ from urc.web.drive.spare import Spare
 from urc.web.fleet.fleet import Fleet
 from urc.web.fleet.garage import Garage, Workshop
 from urc.web.fleet.robots import LINGER_S, Robot, Station, missing_settings
+from urc.web.fleet.tape import Tape
 from urc.web.load.assets import Assets, import_map
 from urc.web.load.file_routes import FileRoutes
 from urc.web.load.foreign import Border
@@ -53,6 +54,7 @@ from urc.web.show.interfaces import KEPT, chosen
 from urc.web.show.menu import Ways, menu_page
 from urc.web.show.pages import Head, error_page, robot_page
 from urc.web.socket import Client
+from urc.web.tape import move_tape, tape_state
 from urc.web.timeline import timeline
 from urc.web.visitor import guest_of, is_here
 from urc.web.wire import messages as wire
@@ -157,6 +159,8 @@ class _Dashboard(Starlette):
                 Route(DOCUMENT, document),
                 Route("/api/v1/robots/{name}/stop", routes.stop, methods=["POST"]),
                 Route("/api/v1/robots/{name}/timeline", routes.timeline),
+                Route("/api/v1/robots/{name}/recording", routes.recording),
+                Route("/api/v1/robots/{name}/recording/move", routes.move, methods=["POST"]),
                 *routes.manage_routes(),
                 *gallery.routes(),
                 *files.routes(),
@@ -270,7 +274,8 @@ class _Routes:
             robot.profile,
             interface,
             self.modules,
-            is_watching="watch" in query,
+            is_watching="watch" in query or robot.tape is not None,
+            tape=_tape_url(name) if robot.tape is not None else "",
             tab=query.get("tab", ""),
             wire=dev_url(name) if is_dev else "",
             is_part="part" in query,
@@ -286,7 +291,7 @@ class _Routes:
         station = self.stations.get(request.path_params["name"])
         if station is None:
             return JSONResponse({"error": "no robot of that name is served here"}, 404, _PAGE)
-        if not station.controls.desk.can_move:
+        if not station.controls.desk.can_move or station.robot.tape is not None:
             return JSONResponse({"error": "this robot has nothing that moves"}, 409, _PAGE)
         station.controls.stop(guest_of(request).place or "a screen of this machine")
         is_confirmed = await station.deliver_stop()
@@ -300,11 +305,26 @@ class _Routes:
             return JSONResponse({"error": "no robot of that name is served here"}, 404, _PAGE)
         return await timeline(request, self.audit, name, is_here=is_here(request))
 
+    async def recording(self, request: Request) -> Response:
+        """Tell where a recording stands."""
+        return tape_state(self._tape(request))
+
+    async def move(self, request: Request) -> Response:
+        """Move it."""
+        return await move_tape(request, self._tape(request))
+
+    def _tape(self, request: Request) -> Tape | None:
+        robot = self.robots.get(request.path_params["name"])
+        return robot.tape if robot is not None else None
+
     async def socket(self, websocket: WebSocket) -> None:
         station = await self._accepted(websocket)
         if station is not None:
             flow = websocket.scope["state"].get("flow")
-            await Client(websocket, station, flow, guest_of(websocket)).serve()
+            guest = guest_of(websocket)
+            if station.robot.tape is not None:
+                guest = guest._replace(role="viewer")
+            await Client(websocket, station, flow, guest).serve()
 
     async def spare(self, websocket: WebSocket) -> None:
         """Be a second line of a page that drives."""
@@ -321,6 +341,10 @@ class _Routes:
         if station is None:
             await websocket.close(wire.CLOSE_NO_ROBOT, "no robot of that name is served here")
         return station
+
+
+def _tape_url(name: str) -> str:
+    return f"/api/v1/robots/{quote(name, safe='')}/recording"
 
 
 async def _told(request: Request, error: Exception) -> Response:

@@ -26,6 +26,7 @@ from urc.runtime.trail import Trail
 from urc.web.drive.consent import Consent
 from urc.web.drive.controls import Controls
 from urc.web.feed.fanout import Fanout
+from urc.web.fleet.tape import Tape
 
 __all__ = [
     "Glimpse",
@@ -100,6 +101,8 @@ class Robot:
     """What is seen of an emulated robot without being connected to it; None for a real one."""
     is_emulated: bool = False
     """It has the name of a real one: what is kept of the one is not the other's."""
+    tape: Tape | None = None
+    """The recording that is shown in its place; None: it is a robot."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -288,6 +291,7 @@ class Station:
         fanout = Fanout(session.hub, clock=self.clock, each=each)
         live = Live(session, fanout, secrets.token_hex(8), asyncio.Event())
         self._coming().set_result(live)
+        self.controls.trail.hub = session.hub
         try:
             async with asyncio.TaskGroup() as group:
                 tasks = [
@@ -300,6 +304,7 @@ class Station:
                     task.cancel()
         finally:
             self._next = None
+            self.controls.trail.hub = None
             live.ended.set()
             live.fanout.end()
 

@@ -27,6 +27,8 @@ __all__ = [
     "Shelf",
     "Started",
     "Stopped",
+    "TapeAsked",
+    "TapeState",
     "Timeline",
     "TriedLine",
     "Url",
@@ -209,6 +211,25 @@ class Stopped(Message, frozen=True):
     """Who stopped it."""
     confirmed: bool
     """Whether the stop was handed to the robot's line."""
+
+
+class TapeAsked(Message, frozen=True):
+    """A recording is to be moved; what is left out stays as it is."""
+
+    position_s: float | None = None
+    is_playing: bool | None = None
+
+
+class TapeState(Message, frozen=True):
+    """Where a recording stands."""
+
+    began_s: float
+    """When it was recorded, in seconds since 1970."""
+    length_s: float
+    position_s: float
+    is_playing: bool
+    speed: float
+    """How many seconds of it pass in one."""
 
 
 class Timeline(Message, frozen=True):

@@ -6,6 +6,7 @@ Floor 5. Pure. `menu.html.j2` sees `MenuPage`; all pages around the dashboard ha
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import PurePath
+from time import gmtime, strftime
 from urllib.parse import quote
 
 from urc.model.profile import Setting
@@ -75,6 +76,8 @@ class Card:
     """Whether there is a live picture before anybody is connected."""
     fault: str = ""
     """Why it cannot be used at all; "" when it can."""
+    recorded: str = ""
+    """When, where it is a recording; "": it is a robot."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,7 +151,12 @@ def _card(name: str, robot: Robot, ways: Ways, driver: str) -> Card:
         settings_url=f"{url}settings" if ways.has_managers else "",
         dev_url=f"{url}dev" if ways.has_dev else "",
         is_looked_at=robot.glimpse is not None,
+        recorded=_utc(robot.tape.began_s) if robot.tape is not None else "",
     )
+
+
+def _utc(time_s: float) -> str:
+    return strftime("%Y-%m-%d %H:%M UTC", gmtime(time_s))
 
 
 def _broken(name: str, one: Broken, ways: Ways) -> Card:

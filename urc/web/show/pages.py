@@ -87,6 +87,8 @@ class RobotPage:
     """JSON list of the transports over which STOP reaches the robot."""
     can_move: bool
     """Whether the controls and STOP are shown."""
+    tape: str
+    """Path at which a recording is asked for; "" where a robot is shown."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,6 +110,7 @@ def robot_page(
     is_watching: bool = False,
     tab: str = "",
     wire: str = "",
+    tape: str = "",
     is_part: bool = False,
     border: Border = Border(),  # noqa: B008  # frozen
 ) -> str:
@@ -122,6 +125,7 @@ def robot_page(
         is_watching: the page is never to drive.
         tab: name of the page of it that is open; "" or an unknown one: the first.
         wire: path of the dev page; "" where there is none for who asks.
+        tape: path at which a recording is asked for; "" where a robot is shown.
         is_part: a page that is open already wants the interface in place of another.
         border: which widgets live in frames.
     """
@@ -157,7 +161,8 @@ def robot_page(
         ),
         stop_url=f"/api/v1/robots/{place}/stop",
         lines=json.dumps(lines),
-        can_move=can_move(profile.driver),
+        can_move=can_move(profile.driver) and not tape,
+        tape=tape,
     )
     return render("robot.html.j2", page)
 

@@ -22,6 +22,7 @@ export class Badge {
     this.el = el;
     this.text = part(el, "[data-badge-text]");
     this.trip = part(el, "[data-badge-trip]");
+    this.isReplay = "replay" in el.dataset;
   }
 
   /**
@@ -29,7 +30,8 @@ export class Badge {
    * @param {Socket} socket
    */
   frame(store, socket) {
-    const [sign, text] = summary(store, socket.failures > 0);
+    let [sign, text] = summary(store, socket.failures > 0);
+    if (this.isReplay && sign === "good") [sign, text] = ["connecting", t("Replay")]; // nothing of it is live
     if (this.el.dataset["state"] !== sign) this.el.dataset["state"] = sign;
     write(this.text, text);
     const [quality, figure] = tripOf(socket.tripMs);

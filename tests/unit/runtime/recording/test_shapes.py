@@ -1,0 +1,214 @@
+"""What a recording says of each thing that happens, and what is made of it again."""
+
+import json
+from collections.abc import Mapping
+from typing import Any
+
+import jsonschema
+import pytest
+
+from urc.model.driver import Argument, Command, Driver, FramingSpec, Hold, TransportSpec
+from urc.model.values import Reading, Sample, Signal
+from urc.runtime.audit import Entry
+from urc.runtime.blanking import Blanker
+from urc.runtime.hub import LinkStatus, Moved, Note, Tapped, Traffic
+from urc.runtime.recording.shapes import DRIVING, LOG, Shapes, channels, event_of
+from urc.testing.codec import text
+
+BORN_NS = 1_700_000_000_000_000_000
+PNG = b"\x89PNG\r\n\x1a\n rest"
+SIGNALS = {
+    one.name: one
+    for one in (
+        Signal("battery", "integer", unit="%"),
+        Signal("word", "string"),
+        Signal("ranges", "array"),
+        Signal("pose", "object"),
+        Signal("camera", "image"),
+        Signal("dump", "blob"),
+        Signal("isOn", "boolean"),
+    )
+}
+DRIVER = Driver(
+    {
+        "wire": TransportSpec("wire", "tcp"),
+        "udp": TransportSpec("udp", "udp", framing=FramingSpec("datagram")),
+    },
+    SIGNALS,
+    commands={
+        "drive": Command(
+            "drive",
+            "wire",
+            text("M {{ speed }}"),
+            arguments={"speed": Argument("speed", "number")},
+            hold=Hold(0.05, release={"speed": 0}),
+        )
+    },
+)
+
+# As published by their authors (github.com/foxglove/foxglove-sdk, schemas/jsonschema, MIT), without
+# the descriptions.
+TIME = {
+    "type": "object",
+    "properties": {
+        "sec": {"type": "integer", "minimum": 0},
+        "nsec": {"type": "integer", "minimum": 0, "maximum": 999999999},
+    },
+}
+FOXGLOVE: Mapping[str, Any] = {
+    "foxglove.CompressedImage": {
+        "type": "object",
+        "properties": {
+            "timestamp": TIME,
+            "frame_id": {"type": "string"},
+            "data": {"type": "string", "contentEncoding": "base64"},
+            "format": {"type": "string"},
+        },
+        "required": ["timestamp", "frame_id", "data", "format"],
+    },
+    "foxglove.Log": {
+        "type": "object",
+        "properties": {
+            "timestamp": TIME,
+            "level": {"oneOf": [{"const": number} for number in range(6)]},
+            "message": {"type": "string"},
+            "name": {"type": "string"},
+            "file": {"type": "string"},
+            "line": {"type": "integer", "minimum": 0},
+        },
+        "required": ["timestamp", "level", "message", "name", "file", "line"],
+    },
+}
+
+
+def shapes(*secrets: str) -> Shapes:
+    return Shapes(DRIVER, Blanker(secrets), lambda time_s: BORN_NS + round(time_s * 1e9))
+
+
+def told(event: Tapped, *secrets: str) -> tuple[str, int, bytes]:
+    (message,) = shapes(*secrets).messages(event)
+    return message
+
+
+EVENTS: Mapping[str, Tapped] = {
+    "whole number": Sample("battery", 42, 1.5, "low"),
+    "nothing": Sample("battery", None, 1.5),
+    "text": Sample("word", "naïve <b> \u202e", 1.5),
+    "truth": Sample("isOn", True, 1.5),
+    "list": Sample("ranges", (1.0, None, 2.5), 1.5),
+    "mapping": Sample("pose", {"x": 1, "at": (1, 2), "in": {"y": None}}, 1.5),
+    "image": Sample("camera", PNG, 1.5),
+    "bytes": Sample("dump", b"\x00\xff", 1.5),
+    "line": LinkStatus("wire", "silent", "tcp 127.0.0.1:6789", 1.5, "no answer", 2, 3),
+    "note": Note(1.5, "warning", "wire", "it hung up"),
+    "text on the wire": Traffic(1.5, "wire", "received", b"42\n"),
+    "bytes on the wire": Traffic(1.5, "udp", "sent", b"\xff\x00\x81"),
+}
+
+
+@pytest.mark.parametrize("event", EVENTS.values(), ids=EVENTS)
+def test_what_happened_is_made_of_it_again(event: Tapped) -> None:
+    topic, time_ns, data = told(event)
+    assert time_ns == BORN_NS + 1_500_000_000
+    assert event_of(topic, data, 1.5, SIGNALS) == event
+
+
+@pytest.mark.parametrize("event", EVENTS.values(), ids=EVENTS)
+def test_every_message_fits_the_schema_that_the_file_says(event: Tapped) -> None:
+    topic, _, data = told(event)
+    known = {channel.topic: channel for channel in channels(DRIVER)}[topic]
+    message = json.loads(data)
+    if b"null" not in data:  # "not available" stands in place of any value
+        jsonschema.validate(message, dict(known.schema))
+    if known.shape in FOXGLOVE:
+        jsonschema.validate(message, FOXGLOVE[known.shape])
+
+
+def test_images_and_the_log_have_the_names_that_programs_know() -> None:
+    names = {channel.topic: channel.shape for channel in channels(DRIVER)}
+    assert names["/signals/camera"] == "foxglove.CompressedImage"
+    assert names[LOG] == "foxglove.Log"
+    assert json.loads(told(EVENTS["image"])[2])["format"] == "png"
+
+
+def test_who_drove_is_a_line_of_the_log_again() -> None:
+    entry = Entry(1_700_000_001.0, "bot", "moved", "screen 1", command="drive", outcome="begins")
+    topic, time_ns, data = told(entry)
+    assert (topic, time_ns) == (DRIVING, BORN_NS + 1_000_000_000)
+    assert json.loads(data)["command"] == "drive"
+    assert event_of(topic, data, 2.0, {}) == Note(
+        2.0, "info", "driving", "screen 1 moved drive begins"
+    )
+
+
+def test_motion_is_told_by_its_arguments_and_ends_with_what_stops_it() -> None:
+    """So that a plot of them shows what the robot was told, and when that was over."""
+    made = shapes()
+    ticks = [made.messages(Moved(1.0 + at, "drive", {"speed": at})) for at in (0, 0.5)]
+    told = [(topic, json.loads(data)) for ((topic, _, data),) in ticks]
+    assert told == [("/commands/drive", {"speed": 0}), ("/commands/drive", {"speed": 0.5})]
+    ended = made.messages(Entry(1_700_000_002.0, "bot", "stopped", command="drive"))
+    assert [(topic, json.loads(data).get("speed")) for topic, _, data in ended] == [
+        (DRIVING, None),
+        ("/commands/drive", 0),
+    ]
+    known = {channel.topic: channel.schema for channel in channels(DRIVER)}
+    assert known["/commands/drive"]["properties"] == {"speed": {"type": "number"}}
+
+
+def test_times_never_go_back() -> None:
+    """A reading has the time of its first byte, which is told after its last one."""
+    made = shapes()
+    (first,) = made.messages(Traffic(2.0, "wire", "received", b"4"))
+    (second,) = made.messages(Sample("battery", 4, 1.0))
+    assert second[1] == first[1]
+
+
+@pytest.mark.parametrize("value", [float("nan"), float("inf"), 2**70, "\ud800", {"a": b"\x01"}])
+def test_whatever_a_robot_says_becomes_json(value: Reading) -> None:
+    """Of what JSON has no word for, another program still reads the message."""
+    data = told(Sample("word", value, 1.0))[2]
+    json.loads(data, parse_constant=lambda word: pytest.fail(f"{word} is no JSON"))
+
+
+def test_secrets_are_kept_out_of_all_of_it() -> None:
+    made = shapes("hunter2")
+    events: list[Tapped] = [
+        Sample("word", "it is hunter2", 1.0),
+        Sample("pose", {"a": ("hunter2",)}, 1.0),
+        LinkStatus("wire", "lost", "tcp hunter2", 1.0, "refused hunter2"),
+        Note(1.0, "info", "wire", "hunter2"),
+        Traffic(1.0, "wire", "received", b"echo hun"),
+        Traffic(1.1, "wire", "received", b"ter2\n"),
+        Traffic(1.2, "udp", "sent", b"\xffhunter2"),
+    ]
+    found = [message for event in events for message in made.messages(event)]
+    found += made.rest(2.0)
+    assert len(found) >= 6
+    for _, _, data in found:
+        assert b"hunter2" not in data
+        assert b"hunter2".hex().encode() not in data
+        json.loads(data)
+
+
+@pytest.mark.parametrize(
+    ("topic", "data"),
+    [
+        ("/signals/battery", b"no json"),
+        ("/signals/battery", b"[1]"),
+        ("/signals/battery", b"{}"),
+        ("/signals/battery", b'{"value": 1, "alarm": "red"}'),
+        ("/signals/gone", b'{"value": 1}'),
+        ("/signals/camera", b'{"data": "\xc3\xa9"}'),
+        ("/signals/camera", b'{"value": 7}'),
+        ("/link/wire", b'{"state": "fine", "address": ""}'),
+        ("/link/wire", b'{"state": "live", "address": "", "attempts": "many"}'),
+        ("/wire/wire", b'{"direction": "sent", "hex": "zz"}'),
+        ("/wire/wire", b'{"direction": "sent"}'),
+        ("/log", b'{"level": 2}'),
+        ("/other", b'{"value": 1}'),
+        ("", b""),
+    ],
+)
+def test_what_is_not_ours_or_damaged_tells_nothing(topic: str, data: bytes) -> None:
+    assert event_of(topic, data, 1.0, SIGNALS) is None

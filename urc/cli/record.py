@@ -1,0 +1,100 @@
+"""`urc record`: connect, and keep all that happens in a file that `urc replay` plays."""
+
+import argparse
+import asyncio
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from urc.cli.arguments import add_profile, duration, load
+from urc.cli.output import complain
+from urc.problems import UrcError, printable
+
+if TYPE_CHECKING:
+    from urc.model.profile import Profile
+    from urc.model.values import Value
+    from urc.runtime.recording.recorder import Recorder
+
+EXAMPLE = "urc record robots/puppet.yaml --for 10s -o puppet.mcap"
+
+_LOOK_S = 0.5
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the profile, how long, and where to."""
+    add_profile(parser)
+    parser.add_argument(
+        "-o",
+        "--output",
+        metavar="FILE",
+        type=Path,
+        help="the recording (default: ROBOT-TIME.mcap here)",
+    )
+    parser.add_argument(
+        "--for", dest="seconds", type=duration, metavar="TIME", help="stop after 500ms, 5s, 2m …"
+    )
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Record until the time is over or a signal comes; 1 when nothing was received."""
+    from urc.cli.running import run_loop
+    from urc.cli.settings import complete_settings
+
+    profile = load(arguments.profile)
+    settings = complete_settings(profile, arguments)
+    return run_loop(_record(profile, settings, arguments), code_when_ended=0)
+
+
+async def _record(
+    profile: "Profile", settings: Mapping[str, "Value"], arguments: argparse.Namespace
+) -> int:
+    from urc.runtime.catalog import built_in_catalog
+    from urc.runtime.recording.recorder import file_in, recorded
+    from urc.runtime.session import Session
+
+    session = Session(profile, settings, built_in_catalog().transports)
+    file = arguments.output or file_in(Path(), profile.name)
+    # It begins before the session and ends after it: what is said at both ends is in it.
+    async with recorded(session.hub, file, profile, settings) as recorder:
+        complain(f"recording {file}; Ctrl-C ends it")
+        async with session:
+            await _until_over(recorder, arguments.seconds)
+            details = {link.detail for link in session.hub.links.values() if link.detail}
+    return _told(recorder, details)
+
+
+async def _until_over(recorder: "Recorder", seconds: float | None) -> None:
+    """Return when the time is over, when nothing can be recorded any more, or at Ctrl-C."""
+    try:
+        async with asyncio.timeout(seconds):
+            while not recorder.fault:  # noqa: ASYNC110 - a thread says so
+                await asyncio.sleep(_LOOK_S)
+    except TimeoutError:
+        pass
+    except asyncio.CancelledError:
+        # That is how a recording without a time ends: the file is made whole, and told of.
+        task = asyncio.current_task()
+        if task is not None:
+            task.uncancel()
+
+
+def _told(recorder: "Recorder", details: set[str]) -> int:
+    if recorder.fault:
+        raise UrcError(recorder.fault)
+    counts = recorder.counts
+    values = {name: count for name, count in counts.items() if name.startswith("/signals/")}
+    wire = sum(count for name, count in counts.items() if name.startswith("/wire/"))
+    print(
+        printable(
+            f"{recorder.file}: {_many(sum(values.values()), 'reading')} of"
+            f" {_many(len(values), 'signal')}, {_many(wire, 'piece')} of traffic"
+        )
+    )
+    if not values:
+        reasons = f": {'; '.join(sorted(details))}" if details else ""
+        raise UrcError(f"no reading was received{reasons}")
+    return 0
+
+
+def _many(number: int, what: str) -> str:
+    return f"{number} {what}{'' if number == 1 else 's'}"

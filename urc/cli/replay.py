@@ -1,0 +1,107 @@
+"""`urc replay`: the dashboard on a recording, as if the robot told it now."""
+
+import argparse
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING
+
+from urc.cli.arguments import add_host, add_port, duration, load
+from urc.cli.failures import Misuse
+from urc.cli.output import complain
+from urc.problems import ProblemsError, UrcError
+
+if TYPE_CHECKING:
+    from urc.model.profile import Profile
+    from urc.runtime.recording.player import Player
+    from urc.runtime.recording.reader import Recording
+
+EXAMPLE = "urc replay puppet.mcap --speed 2"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the recording, how it is played, and where to listen."""
+    parser.add_argument("recording", metavar="FILE", type=Path, help="a recording of URC")
+    parser.add_argument(
+        "--profile",
+        metavar="PROFILE",
+        help="show it with this robot file, as after a change of its interface, or where it has"
+        " widgets of its own (default: the profile that is kept in the recording)",
+    )
+    parser.add_argument(
+        "--speed",
+        type=_speed,
+        default=1.0,
+        metavar="X",
+        help="seconds that pass in one, 0.1 to 100",
+    )
+    parser.add_argument(
+        "--from",
+        dest="start_s",
+        type=duration,
+        default=0.0,
+        metavar="TIME",
+        help="begin at 90s, 2m …",
+    )
+    parser.add_argument("--loop", action="store_true", help="begin anew at the end")
+    add_host(parser)
+    add_port(parser)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Serve until Ctrl-C or SIGTERM."""
+    from urc.cli.running import run_loop
+    from urc.runtime.recording.player import Player
+    from urc.runtime.recording.reader import open_recording
+    from urc.runtime.selftest import sample_settings
+
+    recording = open_recording(arguments.recording)
+    start_s, length_s = arguments.start_s, recording.length_s
+    if start_s > length_s:
+        raise Misuse(f"--from {start_s:g}s is past the end: the recording lasts {length_s:.1f} s")
+    if not recording.is_whole:
+        complain(f"urc replay: {recording.file} has no end; the last second may be missing")
+    profile = load(arguments.profile) if arguments.profile else _profile_in(recording)
+    player = Player(
+        recording,
+        profile,
+        sample_settings(profile.settings),
+        speed=arguments.speed,
+        start_s=start_s,
+        is_looped=arguments.loop,
+    )
+    return run_loop(_serve(player, arguments.host, arguments.port), code_when_ended=0)
+
+
+async def _serve(player: "Player", host: str, port: int) -> int:
+    from urc.web.app import Robot, build_app, serve
+
+    profile = player.profile
+    robot = Robot(profile, player.settings, player.session, tape=player)
+    await serve(build_app({profile.name: robot}), host=host, port=port, on_ready=_print_address)
+    return 0
+
+
+def _profile_in(recording: "Recording") -> "Profile":
+    """Return the profile that is kept in a recording."""
+    with TemporaryDirectory(prefix="urc-replay-") as folder:
+        file = Path(folder, "profile.yaml")
+        file.write_text(recording.document, encoding="utf-8")
+        try:
+            return load(str(file))
+        except ProblemsError as error:
+            line = str(error).partition("\n")[0].replace(str(file), recording.file.name)
+            raise UrcError(f"{line}; --profile names another profile to show it with") from None
+
+
+def _print_address(url: str) -> None:
+    print(f"dashboard {url}", flush=True)
+
+
+def _speed(text: str) -> float:
+    try:
+        speed = float(text)
+    except ValueError:
+        speed = 0.0
+    if not 0.1 <= speed <= 100:
+        raise argparse.ArgumentTypeError(f"a speed from 0.1 to 100 is expected, not {text!r}")
+    return speed

@@ -1,0 +1,46 @@
+"""Where a recording stands that is shown in place of a robot, and the way to move it.
+
+Floor 5. Its pages are those of a robot that is only watched. Whoever sees them may move it: there
+is nothing behind it that could be harmed.
+"""
+
+import math
+
+from starlette.requests import Request
+from starlette.responses import Response
+
+from urc.web.fleet.tape import Tape
+from urc.web.manage.routes import Refusal, answer, body_of, told
+from urc.web.manage.wire import TapeAsked, TapeState
+
+__all__ = ["move_tape", "tape_state"]
+
+
+def tape_state(tape: Tape | None) -> Response:
+    """Answer where a recording stands; None: there is none."""
+    if tape is None:
+        return told(404, "this is no recording")
+    return answer(
+        TapeState(
+            began_s=tape.began_s,
+            length_s=tape.length_s,
+            position_s=tape.position_s,
+            is_playing=tape.is_playing,
+            speed=tape.speed,
+        )
+    )
+
+
+async def move_tape(request: Request, tape: Tape | None) -> Response:
+    """Let a recording run, stand, or go on from somewhere else, and answer where it stands."""
+    if tape is None:
+        return told(404, "this is no recording")
+    try:
+        asked = await body_of(request, TapeAsked)
+    except Refusal as refusal:
+        return told(refusal.status, refusal.line)
+    if asked.position_s is not None and math.isfinite(asked.position_s):
+        tape.seek(asked.position_s)
+    if asked.is_playing is not None and asked.is_playing != tape.is_playing:
+        (tape.play if asked.is_playing else tape.pause)()
+    return tape_state(tape)
