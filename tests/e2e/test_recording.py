@@ -182,6 +182,22 @@ async def recording(urc_process: Start, new_page: PageMaker, tmp_path: Path) -> 
     return file
 
 
+async def test_a_robot_that_cannot_be_recorded_is_driven_all_the_same(
+    urc_process: Start, new_page: PageMaker, tmp_path: Path
+) -> None:
+    (tmp_path / "file").touch()
+    folder = str(tmp_path / "file" / "kept")
+    dashboard = urc_process("serve", PUPPET, "--simulate", "--port", "0", "--record", folder)
+    address = (await dashboard.wait_for_async(r"dashboard (http\S+)"))[1]
+    page = await new_page()
+    await page.goto(f"{address}robots/puppet/")
+    await expect(page.locator("[data-badge-text]")).to_have_text("Live")
+    said = page.locator("[data-log]")
+    await expect(said).to_contain_text("recording: nothing is recorded: ")
+    await expect(said).to_contain_text("cannot be made: Not a directory")
+    assert any("nothing is recorded" in line for line in dashboard.errors)
+
+
 @pytest.fixture
 async def replayed(recording: Path, urc_process: Start) -> AsyncIterator[str]:
     """The address of the recording's page."""

@@ -8,6 +8,7 @@ from contextlib import AsyncExitStack, asynccontextmanager
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
+from typing import Literal
 
 from urc._folders import data_folder
 from urc.cli.failures import Misuse
@@ -33,6 +34,8 @@ __all__ = ["Place", "SettingsOf", "run_dashboard", "workshop_of"]
 SettingsOf = Callable[[Profile], Mapping[str, Value]]
 """The settings of a profile that were given at the start; raises `UrcError` for those that no
 longer fit."""
+_DISK_S = 3.0
+"""How long a session waits for its recording to begin."""
 _LOOK = (320, 240)
 """Columns and rows of the picture on a card."""
 
@@ -225,17 +228,23 @@ async def _kept(session: Session, folder: Path) -> AsyncIterator[None]:
     from urc.runtime.recording.recorder import file_in, recorded  # most record nothing
 
     async with AsyncExitStack() as stack:
-        profile = session.profile
+        profile, is_kept = session.profile, False
         try:
-            file = file_in(folder, profile.name)
-            recording = recorded(session.hub, file, profile, session.settings)
-            await stack.enter_async_context(recording)
-            text = f"all that happens is recorded in {file.name}"
-            session.hub.note(Note(time.monotonic(), "info", "recording", text))
+            async with asyncio.timeout(_DISK_S):
+                file = file_in(folder, profile.name)
+                recording = recorded(session.hub, file, profile, session.settings)
+                await stack.enter_async_context(recording)
+            is_kept, text = True, f"all that happens is recorded in {file.name}"
         except UrcError as error:
             text = f"nothing is recorded: {error}"
-            session.hub.note(Note(time.monotonic(), "warning", "recording", text))
+        except TimeoutError:
+            text = f"nothing is recorded: the disk of {folder} takes nothing"
+        except Exception as bug:  # a supervisor: what goes wrong here must keep nobody from driving
+            text = f"nothing is recorded: this is a mistake in URC, please report it: {bug!r}"
+        if not is_kept:
             complain(f"urc: {profile.name}: {text}")
+        level: Literal["info", "warning"] = "info" if is_kept else "warning"
+        session.hub.note(Note(time.monotonic(), level, "recording", text))
         yield
 
 

@@ -5,7 +5,7 @@
  * @typedef {import("./types.js").Link} Link
  * @typedef {import("./store.js").Store} Store
  * @typedef {import("./socket.js").Socket} Socket
- * @typedef {"good" | "connecting" | "caution" | "bad"} Sign
+ * @typedef {"good" | "connecting" | "caution" | "bad" | "replay"} Sign
  */
 
 import { write } from "./kit.js";
@@ -31,7 +31,7 @@ export class Badge {
    */
   frame(store, socket) {
     let [sign, text] = summary(store, socket.failures > 0);
-    if (this.isReplay && sign === "good") [sign, text] = ["connecting", t("Replay")]; // nothing of it is live
+    if (this.isReplay && sign === "good") [sign, text] = ["replay", t("Replay")]; // nothing of it is live
     if (this.el.dataset["state"] !== sign) this.el.dataset["state"] = sign;
     write(this.text, text);
     const [quality, figure] = tripOf(socket.tripMs);
