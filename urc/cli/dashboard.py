@@ -8,7 +8,6 @@ from contextlib import AsyncExitStack, asynccontextmanager
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Literal
 
 from urc._folders import data_folder
 from urc.cli.failures import Misuse
@@ -19,7 +18,6 @@ from urc.model.profile import Profile
 from urc.model.values import Value
 from urc.problems import UrcError
 from urc.runtime.catalog import built_in_catalog
-from urc.runtime.hub import Note
 from urc.runtime.kept import Kept
 from urc.runtime.selftest import sample_settings
 from urc.runtime.session import Motion, Session
@@ -34,8 +32,6 @@ __all__ = ["Place", "SettingsOf", "run_dashboard", "workshop_of"]
 SettingsOf = Callable[[Profile], Mapping[str, Value]]
 """The settings of a profile that were given at the start; raises `UrcError` for those that no
 longer fit."""
-_DISK_S = 3.0
-"""How long a session waits for its recording to begin."""
 _LOOK = (320, 240)
 """Columns and rows of the picture on a card."""
 
@@ -225,27 +221,18 @@ async def _session(
 @asynccontextmanager
 async def _kept(session: Session, folder: Path) -> AsyncIterator[None]:
     """Record a session; where that cannot be, it is said, and the robot is driven all the same."""
-    from urc.runtime.recording.recorder import file_in, recorded  # most record nothing
+    from urc.runtime.recording.recorder import recorded  # most record nothing
 
+    profile = session.profile
+    keeping = recorded(session.hub, folder, profile, session.settings, is_folder=True)
     async with AsyncExitStack() as stack:
-        profile, is_kept = session.profile, False
+        recorder = await stack.enter_async_context(keeping)
         try:
-            async with asyncio.timeout(_DISK_S):
-                file = file_in(folder, profile.name)
-                recording = recorded(session.hub, file, profile, session.settings)
-                await stack.enter_async_context(recording)
-            is_kept, text = True, f"all that happens is recorded in {file.name}"
-        except UrcError as error:
-            text = f"nothing is recorded: {error}"
-        except TimeoutError:
-            text = f"nothing is recorded: the disk of {folder} takes nothing"
-        except Exception as bug:  # a supervisor: what goes wrong here must keep nobody from driving
-            text = f"nothing is recorded: this is a mistake in URC, please report it: {bug!r}"
-        if not is_kept:
-            complain(f"urc: {profile.name}: {text}")
-        level: Literal["info", "warning"] = "info" if is_kept else "warning"
-        session.hub.note(Note(time.monotonic(), level, "recording", text))
-        yield
+            yield
+        finally:
+            await stack.aclose()
+            if recorder.fault:
+                complain(f"urc: {profile.name}: {recorder.fault}")
 
 
 def _complete(profile: Profile, values: Mapping[str, Value]) -> dict[str, Value]:

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 EXAMPLE = "urc record robots/puppet.yaml --for 10s -o puppet.mcap"
 
-_LOOK_S = 0.5
+_SOON_S, _LOOK_S = 0.02, 0.5
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -49,13 +49,18 @@ async def _record(
     profile: "Profile", settings: Mapping[str, "Value"], arguments: argparse.Namespace
 ) -> int:
     from urc.runtime.catalog import built_in_catalog
-    from urc.runtime.recording.recorder import file_in, recorded
+    from urc.runtime.recording.recorder import check_installed, named, recorded
     from urc.runtime.session import Session
 
     session = Session(profile, settings, built_in_catalog().transports)
-    file = arguments.output or file_in(Path(), profile.name)
+    check_installed()
+    file = arguments.output or named(Path(), profile.name)
     # It begins before the session and ends after it: what is said at both ends is in it.
     async with recorded(session.hub, file, profile, settings) as recorder:
+        while not (recorder.is_begun or recorder.fault):  # noqa: ASYNC110 - a thread says so
+            await asyncio.sleep(_SOON_S)
+        if recorder.fault:
+            raise UrcError(recorder.fault)
         complain(f"recording {file}; Ctrl-C ends it")
         async with session:
             await _until_over(recorder, arguments.seconds)

@@ -54,11 +54,14 @@ def run(arguments: argparse.Namespace) -> int:
     from urc.runtime.recording.reader import open_recording
     from urc.runtime.selftest import sample_settings
 
-    recording = open_recording(arguments.recording)
+    recording = open_recording(arguments.recording, has_profile=bool(arguments.profile))
     start_s, length_s = arguments.start_s, recording.length_s
     if start_s > length_s:
         raise Misuse(f"--from {start_s:g}s is past the end: the recording lasts {length_s:.1f} s")
-    if not recording.is_whole:
+    if recording.unread_bytes > 0:
+        lost = f"its last {recording.unread_bytes} bytes cannot be read"
+        complain(f"urc replay: {recording.file} is damaged, or was cut off: {lost}")
+    elif recording.unread_bytes:
         complain(f"urc replay: {recording.file} has no end; the last second may be missing")
     profile = load(arguments.profile) if arguments.profile else _profile_in(recording)
     player = Player(

@@ -11,6 +11,7 @@ from collections.abc import Iterable, Mapping
 
 from urc.model.profile import Profile
 from urc.model.values import Value
+from urc.runtime.disguise import forms
 from urc.runtime.report import REDACTED
 
 __all__ = ["Blanker", "secret_texts", "stand_ins"]
@@ -44,11 +45,14 @@ class Blanker:
     def __init__(self, secrets: Iterable[str], encodings: Iterable[str] = ("utf-8",)) -> None:
         """Prepare for these, written in any of the encodings; empty ones are none."""
         names, texts = tuple(encodings), [text for text in secrets if text]
-        written = (text.encode(name, "replace") for text in texts for name in names)
+        self._texts = frozenset(texts)
+        written = [text.encode(name, "replace") for text in texts for name in names]
         self._plain = tuple(dict.fromkeys(written))
         coded = [code for secret in self._plain for code in _base64(secret)]
+        coded += [form.encode("utf-8", "replace") for text in texts for form in forms(text)]
         # Longest first: one secret may be part of another.
-        self._all = tuple(sorted((*self._plain, *coded), key=len, reverse=True))
+        found = dict.fromkeys((*self._plain, *coded))
+        self._all = tuple(sorted(found, key=len, reverse=True))
         self._held: dict[tuple[str, str], bytes] = {}
 
     @classmethod
@@ -57,6 +61,15 @@ class Blanker:
         secrets = secret_texts(profile, settings)
         encodings = (spec.encoding for spec in profile.driver.transports.values())
         return cls(secrets, dict.fromkeys(("utf-8", *encodings)))
+
+    @property
+    def is_needed(self) -> bool:
+        """Whether there is any secret."""
+        return bool(self._all)
+
+    def is_one(self, value: object) -> bool:
+        """Return whether a value is a secret: a number has no letters to be found in."""
+        return bool(self._texts) and str(value) in self._texts
 
     def whole(self, data: bytes) -> bytes:
         """Return what is shown of one frame."""
@@ -75,7 +88,7 @@ class Blanker:
 
     def stream(self, key: tuple[str, str], data: bytes) -> bytes:
         """Return what is shown now of the stream `key`, to which `data` was added."""
-        if not self._plain:
+        if not self._all:
             return data
         shown = self.whole(self._held.pop(key, b"") + data)
         kept = self._beginning(shown)
@@ -93,7 +106,7 @@ class Blanker:
     def _beginning(self, data: bytes) -> int:
         """Return how many bytes at the end of `data` may begin a secret."""
         longest = 0
-        for secret in self._plain:
+        for secret in self._all:
             for size in range(min(len(secret) - 1, len(data)), longest, -1):
                 if data.endswith(secret[:size]):
                     longest = size

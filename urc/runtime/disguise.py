@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterable
 from urllib.parse import quote, quote_plus
 
-__all__ = ["HIDDEN", "Disguises"]
+__all__ = ["HIDDEN", "Disguises", "forms"]
 
 HIDDEN = "•••"
 _SHORTEST = 4
@@ -23,7 +23,7 @@ class Disguises:
 
     def __init__(self, secrets: Iterable[str] = ()) -> None:
         known = [one for one in secrets if one]
-        plain = {form for one in known for form in _plain(one)}
+        plain = {form for one in known for form in forms(one)}
         # Longest first: one secret may be part of another.
         self._plain = tuple(sorted(plain, key=lambda form: (-len(form), form)))
         self._based = tuple(sorted({form for one in known for form in _based(one)}))
@@ -45,7 +45,8 @@ class Disguises:
         return any(form in data for form in self._bytes)
 
 
-def _plain(secret: str) -> list[str]:
+def forms(secret: str) -> list[str]:
+    """Return a secret as it may be written: as it is, in JSON, in a URL, in hex."""
     found = [secret, json.dumps(secret, ensure_ascii=False)[1:-1], json.dumps(secret)[1:-1]]
     if _SHORTEST <= len(secret) <= _LONGEST:
         data = secret.encode("utf-8", "surrogatepass")

@@ -31,6 +31,7 @@ __all__ = [
     "Subscription",
     "Tap",
     "Tapped",
+    "Told",
     "Traffic",
 ]
 
@@ -137,7 +138,16 @@ class Moved:
     arguments: Mapping[str, Reading]
 
 
-Tapped: TypeAlias = "Sample | Note | Traffic | LinkStatus | Moved | Entry"
+@dataclass(frozen=True, slots=True)
+class Told:
+    """An entry of the audit."""
+
+    time_s: float
+    """Monotonic: the entry itself has the time of day, which somebody may set."""
+    entry: "Entry"
+
+
+Tapped: TypeAlias = Sample | Note | Traffic | LinkStatus | Moved | Told
 """What a tap gives."""
 
 
@@ -279,7 +289,7 @@ class Hub:
         """Whether somebody is given all that happens."""
         return bool(self._taps)
 
-    def tell(self, done: "Moved | Entry") -> None:
+    def tell(self, done: Moved | Told) -> None:
         """Take what somebody did with the robot: only taps hear of it."""
         for tap in self._taps:
             tap.put((done,))

@@ -18,7 +18,7 @@ from urc.model.values import NOTHING, Reading
 from urc.motion.lease import Client, LeaseState
 from urc.runtime.audit import Entry, shown
 from urc.runtime.disguise import HIDDEN, Disguises
-from urc.runtime.hub import Hub, Moved
+from urc.runtime.hub import Hub, Moved, Told
 
 __all__ = ["Trail"]
 
@@ -93,8 +93,8 @@ class Trail:
         self.is_faulty = False
         """Whether anything could not be noted because of a mistake in URC."""
         self._note = note
-        self.hub: Hub | None = None
-        """Of the session, while the robot is connected; its taps hear of all this."""
+        self._hub: Hub | None = None
+        self._now: Callable[[], float] = _never
         self._utc = utc
         self._secrets: tuple[str, ...] = ()
         self._disguises = Disguises()
@@ -105,6 +105,10 @@ class Trail:
         self._told_s = float("-inf")
         self._told = 0
         """Refusals that were told in the second that began then."""
+
+    def attend(self, hub: Hub | None, now: Callable[[], float]) -> None:
+        """Tell the taps of a session's hub as well, by its clock; None: of no session."""
+        self._hub, self._now = hub, now
 
     def hide(self, secrets: Iterable[str]) -> None:
         """Keep these out as well, from now on."""
@@ -123,8 +127,8 @@ class Trail:
         now: float,
     ) -> None:
         """Take note of a tick that was taken, and the frame that it became."""
-        if self.hub is not None and self.hub.is_tapped:
-            self.hub.tell(Moved(now, command, arguments))
+        if self._hub is not None and self._hub.is_tapped:
+            self._hub.tell(Moved(now, command, arguments))
         motion = self._motions.get(command)
         if motion is None or motion.client != client or motion.epoch != epoch:
             self.stopped(command, "taken over", now)
@@ -247,8 +251,8 @@ class Trail:
             lasted_s=lasted_s,
         )
         self._note(entry)
-        if self.hub is not None:
-            self.hub.tell(entry)
+        if self._hub is not None:
+            self._hub.tell(Told(self._now(), entry))
 
     def _arguments(self, arguments: Mapping[str, Reading]) -> str:
         return self._hidden(_json(arguments))
@@ -262,6 +266,10 @@ class Trail:
     def _hidden(self, text: str) -> str:
         """Return a text without the secrets, however they are encoded."""
         return self._disguises.hide(text)
+
+
+def _never() -> float:
+    return 0.0
 
 
 def _json(values: Mapping[str, Reading]) -> str:

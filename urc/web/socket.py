@@ -280,6 +280,8 @@ class Client:
             self._start(asked, live, group)
 
     def _hear(self, said: Driving) -> None:
+        if isinstance(said, Stop) and self._station.robot.tape is not None:
+            return  # nothing moves in a recording, and no stop could ever be confirmed
         if self._seat is not None:
             self._station.controls.hear(self._seat, said)
 

@@ -8,7 +8,7 @@ import pytest
 
 from urc.model.values import Sample, Signal
 from urc.runtime import hub as hub_module
-from urc.runtime.hub import Hub, LinkStatus, Note, Tapped, Traffic
+from urc.runtime.hub import Hub, LinkStatus, Moved, Note, Tapped, Traffic
 
 pytestmark = pytest.mark.anyio
 
@@ -155,6 +155,20 @@ def test_tap_gives_everything_in_order(hub: Hub) -> None:
         assert tap.take() == expected
         assert tap.take() == []
         assert tap.dropped == 0
+
+
+def test_tap_hears_of_lines_and_of_what_people_did(hub: Hub) -> None:
+    """Nobody else does: who drove is no news to pages."""
+    live, moved = LinkStatus("wire", "live", "tcp x:1", 0.0), Moved(1.0, "drive", {"speed": 1})
+    assert not hub.is_tapped
+    with hub.tap() as tap, hub.subscribe() as subscription:
+        assert hub.is_tapped
+        hub.set_link(live)
+        hub.set_link(live)
+        subscription.take()
+        hub.tell(moved)
+        assert tap.take() == [live, moved]
+        assert hub.revision == subscription.seen
 
 
 def test_tap_without_traffic_asks_for_none(hub: Hub) -> None:

@@ -4,6 +4,7 @@ import pytest
 
 from urc.motion.lease import Client, LeaseState
 from urc.runtime.audit import Entry
+from urc.runtime.hub import Hub, Moved, Told
 from urc.runtime.trail import HIDDEN, Trail
 
 ANN = Client("s1", "screen 1", "driver")
@@ -37,6 +38,23 @@ def test_a_motion_leaves_its_begin_and_its_end() -> None:
         99.0, "rover", "stopped", "screen 1", "driver", "s1", 7, "go", '{"v": 19}', "562031390a",
         "expired", 20, 1.2,
     )  # fmt: skip
+
+
+def test_who_keeps_all_that_happens_hears_of_each_tick_while_it_is_connected() -> None:
+    """By the session's clock, whatever the time of day is."""
+    book, hub = Book(), Hub({})
+    book.trail.attend(hub, lambda: 7.0)
+    book.trail.moved(ANN, 7, "go", {"v": 0}, b"", 1.0)
+    with hub.tap() as tap:
+        for number in (1, 2):
+            book.trail.moved(ANN, 7, "go", {"v": number}, b"", number)
+        book.trail.stopped("go", "expired", 3.0)
+        *ticks, end = tap.take()
+        book.trail.attend(None, lambda: 8.0)
+        book.trail.moved(ANN, 7, "go", {"v": 3}, b"", 9.0)
+        assert tap.take() == []
+    assert ticks == [Moved(1, "go", {"v": 1}), Moved(2, "go", {"v": 2})]
+    assert end == Told(7.0, book.entries[1])
 
 
 def test_a_stop_of_what_stands_still_leaves_nothing() -> None:

@@ -7,9 +7,10 @@ at other times than those that were recorded.
 """
 
 import asyncio
+import logging
 import math
 from collections import deque
-from collections.abc import AsyncIterator, Callable, Iterable, Iterator, Mapping
+from collections.abc import AsyncIterator, Callable, Generator, Iterable, Mapping, Set
 from contextlib import asynccontextmanager, suppress
 from itertools import islice
 from typing import Final
@@ -17,22 +18,27 @@ from typing import Final
 from urc.model.codec import Payload
 from urc.model.profile import Profile
 from urc.model.values import Reading, Sample, Value
+from urc.problems import UrcError
 from urc.protocol.engine import Engine
 from urc.protocol.events import Replied
 from urc.protocol.reins import Pull
 from urc.runtime.clock import Clock, LoopClock, within
 from urc.runtime.held import Frames, Movers
 from urc.runtime.hub import Hub, LinkStatus, Note, Traffic
+from urc.runtime.recording.events import event_of, topic_of
 from urc.runtime.recording.reader import Message, Recording
-from urc.runtime.recording.shapes import event_of
 from urc.runtime.session import CommandFailed
 
 __all__ = ["FASTEST", "Player", "REFUSAL"]
 
 FASTEST: Final = 100.0
 REFUSAL: Final = "this is a recording: nothing reaches a robot"
+_REST_S: Final = 0.25
+"""Between the end of one that is looped and its beginning."""
 _AHEAD: Final = 256
 """Messages that are read at once."""
+
+log = logging.getLogger(__name__)
 
 
 class Player:
@@ -146,6 +152,22 @@ class Player:
     # -- the task
 
     async def _play(self, hub: Hub) -> None:
+        """Play for as long as somebody looks on; what goes wrong is said, and it stands."""
+        while True:
+            try:
+                await self._play_on(hub)
+            except Exception as fault:  # a supervisor: a file may go, or be anything
+                if not isinstance(fault, UrcError):
+                    log.exception("%s cannot be played", self.recording.file)
+                text = str(fault) if isinstance(fault, UrcError) else f"it broke: {fault!r}"
+                hub.note(Note(self._clock.now(), "error", "recording", text))
+                self.pause()
+                number = self._number
+                while number == self._number:
+                    self._changed.clear()
+                    await self._changed.wait()
+
+    async def _play_on(self, hub: Hub) -> None:
         while True:
             number = self._number
             for name in self.profile.driver.transports:
@@ -153,6 +175,7 @@ class Player:
             start_ns = self.recording.start_ns + round(self._base_s * 1e9)
             before = await asyncio.to_thread(self.recording.before, start_ns)
             self._give(hub, before)
+            self._forget(hub, {message.topic for message in before})
             stream = self.recording.messages(start_ns)
             try:
                 await self._follow(hub, stream, number)
@@ -162,7 +185,7 @@ class Player:
             if number == self._number:
                 await self._at_end(number)
 
-    async def _follow(self, hub: Hub, stream: Iterator[Message], number: int) -> None:
+    async def _follow(self, hub: Hub, stream: Generator[Message, None, None], number: int) -> None:
         """Give what the stream has, each in its time, until its end or until it has moved."""
         waiting: deque[Message] = deque()
         while True:
@@ -200,13 +223,22 @@ class Player:
 
     async def _at_end(self, number: int) -> None:
         if self._is_looped and self._wishes_to_run and self.length_s > 0:
-            self.seek(0.0)
+            await self._clock.sleep(_REST_S)
+            if number == self._number:
+                self.seek(0.0)
             return
         self._wishes_to_run = False
         self._stand(self.length_s)
         while number == self._number:
             self._changed.clear()
             await self._changed.wait()
+
+    def _forget(self, hub: Hub, known: Set[str]) -> None:
+        """Let nothing stand that had not been told yet where it stands now."""
+        now_s = self._clock.now()
+        later = [name for name in hub.signals if topic_of(name) not in known and hub.latest(name)]
+        if later:
+            hub.put(tuple(Sample(name, None, now_s) for name in later))
 
     def _give(self, hub: Hub, messages: Iterable[Message]) -> None:
         """Tell the hub, as if it happened so long ago as it did from where the recording stands."""

@@ -1,10 +1,11 @@
 """Keeps all that happens with a robot in an MCAP file.
 
 Floor 4. Theory of operation. `Recorder.put` takes what happened and returns: it never waits for a
-disk, because motion passes by on the same loop. A thread of its own writes. Once a second what was
-written is made whole, so that a process that is killed loses that second, and the end of the file,
-which programs for such files can do without. When the queue is full, what comes is lost, and the
-file says how much; when the disk is, nothing is written any more, and `fault` says why.
+disk, because motion passes by on the same loop. A thread of its own does everything that may wait:
+it reads the document, makes the file, and writes. Once a second what was written is made whole, so
+that a process that is killed loses that second, and the end of the file. When the queue is full,
+what comes is lost, and the file says how much; when the disk is, nothing is written any more, and
+`fault` says why.
 """
 
 import asyncio
@@ -22,21 +23,29 @@ from typing import IO, Any, Final
 from urc import __version__
 from urc.config.resolve import resolve
 from urc.model.profile import Profile
-from urc.model.values import Value
+from urc.model.values import Sample, Value
 from urc.problems import UrcError
 from urc.runtime.blanking import Blanker
-from urc.runtime.hub import Hub, Note, Tap, Tapped
+from urc.runtime.hub import Hub, Note, Tap, Tapped, Traffic
 from urc.runtime.recording.shapes import PROFILE, Shapes, channels
 from urc.runtime.shelves import shelf_of
 
-__all__ = ["Recorder", "check_installed", "file_in", "recorded"]
+__all__ = ["Recorder", "check_installed", "named", "recorded"]
 
 _SUFFIX: Final = ".mcap"
 _MISSING: Final = "recordings need the package mcap: pip install 'urc[record]'"
 MOST_WAITING: Final = 50_000
 """Pieces that wait to be written."""
+MOST_WAITING_BYTES: Final = 64 * 1024 * 1024
+_PIECE_BYTES: Final = 200
+"""What a small piece takes, about."""
+_TRIES: Final = 1000
+"""Names that are tried for a file."""
 _GATHER_S: Final = 0.05
 """How long what happens is gathered on the loop: waking for each piece would cost more than it."""
+_SLICE: Final = 100
+_PAUSE_S: Final = 0.001
+"""After so many pieces the thread lets others run: they wait for the interpreter meanwhile."""
 _WHOLE_S: Final = 1.0
 _CLOSE_S: Final = 10.0
 _SECOND_NS: Final = 1_000_000_000
@@ -53,45 +62,49 @@ def check_installed() -> None:
 class Recorder:
     """The one writer of a file."""
 
-    def __init__(self, file: Path, profile: Profile, document: str, blanker: Blanker) -> None:
-        """Make the file and start the thread that writes.
+    def __init__(
+        self,
+        place: Path,
+        profile: Profile,
+        blanker: Blanker,
+        *,
+        is_folder: bool = False,
+        document: str | None = None,
+    ) -> None:
+        """Start the thread; the file is made by it.
 
         Args:
-            file: where; it must not be there yet.
+            place: the file, which must not be there yet, or a folder.
             profile: of the robot.
-            document: the profile as one document, as `urc.config.resolve` makes it.
             blanker: takes the values of secret settings out.
-
-        Raises:
-            UrcError: there is no package for such files, or the file cannot be made.
+            is_folder: whether `place` is one: the file in it has a name of `named`.
+            document: the profile as one document; read from its file when left out.
         """
-        check_installed()
-        from mcap.writer import Writer  # an extra
-
-        self.file = file
+        self.file = place
+        """Where it is written, as soon as `is_begun`."""
         self.fault = ""
-        """Why nothing is written any more; "" while all is well."""
+        """Why nothing is written, or not any more; "" while all is well."""
+        self.is_begun = False
+        """Whether the file is there."""
         self.counts: Counter[str] = Counter()
         """Topic → messages, as far as they are written."""
+        self._is_folder = is_folder
+        self._profile = profile
+        self._document = document
         # One difference for the whole file: a clock that is set meanwhile moves nothing in it.
         offset_ns = time.time_ns() - time.monotonic_ns()
         self._shapes = Shapes(
             profile.driver, blanker, lambda time_s: offset_ns + round(time_s * _SECOND_NS)
         )
-        self._stream = _made(file)
-        self._writer: Any = Writer(self._stream)  # half of its methods have no types
+        self._writer: Any = None  # half of its methods have no types
         self._channels: dict[str, int] = {}
         self._waiting: deque[Tapped] = deque()
+        self._waiting_bytes = 0
         self._lost = 0
         self._wakes = threading.Condition()
         self._is_closing = False
         self._is_faulty = False
         """Whether anything could not be kept because of a mistake in URC."""
-        try:
-            self._begin(profile, document)
-        except OSError as error:
-            self._stream.close()
-            raise UrcError(f"{file} cannot be written: {error.strerror or error}") from None
         self._thread = threading.Thread(target=self._run, name="urc-recorder", daemon=True)
         self._thread.start()
 
@@ -100,10 +113,13 @@ class Recorder:
         with self._wakes:
             self._lost += lost
             for event in events:
-                if self.fault or len(self._waiting) >= MOST_WAITING:
+                size = _size(event)
+                is_full = len(self._waiting) >= MOST_WAITING
+                if self.fault or is_full or self._waiting_bytes + size > MOST_WAITING_BYTES:
                     self._lost += 1
                 else:
                     self._waiting.append(event)
+                    self._waiting_bytes += size
             self._wakes.notify()
 
     def close(self) -> None:
@@ -112,41 +128,81 @@ class Recorder:
             self._is_closing = True
             self._wakes.notify()
         self._thread.join(_CLOSE_S)
+        if self._thread.is_alive():
+            self._fail(f"{self.file}: the disk has not taken the end of it in {_CLOSE_S:g} s")
 
     # -- the thread
 
-    def _begin(self, profile: Profile, document: str) -> None:
-        writer = self._writer
+    def _run(self) -> None:
+        stream: IO[bytes] | None = None
+        try:
+            check_installed()
+            stream = self._made()
+            self._begin(stream)
+            self._follow()
+            self._write(self._shapes.rest(time.monotonic()))
+            self._writer.finish()
+        except UrcError as error:
+            self._fail(str(error))
+        except OSError as error:
+            self._fail(f"{self.file} cannot be written: {error.strerror or error}")
+        except Exception as error:  # a supervisor: a recording that ends must end nothing else
+            log.exception("a recording broke")
+            self._fail(f"{self.file}: the recording broke: {error!r}")
+        finally:
+            if stream is not None:
+                with suppress(OSError):  # of a disk that is full: it says so a second time
+                    stream.close()
+                if not self.is_begun:
+                    with suppress(OSError):
+                        self.file.unlink()
+
+    def _made(self) -> IO[bytes]:
+        place, name = self.file, self._profile.name
+        try:
+            (place if self._is_folder else place.parent).mkdir(parents=True, exist_ok=True)
+            for number in range(1, _TRIES if self._is_folder else 2):
+                self.file = named(place, name, number) if self._is_folder else place
+                with suppress(FileExistsError):
+                    return open(self.file, "xb")
+        except OSError as error:
+            raise UrcError(f"{self.file} cannot be made: {error.strerror or error}") from None
+        raise UrcError(f"{self.file} is there already; no recording is written over another")
+
+    def _begin(self, stream: IO[bytes]) -> None:
+        from mcap.writer import Writer  # an extra
+
+        profile, document = self._profile, self._document
+        if document is None:
+            document = resolve(profile.file, shelf_of(profile.file), profile).text
+        writer: Any = Writer(stream)
+        self._writer = writer
         writer.start(profile="", library=f"urc {__version__}")
         writer.add_metadata("urc", {"robot": profile.name, "version": __version__})
-        now_ns = time.time_ns()
-        writer.add_attachment(now_ns, now_ns, PROFILE, "application/yaml", document.encode())
+        if document:
+            data, now_ns = document.encode(), time.time_ns()
+            writer.add_attachment(now_ns, now_ns, PROFILE, "application/yaml", data)
+        else:
+            text = f"{profile.file} does not load any more: replay it with --profile"
+            self.put([Note(time.monotonic(), "warning", "recording", text)])
         for channel in channels(profile.driver):
             schema = json.dumps(channel.schema).encode()
             shape = writer.register_schema(channel.shape, "jsonschema", schema)
             self._channels[channel.topic] = writer.register_channel(channel.topic, "json", shape)
         writer.flush()
+        self.is_begun = True
 
-    def _run(self) -> None:
-        try:
-            whole_s = time.monotonic()
-            while (batch := self._next()) is not None:
-                for event in batch:
-                    self._keep(event)
-                now_s = time.monotonic()
-                if not batch or now_s - whole_s >= _WHOLE_S:
-                    whole_s = now_s
-                    if not batch:
-                        self._write(self._shapes.rest(now_s))
-                    self._writer.flush()
-            self._writer.finish()
-        except OSError as error:
-            self._fail(f"{self.file} cannot be written: {error.strerror or error}")
-        except Exception as error:  # a supervisor: a recording that ends must end nothing else
-            self._fail(f"{self.file}: the recording broke: {error!r}")
-        finally:
-            with suppress(OSError):
-                self._stream.close()
+    def _follow(self) -> None:
+        """Write what comes until it is over."""
+        whole_s = time.monotonic()
+        while (batch := self._next()) is not None:
+            for number, event in enumerate(batch, 1):
+                self._keep(event)
+                if number % _SLICE == 0:
+                    time.sleep(_PAUSE_S)
+            if not batch or time.monotonic() - whole_s >= _WHOLE_S:
+                self._writer.flush()
+                whole_s = time.monotonic()
 
     def _next(self) -> list[Tapped] | None:
         """Return what waits; nothing when nothing came for a second, None when it is over."""
@@ -154,9 +210,10 @@ class Recorder:
             self._wakes.wait_for(lambda: self._waiting or self._is_closing, _WHOLE_S)
             batch = list(self._waiting)
             self._waiting.clear()
+            self._waiting_bytes = 0
             lost, self._lost = self._lost, 0
             if lost:
-                text = f"{lost} pieces were not recorded: they came faster than they are written"
+                text = f"{lost} pieces are missing here: they came faster than they are written"
                 batch.append(Note(time.monotonic(), "warning", "recording", text))
             if not batch and self._is_closing:
                 return None
@@ -164,13 +221,15 @@ class Recorder:
 
     def _keep(self, event: Tapped) -> None:
         try:
-            messages = self._shapes.messages(event)
+            self._write(self._shapes.messages(event))
+        except OSError:
+            raise
         except Exception:  # a supervisor: what nobody thought of costs itself only
             if not self._is_faulty:
                 log.exception("%s misses something of kind %s", self.file, type(event).__name__)
+                text = "something is missing here that could not be written; URC's own log says why"
+                self.put([Note(time.monotonic(), "warning", "recording", text)])
             self._is_faulty = True
-            return
-        self._write(messages)
 
     def _write(self, messages: Iterable[tuple[str, int, bytes]]) -> None:
         for topic, time_ns, data in messages:
@@ -179,47 +238,53 @@ class Recorder:
 
     def _fail(self, why: str) -> None:
         with self._wakes:
-            self.fault = why
+            self.fault = self.fault or why
             self._waiting.clear()
+            self._waiting_bytes = 0
 
 
-def _made(file: Path) -> IO[bytes]:
-    try:
-        file.parent.mkdir(parents=True, exist_ok=True)
-        return open(file, "xb")
-    except FileExistsError:
-        raise UrcError(f"{file} is there already; no recording is written over another") from None
-    except OSError as error:
-        raise UrcError(f"{file} cannot be made: {error.strerror or error}") from None
+def _size(event: Tapped) -> int:
+    """Return about how many bytes something takes while it waits."""
+    held: object = None
+    if isinstance(event, Traffic):
+        held = event.data
+    elif isinstance(event, Sample):
+        held = event.value
+    if isinstance(held, (bytes, str)):
+        return _PIECE_BYTES + len(held)
+    if isinstance(held, (tuple, Mapping)):
+        return _PIECE_BYTES + 32 * len(held)
+    return _PIECE_BYTES
 
 
-def file_in(folder: Path, robot: str, utc_s: float | None = None) -> Path:
-    """Return a name for a recording that is not taken: ``puppet-20261123T141502Z.mcap``."""
+def named(folder: Path, robot: str, number: int = 1, utc_s: float | None = None) -> Path:
+    """Return the name of a recording: ``puppet-20261123T141502Z.mcap``, the second with ``-2``."""
     at = time.strftime("%Y%m%dT%H%M%SZ", time.gmtime(utc_s))
-    file, number = folder / f"{robot}-{at}{_SUFFIX}", 2
-    while file.exists():
-        file, number = folder / f"{robot}-{at}-{number}{_SUFFIX}", number + 1
-    return file
+    more = "" if number == 1 else f"-{number}"
+    return folder / f"{robot}-{at}{more}{_SUFFIX}"
 
 
 @asynccontextmanager
 async def recorded(
-    hub: Hub, file: Path, profile: Profile, settings: Mapping[str, Value]
+    hub: Hub,
+    place: Path,
+    profile: Profile,
+    settings: Mapping[str, Value],
+    *,
+    is_folder: bool = False,
 ) -> AsyncIterator[Recorder]:
-    """Keep all that a hub is told for as long as the context lasts.
+    """Keep all that a hub is told for as long as the context lasts; nothing of it is waited for.
+
+    The log of the hub says where it is kept, or why it is not.
 
     Args:
         hub: of the session, best before it is opened.
-        file: where; it must not be there yet.
+        place: the file, or a folder, as of `Recorder`.
         profile: of the robot, from a file.
         settings: of the session; the values of secret ones are kept out.
-
-    Raises:
-        UrcError: the file cannot be made.
+        is_folder: whether `place` is one.
     """
-    blanker = Blanker.of(profile, settings)
-    document = await asyncio.to_thread(_document, profile)
-    recorder = await asyncio.to_thread(Recorder, file, profile, document, blanker)
+    recorder = Recorder(place, profile, Blanker.of(profile, settings), is_folder=is_folder)
     with hub.tap(with_traffic=True) as tap:
         feeding = asyncio.create_task(_feed(tap, hub, recorder))
         try:
@@ -231,19 +296,23 @@ async def recorded(
             await asyncio.to_thread(recorder.close)
 
 
-def _document(profile: Profile) -> str:
-    """Return the profile as one document, which needs no other file but its own widgets."""
-    return resolve(profile.file, shelf_of(profile.file), profile).text
-
-
 async def _feed(tap: Tap, hub: Hub, recorder: Recorder) -> None:
-    dropped, is_told = 0, False
+    dropped, said = 0, ""
     while True:
-        await tap.filled()
+        with suppress(TimeoutError):  # what became of the file is told also where nothing happens
+            async with asyncio.timeout(_WHOLE_S):
+                await tap.filled()
         recorder.put(tap.take(), tap.dropped - dropped)
         dropped = tap.dropped
-        if recorder.fault and not is_told:
-            is_told = True
-            text = f"nothing is recorded any more: {recorder.fault}"
-            hub.note(Note(time.monotonic(), "warning", "recording", text))
+        text = _state(recorder)
+        if text and text != said:
+            said = text
+            level: Any = "warning" if recorder.fault else "info"
+            hub.note(Note(time.monotonic(), level, "recording", text))
         await asyncio.sleep(_GATHER_S)
+
+
+def _state(recorder: Recorder) -> str:
+    if recorder.fault:
+        return f"nothing is recorded{' any more' * recorder.is_begun}: {recorder.fault}"
+    return f"all that happens is recorded in {recorder.file.name}" if recorder.is_begun else ""

@@ -1,4 +1,4 @@
-"""What a recording holds: topics, and what happens as JSON messages, both ways.
+"""What a recording holds: topics, and what happens as JSON messages.
 
 Floor 4, pure. A recording is an MCAP file (https://mcap.dev/spec) of JSON messages whose shapes are
 told by JSON Schemas in it, so that any program for such files shows it. Images and the log have the
@@ -7,10 +7,10 @@ https://docs.foxglove.dev/docs/visualization/message-schemas/introduction).
 """
 
 import base64
-import binascii
 import json
+import math
 from collections.abc import Callable, Mapping
-from typing import Any, Final, NamedTuple, cast, get_args
+from typing import Any, Final, NamedTuple, get_args
 
 import msgspec
 
@@ -18,26 +18,32 @@ from urc.model.driver import Driver
 from urc.model.values import Alarm, Reading, Sample, Signal
 from urc.runtime.audit import Entry
 from urc.runtime.blanking import Blanker
-from urc.runtime.hub import LinkState, LinkStatus, Moved, Note, Tapped, Traffic
+from urc.runtime.hub import LinkState, LinkStatus, Moved, Note, Tapped, Told, Traffic
 
 __all__ = [
+    "COMMANDS",
     "DRIVING",
+    "LEVELS",
+    "LINK",
     "LOG",
     "PROFILE",
+    "SIGNALS",
+    "WIRE",
     "Channel",
     "Shapes",
     "channels",
-    "event_of",
-    "is_state",
 ]
 
 PROFILE: Final = "profile.yaml"
 """Attachment: the robot's document, with all that it is made of."""
 LOG: Final = "/log"
 DRIVING: Final = "/driving"
-_SIGNALS, _LINK, _WIRE, _COMMANDS = "/signals/", "/link/", "/wire/", "/commands/"
+SIGNALS, LINK, WIRE, COMMANDS = "/signals/", "/link/", "/wire/", "/commands/"
 _SECOND_NS: Final = 1_000_000_000
-_LEVELS: Final = {"info": 2, "warning": 3, "error": 4}
+_LAST_S: Final = 1e9
+_LAST_NS: Final = 2**63 - 1
+"""Latest time that every program reads."""
+LEVELS: Final = {"info": 2, "warning": 3, "error": 4}
 _FORMATS: Final = (
     (b"\xff\xd8\xff", "jpeg"),
     (b"\x89PNG\r\n\x1a\n", "png"),
@@ -104,10 +110,10 @@ def channels(driver: Driver) -> tuple[Channel, ...]:
     for command in driver.commands.values():
         if command.hold is not None:
             types = {name: {"type": one.type} for name, one in command.arguments.items()}
-            found.append(_channel(_COMMANDS + command.name, f"urc.Command.{command.name}", types))
+            found.append(_channel(COMMANDS + command.name, f"urc.Command.{command.name}", types))
     for name in driver.transports:
-        found.append(_channel(_LINK + name, "urc.Link", _LINK_STATE))
-        found.append(_channel(_WIRE + name, "urc.Wire", _BYTES))
+        found.append(_channel(LINK + name, "urc.Link", _LINK_STATE))
+        found.append(_channel(WIRE + name, "urc.Wire", _BYTES))
     found.append(_channel(LOG, "foxglove.Log", _LOG))
     found.append(_channel(DRIVING, "urc.Driving", _ENTRY))
     return tuple(found)
@@ -118,7 +124,7 @@ def _channel(topic: str, shape: str, properties: Mapping[str, object]) -> Channe
 
 
 def _signal_channel(signal: Signal) -> Channel:
-    topic = _SIGNALS + signal.name
+    topic = SIGNALS + signal.name
     if signal.type == "image":
         return _channel(topic, "foxglove.CompressedImage", _IMAGE)
     about = " ".join(filter(None, (signal.title or signal.description, signal.unit)))
@@ -163,27 +169,20 @@ class Shapes:
             case Moved():
                 return [self._moved(event.command, event.arguments, self._now(event.time_s))]
             case LinkStatus():
-                told: dict[str, object] = {
-                    "state": event.state,
-                    "address": self._blanker.text(event.address),
-                    "detail": self._blanker.text(event.detail),
-                    "attempts": event.attempts,
-                    "faults": event.faults,
-                }
-                return [(_LINK + event.transport, self._now(event.since_s), _json(told))]
+                return [self._line(event)]
             case Note():
                 time_ns = self._now(event.time_s)
-                text = self._blanker.text(event.text)
-                return [(LOG, time_ns, _json(_log(event, text, time_ns)))]
-            case Entry():
-                time_ns = self._latest(round(event.at * _SECOND_NS))
-                return [(DRIVING, time_ns, _json(event._asdict())), *self._ended(event, time_ns)]
+                return [(LOG, time_ns, _json(self._blanked(_log(event, time_ns))))]
+            case Told():
+                entry, time_ns = event.entry, self._now(event.time_s)
+                told = self._blanked(entry._asdict())
+                return [(DRIVING, time_ns, _json(told)), *self._ended(entry, time_ns)]
 
     def rest(self, time_s: float) -> list[tuple[str, int, bytes]]:
-        """Return what was held back of streams on which nothing has come for a while."""
+        """Return what was held back of streams on which nothing will come any more."""
         time_ns = self._now(time_s)
         return [
-            (_WIRE + transport, time_ns, _json(_wire(direction, data)))
+            (WIRE + transport, time_ns, _json(_wire(direction, data)))
             for (transport, direction), data in self._blanker.rest()
         ]
 
@@ -201,13 +200,22 @@ class Shapes:
             told = {"value": value}
             if sample.alarm:
                 told["alarm"] = sample.alarm
-        return _SIGNALS + sample.signal, time_ns, _json(told)
+        return SIGNALS + sample.signal, time_ns, _json(told)
+
+    def _line(self, status: LinkStatus) -> tuple[str, int, bytes]:
+        told = {
+            "state": status.state,
+            "address": status.address,
+            "detail": status.detail,
+            "attempts": status.attempts,
+            "faults": status.faults,
+        }
+        return LINK + status.transport, self._now(status.since_s), _json(self._blanked(told))
 
     def _moved(
         self, command: str, arguments: Mapping[str, Reading], time_ns: int
     ) -> tuple[str, int, bytes]:
-        told = {name: self._blanked(value) for name, value in arguments.items()}
-        return _COMMANDS + command, time_ns, _json(told)
+        return COMMANDS + command, time_ns, _json(self._blanked(arguments))
 
     def _ended(self, entry: Entry, time_ns: int) -> list[tuple[str, int, bytes]]:
         """Return what a motion that has ended tells the robot: else it seems to last for ever."""
@@ -225,26 +233,29 @@ class Shapes:
         else:
             data = self._blanker.whole(traffic.data)
         told = _wire(traffic.direction, data)
-        return [(_WIRE + traffic.transport, self._now(traffic.time_s), _json(told))]
+        return [(WIRE + traffic.transport, self._now(traffic.time_s), _json(told))]
 
-    def _blanked(self, value: Reading) -> Reading:
+    def _blanked(self, value: Any) -> Any:
+        """Return a value, or a whole message, without the secrets."""
+        if not self._blanker.is_needed:
+            return value
         if isinstance(value, str):
             return self._blanker.text(value)
-        if isinstance(value, tuple):
+        if isinstance(value, bytes):
+            return self._blanker.whole(value)
+        if isinstance(value, tuple | list):
             return tuple(map(self._blanked, value))
         if isinstance(value, Mapping):
-            return {name: self._blanked(one) for name, one in value.items()}
-        return value
+            return {self._blanked(name): self._blanked(one) for name, one in value.items()}
+        return None if self._blanker.is_one(value) else value
 
     def _now(self, time_s: float) -> int:
-        return self._latest(self._utc_ns(time_s))
-
-    def _latest(self, time_ns: int) -> int:
         """Return a time that is not before what was told last: the file is played in its order.
 
         A reading has the time of its first byte, its bytes that of their arrival.
         """
-        self._told_ns = max(self._told_ns, time_ns)
+        time_ns = self._utc_ns(min(max(time_s, 0.0), _LAST_S)) if time_s == time_s else 0
+        self._told_ns = min(max(self._told_ns, time_ns), _LAST_NS)
         return self._told_ns
 
 
@@ -255,11 +266,11 @@ def _wire(direction: str, data: bytes) -> dict[str, object]:
         return {"direction": direction, "hex": data.hex()}
 
 
-def _log(note: Note, text: str, time_ns: int) -> dict[str, object]:
+def _log(note: Note, time_ns: int) -> dict[str, object]:
     return {
         "timestamp": _stamp(time_ns),
-        "level": _LEVELS[note.level],
-        "message": text,
+        "level": LEVELS[note.level],
+        "message": note.text,
         "name": note.source,
         "file": "",
         "line": 0,
@@ -281,8 +292,20 @@ def _json(told: Mapping[str, object]) -> bytes:
         return _encode(told)
     except (UnicodeEncodeError, OverflowError):
         # A lone surrogate in a robot's text, or a number of more than 64 bits.
-        text = json.dumps(told, default=_plain, ensure_ascii=True)
-        return text.encode("ascii")
+        return json.dumps(_mended(told), allow_nan=False).encode()
+
+
+def _mended(value: Any) -> Any:
+    """Return what any JSON can say."""
+    if isinstance(value, str):
+        return value.encode("utf-8", "replace").decode()
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if isinstance(value, tuple | list):
+        return [_mended(one) for one in value]
+    if isinstance(value, Mapping):
+        return {_mended(str(name)): _mended(one) for name, one in value.items()}
+    return value if value is None or isinstance(value, bool | int) else _plain(value)
 
 
 def _plain(value: object) -> object:
@@ -291,72 +314,3 @@ def _plain(value: object) -> object:
     if isinstance(value, Mapping):
         return dict(value)
     raise NotImplementedError(f"no JSON for {type(value).__name__}")
-
-
-# -- back
-
-
-def is_state(topic: str) -> bool:
-    """Return whether the last message of a topic holds until the next: a signal, or a line."""
-    return topic.startswith((_SIGNALS, _LINK))
-
-
-def event_of(
-    topic: str, data: bytes, time_s: float, signals: Mapping[str, Signal]
-) -> Sample | LinkStatus | Note | Traffic | None:
-    """Return what a message tells, as if it happened now; None when it tells nothing known.
-
-    Args:
-        topic: of the message.
-        data: its JSON.
-        time_s: monotonic seconds at which it happens.
-        signals: of the profile that shows it, which may have changed since.
-    """
-    try:
-        told = msgspec.json.decode(data)
-        return _event(topic, told, time_s, signals) if isinstance(told, dict) else None
-    except (ValueError, TypeError, KeyError, binascii.Error):
-        return None  # not one of ours, or damaged
-
-
-def _event(
-    topic: str, told: dict[str, Any], time_s: float, signals: Mapping[str, Signal]
-) -> Sample | LinkStatus | Note | Traffic | None:
-    if topic.startswith(_SIGNALS):
-        signal = signals.get(topic.removeprefix(_SIGNALS))
-        alarm = told.get("alarm", "")
-        if signal is None or alarm not in get_args(Alarm):
-            return None
-        return Sample(signal.name, _value(signal, told), time_s, cast("Alarm", alarm))
-    if topic.startswith(_LINK):
-        if told["state"] not in get_args(LinkState):
-            return None
-        texts = (str(told.get("detail", "")), int(told.get("attempts", 0)))
-        faults, name = int(told.get("faults", 0)), topic.removeprefix(_LINK)
-        return LinkStatus(name, told["state"], str(told["address"]), time_s, *texts, faults)
-    if topic.startswith(_WIRE):
-        data = str(told["text"]).encode() if "text" in told else bytes.fromhex(told["hex"])
-        direction: Any = "sent" if told["direction"] == "sent" else "received"
-        return Traffic(time_s, topic.removeprefix(_WIRE), direction, data)
-    if topic == LOG:
-        level: Any = next((name for name, no in _LEVELS.items() if no == told["level"]), "info")
-        return Note(time_s, level, str(told["name"]), str(told["message"]))
-    if topic == DRIVING:
-        words = [told.get(name) for name in ("who", "what", "command", "arguments", "outcome")]
-        return Note(time_s, "info", "driving", " ".join(str(word) for word in words if word))
-    return None
-
-
-def _value(signal: Signal, told: Mapping[str, Any]) -> Reading:
-    value = told["data"] if signal.type == "image" and "data" in told else told["value"]
-    if value is not None and signal.type in ("image", "blob"):
-        return base64.b64decode(value, validate=True)
-    return _frozen(value)
-
-
-def _frozen(value: Any) -> Reading:
-    if isinstance(value, list):
-        return tuple(map(_frozen, value))
-    if isinstance(value, dict):
-        return {name: _frozen(one) for name, one in value.items()}
-    return cast("Reading", value)

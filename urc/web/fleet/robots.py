@@ -291,7 +291,7 @@ class Station:
         fanout = Fanout(session.hub, clock=self.clock, each=each)
         live = Live(session, fanout, secrets.token_hex(8), asyncio.Event())
         self._coming().set_result(live)
-        self.controls.trail.hub = session.hub
+        self.controls.trail.attend(session.hub, self.clock.now)
         try:
             async with asyncio.TaskGroup() as group:
                 tasks = [
@@ -304,7 +304,7 @@ class Station:
                     task.cancel()
         finally:
             self._next = None
-            self.controls.trail.hub = None
+            self.controls.trail.attend(None, self.clock.now)
             live.ended.set()
             live.fanout.end()
 

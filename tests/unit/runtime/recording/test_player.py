@@ -2,18 +2,19 @@
 
 import asyncio
 import json
-from collections.abc import AsyncIterator, Callable, Iterator
+from collections.abc import AsyncIterator, Callable, Iterator, Sequence
 from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from urc.problems import UrcError
 from urc.runtime.hub import Hub
 from urc.runtime.recording import player as module
+from urc.runtime.recording.events import is_state
 from urc.runtime.recording.player import FASTEST, REFUSAL, Player
 from urc.runtime.recording.reader import Message, Recording
-from urc.runtime.recording.shapes import is_state
 from urc.runtime.session import CommandFailed
 from urc.testing.clock import FakeClock, settle
 from urc.testing.profile import line_profile
@@ -29,16 +30,21 @@ class Kept(Recording):
 
     __slots__ = ()
 
+    @property
+    def extra(self) -> list[Message]:
+        """Of this test alone."""
+        return self.topics  # type: ignore[return-value]
+
     def messages(self, from_ns: int) -> Iterator[Message]:  # type: ignore[override]
-        return (message for message in every() if message.time_ns >= from_ns)
+        return (message for message in every(self.extra) if message.time_ns >= from_ns)
 
     def before(self, until_ns: int) -> list[Message]:
-        last = {one.topic: one for one in every() if one.time_ns < until_ns and is_state(one.topic)}
-        return sorted(last.values())
+        told = [one for one in every(self.extra) if one.time_ns < until_ns]
+        return sorted({one.topic: one for one in told if is_state(one.topic)}.values())
 
 
-def every() -> list[Message]:
-    told = [said(0, "/link/wire", state="live", address="tcp bot:1")]
+def every(extra: Sequence[Message]) -> list[Message]:
+    told = [*extra, said(0, "/link/wire", state="live", address="tcp bot:1")]
     told += [said(at, "/signals/battery", value=at) for at in range(LENGTH_S + 1)]
     told.append(said(5, "/log", level=2, name="wire", message="half of it"))
     return sorted(told, key=lambda message: message.time_ns)
@@ -63,7 +69,7 @@ def clock() -> FakeClock:
 
 
 def player(clock: FakeClock, **options: Any) -> Player:
-    recording = Kept(Path("bot.mcap"), "", START_NS, START_NS + LENGTH_S * 10**9, is_whole=True)
+    recording = Kept(Path("bot.mcap"), "", START_NS, START_NS + LENGTH_S * 10**9, [])
     return Player(recording, line_profile(), {"host": "x", "port": 1}, clock=clock, **options)
 
 
@@ -150,6 +156,44 @@ async def test_what_held_there_is_as_old_as_it_was(clock: FakeClock) -> None:
         assert clock.now() - latest.time_s == pytest.approx(0.75)
 
 
+async def test_nothing_stands_that_was_not_told_yet(clock: FakeClock) -> None:
+    """Of a drive that went wrong nobody is shown what came later."""
+    played = player(clock)
+    played.recording.extra.append(said(6, "/signals/note", value="from the future"))
+    async with shown(played) as hub:
+        played.seek(7)
+        await settle()
+        latest = hub.latest("note")
+        assert latest is not None
+        assert latest.value == "from the future"
+        played.seek(2)
+        await settle()
+        latest = hub.latest("note")
+        assert latest is not None
+        assert latest.value is None
+
+
+async def test_a_file_that_goes_is_told_and_it_stands(
+    clock: FakeClock, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The bar does not run on over a page that stands still; back again, it is played on."""
+    played = player(clock)
+    async with shown(played) as hub:
+        with monkeypatch.context() as patched:
+            patched.setattr(Kept, "before", gone)
+            played.seek(4)
+            await settle()
+        assert [note.text for note in hub.notes] == ["bot.mcap cannot be read"]
+        assert not played.is_playing
+        played.seek(4)
+        await settle()
+        assert battery(hub) == 4
+
+
+def gone(*_: object) -> list[Message]:
+    raise UrcError("bot.mcap cannot be read")
+
+
 async def test_it_runs_faster(clock: FakeClock) -> None:
     played = player(clock, speed=4.0)
     async with shown(played) as hub:
@@ -188,7 +232,7 @@ async def test_one_that_is_looped_stands_at_its_end_while_it_is_paused(clock: Fa
 
 
 async def test_one_of_a_moment_is_not_looped_for_ever(clock: FakeClock) -> None:
-    recording = Kept(Path("bot.mcap"), "", START_NS, START_NS, is_whole=True)
+    recording = Kept(Path("bot.mcap"), "", START_NS, START_NS, [])
     played = Player(recording, line_profile(), {}, clock=clock, is_looped=True)
     async with shown(played):
         assert (played.length_s, played.is_playing) == (0.0, False)

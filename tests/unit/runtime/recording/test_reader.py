@@ -1,16 +1,25 @@
 """Recordings are read as far as there is anything, and what is none is told in one line."""
 
+import io
+import os
+import time
+import tracemalloc
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+import lz4.frame
 import pytest
+import zstandard
+from mcap.data_stream import RecordBuilder
+from mcap.records import Chunk
 from mcap.writer import Writer
 
 from urc.model.values import Sample
 from urc.problems import UrcError
 from urc.runtime.blanking import Blanker
 from urc.runtime.hub import LinkStatus, Note
+from urc.runtime.recording import reader
 from urc.runtime.recording.reader import Recording, open_recording
 from urc.runtime.recording.recorder import Recorder
 from urc.testing.profile import line_profile
@@ -22,7 +31,9 @@ COUNT = 60
 def file(tmp_path: Path) -> Path:
     """A recording of several chunks: a value a second, the number of the second."""
     made = tmp_path / "bot.mcap"
-    kept = Recorder(made, line_profile(), "urc: 1\n", Blanker(()))
+    kept = Recorder(made, line_profile(), Blanker(()), document="urc: 1\n")
+    while not kept.is_begun:
+        time.sleep(0.001)
     kept._shapes._utc_ns = lambda time_s: round(time_s * 1e9)
     kept._writer._Writer__chunk_size = 400
     for at in range(COUNT):
@@ -40,7 +51,7 @@ def values(recording: Recording, from_s: float) -> list[bytes]:
 
 def test_it_is_read_from_any_moment_on(file: Path) -> None:
     found = open_recording(file)
-    assert found.length_s == COUNT - 1
+    assert (found.length_s, found.unread_bytes) == (COUNT - 1, 0)
     assert values(found, 0) == [b'{"value":%d}' % at for at in range(COUNT)]
     assert values(found, 1055.5) == [b'{"value":%d}' % at for at in range(56, COUNT)]
     assert values(found, 2000.0) == []
@@ -73,7 +84,7 @@ def test_a_file_that_was_cut_off_is_read_as_far_as_it_goes(file: Path, tmp_path:
         found = opened(cut)
         if found is None:
             continue
-        assert not found.is_whole
+        assert found.unread_bytes
         got = values(found, 0)
         assert got == [b'{"value":%d}' % at for at in range(len(got))]
         read.add(len(got))
@@ -81,11 +92,51 @@ def test_a_file_that_was_cut_off_is_read_as_far_as_it_goes(file: Path, tmp_path:
 
 
 def test_damaged_bytes_cost_their_chunk_at_most(file: Path, tmp_path: Path) -> None:
+    """The rest is played, and the log says that a piece is not; nobody plays wrong numbers."""
     whole, damaged = file.read_bytes(), tmp_path / "damaged.mcap"
+    right = {b'{"value":%d}' % at for at in range(COUNT)}
+    told = 0
     for at in range(8, len(whole), 61):
         damaged.write_bytes(whole[:at] + bytes([whole[at] ^ 0x55]) + whole[at + 1 :])
         found = opened(damaged)
-        assert found is None or len(values(found, 0)) <= COUNT
+        if found is None:
+            continue
+        got = list(found.messages(0))
+        assert {one.data for one in got if one.topic == "/signals/battery"} <= right
+        if any(b"a piece of the recording cannot be read" in one.data for one in got):
+            told += 1
+            assert len(values(found, 0)) > COUNT / 2
+    assert told > 3
+
+
+def chunk(data: bytes, size: int, compression: str = "zstd") -> bytes:
+    """Return the bytes of a recording with one chunk, which may say of its size what it likes."""
+    stream = io.BytesIO()
+    writer: Any = Writer(stream)
+    writer.start()
+    writer.add_attachment(1, 1, "profile.yaml", "", b"urc: 1\n")
+    builder: Any = RecordBuilder()
+    Chunk(compression, data, 2, 1, 0, size).write(builder)
+    stream.write(builder.end())
+    return stream.getvalue()
+
+
+@pytest.mark.parametrize("compression", ["zstd", "lz4"])
+@pytest.mark.parametrize("size", [0, 2**40])
+def test_a_bomb_is_not_unpacked(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, compression: str, size: int
+) -> None:
+    """However small it says that it is."""
+    monkeypatch.setattr(reader, "_RECORD_BYTES", 1_000_000)
+    pack = zstandard.compress if compression == "zstd" else lz4.frame.compress
+    bomb = tmp_path / "bomb.mcap"
+    bomb.write_bytes(chunk(pack(bytes(200_000_000)), size, compression))
+    tracemalloc.start()
+    (said,) = open_recording(bomb).messages(0)
+    _, most = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert b"more than 1000000 bytes" in said.data
+    assert most < 20_000_000
 
 
 @pytest.mark.parametrize(
@@ -109,6 +160,7 @@ def test_a_recording_of_another_program_is_told_in_one_line(tmp_path: Path) -> N
     writer: Any = Writer(str(other))
     writer.start()
     writer.add_message(writer.register_channel("/odom", "json", 0), 1, b"{}", 1)
+    assert other.exists()
     writer.finish()
     with pytest.raises(UrcError) as refused:
         open_recording(other)
@@ -117,13 +169,32 @@ def test_a_recording_of_another_program_is_told_in_one_line(tmp_path: Path) -> N
 
 def test_a_file_that_is_not_there_is_told_in_one_line(tmp_path: Path) -> None:
     with pytest.raises(UrcError) as refused:
-        open_recording(tmp_path)
-    assert str(refused.value) == f"{tmp_path} cannot be read: Is a directory"
+        open_recording(tmp_path / "gone")
+    assert str(refused.value) == f"{tmp_path / 'gone'} cannot be read: No such file or directory"
+
+
+def test_one_without_chunks_is_read(tmp_path: Path) -> None:
+    """As another program may write it."""
+    other = tmp_path / "other.mcap"
+    writer: Any = Writer(str(other), use_chunking=False)
+    writer.start()
+    writer.add_message(writer.register_channel("/signals/battery", "json", 0), 7, b"{}", 7)
+    writer.finish()
+    found = open_recording(other, has_profile=True)
+    assert list(found.messages(0)) == [(7, "/signals/battery", b"{}")]
+
+
+def test_what_is_no_plain_file_is_told_in_one_line(tmp_path: Path) -> None:
+    """Nobody waits for what comes out of a pipe."""
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(UrcError) as refused:
+        open_recording(tmp_path / "pipe")
+    assert str(refused.value) == f"{tmp_path / 'pipe'} is no file"
 
 
 def test_nothing_recorded_is_told_in_one_line(tmp_path: Path) -> None:
     empty = tmp_path / "empty.mcap"
-    Recorder(empty, line_profile(), "urc: 1\n", Blanker(())).close()
+    Recorder(empty, line_profile(), Blanker(()), document="urc: 1\n").close()
     with pytest.raises(UrcError) as refused:
         open_recording(empty)
-    assert str(refused.value) == f"{empty} holds nothing: nothing happened while it was recorded"
+    assert str(refused.value) == f"{empty} holds nothing that can be played: it has just been begun"

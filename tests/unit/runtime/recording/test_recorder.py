@@ -2,8 +2,10 @@
 
 import errno
 import io
+import threading
 import time
 from collections import Counter
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -15,7 +17,7 @@ from urc.runtime.blanking import Blanker
 from urc.runtime.hub import Note
 from urc.runtime.recording import recorder as module
 from urc.runtime.recording.reader import open_recording
-from urc.runtime.recording.recorder import Recorder, file_in
+from urc.runtime.recording.recorder import Recorder, named
 from urc.testing.profile import line_profile
 
 PROFILE = line_profile()
@@ -23,7 +25,15 @@ DOCUMENT = "urc: 1\nkind: robot\n"
 
 
 def recorder(file: Path) -> Recorder:
-    return Recorder(file, PROFILE, DOCUMENT, Blanker(()))
+    return Recorder(file, PROFILE, Blanker(()), document=DOCUMENT)
+
+
+def wait(is_so: Callable[[], bool]) -> None:
+    """Wait for the thread."""
+    end_s = time.monotonic() + 10
+    while not is_so():
+        assert time.monotonic() < end_s
+        time.sleep(0.001)
 
 
 def readings(*values: int) -> list[Sample]:
@@ -60,7 +70,7 @@ def test_it_is_read_again(file: Path) -> None:
     kept.put(readings(1))
     kept.close()
     found = open_recording(file)
-    assert (found.document, found.is_whole) == (DOCUMENT, True)
+    assert (found.document, found.unread_bytes) == (DOCUMENT, 0)
     assert [message.topic for message in found.messages(0)] == ["/signals/battery"]
 
 
@@ -75,21 +85,63 @@ def test_what_is_more_than_it_can_keep_is_counted(
     kept.close()
     texts = [message.data for message in open_recording(file).messages(0)]
     assert len(texts) == 3
-    assert b"7 pieces were not recorded" in texts[-1]
+    assert b"7 pieces are missing here" in texts[-1]
+
+
+def test_what_is_too_much_in_bytes_is_counted_too(
+    file: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A disk that hangs must not cost the memory of the process that drives."""
+    monkeypatch.setattr(module, "MOST_WAITING_BYTES", 10_000)
+    kept = recorder(file)
+    with kept._wakes:
+        kept.put([Sample("note", "x" * 4000, 1.0)] * 5)
+        assert (len(kept._waiting), kept._lost) == (2, 3)
+    kept.close()
 
 
 def test_another_recording_is_never_written_over(file: Path) -> None:
     recorder(file).close()
-    with pytest.raises(UrcError) as refused:
-        recorder(file)
-    assert str(refused.value) == f"{file} is there already; no recording is written over another"
+    kept = recorder(file)
+    kept.close()
+    assert kept.fault == f"{file} is there already; no recording is written over another"
+    assert not kept.is_begun
 
 
-def test_a_name_is_one_that_is_free(tmp_path: Path) -> None:
-    first = file_in(tmp_path, "bot", 0.0)
-    assert first.name == "bot-19700101T000000Z.mcap"
-    first.touch()
-    assert file_in(tmp_path, "bot", 0.0).name == "bot-19700101T000000Z-2.mcap"
+def test_recordings_in_a_folder_have_names_of_their_own(tmp_path: Path) -> None:
+    folder = tmp_path / "kept.here"
+    kept = [
+        Recorder(folder, PROFILE, Blanker(()), is_folder=True, document=DOCUMENT) for _ in range(3)
+    ]
+    for one in kept:
+        one.close()
+    assert len({one.file for one in kept}) == 3
+    assert sorted(folder.iterdir()) == sorted(one.file for one in kept)
+    assert named(folder, "bot", 1, 0.0).name == "bot-19700101T000000Z.mcap"
+    assert named(folder, "bot", 2, 0.0).name == "bot-19700101T000000Z-2.mcap"
+
+
+@pytest.mark.parametrize(
+    ("place", "said"),
+    [("file/bot.mcap", "cannot be made: File exists"), (f"{'x' * 300}.mcap", "too long")],
+)
+def test_a_place_that_takes_no_file_is_told(tmp_path: Path, place: str, said: str) -> None:
+    (tmp_path / "file").touch()
+    kept = recorder(tmp_path / place)
+    kept.close()
+    assert said in kept.fault
+
+
+def test_a_document_that_is_gone_is_told_in_the_recording(file: Path) -> None:
+    """Its profile was loaded once, and the robot is driven; it can be played with another."""
+    kept = Recorder(file, PROFILE, Blanker(()))
+    kept.put(readings(1))
+    kept.close()
+    assert kept.fault == ""
+    with pytest.raises(UrcError, match=r"it holds no profile\.yaml"):
+        open_recording(file)
+    found = list(open_recording(file, has_profile=True).messages(0))
+    assert b"does not load any more: replay it with --profile" in b"".join(m.data for m in found)
 
 
 class FullDisk(io.BytesIO):
@@ -102,14 +154,22 @@ class FullDisk(io.BytesIO):
             raise OSError(errno.ENOSPC, "No space left on device")
         return super().write(data)  # type: ignore[arg-type]
 
+    def close(self) -> None:
+        if self.is_full:
+            raise OSError(errno.ENOSPC, "No space left on device")
 
+
+@pytest.mark.parametrize("is_full_at_once", [True, False])
 def test_a_full_disk_ends_the_recording_and_says_so(
-    file: Path, monkeypatch: pytest.MonkeyPatch
+    file: Path, monkeypatch: pytest.MonkeyPatch, is_full_at_once: bool
 ) -> None:
     disk = FullDisk()
-    monkeypatch.setattr(module, "_made", lambda _: disk)
+    disk.is_full = is_full_at_once
+    monkeypatch.setattr(Recorder, "_made", lambda _: disk)
     kept = recorder(file)
-    disk.is_full = True
+    if not is_full_at_once:
+        wait(lambda: kept.is_begun)
+        disk.is_full = True
     kept.put(readings(1))
     kept.close()
     assert kept.fault == f"{file} cannot be written: No space left on device"
@@ -117,29 +177,51 @@ def test_a_full_disk_ends_the_recording_and_says_so(
     assert not kept._waiting
 
 
-def test_a_disk_that_is_full_at_once_is_told_in_one_line(
+def test_a_file_that_could_not_be_begun_is_not_left_behind(
     file: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    disk = FullDisk()
-    disk.is_full = True
-    monkeypatch.setattr(module, "_made", lambda _: disk)
-    with pytest.raises(UrcError, match="cannot be written: No space left on device"):
-        recorder(file)
+    monkeypatch.setattr(Recorder, "_begin", lambda *_: full())
+    kept = recorder(file)
+    kept.close()
+    assert "No space left" in kept.fault
+    assert not file.exists()
+
+
+def full() -> None:
+    raise OSError(errno.ENOSPC, "No space left on device")
+
+
+def test_a_disk_that_hangs_is_waited_for_a_while_only(
+    file: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    goes_on = threading.Event()
+    monkeypatch.setattr(module, "_CLOSE_S", 0.05)
+    monkeypatch.setattr(Recorder, "_made", lambda self: (goes_on.wait(), self.file.open("xb"))[1])
+    file.parent.mkdir()
+    kept = recorder(file)
+    kept.put(readings(1))
+    kept.close()
+    assert kept.fault == f"{file}: the disk has not taken the end of it in 0.05 s"
+    goes_on.set()
+    kept._thread.join()
 
 
 def test_one_thing_that_cannot_be_written_costs_itself_only(file: Path) -> None:
-    """A mistake of ours, or a signal that nobody declared."""
+    """A mistake of ours, or a signal that nobody declared; the file says that something is gone."""
     kept = recorder(file)
     kept.put([Sample("nobody", 1, 1.0), Note(2.0, "info", "wire", "live")])
+    wait(lambda: kept.counts["/log"] == 2)
     kept.close()
-    assert kept.counts["/log"] >= 1
     assert kept.fault == ""
+    texts = b"".join(message.data for message in open_recording(file).messages(0))
+    assert b"something is missing here" in texts
 
 
 def test_without_the_package_it_says_how_to_get_it(
     file: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(module, "find_spec", lambda _: None)
-    with pytest.raises(UrcError, match=r"pip install 'urc\[record\]'"):
-        recorder(file)
+    kept = recorder(file)
+    kept.close()
+    assert kept.fault == "recordings need the package mcap: pip install 'urc[record]'"
     assert not file.exists()

@@ -1,8 +1,10 @@
 """What a recording says of each thing that happens, and what is made of it again."""
 
+import base64
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
+from urllib.parse import quote
 
 import jsonschema
 import pytest
@@ -11,8 +13,9 @@ from urc.model.driver import Argument, Command, Driver, FramingSpec, Hold, Trans
 from urc.model.values import Reading, Sample, Signal
 from urc.runtime.audit import Entry
 from urc.runtime.blanking import Blanker
-from urc.runtime.hub import LinkStatus, Moved, Note, Tapped, Traffic
-from urc.runtime.recording.shapes import DRIVING, LOG, Shapes, channels, event_of
+from urc.runtime.hub import LinkStatus, Moved, Note, Tapped, Told, Traffic
+from urc.runtime.recording.events import event_of
+from urc.runtime.recording.shapes import DRIVING, LOG, Shapes, channels
 from urc.testing.codec import text
 
 BORN_NS = 1_700_000_000_000_000_000
@@ -133,7 +136,7 @@ def test_images_and_the_log_have_the_names_that_programs_know() -> None:
 
 def test_who_drove_is_a_line_of_the_log_again() -> None:
     entry = Entry(1_700_000_001.0, "bot", "moved", "screen 1", command="drive", outcome="begins")
-    topic, time_ns, data = told(entry)
+    topic, time_ns, data = told(Told(1.0, entry))
     assert (topic, time_ns) == (DRIVING, BORN_NS + 1_000_000_000)
     assert json.loads(data)["command"] == "drive"
     assert event_of(topic, data, 2.0, {}) == Note(
@@ -147,7 +150,7 @@ def test_motion_is_told_by_its_arguments_and_ends_with_what_stops_it() -> None:
     ticks = [made.messages(Moved(1.0 + at, "drive", {"speed": at})) for at in (0, 0.5)]
     told = [(topic, json.loads(data)) for ((topic, _, data),) in ticks]
     assert told == [("/commands/drive", {"speed": 0}), ("/commands/drive", {"speed": 0.5})]
-    ended = made.messages(Entry(1_700_000_002.0, "bot", "stopped", command="drive"))
+    ended = made.messages(Told(2.0, Entry(0.0, "bot", "stopped", command="drive")))
     assert [(topic, json.loads(data).get("speed")) for topic, _, data in ended] == [
         (DRIVING, None),
         ("/commands/drive", 0),
@@ -164,31 +167,100 @@ def test_times_never_go_back() -> None:
     assert second[1] == first[1]
 
 
-@pytest.mark.parametrize("value", [float("nan"), float("inf"), 2**70, "\ud800", {"a": b"\x01"}])
+ODD: Mapping[str, Reading] = {
+    "no number": float("nan"),
+    "too large": float("inf"),
+    "of many bits": 2**70,
+    "half a letter": "\ud800",
+    "bytes inside": {"a": b"\x01"},
+    "all of it": {"\ud800": ("\udfff", float("nan"), 2**70, b"\x01", {"a": None})},
+}
+
+
+@pytest.mark.parametrize("value", ODD.values(), ids=ODD)
 def test_whatever_a_robot_says_becomes_json(value: Reading) -> None:
-    """Of what JSON has no word for, another program still reads the message."""
-    data = told(Sample("word", value, 1.0))[2]
+    """Of what JSON has no word for, another program still reads the message, and so do we."""
+    topic, _, data = told(Sample("pose", {"of": value}, 1.0))
     json.loads(data, parse_constant=lambda word: pytest.fail(f"{word} is no JSON"))
+    assert isinstance(event_of(topic, data, 1.0, SIGNALS), Sample)
 
 
-def test_secrets_are_kept_out_of_all_of_it() -> None:
-    made = shapes("hunter2")
-    events: list[Tapped] = [
-        Sample("word", "it is hunter2", 1.0),
-        Sample("pose", {"a": ("hunter2",)}, 1.0),
-        LinkStatus("wire", "lost", "tcp hunter2", 1.0, "refused hunter2"),
-        Note(1.0, "info", "wire", "hunter2"),
-        Traffic(1.0, "wire", "received", b"echo hun"),
-        Traffic(1.1, "wire", "received", b"ter2\n"),
-        Traffic(1.2, "udp", "sent", b"\xffhunter2"),
-    ]
+@pytest.mark.parametrize("time_s", [1e300, -1e300, float("nan"), float("inf"), 0.0])
+def test_whatever_time_it_says_fits_into_a_file(time_s: float) -> None:
+    assert 0 <= told(Sample("battery", 1, time_s))[1] < 2**63
+
+
+def test_a_clock_that_is_set_moves_nothing() -> None:
+    """An entry of the audit has the time of day; what comes after it has its own time."""
+    made = shapes()
+    made.messages(Told(1.0, Entry(1_900_000_000.0, "bot", "lease")))
+    ((_, time_ns, _),) = made.messages(Sample("battery", 1, 2.0))
+    assert time_ns == BORN_NS + 2_000_000_000
+
+
+WORD = 'pa"ss\\wörd é'
+FORMS = {
+    "as it is": WORD,
+    "in JSON": json.dumps(WORD)[1:-1],
+    "in JSON, letters as they are": json.dumps(WORD, ensure_ascii=False)[1:-1],
+    "in a URL": quote(WORD, safe=""),
+    "in hex": WORD.encode().hex(),
+    "in base64": base64.b64encode(b"user:" + WORD.encode() + b":x").decode(),
+}
+
+
+def hides(made: Shapes, events: Sequence[Tapped], *forms: str) -> None:
+    """See that no message of these holds a secret, in any form, and that each is JSON still."""
     found = [message for event in events for message in made.messages(event)]
-    found += made.rest(2.0)
-    assert len(found) >= 6
+    found += made.rest(9.0)
+    assert found
+    shown = "".join(data.decode() for _, _, data in found)
+    for form in (*FORMS.values(), *forms):
+        assert form not in shown
     for _, _, data in found:
-        assert b"hunter2" not in data
-        assert b"hunter2".hex().encode() not in data
         json.loads(data)
+    pieces = [json.loads(data).get("text", "") for _, _, data in found]
+    for form in (*FORMS.values(), *forms):
+        assert form not in "".join(pieces)
+
+
+@pytest.mark.parametrize("form", FORMS.values(), ids=FORMS)
+def test_secrets_are_kept_out_of_all_of_it(form: str) -> None:
+    events: list[Tapped] = [
+        Sample("word", f"it is {form}", 1.0),
+        Sample("pose", {form: ("", form), "in": {"x": form.encode()}}, 1.0),
+        Sample("dump", form.encode(), 1.0),
+        LinkStatus("wire", "lost", f"tcp {form}", 1.0, f"refused {form}"),
+        Note(1.0, "info", form, form),
+        Moved(1.0, "drive", {"word": form}),
+        Told(1.0, Entry(1.0, "bot", "ran", command="drive", arguments=form, outcome=form)),
+        Traffic(1.0, "wire", "received", f"echo {form}\n".encode()),
+        Traffic(1.2, "udp", "sent", b"\xff" + form.encode()),
+    ]
+    hides(shapes(WORD), events)
+
+
+@pytest.mark.parametrize("form", FORMS.values(), ids=FORMS)
+@pytest.mark.parametrize("size", [1, 2, 5, 9])
+def test_a_secret_that_comes_in_pieces_is_kept_out(form: str, size: int) -> None:
+    """However long it takes: nobody waits for what a recording shows."""
+    data = f"a {form} b\n".encode()
+    pieces = [data[at : at + size] for at in range(0, len(data), size)]
+    events = [Traffic(1.0, "wire", "received", piece) for piece in pieces]
+    hides(shapes(WORD), events)
+
+
+def test_a_secret_number_is_kept_out() -> None:
+    made = shapes("4711")
+    hides(made, [Sample("battery", 4711, 1.0), Sample("ranges", (1.0, 4711), 1.0)], "4711")
+    assert json.loads(told(Sample("battery", 14711, 1.0), "4711")[2]) == {"value": 14711}
+
+
+def test_what_may_begin_a_secret_is_told_when_nothing_follows() -> None:
+    made = shapes("hunter2")
+    (first,) = made.messages(Traffic(1.0, "wire", "received", b"battery low h"))
+    (rest,) = made.rest(2.0)
+    assert json.loads(first[2])["text"] + json.loads(rest[2])["text"] == "battery low h"
 
 
 @pytest.mark.parametrize(
@@ -201,6 +273,13 @@ def test_secrets_are_kept_out_of_all_of_it() -> None:
         ("/signals/gone", b'{"value": 1}'),
         ("/signals/camera", b'{"data": "\xc3\xa9"}'),
         ("/signals/camera", b'{"value": 7}'),
+        ("/signals/battery", b'{"value": "42"}'),
+        ("/signals/battery", b'{"value": true}'),
+        ("/signals/word", b'{"value": 1}'),
+        ("/signals/isOn", b'{"value": 1}'),
+        ("/signals/ranges", b'{"value": {}}'),
+        ("/signals/pose", b'{"value": []}'),
+        ("/signals/battery", b'{"value": ' + b"[" * 900 + b"]" * 900 + b"}"),
         ("/link/wire", b'{"state": "fine", "address": ""}'),
         ("/link/wire", b'{"state": "live", "address": "", "attempts": "many"}'),
         ("/wire/wire", b'{"direction": "sent", "hex": "zz"}'),

@@ -1,0 +1,108 @@
+"""What the messages of a recording tell, as what happened.
+
+Floor 4, pure. A file may be damaged, or made by anybody: what is not as `shapes` makes it tells
+nothing.
+"""
+
+import base64
+from collections.abc import Mapping
+from typing import Any, Final, cast, get_args
+
+import msgspec
+
+from urc.model.values import Alarm, Reading, Sample, Signal
+from urc.runtime.hub import LinkState, LinkStatus, Note, Traffic
+from urc.runtime.recording.shapes import DRIVING, LEVELS, LINK, LOG, SIGNALS, WIRE
+
+__all__ = ["event_of", "is_state", "topic_of"]
+
+_MOST: Final = 2**31 - 1
+
+
+def is_state(topic: str) -> bool:
+    """Return whether the last message of a topic holds until the next: a signal, or a line."""
+    return topic.startswith((SIGNALS, LINK))
+
+
+def topic_of(signal: str) -> str:
+    """Return the topic of a signal."""
+    return SIGNALS + signal
+
+
+def event_of(
+    topic: str, data: bytes, time_s: float, signals: Mapping[str, Signal]
+) -> Sample | LinkStatus | Note | Traffic | None:
+    """Return what a message tells, as if it happened now; None when it tells nothing known.
+
+    Args:
+        topic: of the message.
+        data: its JSON.
+        time_s: monotonic seconds at which it happens.
+        signals: of the profile that shows it, which may have changed since.
+    """
+    try:
+        told = msgspec.json.decode(data)
+        return _event(topic, told, time_s, signals) if isinstance(told, dict) else None
+    except Exception:  # whatever is wrong with it: it is not one of ours, or damaged
+        return None
+
+
+def _event(
+    topic: str, told: dict[str, Any], time_s: float, signals: Mapping[str, Signal]
+) -> Sample | LinkStatus | Note | Traffic | None:
+    if topic.startswith(SIGNALS):
+        signal = signals.get(topic.removeprefix(SIGNALS))
+        alarm = told.get("alarm", "")
+        if signal is None or alarm not in get_args(Alarm):
+            return None
+        return Sample(signal.name, _value(signal, told), time_s, cast("Alarm", alarm))
+    if topic.startswith(LINK):
+        if told["state"] not in get_args(LinkState):
+            return None
+        name, address, detail = topic.removeprefix(LINK), told["address"], told.get("detail", "")
+        counts = [min(int(told.get(each, 0)), _MOST) for each in ("attempts", "faults")]
+        return LinkStatus(name, told["state"], str(address), time_s, str(detail), *counts)
+    if topic.startswith(WIRE):
+        data = str(told["text"]).encode() if "text" in told else bytes.fromhex(told["hex"])
+        direction: Any = "sent" if told["direction"] == "sent" else "received"
+        return Traffic(time_s, topic.removeprefix(WIRE), direction, data)
+    if topic == LOG:
+        level: Any = next((name for name, no in LEVELS.items() if no == told["level"]), "info")
+        return Note(time_s, level, str(told["name"]), str(told["message"]))
+    if topic == DRIVING:
+        words = [told.get(name) for name in ("who", "what", "command", "arguments", "outcome")]
+        return Note(time_s, "info", "driving", " ".join(str(word) for word in words if word))
+    return None
+
+
+_KINDS: Final[Mapping[str, type | tuple[type, ...]]] = {
+    "integer": (int, float),
+    "number": (int, float),
+    "boolean": bool,
+    "string": str,
+    "array": list,
+    "object": dict,
+    "image": str,
+    "blob": str,
+}
+
+
+def _value(signal: Signal, told: Mapping[str, Any]) -> Reading:
+    value = told["data"] if signal.type == "image" and "data" in told else told["value"]
+    if value is None:
+        return None
+    if not isinstance(value, _KINDS[signal.type]) or (
+        isinstance(value, bool) and signal.type != "boolean"
+    ):
+        raise TypeError(f"{signal.name} is no {signal.type}")
+    if signal.type in ("image", "blob"):
+        return base64.b64decode(str(value), validate=True)
+    return _frozen(value)
+
+
+def _frozen(value: Any) -> Reading:
+    if isinstance(value, list):
+        return tuple(map(_frozen, value))
+    if isinstance(value, dict):
+        return {name: _frozen(one) for name, one in value.items()}
+    return cast("Reading", value)
