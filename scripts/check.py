@@ -71,7 +71,7 @@ def halves(tests: str, *half: str, timeout_s: float) -> Step:
 TESTS = (
     halves(
         "tests/unit",
-        *("protocol", "runtime", "guard", "simulator", "motion", "config", "cli"),
+        *("protocol", "runtime", "guard", "simulator", "motion", "config"),
         timeout_s=240,
     ),
     halves(

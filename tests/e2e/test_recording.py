@@ -63,8 +63,9 @@ widgets:
     bind: { moved: { command: drive, args: { x: speed } } }
     options: { axes: x }
   lamp: { use: button, bind: { press: lamp } }
+  line: { use: link }
 interfaces:
-  default: { grid: "level stick lamp" }
+  default: { grid: "level stick lamp line" }
 simulator:
   wire:
     - { match: '^B$', send: "{{ 40 + (now | int) % 20 }}" }
@@ -234,6 +235,7 @@ async def test_a_recording_is_played_on_the_same_page(replayed: str, new_page: P
     await page.goto(replayed)
     await expect(page.locator(".value-figure")).to_have_text(re.compile("[0-9]+"))
     await expect(page.locator("[data-badge-text]")).to_have_text("Replay")
+    await expect(page.locator(".link-now")).to_have_text("Replay")
     await expect(page.locator("[data-stop-button]")).to_have_count(0)
     await expect(page.locator(".joystick-note")).to_have_text("◆ this page only watches")
     await page.get_by_role("button", name="Pause").click()

@@ -33,6 +33,7 @@ export default {
     let bytes = 0;
     /** @type {readonly Link[]} */
     let links = [];
+    let isReplay = false;
     let rate = { messages: NaN, bytes: NaN };
     let before = { ms: performance.now(), messages: -1, bytes: 0 };
 
@@ -44,6 +45,7 @@ export default {
     });
     follow("links", (news) => {
       links = news.links;
+      isReplay = news.isReplay ?? false;
       show();
     });
     const timer = setInterval(() => {
@@ -61,6 +63,12 @@ export default {
       const grade = quality(tripMs);
       const sign = !isUp || worst === "lost" ? "bad" : worst === "silent" ? "caution" : worst === "live" ? grade || "good" : "";
       attribute(root, "data-state", sign);
+      if (isReplay && worst === "live") {
+        attribute(root, "data-state", "");
+        write(now, t("Replay")); // nothing of it is live, and the way to URC says nothing of it
+        if (facts) draw(facts);
+        return;
+      }
       const words = !isUp
         ? t("No connection to URC")
         : { lost: t("Robot lost"), silent: t("Robot silent"), live: t("Live") }[worst ?? ""] ?? t("Connecting");

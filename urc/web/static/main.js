@@ -84,7 +84,7 @@ const themes = new Themes(wake);
 const follows = new Follows(
   {
     links: () => {
-      const value = { isUp: store.isUp, links: [...store.links.values()] };
+      const value = { isUp: store.isUp, links: [...store.links.values()], isReplay: badge.isReplay };
       return { look: JSON.stringify(value), value };
     },
     log: () => log.news(),

@@ -253,8 +253,8 @@
  * @property {(module: string) => Promise<void>} style Loads the style sheet of a third-party module.
  *
  * @typedef {object} Topics What `follow` tells of.
- * @property {{isUp: boolean, links: readonly Link[]}} links The lines to the robot; none are known
- *   while the page has no connection to URC.
+ * @property {{isUp: boolean, links: readonly Link[], isReplay?: boolean}} links The lines to the robot;
+ *   none are known while the page has no connection to URC. In a replay they are what they were.
  * @property {{lines: readonly LogLine[], missing: number}} log The newest lines, oldest first, and
  *   how many were lost before they reached this page.
  * @property {{lease: Lease | null, isMine: boolean, refusal: string}} lease Who has the controls.
