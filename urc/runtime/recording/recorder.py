@@ -43,6 +43,8 @@ _TRIES: Final = 1000
 """Names that are tried for a file."""
 _GATHER_S: Final = 0.05
 """How long what happens is gathered on the loop: waking for each piece would cost more than it."""
+_CHUNK_BYTES: Final = 256 * 1024
+"""The library's own is four times that, and ending one would hold the interpreter up too long."""
 _SLICE: Final = 100
 _PAUSE_S: Final = 0.001
 """After so many pieces the thread lets others run: they wait for the interpreter meanwhile."""
@@ -175,7 +177,7 @@ class Recorder:
         profile, document = self._profile, self._document
         if document is None:
             document = resolve(profile.file, shelf_of(profile.file), profile).text
-        writer: Any = Writer(stream)
+        writer: Any = Writer(stream, chunk_size=_CHUNK_BYTES)
         self._writer = writer
         writer.start(profile="", library=f"urc {__version__}")
         writer.add_metadata("urc", {"robot": profile.name, "version": __version__})
