@@ -11,6 +11,7 @@ what comes is lost, and the file says how much; when the disk is, nothing is wri
 import asyncio
 import json
 import logging
+import os
 import threading
 import time
 from collections import Counter, deque
@@ -177,6 +178,8 @@ class Recorder:
         profile, document = self._profile, self._document
         if document is None:
             document = resolve(profile.file, shelf_of(profile.file), profile).text
+            # Its comments say where each key comes from: whose home that is, is nobody's business.
+            document = document.replace(f"# {Path(profile.file).parent}{os.sep}", "# ")
         writer: Any = Writer(stream, chunk_size=_CHUNK_BYTES)
         self._writer = writer
         writer.start(profile="", library=f"urc {__version__}")
@@ -205,6 +208,8 @@ class Recorder:
             if not batch or time.monotonic() - whole_s >= _WHOLE_S:
                 self._writer.flush()
                 whole_s = time.monotonic()
+                if not self.file.exists():  # the system would go on writing what nobody can find
+                    raise UrcError(f"{self.file} was removed, or moved away")
 
     def _next(self) -> list[Tapped] | None:
         """Return what waits; nothing when nothing came for a second, None when it is over."""

@@ -11,16 +11,20 @@ from pathlib import Path
 import pytest
 from mcap.reader import make_reader
 
+from urc.config.load import load_profile
 from urc.model.values import Sample
 from urc.problems import UrcError
 from urc.runtime.blanking import Blanker
+from urc.runtime.catalog import built_in_catalog
 from urc.runtime.hub import Note
 from urc.runtime.recording import recorder as module
 from urc.runtime.recording.reader import open_recording
 from urc.runtime.recording.recorder import Recorder, named
+from urc.shipped import shipped
 from urc.testing.profile import line_profile
 
 PROFILE = line_profile()
+CATALOG = built_in_catalog()
 DOCUMENT = "urc: 1\nkind: robot\n"
 
 
@@ -119,6 +123,25 @@ def test_recordings_in_a_folder_have_names_of_their_own(tmp_path: Path) -> None:
     assert sorted(folder.iterdir()) == sorted(one.file for one in kept)
     assert named(folder, "bot", 1, 0.0).name == "bot-19700101T000000Z.mcap"
     assert named(folder, "bot", 2, 0.0).name == "bot-19700101T000000Z-2.mcap"
+
+
+def test_a_file_that_is_removed_is_missed(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "_WHOLE_S", 0.01)
+    kept = recorder(file)
+    wait(lambda: kept.is_begun)
+    file.unlink()
+    wait(lambda: kept.fault != "")
+    assert kept.fault == f"{file} was removed, or moved away"
+    kept.close()
+
+
+def test_the_document_is_in_it_without_the_folders_of_who_recorded(file: Path) -> None:
+    kept = Recorder(file, load_profile(shipped("robots") / "turtlebot4.yaml", CATALOG), Blanker(()))
+    kept.put(readings(1))
+    kept.close()
+    document = open_recording(file).document
+    assert "# turtlebot4.yaml:" in document
+    assert str(shipped("robots")) not in document
 
 
 @pytest.mark.parametrize(
