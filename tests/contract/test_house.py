@@ -11,7 +11,7 @@ NOT_OURS = {
     ".git", ".venv", "node_modules", "dist", "build", "__pycache__",
     ".hypothesis", ".mypy_cache", ".pytest_cache", ".ruff_cache",
 }  # fmt: skip
-MAX_LINES = 400
+MAX_LINES = 600
 MAX_BYTES = 1_000_000
 
 # Written in pieces, so that this file does not find itself.
@@ -60,7 +60,7 @@ def test_no_file_names_a_machine_or_a_registry() -> None:
 
 
 def test_python_files_stay_short() -> None:
-    """A module that outgrows 400 lines has two subjects."""
+    """A module that outgrows 600 lines has two subjects."""
     lengths = {path: text.count("\n") for path, text in texts() if path.endswith((".py", "dev"))}
     assert {path: lines for path, lines in lengths.items() if lines > MAX_LINES} == {}
 
