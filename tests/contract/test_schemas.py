@@ -309,13 +309,14 @@ def is_shared_reader(asked: tuple[str, tuple[str | int, ...], str]) -> bool:
 
     `parse_interface` reads the header of documents and the layouts inside a robot alike. Forms are
     read alike in replies and in errors and steps, which may not `set` anything. Kinds of transport
-    are read alike, though messages have no framing, and not everything goes through something else;
-    one of another package has options that no schema of ours knows.
+    are read alike, though messages have no framing, not everything goes through something else, and
+    a web server always answers; one of another package has options that no schema of ours knows.
     """
     name, path, key = asked
     if path[-2:-1] == ("transports",):
         kind = value_at(read_document(name).data, path)["type"]
         return kind not in TRANSPORTS or key in (
+            "answers",
             "connection",
             "encoding",
             "framing",

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 
 from urc.config.link_steps import steps_of
 from urc.config.part import Findings, Part, shown_duration
+from urc.config.rules_answers import check_answers
 from urc.config.rules_frames import check_frames_apart
 from urc.config.rules_motion import check_motion
 from urc.config.rules_traffic import check_traffic
@@ -51,6 +52,7 @@ def check_flow(part: Part, driver: Driver, secrets: frozenset[str], findings: Fi
     for inner, poll in zip(part.listed("polls"), driver.polls, strict=True):
         _check_poll(inner, poll, findings)
     _check_secrets(part, driver, secrets, findings)
+    check_answers(part, driver, findings)
     check_traffic(part, driver, findings)
     check_motion(part, driver, findings)
     check_frames_apart(part, driver, findings)

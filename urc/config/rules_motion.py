@@ -41,14 +41,17 @@ def check_motion(part: Part, driver: Driver, findings: Findings) -> None:
         if on_line:
             _check_baud(on_line, spec, findings)
             _check_will(on_line, spec, findings)
-    if held and not any(_notices(spec, driver) for spec in driver.transports.values()):
+    is_mute = all(driver.transports[one[1].transport].never_answers for one in held)
+    noticed = any(_notices(spec, driver) for spec in driver.transports.values())
+    if held and not is_mute and not noticed:
         findings.warn(
             held[0][0],
             "unnoticed-loss",
             "nothing tells when the robot has gone: no line says how long it may be silent,"
             " and nothing is asked",
             key=True,
-            hint="write stale_after: beside its transport, or poll something that it answers",
+            hint="write stale_after: beside its transport, or poll something that it answers, or"
+            " write answers: never where it says nothing by design",
         )
 
 

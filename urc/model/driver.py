@@ -88,6 +88,8 @@ class TransportSpec(NamedTuple):
     """Silence after which the line is told to be silent; None = never."""
     via: str = ""
     """Transport that it goes through; "": none."""
+    never_answers: bool = False
+    """The robot says nothing on this line, by design: its silence means nothing."""
 
 
 class Reply(NamedTuple):

@@ -129,3 +129,18 @@ tests:
     profile = check(path, built_in_catalog()).profile
     assert profile is not None
     assert [problem.message for problem in run_tests(profile)] == []
+
+
+@pytest.mark.parametrize(("said", "is_told"), [("", True), (", answers: never", False)])
+def test_a_line_that_never_answers_is_not_asked_to_notice_a_loss(
+    said: str, is_told: bool, tmp_path: object
+) -> None:
+    """A receiver of a remote control has nothing to say: its silence means nothing."""
+    text = f"""
+transports:
+  wire: {{ type: pigeon{said}, framing: {{ type: delimiter, tx: LF, rx: LF }} }}
+commands:
+  drive: {{ send: "V {{{{ v }}}}", args: {{ v: {{}} }},
+    hold: {{ repeat: 50ms, release: {{ v: 0 }}, watchdog: 500ms }} }}
+"""
+    assert ("unnoticed-loss" in codes(text, tmp_path)) == is_told
