@@ -10,7 +10,16 @@ from urc.motion.stall import STALLED_S
 from urc.testing.clock import FakeClock, settle
 from urc.transports.base import ConnectFailed, PeerClosed, Transport, TransportError
 
-__all__ = ["STOP", "TERMS", "CountedWire", "Rig", "ScatteredWire", "SlowWire", "Wire"]
+__all__ = [
+    "STOP",
+    "TERMS",
+    "CountedWire",
+    "GatedWire",
+    "Rig",
+    "ScatteredWire",
+    "SlowWire",
+    "Wire",
+]
 
 STOP = b"stop"
 TERMS = Terms(STOP, period_s=0.02)
@@ -102,6 +111,22 @@ class SlowWire(Wire):
 
     async def send(self, data: Payload) -> None:
         await self.flowing.wait()
+        self.written.append(data)
+
+
+class GatedWire(Wire):
+    """One that takes one frame for each time that it is told to."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._room = asyncio.Semaphore(0)
+
+    def let_through(self, frames: int = 1) -> None:
+        for _ in range(frames):
+            self._room.release()
+
+    async def send(self, data: Payload) -> None:
+        await self._room.acquire()
         self.written.append(data)
 
 

@@ -4,7 +4,7 @@ import asyncio
 
 import pytest
 
-from tests.unit.guard.lines import STOP, TERMS, CountedWire, Rig, Wire
+from tests.unit.guard.lines import STOP, TERMS, CountedWire, GatedWire, Rig, Wire
 from urc.guard import proxy, wire
 from urc.model.codec import Envelope
 from urc.testing.clock import settle
@@ -70,6 +70,29 @@ async def test_tick_that_waited_too_long_renews_nothing(rig: Rig) -> None:
     assert rig.robot.written == [b"go 1", STOP]
 
 
+async def test_tick_that_waited_too_long_leaves_a_running_motion_alone(rig: Rig) -> None:
+    """The old tick neither renews nor ends it."""
+    await rig.drive()
+    await rig.clock.advance(0.1)
+    rig.tick(b"go 2")
+    rig.guard._post(wire.Tick("drive", 9, b"old", rig.clock.now() - 0.3))
+    await rig.clock.advance(0.1)
+    rig.tick(b"go 3")
+    await rig.clock.advance(0.1)
+    assert rig.robot.written == [b"go 1", b"go 2", b"go 3"]
+
+
+async def test_tick_that_waited_too_long_writes_nothing_to_a_robot_at_rest(rig: Rig) -> None:
+    await rig.transport.open(1.0)
+    rig.guard.arm("wire", "drive", TERMS)
+    rig.guard._post(wire.Tick("drive", 1, b"old", rig.clock.now() - 0.3))
+    await rig.clock.advance(1.0)
+    assert rig.robot.written == [], "neither motion nor a stop"
+    rig.tick(b"go")
+    await settle()
+    assert rig.robot.written == [b"go"], "nor does it disarm the control"
+
+
 async def test_stop_is_the_newest_that_was_made(rig: Rig) -> None:
     """Where it carries a number, the one before may count no more. It arms nothing."""
     rig.guard.renew("drive", b"nobody")
@@ -91,6 +114,23 @@ async def test_owed_stop_is_the_newest_too(rig: Rig) -> None:
     rig.robot.cut()
     await rig.clock.advance(0.1)
     assert rig.robot.written == [b"go 1", b"stop 2"]
+
+
+async def test_stop_that_still_waits_when_the_line_is_cut_is_owed(rigs: list[Rig]) -> None:
+    """The motion before it got through; that says nothing about the stop."""
+    robot = GatedWire()
+    rigs.append(rig := Rig(robot))
+    await rig.drive()
+    rig.guard.release("drive")
+    robot.let_through()
+    await settle()
+    assert robot.written == [b"go 1"]
+    robot.cut()
+    await rig.clock.advance(0.1)
+    robot.let_through(10)
+    await rig.clock.advance(0.1)
+    assert robot.written == [b"go 1", STOP]
+    assert await rig.stops() == [("drive", "revoked")]
 
 
 async def test_cut_line_is_opened_by_the_guard_itself(rig: Rig) -> None:

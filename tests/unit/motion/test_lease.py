@@ -93,6 +93,18 @@ def test_stop_latches_until_somebody_resets_it_on_purpose() -> None:
     assert isinstance(lease.take(ANNA, 2.0), Changed)
 
 
+def test_a_stop_stays_that_of_the_first_who_pressed_it() -> None:
+    """Who saw the danger can say when it is over; a second press changes no name."""
+    lease = Lease()
+    lease.stop("Eve")
+    again = lease.stop("Bert")
+    assert again.must_stop
+    assert again.state.latched_by == "Eve"
+    assert again.state.stops == 2
+    lease.reset(ANNA)
+    assert lease.stop("Bert").state.latched_by == "Bert"
+
+
 def test_what_was_wished_before_a_stop_is_refused_also_when_it_was_reset() -> None:
     """By whoever; what is wished after it is not."""
     lease = Lease()

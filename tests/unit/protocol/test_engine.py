@@ -2,6 +2,7 @@
 
 import pytest
 
+from tests.dialogue import Dialogue
 from urc.model.driver import (
     Argument,
     Command,
@@ -195,6 +196,38 @@ def test_a_line_that_misses_three_answers_in_a_row_is_given_up() -> None:
         events += wire.tick(wire.deadline)
     assert codes(events) == ["reply-timeout"] * 3
     assert events[-1] == Close("wire", "no answer to polls.0 within 0.5 s")
+
+
+@pytest.mark.parametrize(
+    ("errors", "answer", "outcome"),
+    [
+        ("", "V 7", "done"),
+        (", errors: [ERR]", "V 7", "done"),
+        (", errors: [ERR]", "ERR", "refused"),
+    ],
+)
+def test_an_answer_begins_the_count_of_missing_ones_again(
+    errors: str, answer: str, outcome: str
+) -> None:
+    """A robot that misses a few answers in an hour is healthy, also one that refuses."""
+    talk = Dialogue(f"""
+signals: {{ volts: {{}} }}
+commands: {{ ask: {{ send: ask, reply: {{ pattern: "V {{volts:number}}"{errors} }} }} }}
+""").connect()
+    now = 0.0
+    for misses in [1, 2] * 5:
+        for _ in range(misses):
+            number = talk.run("ask")
+            talk.at(now := now + 2.0)
+            assert talk.outcomes[number] == "timed-out"
+        number = talk.run("ask")
+        talk.says(answer)
+        assert talk.outcomes[number] == outcome
+    assert not talk.links
+    for _ in range(3):
+        talk.run("ask")
+        talk.at(now := now + 2.0)
+    assert talk.links == ["close wire: no answer to ask within 0.5 s"]
 
 
 def test_a_lost_connection_fails_what_was_waiting_and_forgets_half_a_frame() -> None:

@@ -3,7 +3,7 @@
 import json
 
 from urc.model.values import Sample, Signal
-from urc.runtime.hub import Hub
+from urc.runtime.hub import Hub, Note
 from urc.testing.clock import FakeClock
 from urc.web.feed.crowd import Place
 from urc.web.feed.fanout import Fanout
@@ -182,6 +182,18 @@ def test_a_lone_crowd_gets_images_and_values_in_turn() -> None:
     assert ann.woken == 0
     assert ann.values == [1, 3]
     assert [frame for frame in ann.frames if frame.startswith(JPEG)] == [JPEG, JPEG + b"2"]
+
+
+def test_lines_of_the_log_come_beside_streaming_values() -> None:
+    """A lone client gets them with the next values, not when those have an end."""
+    it = Scene()
+    ann = Client(it, 7)
+    it.say(a=1)
+    for value in (2, 3):
+        it.hub.note(Note(it.clock.now(), "warning", "wire", f"line {value}"))
+        it.say(a=value)
+        assert f"line {value}".encode() in it.kernel.taken[7]
+    assert [json.loads(frame)["t"] for frame in ann.frames] == ["v", "v", "log", "v", "log"]
 
 
 def test_a_camera_that_has_nothing_any_more_is_a_value() -> None:
