@@ -41,15 +41,24 @@ def _whole(value: object, what: str, least: int, most: int) -> int:
     raise ValueError(f"{what} is a whole number from {least} to {most}, found {_short(value)}")
 
 
+def _check_count(count: int, what: str) -> None:
+    if count > MAX_PARTS:
+        raise ValueError(f"there are more than {MAX_PARTS} {what}")
+
+
 def _column(value: Any, key: Any, between: Any = None) -> list[Any]:
     """Return one part of every row: by its name, by its place, or by its place in a text."""
     rows = _list(value)
     if between is not None:
         if not _text(between):
             raise ValueError("'column' needs something to cut the rows at")
-        rows = [_text(row).split(between) for row in rows if row]
+        # Counted before any row is cut: one text may stand in the list many times.
+        rows = [_text(row) for row in rows if row]
+        _check_count(sum(row.count(between) + 1 for row in rows), "parts")
     found = []
     for row in rows:
+        if between is not None:
+            row = row.split(between)
         if (isinstance(row, Mapping) and key in row) or _is_place(row, key):
             found.append(row[key])
         else:
@@ -69,6 +78,7 @@ def _cut(value: Any, start: Any, stop: Any = None) -> list[Any]:
     for row in _list(value):
         if not isinstance(row, (str, list, tuple)):
             raise TypeError(f"{_short(row)} has no parts in a row")
+    _check_count(sum(len(range(len(row))[begin:end]) for row in value), "parts")
     return [row[begin:end] for row in value]
 
 
@@ -130,8 +140,7 @@ def _numbers(value: Any, name: Any) -> list[int | float]:
     data = _bytes(value)
     if len(data) % size:
         raise ValueError(f"{len(data)} bytes are no numbers of {size} each")
-    if len(data) > MAX_PARTS:
-        raise ValueError(f"there are more than {MAX_PARTS} bytes")
+    _check_count(len(data), "bytes")
     return [_unpack(data, name, place) for place in range(0, len(data), size)]
 
 

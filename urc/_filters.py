@@ -16,6 +16,8 @@ __all__ = ["FILTERS", "SCOPE", "filter_names"]
 MAX_TEXT = 65536
 MAX_BITS = 4096
 """Integers stay below 2**4096."""
+MAX_DIGITS = 15
+"""Digits that a number has: `round` takes no more, to either side of the point."""
 
 
 def _number(value: object) -> Any:
@@ -146,7 +148,10 @@ def _float(value: Any, fallback: Any = None) -> Any:
 
 
 def _round(value: Any, digits: Any = 0) -> Any:
-    return round(_number(value), int(_number(digits)))
+    places = _number(digits)
+    if not -MAX_DIGITS <= places <= MAX_DIGITS:  # Python counts with as many digits as are asked
+        raise ValueError(f"'round' takes -{MAX_DIGITS} to {MAX_DIGITS} digits, found {places}")
+    return round(_number(value), int(places))
 
 
 def _require_text(value: Any) -> str:

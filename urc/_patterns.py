@@ -9,6 +9,10 @@ Theory of operation: backtracking costs more than linear time only when the same
 shared out between two parts of a pattern in many ways. So every repeat must be over one set of
 characters, that set must share nothing with what may come next, alternatives must differ in their
 first character, and the pattern must be anchored at the start.
+
+RE2 takes time in proportion to the text and to its program, into which ``{n}`` is written out. So
+the size of a pattern that is not proven is bounded. It is counted here, from the pattern as it is
+written: the answer is the same where RE2 is not installed.
 """
 
 import re
@@ -24,6 +28,7 @@ __all__ = [
     "PatternError",
     "can_be_empty",
     "compile_pattern",
+    "cost_of",
     "example",
     "is_plain_group",
     "literal_prefix",
@@ -32,6 +37,12 @@ __all__ = [
 MAX_SOURCE: Final = 1024
 MAX_REPEAT: Final = 1000
 """RE2's own limit on ``{n}``."""
+MAX_COST: Final = 500
+"""Parts of a pattern that is not proven, its repeats written out: about RE2's instructions."""
+_RE2_BYTES: Final = 1 << 20
+"""Memory that RE2 may take for one pattern."""
+_BEYOND_ASCII: Final = 6
+"""Instructions of RE2 for all characters outside ASCII: they are matched byte by byte."""
 
 _OTHER = 128
 """Stands for every character outside ASCII."""
@@ -136,6 +147,12 @@ def compile_pattern(text: str) -> Pattern:
         ends_there = tree[-1] == (_constants.AT, _constants.AT_END)
         source = text[:-1] + r"\Z" if ends_there else text
         return Pattern(text, groups, re.compile(source, re.ASCII).match, True)
+    cost = _cost(tree)
+    if cost > MAX_COST:
+        raise PatternError(
+            f"this pattern counts to {cost} parts; {MAX_COST} are allowed: use smaller numbers in"
+            " {…}, or start it with '^' and let no repeat run into what follows it"
+        )
     return Pattern(text, groups, _re2_search(text), False)
 
 
@@ -268,6 +285,35 @@ def _parts(operation: Any, argument: Any) -> list[Any]:
     return list(argument[1]) if operation is _constants.BRANCH else []
 
 
+def cost_of(source: str) -> int:
+    """Return the number of parts of a pattern, its repeats written out."""
+    return _cost(_parser.parse(source, re.ASCII))
+
+
+def _cost(tree: Any) -> int:
+    return sum(_cost_of_item(operation, argument) for operation, argument in tree)
+
+
+def _cost_of_item(operation: Any, argument: Any) -> int:
+    if operation is _constants.LITERAL:
+        return len(chr(argument).encode("utf-8", "surrogatepass"))
+    if operation is _constants.SUBPATTERN:
+        return _cost(argument[3]) + (0 if argument[0] is None else 2)
+    if operation is _constants.BRANCH:
+        return sum(_cost(part) + 1 for part in argument[1]) - 1
+    if operation in (_constants.MAX_REPEAT, _constants.MIN_REPEAT):
+        low, high, inner = argument
+        once = _cost(inner)
+        if high is _constants.MAXREPEAT:
+            return int(max(low, 1) * once + 1)
+        return int(high * once + (high - low))
+    characters = _characters(operation, argument)
+    if characters is None:
+        return 1
+    starts = sum(1 for code in characters if code < _OTHER and code - 1 not in characters)
+    return starts + (_BEYOND_ASCII if _OTHER in characters else 0)
+
+
 def _re2_search(text: str) -> Any:
     try:
         import re2
@@ -278,7 +324,7 @@ def _re2_search(text: str) -> Any:
         ) from None
     options = re2.Options()
     options.log_errors = False
-    options.max_mem = 1 << 23
+    options.max_mem = _RE2_BYTES
     try:
         return re2.compile(text, options).search
     except re2.error as error:

@@ -86,7 +86,7 @@ def _searcher(pattern: str) -> Search:
         return compiled
     options = re2.Options()
     options.log_errors = False
-    options.max_mem = 1 << 23
+    options.max_mem = 1 << 20  # as for all patterns
     options.encoding = re2.Options.Encoding.LATIN1
     searched: Search = re2.compile(source, options).search
     return searched
