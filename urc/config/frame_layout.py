@@ -3,18 +3,27 @@
 A frame is seen whole here: with its start and end bytes, without a delimiter or byte stuffing.
 """
 
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 from urc.config.parse_bytes import parse_bytes
 from urc.config.parse_checksum import WrittenChecksum, parse_checksum
 from urc.config.parse_length import check_length, check_loose, parse_length
 from urc.config.part import Findings, Part
-from urc.model.framing import ChecksumSpec, FrameLayout, LengthSpec, Window
+from urc.model.framing import (
+    ChecksumSpec,
+    Digits,
+    FrameLayout,
+    LengthSpec,
+    TrailSpec,
+    Window,
+)
 
 __all__ = ["MARKED", "checksums_of", "parse_layout"]
 
 MARKED: Final = ("fixed", "length", "brackets")
 """Framings whose frames carry bytes of their own."""
+_SPELT: Final = ("delimiter", "brackets", "idle", "datagram")
+"""Framings whose frames may be spelt in digits."""
 
 
 class _Frame(NamedTuple):
@@ -44,9 +53,55 @@ def parse_layout(part: Part, encoding: str, findings: Findings, longest: int) ->
         if length.is_loose:
             check_loose(part, findings)
     found = [parse_checksum(one, encoding, findings) for one in checksums_of(part)]
-    layout = _placed(part, frame, [one for one in found if one is not None], findings)
+    written = [one for one in found if one is not None]
+    trailing = [one for one in written if one.trail is not None]
+    digits = _digits(part, findings)
+    if trailing:
+        _check_trail(part, trailing[0], len(written), findings)
+        layout = FrameLayout(start, end, len(start), len(end), trail=_trail_of(trailing[0], start))
+    else:
+        layout = _placed(part, frame, written, findings)
     _check_size(part, layout, longest, findings)
-    return layout
+    return layout._replace(digits=digits)
+
+
+def _digits(part: Part, findings: Findings) -> Digits:
+    """Return how the framing at `part` spells its bytes."""
+    digits: Any = part.text("decode") if part.text("type") in _SPELT else ""
+    if digits and "escape" in part.data:
+        text = "'escape' means nothing beside 'decode': digits hide nothing"
+        findings.error(part, "misplaced-key", text, at="escape", key=True)
+    return digits  # type: ignore[no-any-return]  # the schema has the words
+
+
+def _check_trail(part: Part, written: WrittenChecksum, count: int, findings: Findings) -> None:
+    key = "after" if "after" in written.part.data else "each"
+    kind = part.text("type")
+    if kind in ("fixed", "length"):
+        findings.error(
+            written.part,
+            "misplaced-key",
+            f"'{key}' is for frames of text; one of type {kind!r} has fixed places",
+            at=key,
+            key=True,
+            hint="say by 'at' where the checksum stands",
+        )
+    elif count > 1:
+        text = f"a checksum with '{key}' is the only one of its frame"
+        findings.error(written.part, "misplaced-key", text, at=key, key=True)
+
+
+def _trail_of(written: WrittenChecksum, start: bytes) -> TrailSpec:
+    trail = written.trail
+    if trail is None:
+        raise AssertionError("a checksum in a fixed place is no trail")
+    over = written.over
+    if not isinstance(over, Window):
+        over = Window(len(start) if over == "payload" and not trail.each else 0)
+    checksum = _spec_of(written, over, -written.size)
+    return TrailSpec(
+        checksum, trail.mark, trail.is_padded, trail.is_optional, trail.each, trail.skip
+    )
 
 
 def checksums_of(part: Part) -> list[Part]:
@@ -115,7 +170,10 @@ def _checksum(
     behind = len(layout.end)
     if is_last:
         behind = -at if at < 0 else behind + written.size
-    over = _over(written, behind, layout)
+    return _spec_of(written, _over(written, behind, layout), at)
+
+
+def _spec_of(written: WrittenChecksum, over: Window, at: int) -> ChecksumSpec:
     return ChecksumSpec(
         written.algorithm, written.bits, over, at, written.is_big, written.spelling,
         written.salt, written.is_from_hex, written.closes, written.before,

@@ -3,7 +3,7 @@
 What depends on the rest of the frame (`at: end`, `over: payload`) is settled by the framing.
 """
 
-from typing import Any, NamedTuple
+from typing import Any, Final, NamedTuple
 
 from urc.config.parse_bytes import parse_bytes
 from urc.config.part import Findings, Part
@@ -19,7 +19,24 @@ from urc.model.framing import (
     spelt_size,
 )
 
-__all__ = ["WrittenChecksum", "parse_checksum"]
+__all__ = ["WrittenChecksum", "parse_checksum", "values_of"]
+
+
+_TRAIL_KEYS: Final = frozenset(("after", "each", "leading_zeros", "optional", "skip"))
+_NEEDED: Final = {
+    "after": "such as after: '*', where a mark stands before the checksum",
+    "each": "such as each: LF, where each line has a checksum",
+}
+
+
+class WrittenTrail(NamedTuple):
+    """How a checksum stands behind a text or its lines, as its author wrote it."""
+
+    mark: bytes
+    is_padded: bool
+    is_optional: bool
+    each: bytes
+    skip: int
 
 
 class WrittenChecksum(NamedTuple):
@@ -38,6 +55,8 @@ class WrittenChecksum(NamedTuple):
     is_from_hex: bool
     closes: bool
     before: bytes
+    trail: "WrittenTrail | None" = None
+    """Where it stands behind a text; `at` is None then."""
 
     @property
     def size(self) -> int:
@@ -58,6 +77,7 @@ def parse_checksum(part: Part, encoding: str, findings: Findings) -> WrittenChec
     is_from_hex = part.flag("from_hex", default=False)
     closes = part.text("on_error", "drop") == "close"
     before = parse_bytes(part.get("before"), encoding, findings)
+    trail = _trail(part, encoding, findings) if _TRAIL_KEYS & part.data.keys() else None
     if algorithm is None or salt is None:
         return None
     place = None if at is None or isinstance(at.data, str) else int(at.data)
@@ -73,6 +93,45 @@ def parse_checksum(part: Part, encoding: str, findings: Findings) -> WrittenChec
         is_from_hex,
         closes,
         before or b"",
+        trail,
+    )
+
+
+def values_of(algorithm: CrcSpec | FoldSpec | str) -> frozenset[int]:
+    """Return which bytes a checksum may have in it when it is written raw."""
+    every = range(256)
+    if not isinstance(algorithm, FoldSpec) or algorithm.bits != 8:
+        return frozenset(every)
+    mask = 0xFF if algorithm.mask is None else algorithm.mask
+    return frozenset((one & mask) + algorithm.added & 0xFF | algorithm.ored for one in every)
+
+
+def _trail(part: Part, encoding: str, findings: Findings) -> WrittenTrail | None:
+    """Return how the checksum at `part` stands behind a text; None when it does not."""
+    mark = parse_bytes(part.get("after"), encoding, findings) or b""
+    each = parse_bytes(part.get("each"), encoding, findings) or b""
+    for key, bytes_found in (("after", mark), ("each", each)):
+        if key in part.data and part.data[key] in ("", []):
+            findings.error(part, "empty-mark", f"an empty '{key}' marks nothing", at=key)
+            return None
+        if bytes_found and isinstance(part.data.get("at", "end"), int):
+            text = f"'at' means nothing beside '{key}', which says where the checksum stands"
+            findings.error(part, "misplaced-key", text, at="at", key=True)
+    needs = {"optional": "after", "skip": "each", "leading_zeros": "after"}
+    for key, needed in needs.items():
+        if key in part.data and needed not in part.data:
+            text = f"'{key}' means nothing without '{needed}'"
+            hint = _NEEDED[needed]
+            findings.error(part, "misplaced-key", text, at=key, key=True, hint=hint)
+    is_padded = part.flag("leading_zeros", default=True)
+    if not is_padded and part.text("as", "raw") == "raw":
+        text = "raw bytes have no leading zeros"
+        hint = "add 'as: dec', or 'as: hex'"
+        findings.error(part, "misplaced-key", text, at="leading_zeros", key=True, hint=hint)
+    if not mark and not each:
+        return None
+    return WrittenTrail(
+        mark, is_padded, part.flag("optional", default=False), each, part.integer("skip") or 0
     )
 
 
@@ -132,8 +191,9 @@ def _fold(part: Part, findings: Findings) -> FoldSpec | None:
     operation, complement = part.text("fold"), part.text("complement", "none")
     bits, of = part.integer("bits") or 8, part.integer("of") or 8
     mask, ored = part.integer("mask"), part.integer("or") or 0
+    added = part.integer("add") or 0
     is_good = True
-    for name, number in (("mask", mask or 0), ("or", ored)):
+    for name, number in (("mask", mask or 0), ("add", added), ("or", ored)):
         if number >> bits:
             is_good = False
             text = f"0x{number:X} has more than {bits} bits"
@@ -155,6 +215,7 @@ def _fold(part: Part, findings: Findings) -> FoldSpec | None:
         of,
         "ones" if complement == "ones" else "twos" if complement == "twos" else "none",
         mask,
+        added,
         ored,
         is_odd_xored,
     )

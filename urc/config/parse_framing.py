@@ -3,9 +3,10 @@
 from collections.abc import Callable
 from typing import Any, Final
 
-from urc.config.frame_layout import MARKED, checksums_of, parse_layout
+from urc.config.frame_layout import MARKED, parse_layout
 from urc.config.frame_pattern import check_frame_pattern
 from urc.config.parse_bytes import parse_bytes
+from urc.config.parse_checksum import values_of
 from urc.config.parse_escape import parse_escape
 from urc.config.part import Findings, Part
 from urc.config.suggest import did_you_mean, listed
@@ -41,6 +42,8 @@ def parse_framing(part: Part, encoding: str, findings: Findings, catalog: Catalo
         return FramingSpec(kind.data, options, longest)
     options = parse(part, encoding, findings)
     layout = parse_layout(part, encoding, findings, longest)
+    if kind.data == "delimiter" and "escape" not in part.data:
+        _check_raw(part, layout, options, findings)
     escape = parse_escape(part, layout, options, encoding, findings)
     if escape is not None and escape.is_of_payload:
         layout = layout._replace(escape=escape)
@@ -71,16 +74,25 @@ def _delimiter(part: Part, encoding: str, findings: Findings) -> dict[str, Any]:
             "an empty delimiter cannot end a frame",
             hint="name what the robot sends after each answer, such as LF or CRLF",
         )
-    checksum = part.get("checksum")
-    spelling = [one.text("as", "raw") for one in checksums_of(part)]
-    if checksum is not None and "raw" in spelling and "escape" not in part.data:
-        findings.warn(
-            checksum,
-            "raw-checksum",
-            "a checksum of raw bytes may contain the delimiter and cut its own frame",
-            hint="write 'as: hex', or use a framing that knows the size of its frames",
-        )
     return {"tx": tx or b"", "rx": rx or b"\n"}
+
+
+def _check_raw(
+    part: Part, layout: FrameLayout, options: dict[str, Any], findings: Findings
+) -> None:
+    """Warn of a checksum of raw bytes among which a delimiter may be."""
+    specs = () if layout.digits else (*layout.checksums, layout.checksum)
+    trailing = layout.trail.checksum if layout.trail else None
+    ends = options["tx"] + options["rx"]
+    for spec in (*specs, trailing):
+        if spec is not None and spec.spelling == "raw" and values_of(spec.algorithm) & {*ends}:
+            findings.warn(
+                part.must("checksum"),
+                "raw-checksum",
+                "a checksum of raw bytes may contain the delimiter and cut its own frame",
+                hint="write 'as: hex', or use a framing that knows the size of its frames",
+            )
+            return
 
 
 def _regex(part: Part, encoding: str, findings: Findings) -> dict[str, Any]:

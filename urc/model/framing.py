@@ -14,18 +14,22 @@ __all__ = [
     "PLAIN_CHECKSUMS",
     "ChecksumSpec",
     "CrcSpec",
+    "Digits",
     "EscapeSpec",
     "FoldSpec",
     "FrameLayout",
     "LengthSpec",
     "Salt",
     "Spelling",
+    "TrailSpec",
     "Window",
     "spelt_size",
 ]
 
 Spelling = Literal["raw", "hex", "HEX", "dec"]
 """How a number stands in a frame: as bytes, or as digits (``HEX``: in capitals)."""
+Digits = Literal["", "hex", "HEX", "base64"]
+"""How a frame spells its bytes, between its marks: "" as they are."""
 
 
 class CrcSpec(NamedTuple):
@@ -50,8 +54,10 @@ class FoldSpec(NamedTuple):
     complement: Literal["none", "ones", "twos"] = "none"
     mask: int | None = None
     """Bits of the result that are kept."""
+    added: int = 0
+    """Number that is added to the result, after the mask."""
     ored: int = 0
-    """Bits of the result that are set, after the mask."""
+    """Bits of the result that are set, last of all."""
     is_odd_xored: bool = False
     """A byte that is left over by numbers of 16 bits is put to the result by exclusive or."""
 
@@ -107,6 +113,23 @@ class ChecksumSpec(NamedTuple):
     def size(self) -> int:
         """Bytes that it takes in the frame."""
         return spelt_size(self.bits, self.spelling)
+
+
+class TrailSpec(NamedTuple):
+    """A checksum behind a text, in a place that only the text shows."""
+
+    checksum: ChecksumSpec
+    """Its window is counted in the text without the checksum; `at` means nothing."""
+    mark: bytes = b""
+    """Stands between the text and the checksum."""
+    is_padded: bool = True
+    """Whether its digits have leading zeros."""
+    is_optional: bool = False
+    """Whether a text without the mark is good, too."""
+    each: bytes = b""
+    """Separates the lines of a frame, each of which has a checksum of its own."""
+    skip: int = 0
+    """First lines that have none."""
 
 
 class LengthSpec(NamedTuple):
@@ -170,6 +193,10 @@ class FrameLayout(NamedTuple):
     """Those before it."""
     escape: EscapeSpec | None = None
     """Stuffing of the payload alone."""
+    trail: TrailSpec | None = None
+    """Checksum that is taken off before all others are looked at, and put on behind them."""
+    digits: Digits = ""
+    """How what is between start and end is spelt; places and `checksums` count the bytes."""
 
 
 def spelt_size(bits: int, spelling: Spelling) -> int:

@@ -15,7 +15,7 @@ from typing import Final
 from urc.model.framing import ChecksumSpec, CrcSpec, FoldSpec, Salt, Window
 from urc.problems import UrcError
 
-__all__ = ["NAMED", "BadFrame", "Checksum", "build_algorithm"]
+__all__ = ["NAMED", "BadFrame", "Checksum", "build_algorithm", "cut"]
 
 Compute = Callable[[bytes], int]
 
@@ -67,7 +67,7 @@ def _fold(spec: FoldSpec, is_big: bool) -> Compute:
             value = ~value
         elif minus:
             value = -value
-        return value & mask ^ last | spec.ored
+        return (value & mask) + spec.added & full ^ last | spec.ored
 
     return compute
 
@@ -128,29 +128,54 @@ class Checksum:
 
     def check(self, frame: bytes) -> None:
         """Raise `BadFrame` unless the frame carries the right number."""
-        place, window = self._place(frame), self._window(frame)
-        if window is None:
-            return
-        found = frame[place : place + self.size]
-        right = self._spelt(self._compute(window))
-        if found == right or (self.spec.spelling[0] in "hH" and found.upper() == right.upper()):
-            return
-        shown, wanted = _shown(found, self.spec.spelling), _shown(right, self.spec.spelling)
-        raise BadFrame(
-            "bad-checksum",
-            f"the frame carries the checksum {shown}, but {wanted} would be right; dropped",
-            closes=self.spec.closes,
-        )
+        place = self._place(frame)
+        right = self.right(frame, self._window(frame, place))
+        if right is not None:
+            self.compare(frame[place : place + self.size], right)
 
     def put(self, frame: bytearray) -> None:
         """Write the right number into its place; raise `BadFrame` when the frame has none."""
         place = self._place(frame)
-        window = self._window(frame)
-        if window is None:
-            number = self.spec.salt.number(frame)
-            raise BadFrame("no-salt", f"the salt of the checksum's table has no row {number}")
-        right = self._spelt(self._compute(window))
+        right = self.right(frame, self._window(frame, place))
+        if right is None:
+            raise self.saltless(frame)
         frame[place : place + self.size] = right
+
+    def right(self, frame: bytes | bytearray, window: bytes) -> bytes | None:
+        """Return what the frame has to carry, where the checksum is taken over `window`.
+
+        None: the salt is unknown, and the frame is taken as it is.
+        """
+        data = window
+        if self.spec.is_from_hex:
+            data = _from_hex(data)
+        if self.spec.before:
+            data = self.spec.before + data
+        if self._salt is not None:
+            salt = self._salt(frame)
+            if salt is None:
+                return None
+            data += salt
+        return self._spelt(self._compute(data))
+
+    def compare(self, found: bytes, right: bytes) -> None:
+        """Raise `BadFrame` unless `found` is `right`; capitals of hex digits make no difference."""
+        spelling = self.spec.spelling
+        if found == right or (spelling[0] in "hH" and found.upper() == right.upper()):
+            return
+        raise self.wrong(
+            f"the frame carries the checksum {_shown(found, spelling)}, but"
+            f" {_shown(right, spelling)} would be right; dropped"
+        )
+
+    def wrong(self, message: str) -> BadFrame:
+        """Return the error of a frame with a wrong checksum."""
+        return BadFrame("bad-checksum", message, closes=self.spec.closes)
+
+    def saltless(self, frame: bytes | bytearray) -> BadFrame:
+        """Return the error of a frame that is to be sent and has no salt."""
+        number = self.spec.salt.number(frame)
+        return BadFrame("no-salt", f"the salt of the checksum's table has no row {number}")
 
     def _place(self, frame: bytes | bytearray) -> int:
         place = self.spec.at if self.spec.at >= 0 else len(frame) + self.spec.at
@@ -158,28 +183,14 @@ class Checksum:
             raise BadFrame("short-frame", f"{len(frame)} bytes are too few to hold the checksum")
         return place
 
-    def _window(self, frame: bytes | bytearray) -> bytes | None:
-        """Return what is summed up: the checksum's own bytes count as zeros, the salt is added.
-
-        None: nobody knows the salt, and the frame is taken as it is.
-        """
-        window: Window = self.spec.over
-        start, stop, _ = slice(window.start, window.stop).indices(len(frame))
-        if start > stop:
-            raise BadFrame("short-frame", f"{len(frame)} bytes are too few for the checksum")
-        place = self._place(frame)
-        data = bytes(frame[start:stop])
+    def _window(self, frame: bytes | bytearray, place: int) -> bytes:
+        """Return what is summed up: the checksum's own bytes count as zeros."""
+        start, data = cut(frame, self.spec.over)
+        stop = start + len(data)
         first, last = max(start, place), min(stop, place + self.size)
         if first < last:
             data = data[: first - start] + bytes(last - first) + data[last - start :]
-        if self.spec.is_from_hex:
-            data = _from_hex(data)
-        if self.spec.before:
-            data = self.spec.before + data
-        if self._salt is None:
-            return data
-        salt = self._salt(frame)
-        return None if salt is None else data + salt
+        return data
 
     def _spelt(self, number: int) -> bytes:
         spec = self.spec
@@ -190,6 +201,14 @@ class Checksum:
             return data
         digits = data.hex()
         return (digits if spec.spelling == "hex" else digits.upper()).encode()
+
+
+def cut(frame: bytes | bytearray, window: Window) -> tuple[int, bytes]:
+    """Return where `window` begins in `frame`, and its bytes; raise `BadFrame` when too short."""
+    start, stop, _ = slice(window.start, window.stop).indices(len(frame))
+    if start > stop:
+        raise BadFrame("short-frame", f"{len(frame)} bytes are too few for the checksum")
+    return start, bytes(frame[start:stop])
 
 
 def _from_hex(digits: bytes) -> bytes:

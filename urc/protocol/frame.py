@@ -3,13 +3,15 @@
 Floor 3, pure. A `Seal` is one layout at work; framings cut the stream and leave the rest to it.
 """
 
+import binascii
 from typing import Literal
 
-from urc.model.framing import FrameLayout, LengthSpec
+from urc.model.framing import Digits, FrameLayout, LengthSpec
 from urc.protocol.checksums import BadFrame, Checksum
 from urc.protocol.open_source import generate_open
 from urc.protocol.spelt_length import SpeltLength
 from urc.protocol.stuffing import Stuffing
+from urc.protocol.trail import Trail
 
 __all__ = ["BadFrame", "LengthField", "Seal", "length_of"]
 
@@ -24,12 +26,21 @@ class Seal:
         specs = (*layout.checksums, *((layout.checksum,) if layout.checksum else ()))
         self._checksums = tuple(Checksum(one) for one in specs)
         self._stuffing = Stuffing(layout.escape) if layout.escape else None
-        is_plain = not layout.checksums and layout.escape is None and self._loose is None
+        self._trail = Trail(layout.trail, layout.start) if layout.trail else None
+        self._is_text = layout.trail is not None or layout.digits != ""
+        is_plain = (
+            not layout.checksums
+            and layout.escape is None
+            and self._loose is None
+            and not self._is_text
+        )
         self.open = generate_open(layout, self._open) if is_plain else self._open
         """Frame → payload; raises `BadFrame` when the checksum is wrong or lacks its place."""
 
     def _open(self, frame: bytes) -> bytes:
         """Return the payload; raise `BadFrame` when the checksum is wrong or lacks its place."""
+        if self._is_text:
+            frame = self._read(frame)
         for checksum in self._checksums:
             checksum.check(frame)
         head, stop = self.layout.head, len(frame) - self.layout.tail
@@ -66,7 +77,47 @@ class Seal:
             self.length.put(frame, len(frame) - layout.tail)
         for checksum in self._checksums:
             checksum.put(frame)
-        return bytes(frame)
+        return self._spelt(bytes(frame)) if self._is_text else bytes(frame)
+
+    def _read(self, frame: bytes) -> bytes:
+        """Return the frame with its trailing checksum taken off and its digits read."""
+        start, end = self.layout.start, self.layout.end
+        if len(frame) < len(start) + len(end):
+            raise BadFrame("short-frame", f"{len(frame)} bytes are too few for this kind of frame")
+        content = frame[len(start) : len(frame) - len(end)]
+        if self._trail is not None:
+            content = self._trail.take_off(content)
+        return start + _bytes_of(content, self.layout.digits) + end
+
+    def _spelt(self, frame: bytes) -> bytes:
+        """Return the frame as it is on the line; the inverse of `_read`."""
+        start, end = self.layout.start, self.layout.end
+        content = _digits_of(frame[len(start) : len(frame) - len(end)], self.layout.digits)
+        if self._trail is not None:
+            content = self._trail.put_on(content)
+        return start + content + end
+
+
+def _bytes_of(text: bytes, digits: Digits) -> bytes:
+    if not digits:
+        return text
+    try:
+        if digits == "base64":
+            return binascii.a2b_base64(text, strict_mode=True) if text else b""
+        return binascii.unhexlify(text)
+    except binascii.Error:
+        noun = "base64" if digits == "base64" else "pairs of hex digits"
+        shown = ascii(text[:40].decode("latin-1"))
+        raise BadFrame("bad-digits", f"{noun} are expected in the frame, found {shown}") from None
+
+
+def _digits_of(data: bytes, digits: Digits) -> bytes:
+    if digits == "base64":
+        return binascii.b2a_base64(data, newline=False)
+    if digits:
+        text = data.hex().encode()
+        return text if digits == "hex" else text.upper()
+    return data
 
 
 def length_of(spec: LengthSpec) -> "LengthField | SpeltLength":

@@ -4,6 +4,7 @@ from functools import cache
 from typing import Any
 
 from tests.unit.protocol.framing_samples_sized import SIZED, Sample, wire
+from tests.unit.protocol.framing_samples_text import TEXT
 from urc.config.parse_framing import parse_framing
 from urc.config.part import Findings, Part
 from urc.model.driver import FramingSpec
@@ -58,6 +59,7 @@ CONTROL = wire("fd 0b 00 00 00 ff be 45 00 00 f4 01 00 00 f4 01 00 00 00 00 01 8
 
 SAMPLES = [
     *SIZED,
+    *TEXT,
     Sample(
         "delimiter",
         "{ type: delimiter, tx: CRLF, rx: CRLF }",
