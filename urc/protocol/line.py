@@ -77,7 +77,8 @@ class Line(Answering):
         refusal = self._refusal(exchange)
         if refusal:
             return [Ended(exchange, Outcome("disconnected", refusal))]
-        if exchange.is_realtime and not self.is_per_request:  # the line is ready
+        may_pass = self.is_ready or exchange.is_privileged
+        if exchange.is_realtime and may_pass and not self.is_per_request:
             if len(self._flights) >= MOST_IN_FLIGHT:
                 text = f"{MOST_IN_FLIGHT} requests wait for their answers already"
                 return [Ended(exchange, Outcome("queue-full", text))]
@@ -113,7 +114,7 @@ class Line(Answering):
             return "the robot is not connected"
         if self._is_leaving:
             return "the line is being closed"
-        if exchange.ask.is_motion or exchange.is_realtime:
+        if exchange.ask.is_motion:
             return "the robot is not ready: the steps of its connection are not done"
         return ""  # it waits for them, as long as for any other turn
 

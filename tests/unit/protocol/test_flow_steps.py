@@ -46,10 +46,10 @@ def logged_in() -> Dialogue:
 
 
 def test_a_line_is_used_only_after_its_steps_are_done() -> None:
-    """Commands wait for it, but what moves or is real-time fails; polls begin after it."""
+    """Commands wait for it, but what a hand holds fails; polls begin after it."""
     talk = Dialogue(LOGIN, SETTINGS).connect()
     early = talk.run("ping")
-    assert [talk.outcomes.get(talk.run(one)) for one in ("halt", "drive")] == ["disconnected"] * 2
+    assert talk.outcomes.get(talk.run("drive")) == "disconnected"
     assert talk.sent == []
     talk.raw(b"Robot v1\nlog")
     talk.raw(b"in: ")
@@ -66,6 +66,34 @@ def test_a_line_is_used_only_after_its_steps_are_done() -> None:
     assert talk.sent == ["STATE?"]
     talk.says("STATE ready")
     assert talk.values == {"state": "ready"}
+
+
+def test_a_stop_that_comes_during_the_login_is_the_first_thing_after_it() -> None:
+    """It passes what waited before it, and it is not refused: whoever stops asks once."""
+    talk = Dialogue(LOGIN, SETTINGS).connect()
+    talk.run("ping")
+    stop = talk.run("halt")
+    assert stop not in talk.outcomes
+    talk.raw(b"login: ")
+    talk.raw(b"password: ")
+    talk.says("WELCOME ada")
+    assert "HALT" not in talk.sent
+    talk.says("STATE awake")
+    assert talk.sent == ["HALT", "PING"]
+    assert talk.outcomes[stop] == "done"
+
+
+def test_a_stop_that_waits_for_a_login_that_fails_fails_with_it() -> None:
+    """It is told, and nothing of it is left for the next connection."""
+    talk = Dialogue(LOGIN, SETTINGS).connect()
+    stop = talk.run("halt")
+    talk.at(0.5)
+    assert talk.outcomes[stop] == "disconnected"
+    talk.connect()
+    for said in (b"login: ", b"password: "):
+        talk.raw(said)
+    talk.says("WELCOME ada", "STATE awake")
+    assert "HALT" not in talk.sent
 
 
 def test_a_whole_login_may_arrive_in_one_chunk() -> None:
