@@ -287,19 +287,6 @@ def test_send_to_a_robot_that_does_not_answer_ends(bot: str) -> None:
     assert done.stderr == "urc send: ask failed (timed-out): no answer to ask within 0.5 s\n"
 
 
-def test_send_moves_nothing_that_has_to_be_held(bot: str) -> None:
-    """Nobody could let it go: the robot is not even connected to."""
-    held = "  go:\n    send: go {{ v }}\n    args: { v: { default: 0 } }\n"
-    held += "    hold: { repeat: 50ms, release: { v: 0 }, watchdog: none }\n"
-    Path(bot).write_text(BOT.replace("commands:\n", f"commands:\n{held}"), encoding="utf-8")
-    done = run("send", bot, "go", "v=1", *at(free_port()))
-    assert (done.returncode, done.stdout) == (2, "")
-    assert done.stderr == (
-        "urc send: go moves the robot for as long as it is held, and nothing holds it here:"
-        " give it on the dashboard\n"
-    )
-
-
 def test_send_waits_for_what_the_command_requires(urc_process: Start, bot: str) -> None:
     """The poll that reads it goes out first; its answer counts."""
     text = BOT.replace(

@@ -20,6 +20,7 @@ from urc.problems import UrcError
 from urc.runtime.catalog import built_in_catalog
 from urc.runtime.kept import Kept
 from urc.runtime.selftest import sample_settings
+from urc.runtime.servers import announced
 from urc.runtime.session import Motion, Session
 from urc.simulator.stand_in import stand_in
 from urc.simulator.twin import Twin
@@ -137,7 +138,12 @@ async def _serve(
         )
         gc.collect()
         gc.freeze()  # what is loaded by now stays: looking through it again would hold us up
-        await serve(app, host=place.host, port=place.port, on_ready=on_ready)
+
+        def ready(url: str) -> None:
+            stack.enter_context(announced(workshop.data, url))
+            on_ready(url)
+
+        await serve(app, host=place.host, port=place.port, on_ready=ready)
     return 0
 
 

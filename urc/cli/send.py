@@ -1,22 +1,28 @@
-"""`urc send`: one command, its reply as JSON."""
+"""`urc send`: one command, its reply as JSON.
+
+What moves the robot is neither begun against a latched STOP nor against a person who drives, and
+ends when either comes: the engine is told of a STOP that is latched elsewhere.
+"""
 
 import argparse
 import asyncio
 import re
-from collections.abc import Mapping
-from contextlib import suppress
+from collections.abc import AsyncIterator, Mapping
+from contextlib import asynccontextmanager, suppress
+from pathlib import Path
 from typing import TYPE_CHECKING
 
-from urc.cli.arguments import add_profile, load, what_it_has
+from urc.cli.arguments import add_profile, duration, load, what_it_has
 from urc.cli.failures import Misuse
 from urc.cli.output import json_text
 from urc.problems import UrcError
 
 if TYPE_CHECKING:
+    from urc.cli.hindrance import Hindrance
     from urc.model.driver import Argument, Command
     from urc.model.profile import Profile
     from urc.model.values import Reading, Value
-    from urc.runtime.session import CommandFailed, Session
+    from urc.runtime.session import CommandFailed, Motion, Session
 
 EXAMPLE = "urc send my-robot.yaml set_speed speed=3 --set host=192.168.1.20"
 
@@ -32,6 +38,25 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_profile(parser)
     parser.add_argument("command", metavar="COMMAND", help="a command of the robot's driver")
     parser.add_argument("words", metavar="ARG=VALUE", nargs="*", default=[], help="its arguments")
+    parser.add_argument(
+        "--hold",
+        dest="hold_s",
+        metavar="TIME",
+        type=duration,
+        help="give a command that is held for so long (500ms, 2s), then release it",
+    )
+    parser.add_argument(
+        "--despite-stop",
+        action="store_true",
+        help="move the robot also while STOP is latched or a person drives it",
+    )
+    parser.add_argument(
+        "--data-dir",
+        dest="data",
+        metavar="FOLDER",
+        type=Path,
+        help="URC's own data, where 'urc serve' keeps a stop (default: as there)",
+    )
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -44,14 +69,24 @@ def run(arguments: argparse.Namespace) -> int:
     if command is None:
         hint = what_it_has(arguments.command, profile.driver.commands)
         raise Misuse(f"{profile.name} has no command {arguments.command!r}; {hint}")
-    if command.hold is not None:
-        raise Misuse(
-            f"{command.name} moves the robot for as long as it is held, and nothing holds it here:"
-            " give it on the dashboard"
-        )
+    _check_hold(command, arguments.hold_s)
     values = _arguments(command, arguments.words)
     settings = complete_settings(profile, arguments)
-    return run_loop(_send(profile, settings, command, values))
+    return run_loop(_send(profile, settings, command, values, arguments))
+
+
+def _check_hold(command: "Command", hold_s: float | None) -> None:
+    if command.hold is None and hold_s is not None:
+        raise Misuse(f"{command.name} is given once, and not held: leave --hold out")
+    if command.hold is not None and hold_s is None:
+        raise Misuse(
+            f"{command.name} moves the robot for as long as it is held: say how long, as --hold 1s"
+        )
+    if hold_s is not None:
+        from urc.runtime.holding import LONGEST_HOLD_S
+
+        if hold_s > LONGEST_HOLD_S:
+            raise Misuse(f"--hold is at most {LONGEST_HOLD_S:g}s; drive longer on a dashboard")
 
 
 def _arguments(command: "Command", words: list[str]) -> dict[str, "Reading"]:
@@ -109,19 +144,77 @@ async def _send(
     settings: Mapping[str, "Value"],
     command: "Command",
     values: Mapping[str, "Reading"],
+    arguments: argparse.Namespace,
 ) -> int:
     from urc.runtime.catalog import built_in_catalog
     from urc.runtime.session import CommandFailed, Session
 
-    async with Session(profile, settings, built_in_catalog().transports) as session:
+    transports = built_in_catalog().transports
+    motion: Motion = "none" if command.hold is None else "guarded"
+    async with Session(profile, settings, transports, motion=motion) as session:
         await _known(session, command)
         try:
-            replied = await session.command(command.name, values)
+            async with _heeding(session, command, arguments) as hindrance:
+                replied = await _given(session, command, values, arguments.hold_s, hindrance)
         except CommandFailed as failed:
             text = f"{command.name} failed ({failed.code}): {_why(session, command, failed)}"
             raise (Misuse if failed.code in _WRONG_USE else UrcError)(text) from failed
-    print(json_text({"command": command.name, "values": dict(replied.values)}))
+        lost = await session.settle()
+    if lost:
+        raise UrcError(f"{command.name} was sent, but {lost}")
+    print(json_text({"command": command.name, "values": replied}))
     return 0
+
+
+async def _given(
+    session: "Session",
+    command: "Command",
+    values: Mapping[str, "Reading"],
+    hold_s: float | None,
+    hindrance: "Hindrance | None",
+) -> dict[str, "Reading"]:
+    """Give the command, or hold it; return the values of its reply."""
+    if hold_s is None:
+        return dict((await session.command(command.name, values)).values)
+    from urc.protocol.encode import BadArgument, check_arguments
+    from urc.runtime.holding import hold
+    from urc.runtime.session import CommandFailed
+
+    try:
+        check_arguments(command, values)
+    except BadArgument as wrong:
+        raise CommandFailed("bad-argument", str(wrong)) from wrong
+    why_not = (lambda: hindrance.why) if hindrance is not None else str
+    await hold(session, command.name, values, hold_s, why_not)
+    return {}
+
+
+@asynccontextmanager
+async def _heeding(
+    session: "Session", command: "Command", arguments: argparse.Namespace
+) -> AsyncIterator["Hindrance | None"]:
+    """Let a STOP and whoever drives count for as long as the context lasts, unless told not to."""
+    may_move = command.moves or command.hold is not None
+    if arguments.despite_stop or not may_move:
+        yield None
+        return
+    from urc._folders import data_folder
+    from urc.cli.hindrance import Hindrance
+
+    clock = asyncio.get_running_loop().time
+    data = arguments.data or data_folder()
+    hindrance = Hindrance(data, session.profile.name, clock)
+
+    def tell(why: str) -> None:
+        session.latch(f"{why}; --despite-stop moves it all the same" if why else "")
+
+    if await hindrance.look():
+        tell(hindrance.why)
+    following = asyncio.create_task(hindrance.follow(tell))
+    try:
+        yield hindrance
+    finally:
+        following.cancel()
 
 
 async def _known(session: "Session", command: "Command") -> None:
@@ -142,8 +235,13 @@ async def _known(session: "Session", command: "Command") -> None:
 
 
 def _why(session: "Session", command: "Command", failed: "CommandFailed") -> str:
-    """Return the reason, with what the link knows when the robot is not there."""
-    link = session.hub.links[command.transport]
-    if failed.code != "disconnected" or not link.detail or link.detail in failed.message:
+    """Return the reason, with what the links know when the robot is not there."""
+    from urc.protocol.bounds import lines_of
+
+    if failed.code != "disconnected":
         return failed.message
-    return f"{failed.message}: {link.detail}"
+    lines = lines_of(command.name, session.profile.driver)
+    links = [link for name, link in session.hub.links.items() if name in lines]
+    details = dict.fromkeys(link.detail for link in links if link.detail)
+    more = "; ".join(detail for detail in details if detail not in failed.message)
+    return f"{failed.message}: {more}" if more else failed.message

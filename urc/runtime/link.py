@@ -27,9 +27,9 @@ from urc.protocol.events import Fault
 from urc.runtime.clock import Clock, Repeating, within
 from urc.runtime.dispatcher import Dispatcher
 from urc.runtime.hub import Hub, LinkState
-from urc.runtime.outgoing import Outgoing
+from urc.runtime.outgoing import STUCK_S, Outgoing
 from urc.runtime.report import LinkReport
-from urc.transports.base import Prompt, Transport, TransportError
+from urc.transports.base import Prompt, Settling, Transport, TransportError
 
 __all__ = ["Link"]
 
@@ -44,6 +44,7 @@ SETTLE_S = 1.0
 """A connection that stands this long without being closed has been accepted."""
 _GRACE_S = 1.0
 """What a transport may take beyond the time it promised."""
+_LOOK_S = 0.01
 _NOTHING_YET = "connected; nothing received yet"
 
 log = logging.getLogger(__name__)
@@ -175,6 +176,24 @@ class Link:
         """Write what is queued, if that needs no waiting; show the state, if it has changed."""
         self._outgoing.flush()
         self._report.publish()
+
+    async def settle(self) -> str:
+        """Wait until all that was sent is written and, where that can be known, has arrived.
+
+        Returns:
+            What did not arrive, in one line, or "". Takes a few seconds at most.
+        """
+        until = self._clock.now() + STUCK_S
+        while self.is_connected and not self._outgoing.is_written:
+            if self._clock.now() >= until:
+                return f"{self._transport.address} takes nothing"
+            await self._clock.sleep(_LOOK_S)
+        if self.is_connected and isinstance(self._transport, Settling):
+            try:
+                return await self._transport.settle()
+            except TransportError as broken:
+                return str(broken)
+        return ""
 
     async def run(self) -> None:
         """Keep the line, until cancelled. Leaves nothing open behind."""

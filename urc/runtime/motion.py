@@ -105,6 +105,10 @@ class MotionDesk:
         """Return whether `command` is a held one."""
         return command in self._holds
 
+    def rests(self, command: str) -> bool:
+        """Return whether a held command does not move, and its last stop was reported."""
+        return self._controls[command].course == "rest"
+
     @property
     def is_confirmed(self) -> bool:
         """Whether the robot's lines have taken the stop of everything that was to stop."""

@@ -11,6 +11,7 @@ async def main():
 asyncio.run(main())
 """
 
+import logging
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from os import PathLike
@@ -23,6 +24,8 @@ from urc.runtime.catalog import built_in_catalog
 from urc.runtime.session import CommandFailed, Session, resolve_settings
 
 __all__ = ["CommandFailed", "ConnectedRobot", "connect", "load"]
+
+log = logging.getLogger(__name__)
 
 
 def load(path: str | PathLike[str]) -> Profile:
@@ -57,6 +60,8 @@ async def connect(
         raise UrcError(f"{opened.name} needs a value for: {', '.join(missing)}")
     async with Session(opened, values, built_in_catalog().transports) as session:
         yield ConnectedRobot(session)
+        if lost := await session.settle():
+            log.warning("%s: %s", opened.name, lost)
 
 
 class ConnectedRobot:

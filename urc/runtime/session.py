@@ -14,7 +14,7 @@ from urc.model.driver import STOPPED, Driver
 from urc.model.profile import Profile
 from urc.model.values import NOTHING, Reading, Value
 from urc.problems import UrcError
-from urc.protocol.bounds import GOOD_BYE_S, longest_s
+from urc.protocol.bounds import GOOD_BYE_S, lines_of, longest_s
 from urc.protocol.engine import Engine
 from urc.protocol.events import Failed, Replied, Request
 from urc.protocol.reins import PAUSE_S, Pull
@@ -227,6 +227,15 @@ class Session:
             raise CommandFailed(outcome.code, outcome.message)
         return outcome
 
+    async def settle(self) -> str:
+        """Wait until what was sent has arrived, before the session is closed.
+
+        Returns:
+            What did not arrive, in one line, or "". Takes a few seconds at most.
+        """
+        found = await asyncio.gather(*(link.settle() for link in self._links.values()))
+        return "; ".join(filter(None, found))
+
     def pull(self, sequence: str, what: Pull) -> None:
         """Let a sequence pause, do one more step, go on, or end.
 
@@ -245,23 +254,31 @@ class Session:
         self._dispatcher.latch(reason)
 
     async def _first_attempt(self, name: str, given: Mapping[str, Reading]) -> None:
-        """Wait until the line of a command has been tried, well or not, for as long as may take.
+        """Wait until the lines of a command have been tried, well or not, for as long as may take.
 
         Raises:
             CommandFailed: it moves something, and STOP was pressed meanwhile.
         """
-        command, stops = self.profile.driver.commands.get(name), self._stops
-        turnstile = self._untried.get(command.transport) if command is not None else None
-        if command is None or turnstile is None:
+        driver, stops = self.profile.driver, self._stops
+        command = driver.commands.get(name)
+        untried = [line for line in lines_of(name, driver) if line in self._untried]
+        if command is None or not untried:
             return
-        timeouts = self.profile.driver.transports[command.transport].timeouts
+        for line in untried:
+            await self._until_tried(line)
+        if stops != self._stops and command.moves_with(given):
+            raise CommandFailed("not-allowed", STOPPED)
+
+    async def _until_tried(self, line: str) -> None:
+        turnstile = self._untried.get(line)
+        if turnstile is None:
+            return  # another command has found out meanwhile
+        timeouts = self.profile.driver.transports[line].timeouts
         with suppress(TimeoutError):  # then the engine says that it is not connected
             async with within(self._clock, timeouts.connect_s + _GRACE_S):
                 await turnstile.wait()
         if turnstile.is_open:
-            self._untried.pop(command.transport, None)
-        if stops != self._stops and command.moves_with(given):
-            raise CommandFailed("not-allowed", STOPPED)
+            self._untried.pop(line, None)
 
 
 def _limit_s(driver: Driver, name: str) -> float:

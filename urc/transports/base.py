@@ -19,6 +19,7 @@ __all__ = [
     "ConnectFailed",
     "PeerClosed",
     "Prompt",
+    "Settling",
     "Setup",
     "Subscription",
     "Transport",
@@ -113,6 +114,20 @@ class Setup(NamedTuple):
     subscriptions: tuple[Subscription, ...] = ()
     via: Carrier | None = None
     """What it goes through; None: this machine's own network."""
+
+
+@runtime_checkable
+class Settling(Protocol):
+    """What a transport may offer beside, where handing over is not yet arriving."""
+
+    async def settle(self) -> str:
+        """Keep the line until what was sent has arrived, as far as can be known.
+
+        Bounded to a few seconds.
+
+        Returns:
+            What did not arrive, in one line; "" where all did, or nothing can be known.
+        """
 
 
 @runtime_checkable

@@ -6,6 +6,10 @@ is thrown away with the connection, so nothing can be said late. A task reads al
 slowly the messages are taken: one reader that stalls freezes the topic for every client of the
 bridge.
 
+A bridge hands a first message on when its publisher is connected to the subscribers, and forgets it
+when its client leaves before that. `settle` is for who leaves: it asks rosapi, whose answer also
+says that the bridge has worked off all before it, and stays for the time of such a connection.
+
 The bridge tells no errors: a topic that nobody publishes, a wrong type, a white-list, all are
 silence. So it is asked once, through rosapi, which topics there are.
 """
@@ -17,9 +21,9 @@ from importlib.util import find_spec
 from typing import Any
 
 from urc.model.codec import Envelope, Payload
-from urc.model.values import Value
+from urc.model.values import NOTHING, Value
 from urc.transports.base import ConnectFailed, PeerClosed, Setup, Transport, TransportError
-from urc.transports.rosbridge_client import Listening, RosClient
+from urc.transports.rosbridge_client import KNOWN_TOPICS, Listening, RosClient
 from urc.transports.rosbridge_frames import MAX_BYTES, BadFrame, FrameReader
 from urc.transports.topics import Inbox
 from urc.transports.websocket import WebSocketTransport
@@ -29,6 +33,12 @@ __all__ = ["RosbridgeTransport", "from_setup"]
 DEFAULT_PORT = 9090
 _WEBSOCKET = ("auth", "headers")
 """Options that are the WebSocket's own."""
+
+_ANSWER_S = 3.0
+"""How long rosapi may take to answer, before it is taken to be missing."""
+_CONNECTS_S = 1.0
+"""How long a bridge keeps a message for subscribers that have not connected yet."""
+_LOOK_S = 0.2
 
 _TURN_S = 0.005
 """How long frames are read before others have their turn on the loop."""
@@ -112,6 +122,14 @@ class RosbridgeTransport:
                 await session.end()
         finally:
             await self._wire.close()
+
+    async def settle(self) -> str:
+        """Stay until what was published first on a topic has reached its subscribers.
+
+        Returns:
+            The topics that nothing subscribes to, in one line, or "".
+        """
+        return "" if self._session is None else await self._session.settle()
 
     def unsent(self) -> int:
         """Return the bytes handed over that have not left this machine for good."""
@@ -211,6 +229,8 @@ class _Session:
         self._missing = missing
         self._bad = 0
         self._reader: asyncio.Task[None] | None = None
+        self._fresh: dict[str, None] = {}
+        """Topics on which something was published that may not have arrived yet, in order."""
 
     async def begin(self, subscriptions: tuple[Listening, ...]) -> None:
         """Subscribe, ask which topics there are, and read from now on."""
@@ -225,7 +245,51 @@ class _Session:
 
     async def perform(self, envelope: Envelope) -> None:
         """Send what an envelope asks for."""
-        await self._write(self._client.perform(envelope))
+        frames = self._client.perform(envelope)
+        if envelope.verb == "publish" and len(self._fresh) < KNOWN_TOPICS:
+            self._fresh[str(envelope.attributes.get("topic"))] = None
+        await self._write(frames)
+
+    async def settle(self) -> str:
+        """Stay until what was published has arrived; return what did not."""
+        topics = list(self._fresh)
+        self._fresh.clear()
+        heard = await asyncio.gather(*map(self._is_heard, topics))
+        lost = [topic for topic, is_heard in zip(topics, heard, strict=True) if not is_heard]
+        return f"nothing subscribes to {', '.join(lost)}" if lost else ""
+
+    async def _is_heard(self, topic: str) -> bool:
+        """Stay until a topic's publisher is connected; return False where nothing subscribes."""
+        clock = asyncio.get_running_loop().time
+        subscribers = await self._subscribers(topic)
+        ends_s = clock() + _CONNECTS_S
+        while subscribers is not None and not subscribers:
+            if clock() >= ends_s:
+                return False
+            await asyncio.sleep(_LOOK_S)
+            subscribers = await self._subscribers(topic)
+        await asyncio.sleep(_CONNECTS_S)
+        return True
+
+    async def _subscribers(self, topic: str) -> list[object] | None:
+        """Return the nodes that subscribe to a topic; None where rosapi does not say."""
+        said: asyncio.Future[Mapping[str, Any]] = asyncio.get_running_loop().create_future()
+
+        def told(values: Mapping[str, Any]) -> None:
+            if not said.done():
+                said.set_result(values)
+
+        await self._write(
+            self._client.ask(
+                "/rosapi/subscribers", told, {"topic": topic}, lambda problem: told(NOTHING)
+            )
+        )
+        try:
+            async with asyncio.timeout(_ANSWER_S):
+                found = (await said).get("subscribers")
+        except TimeoutError:
+            return None
+        return found if isinstance(found, list) else None
 
     async def end(self) -> None:
         """Stop reading, and give up whoever waits."""

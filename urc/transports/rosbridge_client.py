@@ -18,6 +18,7 @@ from roslibpy.comm.comm import RosBridgeProtocol
 from roslibpy.event_emitter import EventEmitterMixin
 
 from urc.model.codec import Envelope
+from urc.model.values import NOTHING
 from urc.transports._faults import one_line
 from urc.transports.base import TransportError
 from urc.transports.rosbridge_frames import BadFrame, encode_operation
@@ -79,9 +80,16 @@ class RosClient:
         topic.subscribe(lambda body: self._message(wanted.topic, body))
         return self._protocol.written()
 
-    def ask(self, service: str, callback: Callable[[Mapping[str, Any]], None]) -> list[bytes]:
-        """Call a service for ourselves; where it fails or is not there nothing happens."""
-        Service(self._ros, service, "").call({}, callback=callback, errback=_ignore)
+    def ask(
+        self,
+        service: str,
+        callback: Callable[[Mapping[str, Any]], None],
+        arguments: Mapping[str, object] = NOTHING,
+        errback: Callable[[object], None] | None = None,
+    ) -> list[bytes]:
+        """Call a service for ourselves; where it fails or is not there, only `errback` hears it."""
+        call = Service(self._ros, service, "").call
+        call(dict(arguments), callback=callback, errback=errback or _ignore)
         return self._protocol.written()
 
     def perform(self, envelope: Envelope) -> list[bytes]:

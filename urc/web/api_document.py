@@ -15,6 +15,7 @@ from urc import __version__
 from urc.web.manage.wire import (
     Add,
     Agree,
+    ControlState,
     Failure,
     Gone,
     Healthy,
@@ -104,6 +105,12 @@ _CALLS: Final = (
         SettingsAsked,
     ),
     _Call("/api/v1/robots/{name}/stop", "Stop a robot, and latch.", Stopped),
+    _Call(
+        "/api/v1/robots/{name}/controls",
+        "Who drives a robot, and who stopped it.",
+        ControlState,
+        is_post=False,
+    ),
     _Call(
         "/api/v1/robots/{name}/timeline",
         "What made a robot move, newest first; on the machine that runs URC only.",

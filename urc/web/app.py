@@ -158,6 +158,7 @@ class _Dashboard(Starlette):
                 Route("/healthz", routes.health),
                 Route(DOCUMENT, document),
                 Route("/api/v1/robots/{name}/stop", routes.stop, methods=["POST"]),
+                Route("/api/v1/robots/{name}/controls", routes.controls),
                 Route("/api/v1/robots/{name}/timeline", routes.timeline),
                 Route("/api/v1/robots/{name}/recording", routes.recording),
                 Route("/api/v1/robots/{name}/recording/move", routes.move, methods=["POST"]),
@@ -297,6 +298,13 @@ class _Routes:
         is_confirmed = await station.deliver_stop()
         by = station.controls.desk.lease.state.latched_by
         return JSONResponse({"latched": by, "confirmed": is_confirmed}, headers=_PAGE)
+
+    async def controls(self, request: Request) -> Response:
+        """Tell who drives a robot, and who stopped it."""
+        station = self.stations.get(request.path_params["name"])
+        if station is None:
+            return JSONResponse({"error": "no robot of that name is served here"}, 404, _PAGE)
+        return JSONResponse(station.who(), headers=_PAGE)
 
     async def timeline(self, request: Request) -> Response:
         """Tell who made a robot move."""

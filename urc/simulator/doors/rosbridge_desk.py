@@ -71,7 +71,8 @@ class Seat:
         """Join `desk`; `send` takes one frame, text or binary."""
         self._desk = desk
         self._send = send
-        self._wanted: dict[str, _Wanted] = {}
+        self.wanted: dict[str, _Wanted] = {}
+        """Topics that it subscribes to."""
         self._shown_s: dict[str, float] = {}
         self._calls: dict[object, str] = {}
         """Id of an unanswered call → its service."""
@@ -130,7 +131,7 @@ class Seat:
 
     def show(self, topic: str, message: object, now_s: float) -> None:
         """Give a message to the client if it listens, and not more often than it wants."""
-        wanted = self._wanted.get(topic)
+        wanted = self.wanted.get(topic)
         if wanted is None:
             return
         if now_s < self._shown_s.get(topic, float("-inf")) + wanted.throttle_s:
@@ -202,11 +203,11 @@ class Seat:
     def subscribe(self, operation: Mapping[str, Any], now_s: float) -> None:
         """A second subscription to a topic takes the first one's place, throttle and all."""
         topic = _text(operation, "topic")
-        if not topic or len(self._wanted) >= MAX_TOPICS:
+        if not topic or len(self.wanted) >= MAX_TOPICS:
             return
         self._learn(topic, operation)
         throttle_ms, fragment = operation.get("throttle_rate"), operation.get("fragment_size")
-        self._wanted[topic] = _Wanted(
+        self.wanted[topic] = _Wanted(
             max(0, throttle_ms) / 1000 if isinstance(throttle_ms, int | float) else 0.0,
             str(operation.get("compression") or "none"),
             max(0, fragment) if isinstance(fragment, int) else 0,
@@ -214,7 +215,7 @@ class Seat:
 
     def unsubscribe(self, operation: Mapping[str, Any], now_s: float) -> None:
         """Forget a subscription."""
-        self._wanted.pop(_text(operation, "topic"), None)
+        self.wanted.pop(_text(operation, "topic"), None)
 
     def advertise(self, operation: Mapping[str, Any], now_s: float) -> None:
         """Take note of the type of a topic."""
@@ -310,6 +311,12 @@ class Seat:
             case "topics_for_type":
                 kind = given.get("type")
                 return {"topics": [name for name, known in types.items() if known == kind]}
+            case "subscribers":
+                topic = str(given.get("topic"))
+                nodes = ["/robot"] if topic in types else []
+                if any(topic in seat.wanted for seat in self._desk.seats):
+                    nodes.append("/rosbridge_websocket")
+                return {"subscribers": nodes}
             case "services":
                 return {"services": sorted(self._desk.servers)}
         return None

@@ -225,6 +225,13 @@ class Station:
                 await self.clock.sleep(_LOOK_S)
         return desk.is_confirmed and desk.has_own_stop
 
+    def who(self) -> dict[str, str | bool]:
+        """Return who drives the robot, and who stopped it: `urc.web.manage.wire.ControlState`."""
+        state = self.controls.desk.lease.state
+        holder = "" if state.holder is None else state.holder.name or "another screen"
+        is_emulated = self.robot.is_emulated or self.robot.tape is not None
+        return {"holder": holder, "latched": state.latched_by, "emulated": is_emulated}
+
     @property
     def is_at_rest(self) -> bool:
         """Whether nobody has the controls and every stop has reached the robot."""

@@ -213,6 +213,17 @@ class Stopped(Message, frozen=True):
     """Whether the stop was handed to the robot's line."""
 
 
+class ControlState(Message, frozen=True):
+    """Who drives a robot, and who stopped it."""
+
+    holder: str
+    """The screen that has the controls; "" where none has."""
+    latched: str
+    """Who pressed STOP; "" while nothing is latched."""
+    emulated: bool
+    """It only has the name of a real robot: it is emulated, or a recording."""
+
+
 class TapeAsked(Message, frozen=True):
     """A recording is to be moved; what is left out stays as it is."""
 
