@@ -308,7 +308,7 @@ def is_shared_reader(asked: tuple[str, tuple[str | int, ...], str]) -> bool:
     """One parser serves places of which the schema allows some keys and not others.
 
     `parse_interface` reads the header of documents and the layouts inside a robot alike. Forms are
-    read alike in replies and in errors and steps, which may not `set` anything. Kinds of transport
+    read alike in replies and in steps, which may not `set` anything. Kinds of transport
     are read alike, though messages have no framing, not everything goes through something else, and
     a web server always answers; one of another package has options that no schema of ours knows.
     """
@@ -326,5 +326,5 @@ def is_shared_reader(asked: tuple[str, tuple[str | int, ...], str]) -> bool:
     if key == "subscribe" and "simulator" in path:
         return True
     if key == "set":
-        return not {"errors", "on_connect", "on_close", "sequences", "simulator"}.isdisjoint(path)
+        return not {"on_connect", "on_close", "sequences", "simulator"}.isdisjoint(path)
     return path[:1] == ("interfaces",) and key in ("summary", "licence", "author")

@@ -10,7 +10,7 @@ from urc.config.values import check_within, fit_argument, fit_hint, known_argume
 from urc.expressions import COUNTERS, Template
 from urc.model.codec import ReadSpec, WriteSpec
 from urc.model.driver import Argument, Command, Driver, Poll, Reply
-from urc.model.flow import ErrorReply
+from urc.model.flow import Asides, ErrorReply
 
 __all__ = [
     "Linker",
@@ -142,10 +142,12 @@ def link_reply(
     reads = [reply.read, *(one.read for one in reply.stages)]
     errors = [reply.faults, *(one.faults for one in reply.stages)]
     own = len(_refusal_parts(part)) if stages else 0
-    for place, (inner, read, faults) in enumerate(
-        zip(stages or [part], reads, errors, strict=True)
+    beside = [reply.asides, *(one.asides for one in reply.stages)]
+    for place, (inner, read, faults, asides) in enumerate(
+        zip(stages or [part], reads, errors, beside, strict=True)
     ):
         linker.fields(inner, read)
+        link_asides(linker, inner, asides)
         link_refusals(linker, inner, faults[: len(faults) - own] if stages else faults)
         if stages and not place and own:
             link_refusals(linker, part, faults[-own:])
@@ -163,6 +165,14 @@ def link_reply(
             length=3,
             hint="write {{ seq('number', 0, 255) }} where the request carries it",
         )
+
+
+def link_asides(linker: Linker, part: Part, asides: Asides) -> None:
+    """Check what a robot says before it answers, in any form."""
+    for key, read in (("resend", asides.resend), ("extend", asides.extend)):
+        inner = part.get(key)
+        if inner is not None and read is not None and isinstance(inner.data, dict):
+            linker.fields(inner, read)
 
 
 def link_refusals(linker: Linker, part: Part, faults: tuple[ErrorReply, ...]) -> None:

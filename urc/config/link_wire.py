@@ -5,13 +5,14 @@ from collections.abc import Iterable, Mapping
 
 from urc.config.forms import read_form, write_form
 from urc.config.gather import Sources
-from urc.config.link_flow import link_command, link_keepalives, link_poll
+from urc.config.link_flow import link_command, link_keepalives, link_poll, link_refusals
 from urc.config.link_frames import check_frames
 from urc.config.link_messages import check_messages, check_via
 from urc.config.link_options import check_option
 from urc.config.link_signals import link_signals
 from urc.config.link_steps import link_sequences
 from urc.config.parse_line import option_templates
+from urc.config.parse_reply import refuse
 from urc.config.parse_simulator import Simulated
 from urc.config.part import Findings, Part
 from urc.config.suggest import did_you_mean
@@ -202,7 +203,14 @@ def link_driver(
 ) -> Uses:
     """Check every name in the driver at `part`; return what is used."""
     linker = _Linker(driver, settings, findings)
+    answered = {one.transport for one in driver.commands.values() if one.reply}
+    answered |= {one.transport for one in driver.polls if one.reply}
     for name, inner in part.named("transports").items():
+        link_refusals(linker, inner, driver.transports[name].faults)
+        if name not in answered:
+            refuse(
+                inner, ("errors",), "refuses nothing: nothing on this line has a reply", findings
+            )
         for place, template in option_templates(inner, driver.transports[name]):
             linker.template(place, template)
             check_option(place, driver.transports[name].type, template, settings, findings)

@@ -7,7 +7,7 @@ from typing import Final, Literal, cast
 from urc.config.forms import FormContext, parse_write
 from urc.config.messaging import MESSAGING
 from urc.config.moving import parse_moves
-from urc.config.parse_reply import refuse
+from urc.config.parse_reply import parse_errors, refuse
 from urc.config.parse_steps import StepContext, parse_steps
 from urc.config.part import Findings, Part
 from urc.config.suggest import did_you_mean
@@ -61,7 +61,10 @@ def line_with_flow(
         refuse(timeouts, ("on_connect",), "limits nothing: there are no steps", findings)
     steps = StepContext(spec.name, is_named=False, forms=context)
     on_connect, on_close = part.get("on_connect"), part.get("on_close")
+    errors, faults = parse_errors(part, findings, context)
     return spec._replace(
+        errors=errors,
+        faults=faults,
         queue=_queue(queue, spec.type),
         keepalive=_keepalive(part.get("keepalive"), context, findings),
         on_connect=parse_steps(on_connect, steps, findings) if on_connect else (),
@@ -102,7 +105,8 @@ def command_with_flow(command: Command, part: Part, findings: Findings) -> Comma
     hold, confirm, verify = part.get("hold"), part.get("confirm"), part.get("verify")
     retries, retry = _retries(part.get("retries"), findings)
     is_idempotent = part.flag("idempotent", default=False)
-    if retries and not is_idempotent:
+    is_asked_again = command.reply is not None and command.reply.is_asked_again
+    if retries and not (is_idempotent or is_asked_again):
         findings.error(
             part,
             "not-idempotent",
@@ -119,6 +123,7 @@ def command_with_flow(command: Command, part: Part, findings: Findings) -> Comma
         refuse(part, ("coalesce", "rate_limit"), "means nothing for what never waits", findings)
     if hold is not None:
         refuse(part, ("moves", "stop"), "means nothing beside 'hold': a hand moves it", findings)
+        _refuse_asides(part.get("reply"), findings)
     stops = part.flag("stop", default=False)
     if stops:
         _check_stop(command, part, findings)
@@ -138,6 +143,13 @@ def command_with_flow(command: Command, part: Part, findings: Findings) -> Comma
         requires=_requires(part, findings),
         verify=_verify(verify, findings) if verify else None,
     )
+
+
+def _refuse_asides(reply: Part | None, findings: Findings) -> None:
+    """Report what a robot asks for about motion: the newest values go out all the time."""
+    for inner in [reply, *reply.listed("stages")] if reply is not None else ():
+        why = "means nothing beside 'hold': the next value goes out anyway"
+        refuse(inner, ("resend", "extend"), why, findings)
 
 
 def _check_stop(command: Command, part: Part, findings: Findings) -> None:

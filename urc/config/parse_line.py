@@ -16,7 +16,7 @@ __all__ = ["option_templates", "parse_transport"]
 _COMMON: Final = (
     "type", "connection", "framing", "send_framing", "encoding", "timeouts", "reconnect", "min_gap",
     "queue", "keepalive", "on_connect", "on_close", "stale_after", "via",
-    "answers",
+    "answers", "errors",
 )  # fmt: skip
 
 

@@ -6,7 +6,7 @@ from urc.config.parse_framing import parse_framing
 from urc.config.part import Findings, Part
 from urc.model.codec import NUMBERED, ReadSpec, WriteSpec
 from urc.model.driver import FramingSpec, Reply
-from urc.model.flow import ErrorReply, Stage
+from urc.model.flow import Asides, ErrorReply, Stage
 from urc.patterns import Pattern
 
 __all__ = [
@@ -20,6 +20,8 @@ __all__ = [
 
 _OF_THE_WHOLE = ("match", "stages", "framing")
 """Keys that belong to the reply, not to one of its stages."""
+_MOST_BUSY_S = 600.0
+"""How long a robot may be busy in all where ``within`` does not say it."""
 
 
 def parse_reply(part: Part | None, findings: Findings, context: FormContext) -> Reply | None:
@@ -31,23 +33,21 @@ def parse_reply(part: Part | None, findings: Findings, context: FormContext) -> 
     for inner in stages:
         refuse(inner, _OF_THE_WHOLE, "belongs to the whole reply", findings)
     if stages:
-        beside = (*READ_FORMS, "fields", "set", "when", "lines", "timeout")
+        beside = (*READ_FORMS, "fields", "set", "when", "lines", "timeout", "resend", "extend")
         refuse(part, beside, "belongs to one of the stages", findings)
     first, *others = [parse_stage(inner, findings, context) for inner in stages or [part]]
     errors, faults = parse_errors(part, findings, context) if stages else ((), ())
     match = part.get("match")
     return Reply(
         read=first.read,
-        errors=(*first.errors, *errors),
-        faults=(*first.faults, *faults),
+        errors=first.errors,
+        faults=first.faults,
         timeout_s=first.timeout_s,
         match=findings.expression(match) if match else None,
-        stages=tuple(
-            one._replace(errors=(*one.errors, *errors), faults=(*one.faults, *faults))
-            for one in others
-        ),
+        stages=tuple(others),
         framing=own,
-    )
+        asides=first.asides,
+    ).with_errors(errors, faults)
 
 
 def implied_reply(send: WriteSpec) -> Reply | None:
@@ -66,7 +66,37 @@ def parse_stage(part: Part, findings: Findings, context: FormContext) -> Stage:
         errors=errors,
         faults=faults,
         timeout_s=findings.duration(part, "timeout", 0.0, most=3600) or None,
+        asides=_asides(part, findings, context),
     )
+
+
+def _asides(part: Part, findings: Findings, context: FormContext) -> Asides:
+    """Return what the robot may say under ``resend:`` and ``extend:``."""
+    extend, extend_s = part.get("extend"), _MOST_BUSY_S
+    if extend is not None and isinstance(extend.data, dict):
+        extend_s = findings.duration(extend, "within", _MOST_BUSY_S, most=3600)
+        if extend_s < findings.duration(part, "timeout", 0.0, most=3600):
+            findings.error(
+                extend,
+                "wrong-order",
+                "the robot may be busy for less time than its answer may take anyway",
+                at="within",
+                hint="'timeout' is the longest wait for each of its words, 'within' for all",
+            )
+    resend = part.get("resend")
+    if resend is not None and isinstance(resend.data, dict):
+        refuse(resend, ("within",), "belongs to 'extend'", findings)
+    return Asides(_aside(resend, findings, context), _aside(extend, findings, context), extend_s)
+
+
+def _aside(part: Part | None, findings: Findings, context: FormContext) -> ReadSpec | None:
+    """Return a frame in any form; a text is a pattern."""
+    if part is None:
+        return None
+    if isinstance(part.data, dict):
+        return parse_read(part, findings, context)
+    pattern = findings.pattern(part)
+    return ReadSpec("regex", {"pattern": pattern}, pattern.groups) if pattern else None
 
 
 def parse_errors(

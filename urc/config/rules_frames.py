@@ -14,6 +14,7 @@ from urc.config.part import Findings, Part
 from urc.model.binary import Item, fixed_size
 from urc.model.codec import ReadSpec
 from urc.model.driver import Driver, Reply
+from urc.model.flow import Asides
 from urc.model.values import Signal
 from urc.patterns import Pattern, can_be_empty, example
 
@@ -36,6 +37,7 @@ def check_frames_apart(part: Part, driver: Driver, findings: Findings) -> None:
         _check_refusals(inner, reply, findings)
         for stage, read in _stages(inner, reply):
             _check_empty(stage, read, driver.signals, findings)
+    _check_shared_refusals(part, driver, findings)
     for name, inner in part.named("messages").items():
         _check_empty(inner, driver.messages[name].read, driver.signals, findings)
     for inner in _prompts(part):
@@ -213,29 +215,57 @@ def _asked(items: tuple[Item, ...]) -> dict[tuple[int, int], object] | None:
 def _check_refusals(part: Part, reply: Reply, findings: Findings) -> None:
     """Warn of a refusal that takes the good answer: refusals are looked at first."""
     good = _text_of(reply.read) if reply.read.when is None and reply.read.lines is None else None
-    written = [inner for inner in part.listed("errors") if not isinstance(inner.data, dict)]
-    for inner in written:
-        pattern = next((one for one in reply.errors if one.source == inner.data), None)
+    errors = [(inner, "a refusal", "refusals") for inner in part.listed("errors")]
+    asides = [("resend", "a request for the frame"), ("extend", "being busy")]
+    errors += [(part.must(key), what, f"{key!r}") for key, what in asides if key in part.data]
+    patterns = (*reply.errors, *_patterns_of(reply.asides))
+    for inner, what, whose in errors:
+        pattern = next((one for one in patterns if one.source == inner.data), None)
         if pattern is None:
             continue
         if _finds(pattern, ""):
             findings.warn(
                 inner,
                 "matches-empty",
-                "this fits an empty text, and so every answer counts as a refusal"
+                f"this fits an empty text, and so every answer counts as {what}"
                 if _finds(pattern, "~ no such answer ~")
                 else "this fits an empty answer, too",
-                hint="say what the refusal begins with: '^ERR'",
+                hint=f"say what {what} begins with: '^ERR'"
+                if what == "a refusal"
+                else "say what such a frame begins with",
             )
         elif good is not None and _Text(pattern).takes_all_of(good):
             findings.warn(
                 inner,
                 "ambiguous-frame",
                 f"the good answer fits this, too, such as {good.samples[0][:_SHOWN]!r}: it would"
-                " count as a refusal",
-                hint="make it fit refusals only; they are looked at first",
+                f" count as {what}",
+                hint=f"make it fit {whose} only; they are looked at first",
             )
     _check_struct_refusals(part, reply, findings)
+
+
+def _check_shared_refusals(part: Part, driver: Driver, findings: Findings) -> None:
+    """Warn of a refusal of a whole line that takes the good answer of some request."""
+    for name, inner in part.named("transports").items():
+        spec = driver.transports[name]
+        requests = [(one.transport, one.reply) for one in driver.commands.values()]
+        requests += [(one.transport, one.reply) for one in driver.polls]
+        for transport, reply in requests:
+            if transport != name or reply is None or reply.read.lines is not None:
+                continue
+            alone = Reply(reply.read, spec.errors, faults=spec.faults)
+            told = len(findings.problems)
+            _check_refusals(inner, alone, findings)
+            if len(findings.problems) > told:
+                break  # one is enough to mend it
+
+
+def _patterns_of(asides: Asides) -> Iterator[Pattern]:
+    for read in (asides.resend, asides.extend):
+        pattern = read.options.get("pattern") if read is not None else None
+        if isinstance(pattern, Pattern):
+            yield pattern
 
 
 def _check_struct_refusals(part: Part, reply: Reply, findings: Findings) -> None:

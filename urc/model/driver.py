@@ -6,6 +6,7 @@ from typing import Final, Literal, NamedTuple
 from urc.expressions import ExpressionError, Template
 from urc.model.codec import FramingSpec, ReadSpec, WriteSpec
 from urc.model.flow import (
+    Asides,
     Confirm,
     ErrorReply,
     Hold,
@@ -90,6 +91,10 @@ class TransportSpec(NamedTuple):
     """Transport that it goes through; "": none."""
     never_answers: bool = False
     """The robot says nothing on this line, by design: its silence means nothing."""
+    errors: tuple[Pattern, ...] = ()
+    """Answers that mean failure, whatever was asked."""
+    faults: tuple[ErrorReply, ...] = ()
+    """As `errors`, of any form."""
 
 
 class Reply(NamedTuple):
@@ -108,6 +113,27 @@ class Reply(NamedTuple):
     """Answers that mean failure, beside `errors`."""
     framing: FramingSpec | None = None
     """How the answer is cut; None: as everything else on the line."""
+    asides: Asides = Asides()
+    """What may come before its first answer."""
+
+    def with_errors(self, errors: tuple[Pattern, ...], faults: tuple[ErrorReply, ...]) -> "Reply":
+        """Return the reply with more answers that mean failure, at every stage."""
+        if not (errors or faults):
+            return self
+        return self._replace(
+            errors=(*self.errors, *errors),
+            faults=(*self.faults, *faults),
+            stages=tuple(
+                one._replace(errors=(*one.errors, *errors), faults=(*one.faults, *faults))
+                for one in self.stages
+            ),
+        )
+
+    @property
+    def is_asked_again(self) -> bool:
+        """Whether the robot may ask for the request again, at any stage."""
+        asides = (self.asides, *(stage.asides for stage in self.stages))
+        return any(one.resend is not None for one in asides)
 
 
 MOST_ELEMENTS: Final = 1024
@@ -159,7 +185,8 @@ class Command(NamedTuple):
     is_idempotent: bool = False
     """Doing it twice is the same as once."""
     retries: int = 0
-    """How often it is sent again when no answer comes; 0 unless it is idempotent."""
+    """How often it is sent again at most: after a timeout where it is idempotent, and when the
+    robot asks for it. 0: `RESENDS` times where the robot may ask."""
     retry: Retry = Retry()
     """How long it waits before each of them."""
     hold: Hold | None = None

@@ -15,6 +15,8 @@ __all__ = [
     "MAX_STEPS",
     "MAX_STEPS_DONE",
     "MAX_STEP_S",
+    "RESENDS",
+    "Asides",
     "Confirm",
     "ErrorReply",
     "ExpectStep",
@@ -47,6 +49,9 @@ MAX_STEPS_DONE = 10_000
 """Steps that one run may do, every round of every ``repeat`` counted."""
 MAX_STEP_S = 600.0
 """Longest wait of one step, in seconds."""
+
+RESENDS = 3
+"""How often a frame is sent again for a robot that asks, where ``retries`` does not say it."""
 
 Priority = Literal["realtime", "high", "normal", "low"]
 """``realtime`` waits for nothing: neither for the queue, nor for the gap, nor for an answer."""
@@ -81,6 +86,17 @@ class ErrorReply(NamedTuple):
     """What to tell people, over the answer's fields; None: the answer as it came."""
 
 
+class Asides(NamedTuple):
+    """What a robot may say about a request before it answers."""
+
+    resend: ReadSpec | None = None
+    """A frame by which it asks for the request again; None: it never does."""
+    extend: ReadSpec | None = None
+    """A frame by which it says that it is busy; None: it never does."""
+    extend_s: float = 600.0
+    """How long it may be busy in all, in seconds, 0.001 to 3600."""
+
+
 class Stage(NamedTuple):
     """A further answer to a request, after the first one."""
 
@@ -89,6 +105,7 @@ class Stage(NamedTuple):
     faults: tuple[ErrorReply, ...] = ()
     timeout_s: float | None = None
     """None: the transport's ``timeouts.reply``."""
+    asides: Asides = Asides()
 
 
 class Hold(NamedTuple):

@@ -6,7 +6,7 @@ it each frame that comes in.
 """
 
 from collections.abc import Callable, Mapping
-from typing import Final, NamedTuple, Protocol
+from typing import Final, Literal, NamedTuple, Protocol
 
 from urc.expressions import ExpressionError, Template, text_of
 from urc.model.codec import traffic_of
@@ -16,13 +16,28 @@ from urc.protocol.fast_value import FastRead, Taken
 from urc.protocol.framings.base import Framing
 from urc.protocol.readings import Decode
 
-__all__ = ["Answer", "Ear", "Fields", "Heard", "Listening", "Matcher", "Offer", "Quick", "shown"]
+__all__ = [
+    "Answer",
+    "Aside",
+    "Ear",
+    "Fields",
+    "Heard",
+    "Listening",
+    "Matcher",
+    "Offer",
+    "Quick",
+    "shown",
+]
 
 Fields = Mapping[str, object]
 """What a frame says: name → raw value."""
 
 _MOST_COLLECTED: Final = 1 << 20
 """Bytes that a reply of several frames may have."""
+
+
+Aside = Literal["resend", "extend"]
+"""The request once more, or more time."""
 
 
 class Matcher(NamedTuple):
@@ -65,6 +80,10 @@ class Answer(NamedTuple):
     lines: int | Pattern | None = None
     framing: Framing | None = None
     """What cuts the line while a step waits for it; None: the line's own, or its request's."""
+    asides: tuple[tuple[Aside, Matcher], ...] = ()
+    """What the robot may ask for instead of answering, and the frame by which it does."""
+    extend_s: float = 0.0
+    """For how long it may ask for more time, in all."""
 
 
 class Offer(NamedTuple):
@@ -74,11 +93,17 @@ class Offer(NamedTuple):
     """Of a whole answer; None: more is to come, or it is a refusal."""
     refusal: str = ""
     """Why the robot refused, for people."""
+    told: tuple[Matcher, Fields] | None = None
+    """What a frame says that is no answer, for signals."""
+    aside: Aside | None = None
+    """What the robot asks for instead of answering."""
     dropped: str = ""
     """What was collected before and belongs to no answer, for people."""
 
 
 _MORE: Final = Offer()
+IsMine = Callable[[Fields], bool]
+"""Tells by its fields whether a frame is about the request that waits."""
 
 
 class Ear:
@@ -92,16 +117,11 @@ class Ear:
         self._lines: list[bytes] = []
         self._size = 0
 
-    def offer(self, frame: Frame, is_mine: Callable[[Fields], bool] | None = None) -> Offer | None:
-        """Return what the frame means here, or None when it is no part of the answer.
-
-        Args:
-            frame: as it came in.
-            is_mine: tells by its fields whether an answer is the one waited for.
-        """
-        refused = self._refusal(frame, is_mine)
-        if refused is not None:
-            return refused
+    def offer(self, frame: Frame, is_mine: IsMine | None = None) -> Offer | None:
+        """Return what the frame means here, or None when it is no part of the answer."""
+        beside = self.beside(frame, is_mine)
+        if beside is not None:
+            return beside
         if self.answer.lines is not None:
             return self._collect(frame, self.answer.lines)
         found = self.answer.matcher.read(frame)
@@ -109,17 +129,37 @@ class Ear:
             return None
         return Offer(found)
 
-    def _refusal(self, frame: Frame, is_mine: Callable[[Fields], bool] | None) -> Offer | None:
-        """Return why the robot refused; what names nobody is for whoever waits longest."""
+    def beside(self, frame: Frame, is_mine: IsMine | None = None) -> Offer | None:
+        """Return what the frame means when it takes the place of an answer, or None.
+
+        It asks for the request again, or for more time, or refuses. What names no request is about
+        the one that has waited longest.
+        """
+        for kind, matcher in self.answer.asides:
+            fields = matcher.read(frame)
+            if fields is not None and _is_about(fields, is_mine):
+                return Offer(aside=kind, told=(matcher, fields))
+        return self._refusal(self._so_far(frame), is_mine)
+
+    def _so_far(self, frame: Frame) -> Frame:
+        """Return what a refusal is looked for in: of a counted reply, all of it that has come."""
+        if not (self._lines and isinstance(self.answer.lines, int)):
+            return frame
+        if not isinstance(frame.payload, bytes):
+            return frame
+        return Frame(b"\n".join((*self._lines, frame.payload)), frame.encoding)
+
+    def _refusal(self, frame: Frame, is_mine: IsMine | None) -> Offer | None:
+        """Return why the robot refused, or None."""
         for matcher, text in self.answer.faults:  # first: they say more
             fields = matcher.read(frame)
-            if fields is not None and (is_mine is None or not fields or is_mine(fields)):
+            if fields is not None and _is_about(fields, is_mine):
                 if _lacks(text, fields) and self.answer.matcher.read(frame) is not None:
                     continue  # a good answer has some of these fields, too, but not the reason
-                return Offer(refusal=_told(text, fields, frame))
+                return Offer(refusal=_told(text, fields, frame), told=(matcher, fields))
         for pattern in self.answer.errors:
             groups = _search(pattern, frame)
-            if groups is not None and (is_mine is None or not groups or is_mine(groups)):
+            if groups is not None and _is_about(groups, is_mine):
                 return Offer(refusal=f"the robot answered {shown(frame)}")
         return None
 
@@ -161,6 +201,11 @@ class Heard(NamedTuple):
 
     ear: "Ear"
     offer: "Offer"
+
+
+def _is_about(fields: Fields, is_mine: IsMine | None) -> bool:
+    """Return whether a frame with `fields` is about the request; one without names none."""
+    return is_mine is None or not fields or is_mine(fields)
 
 
 def _search(pattern: Pattern, frame: Frame) -> Mapping[str, str | None] | None:

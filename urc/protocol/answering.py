@@ -5,9 +5,10 @@ Floor 3, pure. See `urc.protocol.line` for the theory of operation.
 
 from urc.model.codec import Envelope
 from urc.protocol.answer import Offer
+from urc.protocol.codec import Frame
 from urc.protocol.connection import Connection
 from urc.protocol.events import Fault
-from urc.protocol.exchange import Ended, LineEvent, Outcome, expires_at
+from urc.protocol.exchange import Ended, Exchange, LineEvent, Outcome, expires_at
 from urc.protocol.flights import Flight
 from urc.protocol.topics import frame_of
 
@@ -28,25 +29,55 @@ class Answering(Connection):
             if flight is None:
                 return []  # nobody wants to know, or it was told already that it is late
             if attributes.get("ok", True):
-                return self._answer(flight, flight.answer(frame), now)
+                return self._answer(flight, flight.answer(frame), frame, now)
             reason = str(attributes.get("reason") or "the robot refused")
-            return self._answer(flight, flight.refused(frame, reason), now)
+            return self._answer(flight, flight.refused(frame, reason), frame, now)
         answered = self._flights.offer(frame) if self._flights else None
-        return self._answer(*answered, now) if answered else self.inbox.tell(frame, now)
+        return self._answer(*answered, frame, now) if answered else self.inbox.tell(frame, now)
 
-    def _answer(self, flight: Flight, offer: Offer, now: float) -> list[LineEvent]:
+    def _answer(
+        self, flight: Flight, offer: Offer, frame: Frame | None, now: float
+    ) -> list[LineEvent]:
+        """Return what follows from a frame that means `offer` for a request.
+
+        One that is no answer, yet about the request, may be a message as well; `frame` is None
+        where that has been told already.
+        """
         exchange = flight.exchange
         events: list[LineEvent] = self.inbox.dropped(offer) if offer.dropped else []
-        if offer.fields is None and not offer.refusal:
+        if offer.fields is None and not (offer.refusal or offer.aside):
             return events  # more is to come
+        if offer.fields is None and frame is not None:
+            events += self.inbox.message(frame, now) or ()
         if flight.is_late:
-            if exchange not in self._outbox:
-                return [*events, self._late(flight)]
             # It is as good as the answer to the same request, sent again.
-            self._outbox.remove(exchange)
+            again = self._flights.again(exchange)
+            if again is not None:
+                again.is_late = True
+            elif exchange in self._outbox:
+                self._outbox.remove(exchange)
+            elif offer.aside == "extend":
+                flight.extend(now)  # its answer is still to come, and still nobody else's
+                return events
+            else:
+                return [*events, self._late(flight)]
             flight.is_late = False
         self._misses = 0
-        if offer.fields is None:
+        if offer.told is not None:
+            events += self.inbox.samples(*offer.told, now)[0]
+        if offer.aside == "extend":
+            flight.extend(now)
+            return events
+        if offer.aside == "resend" and exchange.tries_left:
+            exchange.tries_left -= 1
+            self._flights.remove(flight)
+            text = f"the robot asked for {exchange.ask.label} again"
+            return [*events, Fault(self.spec.name, "sent-again", text), *self._send(exchange, now)]
+        if offer.aside:
+            times = 1 + exchange.ask.retries
+            text = f"the robot asks for {exchange.ask.label} again, and has got it {times} times"
+            outcome = Outcome("refused", text)
+        elif offer.fields is None:
             outcome = Outcome("refused", self.inbox.secrets.hide(offer.refusal))
         else:
             told, samples = self.inbox.samples(flight.ear.answer.matcher, offer.fields, now)
@@ -60,6 +91,10 @@ class Answering(Connection):
         # One connection, one request: the next one waits for a connection of its own.
         return events + self.leave(now) if self.is_per_request and self.is_ready else events
 
+    def _send(self, exchange: Exchange, now: float) -> list[LineEvent]:
+        """Send a request, whatever else waits."""
+        raise NotImplementedError
+
     def _late(self, flight: Flight) -> Fault:
         self._flights.remove(flight)
         text = f"the answer to {flight.exchange.ask.label} came too late and was dropped"
@@ -72,16 +107,16 @@ class Answering(Connection):
             self._flights.remove(flight)
             return []
         exchange, reply_s = flight.exchange, flight.ear.answer.timeout_s
-        text = f"no answer to {exchange.ask.label} within {reply_s:g} s"
+        text = f"no answer to {exchange.ask.label} {flight.waited(now)}"
         text += self.inbox.came_since(exchange.sent_at)
         events: list[LineEvent] = [Fault(self.spec.name, "reply-timeout", text)]
         flight.is_late = True
         flight.due = now + reply_s
-        if exchange.tries_left and flight.stage == 0:
+        if exchange.ask.is_repeated and exchange.tries_left and flight.stage == 0:
             exchange.tries_left -= 1
             wait_s = exchange.ask.retry.wait_s(exchange.ask.retries - exchange.tries_left)
             exchange.waits_until = now + wait_s
-            exchange.gives_up_at = expires_at(exchange.ask, flight.due + wait_s)
+            exchange.gives_up_at = expires_at(exchange.ask, now + wait_s)
             self._outbox.put_back(exchange)
             return events + self.give_up(text, now) if self.is_per_request else events
         events.append(Ended(exchange, Outcome("timed-out", text)))

@@ -9,10 +9,9 @@ from functools import partial
 from urc.expressions import COUNTERS
 from urc.model.codec import NUMBERED, Payload, ReadSpec, WriteSpec
 from urc.model.driver import Argument, Command, Driver, Message, Poll, Reply, TransportSpec
-from urc.model.flow import ErrorReply, ExpectStep, SendStep, Stage
+from urc.model.flow import RESENDS, Asides, ExpectStep, SendStep, Stage
 from urc.model.values import NOTHING
-from urc.patterns import Pattern
-from urc.protocol.answer import Answer, Matcher, Quick
+from urc.protocol.answer import Answer, Aside, Matcher, Quick
 from urc.protocol.bounds import queue_limit_s
 from urc.protocol.codec import CodecContext, Frame
 from urc.protocol.encode import build_encode
@@ -89,7 +88,8 @@ class Builder:
             rank=RANKS[command.priority],
             is_latest_only=command.is_latest_only,
             bucket=Bucket(command.rate_per_s) if command.rate_per_s else None,
-            retries=command.retries if command.is_idempotent else 0,
+            retries=command.retries or ask.retries,
+            is_repeated=command.is_idempotent and command.retries > 0,
             retry=command.retry,
             is_motion=command.hold is not None,
         )
@@ -109,7 +109,8 @@ class Builder:
 
     def expected(self, step: ExpectStep) -> Answer:
         """Return what a step waits for."""
-        answer = self._answer(step.transport, step.read, step.errors, step.faults, step.timeout_s)
+        stage = Stage(step.read, step.errors, step.faults, step.timeout_s)
+        answer = self._answer(step.transport, stage)
         return answer._replace(framing=step.framing and build_framing(step.framing))
 
     def reply_s(self, transport: str) -> float:
@@ -139,19 +140,18 @@ class Builder:
                 is_local=is_local,
                 queue_s=queue_limit_s(line.spec, None),
             )
+        reply = reply.with_errors(line.spec.errors, line.spec.faults)
         stages = (
-            Stage(reply.read, reply.errors, reply.faults, reply.timeout_s),
+            Stage(reply.read, reply.errors, reply.faults, reply.timeout_s, reply.asides),
             *reply.stages,
         )
-        answers = tuple(
-            self._answer(transport, one.read, one.errors, one.faults, one.timeout_s)
-            for one in stages
-        )
+        answers = tuple(self._answer(transport, one) for one in stages)
         return Ask(
             label,
             encode,
             answers,
             match=reply.match,
+            retries=RESENDS if reply.is_asked_again else 0,
             framing=None if reply.framing is None else build_framing(reply.framing),
             has_counters=has_counters,
             is_numbered=is_numbered,
@@ -165,26 +165,30 @@ class Builder:
         """Return what makes samples of a reply, or None where it may mean more than samples."""
         read = reply.read
         is_more = reply.errors or reply.faults or reply.stages or reply.match or reply.framing
-        if is_more or read.lines or any(name.startswith("_") for name in read.fields):
+        if (
+            is_more
+            or reply.asides != Asides()
+            or read.lines
+            or any(name.startswith("_") for name in read.fields)
+        ):
             return None
         return Messages([self._message(read, context)], context.encoding).take
 
-    def _answer(
-        self,
-        transport: str,
-        read: ReadSpec,
-        errors: tuple[Pattern, ...],
-        faults: tuple[ErrorReply, ...],
-        timeout_s: float | None,
-    ) -> Answer:
+    def _answer(self, transport: str, stage: Stage) -> Answer:
         spec = self.lines[transport].spec
         context = CodecContext(spec.encoding, self._readings.settings)
+        asides: tuple[tuple[Aside, ReadSpec | None], ...]
+        asides = (("resend", stage.asides.resend), ("extend", stage.asides.extend))
         return Answer(
-            self._matcher(read, context),
-            spec.timeouts.reply_s if timeout_s is None else timeout_s,
-            errors,
-            tuple((self._matcher(one.read, context), one.text) for one in faults),
-            read.lines,
+            self._matcher(stage.read, context),
+            spec.timeouts.reply_s if stage.timeout_s is None else stage.timeout_s,
+            stage.errors,
+            tuple((self._matcher(one.read, context), one.text) for one in stage.faults),
+            stage.read.lines,
+            asides=tuple(
+                (kind, self._matcher(read, context)) for kind, read in asides if read is not None
+            ),
+            extend_s=stage.asides.extend_s,
         )
 
     def _message(self, read: ReadSpec, context: CodecContext) -> Matcher:

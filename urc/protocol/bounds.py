@@ -10,6 +10,8 @@ from typing import Final
 
 from urc.model.driver import Command, Driver, Reply, TransportSpec
 from urc.model.flow import (
+    RESENDS,
+    Asides,
     ExpectStep,
     IfStep,
     PromptStep,
@@ -111,20 +113,22 @@ def _exchange_s(command: Command, spec: TransportSpec) -> float:
     reply = command.reply
     if reply is None:
         return queue_limit_s(spec, None)
-    first_s = _answer_s(reply.timeout_s, spec)
-    # Before it is sent again, the late answer is waited for as long as the answer was.
+    first_s = _answer_s(reply.timeout_s, spec, reply.asides)
     once_s = queue_limit_s(spec, first_s) + first_s
-    again_s = once_s + first_s
     waits_s = sum(command.retry.wait_s(tries + 1) for tries in range(command.retries))
-    return once_s + command.retries * again_s + waits_s + _stages_s(reply, spec)
+    times = 1 + (command.retries or RESENDS * reply.is_asked_again)
+    # A request that is asked for again begins at its first answer.
+    stages_s = _stages_s(reply, spec) * (times if reply.is_asked_again else 1)
+    return times * once_s + waits_s + stages_s
 
 
 def _stages_s(reply: Reply, spec: TransportSpec) -> float:
-    return sum(_answer_s(one.timeout_s, spec) for one in reply.stages)
+    return sum(_answer_s(one.timeout_s, spec, one.asides) for one in reply.stages)
 
 
-def _answer_s(timeout_s: float | None, spec: TransportSpec) -> float:
-    return spec.timeouts.reply_s if timeout_s is None else timeout_s
+def _answer_s(timeout_s: float | None, spec: TransportSpec, asides: Asides) -> float:
+    busy_s = asides.extend_s if asides.extend is not None else 0.0
+    return max(spec.timeouts.reply_s if timeout_s is None else timeout_s, busy_s)
 
 
 def _line_of(step: Step, transports: Mapping[str, TransportSpec]) -> TransportSpec | None:
@@ -144,7 +148,7 @@ def _step_s(step: Step, spec: TransportSpec | None) -> float:
     if isinstance(step, SendStep):
         return spec.timeouts.connect_s + 2 * spec.timeouts.reply_s
     if isinstance(step, (ExpectStep, PromptStep)):
-        return _answer_s(step.timeout_s, spec)
+        return _answer_s(step.timeout_s, spec, Asides())
     return 0.0
 
 

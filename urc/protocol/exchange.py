@@ -60,6 +60,9 @@ class Ask(NamedTuple):
     is_latest_only: bool = False
     bucket: Bucket | None = None
     retries: int = 0
+    """How often it is sent again at most."""
+    is_repeated: bool = False
+    """It is sent again when no answer comes, not only when the robot asks for it."""
     retry: Retry = Retry()
     """How long it waits before it is sent again."""
     has_counters: bool = False

@@ -21,7 +21,18 @@ __all__ = ["Flight", "Flights"]
 class Flight:
     """One time that a request was sent, until its last answer has come or is given up."""
 
-    __slots__ = ("_ear", "due", "exchange", "is_late", "number", "quick", "stage", "values")
+    __slots__ = (
+        "_ear",
+        "due",
+        "exchange",
+        "is_extended",
+        "is_late",
+        "number",
+        "quick",
+        "since",
+        "stage",
+        "values",
+    )
 
     def __init__(self, exchange: Exchange, now: float) -> None:
         self.exchange = exchange
@@ -32,6 +43,10 @@ class Flight:
         """Made when it is needed: hardly ever, where `quick` is enough."""
         self.due = now + ask.answers[0].timeout_s
         """When its answer is overdue; of one that is late: when it is not expected any more."""
+        self.since = now
+        """When its present answer began to be waited for."""
+        self.is_extended = False
+        """The robot has asked for more time for it."""
         self.is_late = False
         """It has failed, but its answer may still come and must not be taken for another's."""
         self.values: dict[str, Reading] = {}
@@ -57,11 +72,31 @@ class Flight:
         offer = self.ear.offer(frame)
         return offer if offer is not None and offer.refusal else Offer(refusal=reason)
 
-    def offer(self, frame: Frame) -> Offer | None:
-        """Return what the frame means for this request, or None when it answers another one."""
+    def offer(self, frame: Frame, *, is_message: bool = False) -> Offer | None:
+        """Return what the frame means for this request, or None when it answers another one.
+
+        A message `is_message`: it may take the place of an answer, but is none.
+        """
         if self.number is not None:
             return None  # its answer would carry it, see `answer`
-        return self.ear.offer(frame, None if self.exchange.ask.match is None else self._is_mine)
+        is_mine = None if self.exchange.ask.match is None else self._is_mine
+        return self.ear.beside(frame, is_mine) if is_message else self.ear.offer(frame, is_mine)
+
+    def extend(self, now: float) -> None:
+        """Wait on, for as long as its answer may take, and as its robot may be busy."""
+        answer = self.ear.answer
+        self.is_extended = True
+        late_s = answer.timeout_s if self.is_late else 0.0
+        self.due = min(now + answer.timeout_s, self.since + answer.extend_s + late_s)
+
+    def waited(self, now: float) -> str:
+        """Return how long its answer has been waited for, for people."""
+        answer = self.ear.answer
+        if not self.is_extended:
+            return f"within {answer.timeout_s:g} s"
+        if now >= self.since + answer.extend_s:
+            return f"within {answer.extend_s:g} s, for which the robot was busy"
+        return f"within {answer.timeout_s:g} s after the robot said that it was busy"
 
     def next_stage(self, now: float) -> bool:
         """Wait for the next answer; return whether there is one to come."""
@@ -69,7 +104,7 @@ class Flight:
         self.stage += 1
         if self.stage == len(answers):
             return False
-        self._ear = None
+        self._ear, self.since, self.is_extended = None, now, False
         self.due = now + answers[self.stage].timeout_s
         return True
 
@@ -117,13 +152,24 @@ class Flights(list[Flight]):
             return self[0].due
         return min((flight.due for flight in self), default=None)
 
-    @property
-    def is_wary(self) -> bool:
-        """Whether a late answer may still come that could be taken for another one's."""
+    def may_confuse(self, exchange: Exchange) -> bool:
+        """Return whether a late answer may still come that could be taken for the one to this.
+
+        A late answer to the very same request, sent before, is as good as the one to come.
+        """
+        if not (exchange.ask.answers and exchange.ask.is_in_order):
+            return False
         return any(
-            flight.is_late and flight.exchange.ask.is_in_order and not flight.exchange.is_realtime
+            flight.is_late
+            and flight.exchange is not exchange
+            and flight.exchange.ask.is_in_order
+            and not flight.exchange.is_realtime
             for flight in self
         )
+
+    def again(self, exchange: Exchange) -> Flight | None:
+        """Return the flight of `exchange` that still waits; None when it is not sent again."""
+        return next((one for one in self if one.exchange is exchange and not one.is_late), None)
 
     def has(self, label: str) -> bool:
         """Return whether a request of that name waits for its answer."""
@@ -148,10 +194,10 @@ class Flights(list[Flight]):
         """Return the one whose answer carries `number`."""
         return next((one for one in self if one.number is not None and one.number == number), None)
 
-    def offer(self, frame: Frame) -> tuple[Flight, Offer] | None:
+    def offer(self, frame: Frame, *, is_message: bool = False) -> tuple[Flight, Offer] | None:
         """Return whose answer the frame is and what it means, or None when it answers nobody."""
         if len(self) == 1:
-            only = self[0].offer(frame)
+            only = self[0].offer(frame, is_message=is_message)
             return None if only is None else (self[0], only)
         has_first, has_first_realtime = False, False
         collecting: list[Flight] = []
@@ -166,11 +212,11 @@ class Flights(list[Flight]):
             if flight.ear.answer.lines is not None:
                 collecting.append(flight)
                 continue
-            offer = flight.offer(frame)
+            offer = flight.offer(frame, is_message=is_message)
             if offer is not None:
                 return flight, offer
         for flight in collecting:  # last: any frame at all could be one of its lines
-            offer = flight.offer(frame)
+            offer = flight.offer(frame, is_message=is_message)
             if offer is not None:
                 return flight, offer
         return None

@@ -197,6 +197,8 @@ class Inbox:
             events: list[LineEvent] = self.dropped(offer)
             if offer.fields is not None:
                 events += self.samples(ear.answer.matcher, offer.fields, now)[0]
+            elif offer.told is not None:
+                events += self.samples(*offer.told, now)[0]
             if offer.fields is not None or offer.refusal:
                 self.unlisten(ear)
                 events.append(Heard(ear, offer))

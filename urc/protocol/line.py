@@ -291,11 +291,12 @@ class Line(Answering):
         if self._flights:
             # Any frame may be one of a reply's lines, so what has a name of its own goes first.
             message = self.inbox.message(frame, now) if self._flights.collects_lines() else None
+            answered = self._flights.offer(frame, is_message=message is not None)
+            if answered is not None:
+                told = self._answer(*answered, frame if message is None else None, now)
+                return told if message is None else message + told
             if message is not None:
                 return message
-            answered = self._flights.offer(frame)
-            if answered is not None:
-                return self._answer(*answered, now)
         return self.inbox.tell(frame, now)
 
     def _quick(self, flight: Flight, payload: bytes, now: float) -> list[LineEvent] | None:

@@ -55,13 +55,11 @@ class Outbox(Waiting[Exchange]):
         """
         if not self:
             return None
-        is_full, is_wary = False, False
-        if self._flights:
-            is_full, is_wary = self._flights.waiting >= self._limit, self._flights.is_wary
+        is_full = self._flights.waiting >= self._limit
         for exchange in self:
             if not (is_ready or exchange.is_privileged) or _free_at(exchange) > now:
                 continue
-            if is_wary and _may_be_mistaken(exchange):
+            if self._flights.may_confuse(exchange):
                 continue
             return None if is_full or now < self.next_send else exchange
         return None
@@ -78,18 +76,12 @@ class Outbox(Waiting[Exchange]):
         """Return when time alone lets something be sent; None when only an answer does."""
         if not self or self._flights.waiting >= self._limit:
             return None
-        is_wary = self._flights.is_wary
         times = [
             max(self.next_send, _free_at(exchange))
             for exchange in self
-            if (is_ready or exchange.is_privileged) and not (is_wary and _may_be_mistaken(exchange))
+            if (is_ready or exchange.is_privileged) and not self._flights.may_confuse(exchange)
         ]
         return min(times, default=None)
-
-
-def _may_be_mistaken(exchange: Exchange) -> bool:
-    """Return whether an answer that comes late could be taken for the one to this."""
-    return bool(exchange.ask.answers) and exchange.ask.is_in_order
 
 
 def _free_at(exchange: Exchange) -> float:

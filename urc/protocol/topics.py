@@ -108,6 +108,7 @@ def _reads(driver: Driver, transport: str) -> Iterator[ReadSpec]:
     for message in driver.messages.values():
         if message.transport == transport:
             yield message.read
+    yield from (fault.read for fault in driver.transports[transport].faults)
     replies = [(one.transport, one.reply) for one in driver.commands.values()]
     replies += [(one.transport, one.reply) for one in driver.polls]
     for name, reply in replies:
@@ -124,4 +125,6 @@ def _reads(driver: Driver, transport: str) -> Iterator[ReadSpec]:
 def _of_reply(reply: Reply) -> Iterator[ReadSpec]:
     yield reply.read
     yield from (stage.read for stage in reply.stages)
+    asides = (reply.asides, *(stage.asides for stage in reply.stages))
+    yield from (read for one in asides for read in (one.resend, one.extend) if read is not None)
     yield from (fault.read for fault in reply.faults)

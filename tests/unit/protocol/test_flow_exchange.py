@@ -150,15 +150,30 @@ commands:
 
 
 def test_what_is_idempotent_is_sent_again_with_the_same_bytes() -> None:
-    """After the time in which the first answer could still come, ahead of the others."""
+    """After one timeout, ahead of the others: any answer to it is as good as another."""
     talk = Dialogue(RETRIED).connect()
     talk.run("get")
     talk.run("other")
-    assert talk.at(0.9).sent == ["0 GET"]
+    assert talk.at(0.4).sent == ["0 GET"]
+    assert talk.at(0.5).sent == ["0 GET"]
     assert talk.at(1.0).sent == ["0 GET"]
     talk.says("V1")
     assert talk.outcomes == {1: "done"}
+
+
+def test_the_second_answer_to_a_retried_request_goes_to_no_other() -> None:
+    """The robot answers both copies: the second answer is dropped, and the next request waits."""
+    talk = Dialogue(RETRIED).connect()
+    talk.run("get")
+    talk.run("other")
+    talk.at(0.6).says("V1")
+    assert talk.outcomes == {1: "done"}
+    assert talk.sent == ["0 GET", "0 GET"]
+    talk.at(0.7).says("V1")
+    assert talk.faults == ["reply-timeout", "late-reply"]
     assert talk.sent == ["OTHER"]
+    talk.says("O")
+    assert talk.outcomes == {1: "done", 2: "done"}
 
 
 def test_retries_end() -> None:
@@ -174,7 +189,7 @@ def test_retries_end() -> None:
 
 def test_a_late_answer_spares_the_retry() -> None:
     """It is as good as the answer to the same request, sent again."""
-    talk = Dialogue(RETRIED).connect()
+    talk = Dialogue(RETRIED.replace("retries: 2", "retries: { count: 2, initial: 1s }")).connect()
     talk.run("get")
     talk.at(0.7).says("V1")
     assert talk.outcomes == {1: "done"}

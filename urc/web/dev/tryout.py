@@ -274,6 +274,7 @@ def _replies(driver: Driver, spec: TransportSpec) -> Iterator[tuple[str, Reply]]
     for name, transport, reply in asked:
         if transport != spec.name or reply is None:
             continue
+        reply = reply.with_errors(spec.errors, spec.faults)
         yield name, reply
         for number, stage in enumerate(reply.stages, 2):
             yield f"{name}, stage {number}", Reply(stage.read, stage.errors, faults=stage.faults)
