@@ -10,14 +10,13 @@ from pathlib import Path
 from typing import NamedTuple
 
 from tests.e2e.processes import UrcProcess
-from tests.unit.packages.made import write_package
+from tests.unit.packages.made import keep_settings, write_package
 from urc.cli.dashboard import Place, workshop_of
 from urc.model.profile import Profile
 from urc.packages.install import plan_wish
 from urc.packages.names import parse_wish
 from urc.packages.repositories import Repositories
 from urc.packages.store import Store
-from urc.runtime.kept import Kept, KeptFile
 from urc.web.app import build_app, serve
 from urc.web.fleet.garage import Garage
 
@@ -146,7 +145,7 @@ def install(data: Path, url: str, *packages: str) -> None:
 def set_up(data: Path, port: int, host: str = "127.0.0.1") -> None:
     """Have the rover's settings filled in."""
     settings = {"host": host, "port": str(port), "key": "open sesame"}
-    KeptFile(data / "robots", "rover").save(Kept(settings=settings))
+    keep_settings(data, "rover", settings)
 
 
 @asynccontextmanager

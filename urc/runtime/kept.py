@@ -3,6 +3,7 @@
 The file may hold secrets, so nobody but its owner can read it.
 """
 
+from collections.abc import Iterable
 from contextlib import suppress
 from pathlib import Path
 from typing import Annotated, Final
@@ -10,10 +11,14 @@ from urllib.parse import quote
 
 import msgspec
 
+from urc.packages.lock import Lock
 from urc.private_files import put_private
 from urc.problems import UrcError
 
-__all__ = ["Kept", "KeptFile"]
+__all__ = ["DRIVEN", "Kept", "KeptFile", "names_kept"]
+
+DRIVEN: Final = ("robot", "driver")
+"""Kinds of packages that settings are filled in for; of one name, the robot goes first."""
 
 _MOST_BYTES: Final = 1 << 20
 _Name = Annotated[str, msgspec.Meta(max_length=200)]
@@ -30,6 +35,11 @@ class Kept(msgspec.Struct, frozen=True):
     """Shown first; "": the document's first."""
     settings: dict[_Name, _Text] = {}
     """Setting → as typed; those that are missing take their defaults."""
+    destination: _Name = ""
+    """What the secrets among them were entered for, as `urc.runtime.destination` tells it; "": that
+    was not noted, so they are asked for again."""
+    package: _Name = ""
+    """For which they were filled in, as ``drivers/puppet``; "": for a document that was named."""
 
 
 class KeptFile:
@@ -68,7 +78,35 @@ class KeptFile:
         except OSError as error:
             raise UrcError(f"{self.file}: {error.strerror or error}") from None
 
+    def is_of(self, package: str) -> bool:
+        """Return whether it is there, and was not filled in for something else than a package."""
+        try:
+            kept = self.load()
+        except UrcError:
+            return True  # damaged: what it held is of no use any more
+        if kept == Kept():
+            return False
+        # An earlier version noted no destination, and no package with it.
+        return kept.package == package or not (kept.package or kept.destination)
+
     def forget(self) -> None:
         """Take the file away, if it is there."""
         with suppress(OSError):
             self.file.unlink(missing_ok=True)
+
+
+def names_kept(folder: Path, removed: Iterable[Lock], left: Iterable[Lock]) -> list[str]:
+    """Return the robots for which something is kept that goes with packages that are removed.
+
+    Args:
+        folder: of the files.
+        removed: the packages.
+        left: what stays installed; a robot that still has a package keeps its settings.
+    """
+    stay = {lock.key.name for lock in left if lock.key.kind in DRIVEN}
+    roots = {lock.key.name: lock.root for lock in removed if lock.key.kind in DRIVEN}
+    return [
+        name
+        for name, package in sorted(roots.items())
+        if name not in stay and KeptFile(folder, name).is_of(package)
+    ]

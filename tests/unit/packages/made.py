@@ -2,6 +2,9 @@
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
+
+import msgspec
 
 from urc.packages.archive import PACKAGE, write_archive
 from urc.packages.index import Entry
@@ -11,8 +14,19 @@ from urc.packages.package import Package, open_package, sha256
 from urc.packages.signature import Signature
 from urc.packages.sources import FileSource
 from urc.packages.store import Store
+from urc.runtime.kept import Kept
+from urc.web.fleet.garage import Garage, Workshop
 
-__all__ = ["DOCUMENTS", "assert_whole", "entry", "files_of", "install", "package", "write_package"]
+__all__ = [
+    "DOCUMENTS",
+    "assert_whole",
+    "entry",
+    "files_of",
+    "install",
+    "keep_settings",
+    "package",
+    "write_package",
+]
 
 DOCUMENTS = {
     "driver": """\
@@ -111,6 +125,19 @@ def install(
         change.stage(plan)
         change.commit(plan)
     return plan.lock
+
+
+def keep_settings(data: Path, name: str, settings: Mapping[str, str]) -> None:
+    """Have the settings of an installed robot filled in, for where its lines then lead."""
+
+    def unused(*_: object) -> Any:
+        raise AssertionError("no robot is made or tried here")
+
+    garage = Garage(Workshop(data, unused, unused, lambda _: {}))
+    lock = garage.parked()[name][-1]
+    kept = Kept(settings=dict(settings), package=lock.root)
+    place = garage.filled(garage.profile(lock), kept).destination
+    garage.kept(name).save(msgspec.structs.replace(kept, destination=place))
 
 
 def assert_whole(store: Store) -> list[str]:

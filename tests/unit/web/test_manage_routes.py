@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from starlette.testclient import TestClient
 
-from tests.unit.packages.made import DOCUMENTS, install, package
+from tests.unit.packages.made import DOCUMENTS, install, keep_settings, package
 from urc.model.profile import Profile, Setting
 from urc.packages.package import Package
 from urc.packages.store import Store
@@ -218,7 +218,8 @@ def test_settings_are_checked_kept_and_used(tmp_path: Path) -> None:
         part = send(client, settings={"host": "10.0.0.7", "key": ""})
         assert part["text"] == "saved; not set yet: Key"
         assert send(client, settings={"host": "10.0.0.7", "key": "open sesame"})["isSaved"]
-        assert send(client, settings={"host": "10.0.0.8", "key": None})["isSaved"]
+        assert send(client, settings={"host": "10.0.0.7", "key": None})["isSaved"]
+        assert send(client, settings={"host": "10.0.0.8", "key": "open sesame"})["isSaved"]
         assert file.load().settings == {"host": "10.0.0.8", "key": "open sesame"}
         assert client.get("/robots/rover/").status_code == 200
         for page in ("/", "/robots/rover/settings"):
@@ -335,7 +336,7 @@ def test_two_robots_may_need_two_versions_of_a_widget(tmp_path: Path) -> None:
     store = Store(tmp_path / "packages")
     for name, version in (("a", "1.0.0"), ("b", "2.0.0"), ("c", "1.0.0")):
         install(store, *with_dial(name, version))
-        KeptFile(tmp_path / "robots", name).save(Kept(settings={"key": "x"}))
+        keep_settings(tmp_path, name, {"key": "x"})
     with served(tmp_path) as client:
         assert "It cannot be used" not in client.get("/").text
         dials = {name: dial_of(client.get(f"/robots/{name}/").text) for name in "abc"}

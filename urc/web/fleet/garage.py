@@ -4,11 +4,12 @@ Floor 5. It reads files and keeps what the operator fills in; it holds no sessio
 while: from the event loop it is called in a thread.
 """
 
+import logging
 from collections.abc import Callable, Mapping
 from contextlib import AbstractAsyncContextManager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 from urc.config.fit import Fitted, fit_interface
 from urc.model.profile import Profile
@@ -19,17 +20,17 @@ from urc.packages.names import PackageError
 from urc.packages.package import open_package
 from urc.packages.store import Store
 from urc.problems import UrcError
-from urc.runtime.kept import Kept, KeptFile
+from urc.runtime.destination import destination_of
+from urc.runtime.kept import DRIVEN, Kept, KeptFile
 from urc.runtime.opened import open_document
 from urc.runtime.session import Session
 from urc.runtime.settings import parse_setting
 from urc.runtime.shelves import shelf_of
 from urc.web.fleet.robots import Robot
 
-__all__ = ["DRIVEN", "Added", "Garage", "Workshop"]
+__all__ = ["Added", "Filled", "Garage", "Workshop"]
 
-DRIVEN: Final = ("robot", "driver")
-"""Kinds of packages that stand on the menu; of one name, the robot goes before the driver."""
+log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,6 +52,19 @@ class Workshop:
     """Whether other machines may manage packages and settings, too."""
 
 
+class Filled(NamedTuple):
+    """What the settings of a robot come to."""
+
+    values: dict[str, Value]
+    """Of every setting that has one that may be used."""
+    given: dict[str, Value]
+    """Those of them that were given at the start."""
+    destination: str
+    """Where the robot's lines lead."""
+    withheld: frozenset[str]
+    """Secrets that are there, but were entered for another destination."""
+
+
 class Added(NamedTuple):
     """An installed interface."""
 
@@ -62,11 +76,22 @@ class Garage:
     """The documents behind the robots."""
 
     def __init__(self, workshop: Workshop) -> None:
-        """Read nothing yet."""
+        """Look which packages are installed; no document is read yet."""
         self.workshop = workshop
         self.store = Store(workshop.data / "packages")
+        self._there = self._roots()
+        """Packages that were installed at the start."""
+        self._begun: dict[str, str] = {}
+        """Robot → where its lines led when it was seen first: what was given at the start is for
+        there."""
         self._manifests: dict[tuple[str, int, int], Manifest] = {}
         """By digest and state of the archive: pages ask for all of them again and again."""
+
+    def _roots(self) -> frozenset[str]:
+        try:
+            return frozenset(lock.root for lock in self.store.installed())
+        except PackageError:  # the managers' pages tell it
+            return frozenset()
 
     def stamp(self) -> object:
         """Return what is another thing whenever something was installed or removed."""
@@ -89,27 +114,69 @@ class Garage:
             kept: what was filled in; None: what is in its file.
         """
         chosen = self.kept(name).load() if kept is None else kept
-        values = self.values(profile, chosen)
-        return self.workshop.make(self.furnished(profile, chosen.interface), values)
+        filled = self.filled(profile, chosen)
+        for secret in sorted(filled.withheld):
+            log.warning(
+                "%s: the setting %s is not used until it is entered again: it was entered for"
+                " another place or package, or by an earlier version of URC",
+                name,
+                secret,
+            )
+        return self.workshop.make(self.furnished(profile, chosen.interface), filled.values)
 
-    def values(self, profile: Profile, kept: Kept) -> dict[str, Value]:
-        """Return the value of every setting that has one.
+    def filled(self, profile: Profile, kept: Kept) -> Filled:
+        """Return what the settings of a robot come to; raise `UrcError`.
 
         What was given at the start wins over what was filled in, and that over the default.
         What was filled in and does not fit any more, as after an update, counts as not set.
+        A secret is used for no other destination than the one for which it was entered.
         """
-        values: dict[str, Value] = {
+        defaults: dict[str, Value] = {
             name: setting.default
             for name, setting in profile.settings.items()
             if setting.default is not None
         }
+        typed = dict(defaults)
         for name, text in kept.settings.items():
             if name in profile.settings:
                 try:
-                    values[name] = parse_setting(profile.settings[name], text)
+                    typed[name] = parse_setting(profile.settings[name], text)
                 except UrcError:
-                    values.pop(name, None)
-        return values | dict(self.workshop.given(profile))
+                    typed.pop(name, None)
+        given = dict(self.workshop.given(profile))
+        package = self.package_of(profile)
+        everything = typed | given
+        place = destination_of(profile, package, everything)
+        begun = self._begun_at(profile, package, defaults | given)
+        withheld: set[str] = set()
+        for name, setting in profile.settings.items():
+            if not setting.is_secret or name not in everything:
+                continue
+            if name in given and begun == place:
+                continue
+            given.pop(name, None)
+            if name in typed and kept.destination == place:
+                everything[name] = typed[name]
+            else:
+                del everything[name]
+                withheld.add(name)
+        return Filled(everything, given, place, frozenset(withheld))
+
+    def _begun_at(self, profile: Profile, package: str, values: Mapping[str, Value]) -> str:
+        """Return where the lines of a robot led at the start; "" where it was not there."""
+        if package and package not in self._there:
+            return ""
+        place = destination_of(profile, package, values)
+        return self._begun.setdefault(package or profile.name, place)
+
+    def package_of(self, profile: Profile) -> str:
+        """Return the installed package of a robot, as ``drivers/puppet``; "" where it is a file."""
+        home = (self.store.folder / "ecosystems").resolve()
+        try:
+            parts = Path(profile.file).resolve().relative_to(home).parts
+        except ValueError:
+            return ""
+        return "/".join(parts[1:3])
 
     def furnished(self, profile: Profile, first: str = "") -> Profile:
         """Return a profile with the installed interfaces that fit it; `first` is shown first."""

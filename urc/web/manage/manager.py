@@ -15,6 +15,7 @@ from urc.packages.names import Key, PackageError, Wish, parse_wish
 from urc.packages.repositories import Repository
 from urc.packages.sources import Source
 from urc.problems import UrcError, printable
+from urc.runtime.kept import names_kept
 from urc.web.daemon import in_daemon
 from urc.web.fleet.fleet import Broken, Fleet
 from urc.web.fleet.garage import Garage
@@ -195,8 +196,18 @@ class Manager:
             raise PackageError(f"{wish} was not installed by itself")
         return meant
 
-    async def remove(self, text: str) -> list[str]:
+    def forgettable(self, wish: Wish) -> list[str]:
+        """Return the robots for which something was filled in that goes with a package; raise."""
+        meant = self._meant(wish)
+        left = [lock for lock in self.garage.store.installed() if lock not in meant]
+        return names_kept(self.garage.workshop.data / "robots", meant, left)
+
+    async def remove(self, text: str, *, forgets: bool = True) -> list[str]:
         """Remove a package and what only it needed; return what is gone.
+
+        Args:
+            text: which.
+            forgets: whether what was filled in for its robot goes, too.
 
         Raises:
             PackageError: it is not installed, or its robot is being driven.
@@ -209,7 +220,10 @@ class Manager:
             with self.garage.store.changing() as change:
                 return change.remove(wish)[1]
 
+        names = await asyncio.to_thread(self.forgettable, wish) if forgets else []
         gone = await asyncio.to_thread(work)
+        for name in names:
+            await asyncio.to_thread(self.garage.kept(name).forget)
         await self.changed()
         return gone
 

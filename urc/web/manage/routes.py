@@ -227,9 +227,11 @@ class ManageRoutes:
         self.check(request)
         said = await body_of(request, Package)
         if not said.yes:
-            gone = await asyncio.to_thread(self._manager.gone, parse_wish(said.package))
-            return answer(Gone(tuple(gone), ""))
-        gone = await self._manager.remove(said.package)
+            wish = parse_wish(said.package)
+            gone = await asyncio.to_thread(self._manager.gone, wish)
+            filled = await asyncio.to_thread(self._manager.forgettable, wish)
+            return answer(Gone(tuple(gone), "", has_settings=bool(filled)))
+        gone = await self._manager.remove(said.package, forgets=said.forget)
         line = t("removed {names}", names=", ".join(gone))
         if not gone:
             line = t("removed; another package needs its files")

@@ -4,7 +4,7 @@ Floor 5. Pure: what is in a field is decided here, what becomes of it in
 `urc.web.manage.settings_routes`.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 from urllib.parse import quote
@@ -61,6 +61,8 @@ class Field:
     """It was given at the start, and cannot be changed here."""
     is_set: bool
     """A secret: whether there is one."""
+    is_withheld: bool
+    """A secret that is there and not used: it was entered for another destination."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,6 +96,7 @@ def settings_page(
     kept: Kept,
     given: Mapping[str, Value],
     *,
+    withheld: Collection[str] = (),
     ways: Ways,
     driver: str,
     versions: Sequence[str],
@@ -108,6 +111,7 @@ def settings_page(
         profile: what it is, with all its interfaces.
         kept: what was filled in before.
         given: settings that were given at the start.
+        withheld: secrets that are not used, since they were entered for another destination.
         ways: which pages there are.
         driver: what it is driven with.
         versions: installed versions of it, the newest first.
@@ -126,7 +130,7 @@ def settings_page(
         driver=driver,
         versions=_versions(versions, kept.version),
         interfaces=_interfaces(profile, kept.interface),
-        fields=tuple(_field(one, kept, given) for one in profile.settings.values()),
+        fields=tuple(_field(one, kept, given, withheld) for one in profile.settings.values()),
         transports=tuple(profile.driver.transports),
         may_manage=may_manage,
         is_simulated=False,
@@ -150,7 +154,9 @@ def _interfaces(profile: Profile, chosen: str) -> tuple[Option, ...]:
     )
 
 
-def _field(setting: Setting, kept: Kept, given: Mapping[str, Value]) -> Field:
+def _field(
+    setting: Setting, kept: Kept, given: Mapping[str, Value], withheld: Collection[str]
+) -> Field:
     is_given = setting.name in given
     text = kept.settings.get(setting.name, "")
     if is_given and not setting.is_secret:
@@ -175,7 +181,8 @@ def _field(setting: Setting, kept: Kept, given: Mapping[str, Value]) -> Field:
         placeholder=default,
         options=options,
         is_given=is_given,
-        is_set=is_given or setting.name in kept.settings,
+        is_set=is_given or (setting.name in kept.settings and setting.name not in withheld),
+        is_withheld=setting.name in withheld,
     )
 
 

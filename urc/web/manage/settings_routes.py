@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from contextlib import nullcontext
 from typing import Final
 
+import msgspec
 from starlette.exceptions import HTTPException
 from starlette.requests import Request
 from starlette.responses import HTMLResponse, Response
@@ -81,12 +82,14 @@ class SettingsRoutes:
             if broken is None:
                 raise HTTPException(404, t("No robot of that name is served here."))
             profile, fault = Profile(name, broken.title, ""), broken.fault
+        filled = None if fault else garage.filled(profile, kept)
         return settings_page(
             request.state.nonce,
             name,
             profile,
             kept,
-            {} if fault else garage.workshop.given(profile),
+            filled.given if filled is not None else {},
+            withheld=filled.withheld if filled is not None else (),
             ways=self._ways,
             driver=str(lock) if lock is not None else profile.file,
             versions=[one.version for one in reversed(locks)],
@@ -125,7 +128,7 @@ class SettingsRoutes:
         manager.check_idle(name)
         before = await asyncio.to_thread(self._kept, name)
         bare = await asyncio.to_thread(self._document, name, said.version)
-        kept, faults = _filled_in(bare, before, said)
+        kept, faults = await asyncio.to_thread(self._filled_in, bare, before, said)
         if faults:
             text = t("not saved: look at what is marked")
             return SettingsAnswer(is_saved=False, text=text, faults=faults)
@@ -161,6 +164,31 @@ class SettingsRoutes:
                 raise UrcError(f"{name} {version} is not installed")
             return garage.profile(garage.chosen(locks, version))
         return garage.reread(manager.fleet.robots[name].profile)
+
+    def _filled_in(
+        self, profile: Profile, before: Kept, said: SettingsAsked
+    ) -> tuple[Kept, dict[str, str]]:
+        """Return what is to be kept, and what is wrong with it, field by field."""
+        texts, faults = _typed(profile, said)
+        garage = self._manager.garage
+        package = garage.package_of(profile)
+        untouched = {
+            name: before.settings.get(name, "")
+            for name, text in said.settings.items()
+            if text is None and name in profile.settings
+        }
+        old = {name: text for name, text in untouched.items() if text}
+        kept = Kept(
+            version=said.version,
+            interface=said.interface,
+            settings=texts | old,
+            destination=before.destination,
+            package=package,
+        )
+        found = garage.filled(profile, kept)
+        for name in untouched.keys() & found.withheld:
+            faults[name] = t("enter it again: it was entered for another place, or another package")
+        return msgspec.structs.replace(kept, destination=found.destination), faults
 
     async def _tried(
         self, name: str, profile: Profile, values: Mapping[str, Value]
@@ -200,14 +228,12 @@ def _line(tried: Tried) -> TriedLine:
     )
 
 
-def _filled_in(profile: Profile, before: Kept, said: SettingsAsked) -> tuple[Kept, dict[str, str]]:
-    """Return what is to be kept, and what is wrong with it, field by field."""
+def _typed(profile: Profile, said: SettingsAsked) -> tuple[dict[str, str], dict[str, str]]:
+    """Return what was typed and fits, and what is wrong with the rest, field by field."""
     texts: dict[str, str] = {}
     faults: dict[str, str] = {}
     for name, setting in profile.settings.items():
-        text = said.settings.get(name, "")
-        if text is None:  # a secret that was not touched
-            text = before.settings.get(name, "")
+        text = said.settings.get(name) or ""
         text = text if setting.is_secret else text.strip()
         if not text:
             continue
@@ -219,4 +245,4 @@ def _filled_in(profile: Profile, before: Kept, said: SettingsAsked) -> tuple[Kep
     for name in said.settings:
         if name not in profile.settings:
             faults[name] = "the driver has no such setting"
-    return Kept(version=said.version, interface=said.interface, settings=texts), faults
+    return texts, faults

@@ -58,6 +58,8 @@ class Package(Message, frozen=True):
     package: _Short
     yes: bool = False
     """Of a removal: do it; else only say what would go."""
+    forget: bool = True
+    """Of a removal: also of what was filled in for the robot, secrets among it."""
 
 
 class Add(Message, frozen=True):
@@ -188,6 +190,8 @@ class Gone(Message, frozen=True):
     gone: tuple[str, ...]
     """As ``drivers/puppet 1.0.0``."""
     line: str
+    has_settings: bool = False
+    """Whether something was filled in for it, which may be forgotten."""
 
 
 class Failure(Message, frozen=True):

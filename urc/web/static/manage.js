@@ -120,8 +120,8 @@ async function act(path, body) {
 async function remove(wish) {
   say("");
   try {
-    const { gone } = await ask("/api/v1/packages/remove", { package: wish });
-    dialog.confirm(wish, gone, () => void act("packages/remove", { package: wish, yes: true }));
+    const { gone, hasSettings } = await ask("/api/v1/packages/remove", { package: wish });
+    dialog.confirm(wish, gone, hasSettings, (forget) => void act("packages/remove", { package: wish, yes: true, forget }));
   } catch (error) {
     say(reason(error), "bad");
   }

@@ -51,21 +51,25 @@ export class JobDialog {
    *
    * @param {string} wish
    * @param {string[]} gone
-   * @param {() => void} yes
+   * @param {boolean} hasSettings whether something was filled in for it
+   * @param {(forget: boolean) => void} yes
    */
-  confirm(wish, gone, yes) {
+  confirm(wish, gone, hasSettings, yes) {
+    const forget = /** @type {HTMLInputElement} */ (made("input", { type: "checkbox", checked: true, "data-forget": true }));
     this.number = null;
     this.job = null;
     this.open(
       title(t("Remove {name}?", { name: wish })),
       gone.length ? made("p", {}, t("This goes:")) : made("p", {}, t("Its files stay: another package needs them.")),
       list(gone),
+      hasSettings &&
+        made("label", { class: "urc-check" }, forget, ` ${t("Forget what was filled in for it, secrets too")}`),
       made(
         "div",
         { class: "urc-ways" },
         button(t("Remove"), "yes", () => {
           this.close();
-          yes();
+          yes(forget.checked);
         }, { class: "urc-button-main" }),
         button(t("Keep"), "no", () => this.close()),
       ),
