@@ -154,7 +154,8 @@ def _refuse_asides(reply: Part | None, findings: Findings) -> None:
 
 def _check_stop(command: Command, part: Part, findings: Findings) -> None:
     """Report what would keep back a command that STOP gives, or make it wait."""
-    hindering = ("moves", "confirm", "requires", "coalesce", "rate_limit")
+    moves = () if part.data.get("moves") is False else ("moves",)  # false only says so once more
+    hindering = (*moves, "confirm", "requires", "coalesce", "rate_limit")
     refuse(part, hindering, "means nothing beside 'stop': nothing may keep it back", findings)
     for name, one in command.arguments.items():
         if one.confirm or (one.is_required and one.default is None):

@@ -11,6 +11,7 @@ from urc.config.rules_answers import check_answers
 from urc.config.rules_frames import check_frames_apart
 from urc.config.rules_motion import check_motion
 from urc.config.rules_traffic import check_traffic
+from urc.config.rules_unmarked import check_unguarded, check_unmarked
 from urc.expressions import split_template
 from urc.model.driver import Driver, Poll, Reply, TransportSpec
 from urc.model.flow import SendStep, Step, UntilStep, WaitStep, all_steps
@@ -37,14 +38,6 @@ def check_flow(part: Part, driver: Driver, secrets: frozenset[str], findings: Fi
         _check_baud(inner, driver, driver.transports[name], findings)
     for name, inner in part.named("commands").items():
         command = driver.commands[name]
-        if command.hold is not None and command.confirm is None and not command.requires:
-            findings.warn(
-                inner.must("hold"),
-                "unguarded-motion",
-                f"{name!r} moves the robot without a question or a condition",
-                key=True,
-                hint="say what it 'requires', or what people 'confirm' when they take control",
-            )
         if command.reply is not None and "reply" in inner.data:
             _check_stages(inner.must("reply"), command.reply, command.transport, driver, findings)
         if command.verify is not None:
@@ -55,6 +48,8 @@ def check_flow(part: Part, driver: Driver, secrets: frozenset[str], findings: Fi
     check_answers(part, driver, findings)
     check_traffic(part, driver, findings)
     check_motion(part, driver, findings)
+    check_unguarded(part, driver, findings)
+    check_unmarked(part, driver, findings)
     check_frames_apart(part, driver, findings)
 
 

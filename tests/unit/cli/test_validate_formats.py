@@ -24,7 +24,7 @@ signals:
   battery: { type: integer }
   mode: { type: string }
 commands:
-  go: { send: "GO" }
+  go: { send: "GO", moves: true, confirm: { text: It goes } }
   halt: { send: "HALT" }
 polls:
   - { name: battery, every: 1s, send: "?", reply: { regex: '^(?P<battery>\\d+)$' } }

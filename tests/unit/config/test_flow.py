@@ -93,6 +93,7 @@ transports:
     on_connect: [{{ run: set_mode, args: {{ mode: {mode} }} }}]
 commands:
   set_mode: {{ send: "M {{{{ mode }}}}", args: {{ mode: {{ type: integer }} }}, moves: mode == 10 }}
+  stay: {{ send: STAY, stop: true }}
 """
     assert codes(text, tmp_path) == ({"wrong-command"} if is_told else set())
 

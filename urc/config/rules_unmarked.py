@@ -1,0 +1,158 @@
+"""Commands that move a robot: is each marked as such, and does anything end what goes on by itself?
+
+A command is taken for motion by its name, by the units and names of its arguments, or by the type
+of the message that it becomes. All words are compared whole: ``moves_left`` is not ``move``.
+"""
+
+import re
+from collections.abc import Mapping
+from typing import Final
+
+from urc.config.part import Findings, Part
+from urc.model.driver import Command, Driver
+from urc.model.units import quantity_of
+
+__all__ = ["check_unguarded", "check_unmarked", "why_it_moves"]
+
+
+def _words(text: str) -> frozenset[str]:
+    return frozenset(text.split())
+
+
+_MOTION: Final = _words(
+    "advance climb crawl dive dock drive fly follow goto hover jog jump launch move navigate orbit"
+    " reverse roll rotate spin steer swim takeoff turn undock walk"
+)
+"""Words that mean motion wherever they stand in a name."""
+_FIRST: Final = _words("back backward flip forward go home lift lower raise return")
+"""Words that mean motion where a name begins with them."""
+_PAIRS: Final = frozenset(("go to", "set speed", "set velocity", "take off"))
+"""Two words that mean motion where a name begins with them."""
+_QUIET: Final = _words(
+    "abort accept alarm arm brake calibrate cancel clear config configure disable disarm enable end"
+    " error feedback finish get gain halt info init lamp led level light limit list load lock log"
+    " max min mode name off offset on param pause ping query read reset save select show signal"
+    " state status stop store subscribe test timeout trim tune unlock version volume zero"
+)
+"""Words of a name that is about something else than starting a motion: ``drive_mode``."""
+_BOUND: Final = _words("limit max maximum min minimum top")
+"""Words of an argument that bounds a motion and starts none."""
+_MOVING_ARGUMENTS: Final = _words("omega rudder steering throttle thrust velocity vx vy vz")
+_MOVING_TYPES: Final = _words(
+    "AckermannDrive AckermannDriveStamped JointJog JointTrajectory Twist TwistStamped"
+)
+_QUANTITIES: Final = {"speed": "a speed", "rotation": "a rotation"}
+_WORD: Final = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+")
+_HINT: Final = (
+    "write hold: { … } for motion by hand, moves: true when it goes on by itself, stop: true when"
+    " it ends motion, or moves: false when nothing moves"
+)
+_HINT_OF_STEPS: Final = (
+    "write steps: [ … ] with moves: true when it goes on by itself, or moves: false when nothing"
+    " moves"
+)
+
+
+def check_unmarked(part: Part, driver: Driver, findings: Findings) -> None:
+    """Warn of each command and sequence that seems to move the robot and does not say so.
+
+    Args:
+        part: the driver's mapping.
+        driver: as loaded, without errors.
+        findings: takes the warnings.
+    """
+    for key in ("commands", "sequences"):
+        for name, inner in part.named(key).items():
+            command = driver.commands[name]
+            if command.hold is not None or command.moves or command.stops or _says_no(inner):
+                continue
+            why = why_it_moves(name, command)
+            if why:
+                findings.warn(
+                    inner,
+                    "unmarked-motion",
+                    f"{name!r} seems to move the robot ({why}) and does not say so: STOP does not"
+                    " hold it back",
+                    key=True,
+                    hint=_HINT if key == "commands" else _HINT_OF_STEPS,
+                )
+
+
+def check_unguarded(part: Part, driver: Driver, findings: Findings) -> None:
+    """Warn of motion that goes on by itself, which STOP cannot end and people are not asked about.
+
+    A held command needs no such guard: the hand is its guard, and its release ends it.
+
+    Args:
+        part: the driver's mapping.
+        driver: as loaded, without errors.
+        findings: takes the warnings.
+    """
+    if any(one.stops or one.hold is not None for one in driver.commands.values()):
+        return
+    for key in ("commands", "sequences"):
+        for name, inner in part.named(key).items():
+            command = driver.commands[name]
+            is_said = isinstance(inner.data, dict) and "moves" in inner.data
+            if is_said and command.moves and not _is_asked(command):
+                findings.warn(
+                    inner.must("moves"),
+                    "unguarded-motion",
+                    f"{name!r} moves the robot by itself: STOP has nothing to send to end it,"
+                    " and people are not asked before",
+                    key=True,
+                    hint="mark the command that ends it with stop: true, or let people 'confirm'"
+                    " this one when the robot has none",
+                )
+
+
+def _is_asked(command: Command) -> bool:
+    return command.confirm is not None or any(one.confirm for one in command.arguments.values())
+
+
+def _says_no(part: Part) -> bool:
+    return isinstance(part.data, dict) and part.data.get("moves") is False
+
+
+def why_it_moves(name: str, command: Command) -> str:
+    """Return what makes a command look like motion, in words for people; "" when nothing does."""
+    if command.send.options.get("verb") == "cancel":
+        return ""  # whatever its name, it gives up what was begun
+    words = words_of(name)
+    pair = " ".join(words[:2])
+    is_quiet = pair not in _PAIRS and not _QUIET.isdisjoint(words)
+    if not is_quiet and (found := pair if pair in _PAIRS else _motion_word(words)):
+        return f"its name says {found!r}"
+    for argument in command.arguments.values():
+        own = words_of(argument.name)
+        if not _BOUND.isdisjoint((*own, *words)):
+            continue
+        if what := _QUANTITIES.get(quantity_of(argument.unit)):
+            return f"its argument {argument.name!r} is {what} in {argument.unit}"
+        if not is_quiet and not _MOVING_ARGUMENTS.isdisjoint(own):
+            return f"its argument is {argument.name!r}"
+    return _type_of_motion(command.send.options)
+
+
+def words_of(name: str) -> tuple[str, ...]:
+    """Return the words of ``go_to``, ``GoTo`` or ``GO2``, in small letters."""
+    return tuple(found[0].lower() for found in _WORD.finditer(name))
+
+
+def _motion_word(words: tuple[str, ...]) -> str:
+    if not words:
+        return ""
+    if words[0] in _FIRST:
+        return words[0]
+    return next((one for one in words if one in _MOTION), "")
+
+
+def _type_of_motion(send: Mapping[str, object]) -> str:
+    """Return why the type of a message means motion; "" when it does not."""
+    attributes = send.get("attributes")
+    kind = attributes.get("type") if isinstance(attributes, Mapping) else None
+    if not isinstance(kind, str):
+        return ""
+    own = kind.rpartition("/")[2]
+    is_goal = send.get("verb") == "goal" and not _MOTION.isdisjoint(words_of(own))
+    return f"it sends a {own}" if is_goal or own in _MOVING_TYPES else ""
