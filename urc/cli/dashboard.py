@@ -230,7 +230,7 @@ async def _kept(session: Session, folder: Path) -> AsyncIterator[None]:
     from urc.runtime.recording.recorder import recorded  # most record nothing
 
     profile = session.profile
-    keeping = recorded(session.hub, folder, profile, session.settings, is_folder=True)
+    keeping = recorded(session.hub, folder, profile, is_folder=True)
     async with AsyncExitStack() as stack:
         recorder = await stack.enter_async_context(keeping)
         try:

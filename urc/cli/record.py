@@ -56,7 +56,7 @@ async def _record(
     check_installed()
     file = arguments.output or named(Path(), profile.name)
     # It begins before the session and ends after it: what is said at both ends is in it.
-    async with recorded(session.hub, file, profile, settings) as recorder:
+    async with recorded(session.hub, file, profile) as recorder:
         while not (recorder.is_begun or recorder.fault):  # noqa: ASYNC110 - a thread says so
             await asyncio.sleep(_SOON_S)
         if recorder.fault:

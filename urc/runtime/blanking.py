@@ -1,24 +1,35 @@
-"""The values of secret settings, taken out of traffic that is shown or kept.
+"""The values of secret settings, taken out of all that is shown or kept.
 
-Floor 4, pure. The engine says which frames are secret and the hub blanks them; a robot that echoes
-a password, or a command that carries a token, is blanked here. A stream may bring an echo letter by
-letter: what may be the beginning of a secret is held back until more of it has come, or nothing has
-for a while.
+Floor 4, pure. The engine says which frames are secret and the link blanks them; a robot that echoes
+a password, or a command that carries a token, is blanked here, for the hub. A stream may bring an
+echo letter by letter: what may be the beginning of a secret is held back until more of it has come,
+or nothing has for a while.
 """
 
 import base64
+import re
 from collections.abc import Iterable, Mapping
+from typing import Any
 
+from urc.model.codec import Envelope
 from urc.model.profile import Profile
 from urc.model.values import Value
 from urc.runtime.disguise import forms
-from urc.runtime.report import REDACTED
 
-__all__ = ["Blanker", "secret_texts", "stand_ins"]
+__all__ = ["REDACTED", "Blanker", "secret_texts", "stand_ins"]
+
+REDACTED = "‹secret›".encode()
+"""Stands for secret bytes in what is shown."""
 
 _SHORTEST = 3
 """A shorter secret would blot out half of every frame; then the whole of it is blanked."""
 _SHORTEST_CODED = 6
+_SHORTEST_PART = 4
+"""Letters of a secret that was cut off; fewer are in many words."""
+_SHORTEST_NUMBER = 4
+"""Digits of a secret number; shorter ones would blank many a reading that only equals it."""
+_CUT = re.compile(rb"['\"]?\s*(?:\.\.\.|\xe2\x80\xa6|['\"]|$)")
+"""What follows a text that was cut: dots, or its quotation mark, or nothing."""
 
 
 def stand_ins(profile: Profile, settings: Mapping[str, Value]) -> dict[str, Value]:
@@ -45,7 +56,6 @@ class Blanker:
     def __init__(self, secrets: Iterable[str], encodings: Iterable[str] = ("utf-8",)) -> None:
         """Prepare for these, written in any of the encodings; empty ones are none."""
         names, texts = tuple(encodings), [text for text in secrets if text]
-        self._texts = frozenset(texts)
         written = [text.encode(name, "replace") for text in texts for name in names]
         self._plain = tuple(dict.fromkeys(written))
         coded = [code for secret in self._plain for code in _base64(secret)]
@@ -53,6 +63,16 @@ class Blanker:
         # Longest first: one secret may be part of another.
         found = dict.fromkeys((*self._plain, *coded))
         self._all = tuple(sorted(found, key=len, reverse=True))
+        self._long = tuple(secret for secret in self._all if len(secret) >= _SHORTEST)
+        self._short = tuple(
+            re.compile(rf"(?<!\w){re.escape(text)}(?!\w)")
+            for text in texts
+            if len(text.encode("utf-8", "replace")) < _SHORTEST
+        )
+        """They blank a text only where they stand alone: else they would blank nearly all."""
+        self._numbers = frozenset(
+            int(text) for text in texts if text.isdecimal() and len(text) >= _SHORTEST_NUMBER
+        )
         self._held: dict[tuple[str, str], bytes] = {}
 
     @classmethod
@@ -67,10 +87,6 @@ class Blanker:
         """Whether there is any secret."""
         return bool(self._all)
 
-    def is_one(self, value: object) -> bool:
-        """Return whether a value is a secret: a number has no letters to be found in."""
-        return bool(self._texts) and str(value) in self._texts
-
     def whole(self, data: bytes) -> bytes:
         """Return what is shown of one frame."""
         for secret in self._all:
@@ -81,10 +97,39 @@ class Blanker:
         return data
 
     def text(self, text: str) -> str:
-        """Return what is shown of a text."""
+        """Return what is shown of a text, which may quote the beginning of a secret and be cut."""
         if not self._all:
             return text
-        return self.whole(text.encode("utf-8", "replace")).decode("utf-8", "replace")
+        if any(word.search(text) for word in self._short):
+            return REDACTED.decode()
+        shown = text.encode("utf-8", "replace")
+        for secret in self._long:
+            shown = _without_cut(secret, shown.replace(secret, REDACTED))
+        return shown.decode("utf-8", "replace")
+
+    def value(self, value: Any) -> Any:
+        """Return what is shown of a reading: of a number that is a secret, None."""
+        if isinstance(value, str):
+            return self.text(value)
+        if isinstance(value, bytes):
+            return self._in_bytes(value)
+        if isinstance(value, tuple | list):
+            return tuple(map(self.value, value))
+        if isinstance(value, Mapping):
+            return {self.value(name): self.value(one) for name, one in value.items()}
+        return None if value in self._numbers else value
+
+    def _in_bytes(self, data: bytes) -> bytes:
+        """Return what is shown of a picture or blob: two letters stand in every one by chance."""
+        for secret in self._long:
+            if len(secret) >= _SHORTEST_PART:
+                data = data.replace(secret, REDACTED)
+        return data
+
+    def envelope(self, envelope: Envelope) -> Envelope:
+        """Return what is shown of a message."""
+        shown = self.value(envelope.attributes)
+        return envelope._replace(attributes=shown, body=self.value(envelope.body))
 
     def stream(self, key: tuple[str, str], data: bytes) -> bytes:
         """Return what is shown now of the stream `key`, to which `data` was added."""
@@ -96,6 +141,11 @@ class Blanker:
             self._held[key] = shown[len(shown) - kept :]
             shown = shown[: len(shown) - kept]
         return shown
+
+    @property
+    def is_holding(self) -> bool:
+        """Whether something was held back that may begin a secret."""
+        return bool(self._held)
 
     def rest(self) -> list[tuple[tuple[str, str], bytes]]:
         """Return what was held back of each stream, on which nothing has come for a while."""
@@ -124,3 +174,16 @@ def _base64(secret: bytes) -> list[bytes]:
         if whole - first >= _SHORTEST_CODED:
             found.append(code[first:whole])
     return found
+
+
+def _without_cut(secret: bytes, shown: bytes) -> bytes:
+    """Return a text without a beginning of `secret` that it ends, or quotes, with."""
+    at = shown.find(secret[:_SHORTEST_PART])
+    while at >= 0 and len(secret) > _SHORTEST_PART:
+        size = _SHORTEST_PART
+        while shown[at + size : at + size + 1] == secret[size : size + 1] != b"":
+            size += 1
+        if _CUT.match(shown, at + size):
+            shown = shown[:at] + REDACTED + shown[at + size :]
+        at = shown.find(secret[:_SHORTEST_PART], at + 1)
+    return shown

@@ -3,18 +3,22 @@
 Floor 4. State is newest-wins: a reader that was away sees the newest reading, never a queue of old
 ones. Notes (faults, state changes) are kept in a bounded list that says how many it dropped. The
 hub is used from one event loop; it has no task and no timer of its own.
+
+It is the one door between a robot and all who are shown something of it: pages, cards, recordings,
+the command line. So the values of secret settings are taken out here, on the way in.
 """
 
 import asyncio
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
 from urc.model.codec import Envelope
 from urc.model.values import Alarm, Reading, Sample, Signal
+from urc.runtime.blanking import Blanker
 from urc.runtime.streams import Streams
 
 if TYPE_CHECKING:
@@ -185,8 +189,22 @@ class Tap:
 class Hub:
     """Latest values of one robot, with a revision that grows with every change."""
 
-    def __init__(self, signals: Mapping[str, Signal]) -> None:
+    def __init__(
+        self,
+        signals: Mapping[str, Signal],
+        blanker: Blanker | None = None,
+        streams: Iterable[str] = (),
+    ) -> None:
+        """Begin with nothing known.
+
+        Args:
+            signals: of the driver.
+            blanker: takes secrets out of all that comes in; None: there are none.
+            streams: lines on which a piece of traffic may go on in the next one.
+        """
         self.signals = signals
+        self._blanker = blanker if blanker is not None and blanker.is_needed else None
+        self._stream_lines = frozenset(streams)
         self.names = tuple(signals)
         """Index → signal name; the order of the driver, fixed for the session."""
         self.index = {name: place for place, name in enumerate(self.names)}
@@ -226,6 +244,9 @@ class Hub:
     def put(self, samples: Iterable[Sample]) -> None:
         """Take readings; a repeated value counts as a change, because its age is new."""
         taken = samples if type(samples) is tuple else tuple(samples)
+        if self._blanker is not None:
+            value = self._blanker.value
+            taken = tuple(one._replace(value=value(one.value)) for one in taken)
         revision = self.revision = self.revision + 1
         if len(taken) > _FEW:
             self._put_many(taken)
@@ -266,6 +287,9 @@ class Hub:
 
     def set_link(self, status: LinkStatus) -> None:
         """Take the state of one transport."""
+        if self._blanker is not None:
+            text = self._blanker.text
+            status = replace(status, address=text(status.address), detail=text(status.detail))
         if self.links.get(status.transport) == status:
             return
         self.links[status.transport] = status
@@ -277,6 +301,8 @@ class Hub:
 
     def set_progress(self, progress: Progress) -> None:
         """Take where a sequence stands."""
+        if self._blanker is not None:
+            progress = replace(progress, reason=self._blanker.text(progress.reason))
         if self.progress.get(progress.command) == progress:
             return
         self.progress[progress.command] = progress
@@ -291,11 +317,15 @@ class Hub:
 
     def tell(self, done: Moved | Told) -> None:
         """Take what somebody did with the robot: only taps hear of it."""
+        if self._blanker is not None and isinstance(done, Moved):
+            done = replace(done, arguments=self._blanker.value(done.arguments))
         for tap in self._taps:
             tap.put((done,))
 
     def note(self, note: Note) -> None:
         """Take one line for the log."""
+        if self._blanker is not None:
+            note = replace(note, text=self._blanker.text(note.text))
         self.notes.append(note)
         self.notes_count += 1
         self.revision += 1
@@ -304,7 +334,32 @@ class Hub:
         self._wake()
 
     def saw(self, traffic: Traffic) -> None:
-        """Take bytes that went over a line."""
+        """Take bytes that went over a line; what may begin a secret waits for what follows it."""
+        if self._blanker is not None:
+            is_stream = traffic.envelope is None and traffic.transport in self._stream_lines
+            if is_stream:
+                data = self._blanker.stream((traffic.transport, traffic.direction), traffic.data)
+                if not data and traffic.data:
+                    return
+            else:
+                data = self._blanker.whole(traffic.data)
+            envelope = traffic.envelope and self._blanker.envelope(traffic.envelope)
+            traffic = replace(traffic, data=data, envelope=envelope)
+        self._show(traffic)
+
+    @property
+    def holds_back(self) -> bool:
+        """Whether some traffic waits for what follows it."""
+        return self._blanker is not None and self._blanker.is_holding
+
+    def tell_rest(self, now_s: float) -> None:
+        """Show the traffic that waits: nothing has followed it."""
+        if self._blanker is not None:
+            for (transport, direction), data in self._blanker.rest():
+                went: Literal["sent", "received"] = "sent" if direction == "sent" else "received"
+                self._show(Traffic(now_s, transport, went, data))
+
+    def _show(self, traffic: Traffic) -> None:
         self.traffic.append(traffic)
         self.traffic_count += 1
         self.revision += 1

@@ -5,17 +5,18 @@ from typing import Literal
 
 from urc.model.codec import Envelope, Payload, traffic_of
 from urc.protocol.events import Fault
-from urc.runtime.clock import Clock
+from urc.runtime.blanking import REDACTED
+from urc.runtime.clock import Alarm, Clock
 from urc.runtime.hub import Hub, LinkState, LinkStatus, Note, Traffic
 
 __all__ = ["REDACTED", "LinkReport", "NoteLimiter"]
 
 BURST = 4
 """Notes of one kind that are told at once."""
-REDACTED = "‹secret›".encode()
-"""Stands for secret bytes in the traffic."""
 REFILL_S = 10.0
 """After so many seconds one more of that kind is told."""
+HELD_S = 0.3
+"""What may begin a secret is told when nothing has followed it for so long."""
 KINDS = 64
 """Kinds told apart; what a foreign engine adds beyond them is counted together."""
 
@@ -63,6 +64,7 @@ class LinkReport:
         self._detail = ""
         self._is_changed = True
         self._limiter = NoteLimiter(clock)
+        self._telling: Alarm | None = None
         self.state: LinkState = "idle"
         self.attempts = 0
         """Failed attempts since the last good frame."""
@@ -114,6 +116,14 @@ class LinkReport:
             envelope = data if isinstance(data, Envelope) else None
             shown, now = traffic_of(data), self._clock.now()
             self._hub.saw(Traffic(now, self._transport, direction, shown, envelope))
+            if self._hub.holds_back:
+                if self._telling is not None:
+                    self._telling.cancel()
+                self._telling = self._clock.call_at(now + HELD_S, self._tell_rest)
+
+    def _tell_rest(self) -> None:
+        self._telling = None
+        self._hub.tell_rest(self._clock.now())
 
     def publish(self) -> None:
         """Put the state into the hub, if anything about it has changed."""

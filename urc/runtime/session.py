@@ -19,6 +19,7 @@ from urc.protocol.engine import Engine
 from urc.protocol.events import Failed, Replied, Request
 from urc.protocol.reins import PAUSE_S, Pull
 from urc.registry import Table
+from urc.runtime.blanking import Blanker
 from urc.runtime.clock import Clock, LoopClock, within
 from urc.runtime.dispatcher import Dispatcher
 from urc.runtime.hub import Hub
@@ -92,7 +93,11 @@ class Session:
         self.profile = profile
         self.settings = dict(settings)
         driver = profile.driver
-        self.hub = Hub(driver.signals)
+        self._blanker = Blanker.of(profile, self.settings)
+        streams = (
+            name for name, spec in driver.transports.items() if spec.framing.type != "datagram"
+        )
+        self.hub = Hub(driver.signals, self._blanker, streams)
         self._clock: Clock = clock or LoopClock()
         engine = Engine(driver, self.settings)
         self.frames: Frames = engine.motions
@@ -168,6 +173,7 @@ class Session:
         trace: TracebackType | None,
     ) -> None:
         self._dispatcher.stop("the session was closed")
+        self.hub.tell_rest(self._clock.now())
         for task in self._tasks:
             task.cancel()
         # An error of the block is the caller's own and passes as it is, not inside a group. Only
@@ -224,7 +230,9 @@ class Session:
             self._dispatcher.forget(request.id)
             raise
         if isinstance(outcome, Failed):
-            raise CommandFailed(outcome.code, outcome.message)
+            raise CommandFailed(outcome.code, self._blanker.text(outcome.message))
+        if outcome.values and self._blanker.is_needed:
+            return outcome._replace(values=self._blanker.value(outcome.values))
         return outcome
 
     async def settle(self) -> str:

@@ -4,11 +4,7 @@ import base64
 
 import pytest
 
-from urc.model.codec import Envelope
-from urc.runtime.blanking import Blanker
-from urc.runtime.hub import Note, Traffic
-from urc.runtime.report import REDACTED
-from urc.web.dev.rows import Row, note_row, traffic_row
+from urc.runtime.blanking import REDACTED, Blanker
 
 HIDDEN = "hunter2"
 KEY = ("wire", "received")
@@ -60,46 +56,3 @@ def test_streams_are_told_apart() -> None:
     blanker = Blanker([HIDDEN])
     assert blanker.stream(("a", "sent"), b"hunt") == b""
     assert blanker.stream(("b", "sent"), b"er2") == b"er2"
-
-
-def row_of(traffic: Traffic, *, is_stream: bool = False) -> Row:
-    """Return the row of a piece of traffic."""
-    row = traffic_row(traffic, Blanker([HIDDEN]), is_stream=is_stream)
-    assert row is not None
-    return row
-
-
-def test_a_message_is_shown_without_its_secret() -> None:
-    """Not in the address, not in the other attributes, not in the body, and not by its length."""
-    envelope = Envelope(
-        "request",
-        {"method": "GET", "path": f"/login/{HIDDEN}", "headers": {"x-key": HIDDEN}},
-        {"password": HIDDEN},
-    )
-    row = row_of(Traffic(1.0, "web", "sent", b"", envelope))
-    assert (row.verb, row.address) == ("request", "GET /login/‹secret›")
-    assert HIDDEN not in row.more + row.text
-    long = Envelope("request", {}, {"password": HIDDEN})
-    assert row_of(Traffic(1.0, "web", "sent", b"", long)).size == len(
-        '{"password": "‹secret›"}'.encode()
-    )
-
-
-def test_a_note_is_shown_without_a_secret() -> None:
-    """A fault may repeat what the robot said."""
-    row = note_row(Note(1.0, "warning", "wire", f"no-match: {HIDDEN}"), Blanker([HIDDEN]))
-    assert row.text == "no-match: ‹secret›"
-
-
-def test_a_picture_is_a_picture_and_its_size() -> None:
-    """A large one is only counted."""
-    small = b"\xff\xd8\xff" + bytes(2000)
-    row = row_of(Traffic(1.0, "cam", "received", b"", Envelope("message", {"topic": "/c"}, small)))
-    assert (row.picture, row.data, row.text) == (
-        "image/jpeg",
-        small,
-        "<2\u202f003 bytes, image/jpeg>",
-    )
-    row = row_of(Traffic(1.0, "cam", "received", b"\xff\xd8\xff" + bytes(100_000)))
-    assert (row.picture, row.data) == ("", b"")
-    assert row.text == "<100\u202f003 bytes, image/jpeg>"

@@ -14,7 +14,7 @@ from urc.model.flow import Hold
 from urc.model.profile import Profile, Setting
 from urc.motion.lease import Client as Screen
 from urc.problems import Problem, UrcError
-from urc.runtime.hub import Note, Traffic
+from urc.runtime.hub import Traffic
 from urc.testing.clock import FakeClock, settle
 from urc.testing.codec import text
 from urc.testing.dashboard import FakeRobot, dashboard_profile
@@ -131,20 +131,6 @@ def test_a_backlog_is_bounded_in_bytes_as_well() -> None:
     assert len(backlog) < 30
     assert backlog.first == 100 - len(backlog)
     assert backlog.take()[-1].n == 99
-
-
-async def test_the_echo_of_a_secret_is_not_shown() -> None:
-    """What the robot repeats of a password is blanked, letter by letter as well."""
-    settings = {"password": Setting("password", "string", is_secret=True)}
-    async with scene(dashboard_profile(settings=settings), "hunter2") as it:
-        it.goes(b"login hunter2\n", "sent")
-        for letter in b"hunter2\n":
-            it.goes(bytes([letter]))
-        it.robot.hub.note(Note(it.clock.now(), "warning", "wire", "no-match: 'hunter2'"))
-        rows = await it.rows()
-        assert rows[0]["data"] == "login ‹secret›\n".encode()
-        assert b"".join(bytes(row["data"]) for row in rows[1:]) == "‹secret›\n".encode()  # type: ignore[call-overload]
-        assert "hunter2" not in str(it.line.sent)
 
 
 async def test_a_question_is_answered_with_its_number() -> None:

@@ -24,9 +24,8 @@ from typing import IO, Any, Final
 from urc import __version__
 from urc.config.resolve import resolve
 from urc.model.profile import Profile
-from urc.model.values import Sample, Value
+from urc.model.values import Sample
 from urc.problems import UrcError
-from urc.runtime.blanking import Blanker
 from urc.runtime.hub import Hub, Note, Tap, Tapped, Traffic
 from urc.runtime.recording.shapes import PROFILE, Shapes, channels
 from urc.runtime.shelves import shelf_of
@@ -69,7 +68,6 @@ class Recorder:
         self,
         place: Path,
         profile: Profile,
-        blanker: Blanker,
         *,
         is_folder: bool = False,
         document: str | None = None,
@@ -79,7 +77,6 @@ class Recorder:
         Args:
             place: the file, which must not be there yet, or a folder.
             profile: of the robot.
-            blanker: takes the values of secret settings out.
             is_folder: whether `place` is one: the file in it has a name of `named`.
             document: the profile as one document; read from its file when left out.
         """
@@ -96,9 +93,7 @@ class Recorder:
         self._document = document
         # One difference for the whole file: a clock that is set meanwhile moves nothing in it.
         offset_ns = time.time_ns() - time.monotonic_ns()
-        self._shapes = Shapes(
-            profile.driver, blanker, lambda time_s: offset_ns + round(time_s * _SECOND_NS)
-        )
+        self._shapes = Shapes(profile.driver, lambda time_s: offset_ns + round(time_s * _SECOND_NS))
         self._writer: Any = None  # half of its methods have no types
         self._channels: dict[str, int] = {}
         self._waiting: deque[Tapped] = deque()
@@ -143,7 +138,6 @@ class Recorder:
             stream = self._made()
             self._begin(stream)
             self._follow()
-            self._write(self._shapes.rest(time.monotonic()))
             self._writer.finish()
         except UrcError as error:
             self._fail(str(error))
@@ -276,7 +270,6 @@ async def recorded(
     hub: Hub,
     place: Path,
     profile: Profile,
-    settings: Mapping[str, Value],
     *,
     is_folder: bool = False,
 ) -> AsyncIterator[Recorder]:
@@ -285,13 +278,12 @@ async def recorded(
     The log of the hub says where it is kept, or why it is not.
 
     Args:
-        hub: of the session, best before it is opened.
+        hub: of the session, best before it is opened; no secret leaves it.
         place: the file, or a folder, as of `Recorder`.
         profile: of the robot, from a file.
-        settings: of the session; the values of secret ones are kept out.
         is_folder: whether `place` is one.
     """
-    recorder = Recorder(place, profile, Blanker.of(profile, settings), is_folder=is_folder)
+    recorder = Recorder(place, profile, is_folder=is_folder)
     with hub.tap(with_traffic=True) as tap:
         feeding = asyncio.create_task(_feed(tap, hub, recorder))
         try:

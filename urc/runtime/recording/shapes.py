@@ -17,7 +17,6 @@ import msgspec
 from urc.model.driver import Driver
 from urc.model.values import Alarm, Reading, Sample, Signal
 from urc.runtime.audit import Entry
-from urc.runtime.blanking import Blanker
 from urc.runtime.hub import LinkState, LinkStatus, Moved, Note, Tapped, Told, Traffic
 
 __all__ = [
@@ -140,54 +139,41 @@ def _signal_channel(signal: Signal) -> Channel:
 
 
 class Shapes:
-    """Makes the messages of one recording: stateful, since a secret may come in pieces."""
+    """Makes the messages of one recording: stateful, since its times never go back."""
 
-    def __init__(self, driver: Driver, blanker: Blanker, utc_ns: Callable[[float], int]) -> None:
+    def __init__(self, driver: Driver, utc_ns: Callable[[float], int]) -> None:
         """Begin.
 
         Args:
             driver: of the robot.
-            blanker: takes the values of secret settings out of all that is kept.
             utc_ns: monotonic seconds → nanoseconds since 1970.
         """
         self._signals = driver.signals
         self._commands = driver.commands
-        self._streams = {
-            name for name, spec in driver.transports.items() if spec.framing.type != "datagram"
-        }
-        self._blanker = blanker
         self._utc_ns = utc_ns
         self._told_ns = 0
 
     def messages(self, event: Tapped) -> list[tuple[str, int, bytes]]:
-        """Return topic, time and JSON of what happened; none while it may be part of a secret."""
+        """Return topic, time and JSON of what happened."""
         match event:
             case Sample():
                 return [self._sample(event)]
             case Traffic():
-                return self._traffic(event)
+                return [self._traffic(event)]
             case Moved():
                 return [self._moved(event.command, event.arguments, self._now(event.time_s))]
             case LinkStatus():
                 return [self._line(event)]
             case Note():
                 time_ns = self._now(event.time_s)
-                return [(LOG, time_ns, _json(self._blanked(_log(event, time_ns))))]
+                return [(LOG, time_ns, _json(_log(event, time_ns)))]
             case Told():
                 entry, time_ns = event.entry, self._now(event.time_s)
-                told = self._blanked(entry._asdict())
+                told = entry._asdict()
                 return [(DRIVING, time_ns, _json(told)), *self._ended(entry, time_ns)]
 
-    def rest(self, time_s: float) -> list[tuple[str, int, bytes]]:
-        """Return what was held back of streams on which nothing will come any more."""
-        time_ns = self._now(time_s)
-        return [
-            (WIRE + transport, time_ns, _json(_wire(direction, data)))
-            for (transport, direction), data in self._blanker.rest()
-        ]
-
     def _sample(self, sample: Sample) -> tuple[str, int, bytes]:
-        time_ns, value = self._now(sample.time_s), self._blanked(sample.value)
+        time_ns, value = self._now(sample.time_s), sample.value
         signal = self._signals[sample.signal]
         if signal.type == "image" and isinstance(value, bytes):
             told: dict[str, object] = {
@@ -210,12 +196,12 @@ class Shapes:
             "attempts": status.attempts,
             "faults": status.faults,
         }
-        return LINK + status.transport, self._now(status.since_s), _json(self._blanked(told))
+        return LINK + status.transport, self._now(status.since_s), _json(told)
 
     def _moved(
         self, command: str, arguments: Mapping[str, Reading], time_ns: int
     ) -> tuple[str, int, bytes]:
-        return COMMANDS + command, time_ns, _json(self._blanked(arguments))
+        return COMMANDS + command, time_ns, _json(arguments)
 
     def _ended(self, entry: Entry, time_ns: int) -> list[tuple[str, int, bytes]]:
         """Return what a motion that has ended tells the robot: else it seems to last for ever."""
@@ -224,30 +210,9 @@ class Shapes:
             return []
         return [self._moved(command.name, command.hold.release, time_ns)]
 
-    def _traffic(self, traffic: Traffic) -> list[tuple[str, int, bytes]]:
-        if traffic.envelope is None and traffic.transport in self._streams:
-            key = (traffic.transport, str(traffic.direction))
-            data = self._blanker.stream(key, traffic.data)
-            if not data and traffic.data:
-                return []
-        else:
-            data = self._blanker.whole(traffic.data)
-        told = _wire(traffic.direction, data)
-        return [(WIRE + traffic.transport, self._now(traffic.time_s), _json(told))]
-
-    def _blanked(self, value: Any) -> Any:
-        """Return a value, or a whole message, without the secrets."""
-        if not self._blanker.is_needed:
-            return value
-        if isinstance(value, str):
-            return self._blanker.text(value)
-        if isinstance(value, bytes):
-            return self._blanker.whole(value)
-        if isinstance(value, tuple | list):
-            return tuple(map(self._blanked, value))
-        if isinstance(value, Mapping):
-            return {self._blanked(name): self._blanked(one) for name, one in value.items()}
-        return None if self._blanker.is_one(value) else value
+    def _traffic(self, traffic: Traffic) -> tuple[str, int, bytes]:
+        told = _wire(traffic.direction, traffic.data)
+        return WIRE + traffic.transport, self._now(traffic.time_s), _json(told)
 
     def _now(self, time_s: float) -> int:
         """Return a time that is not before what was told last: the file is played in its order.

@@ -17,16 +17,15 @@ from urc.config.messaging import MESSAGING
 from urc.model.profile import Profile
 from urc.model.values import Value
 from urc.problems import UrcError
-from urc.runtime.blanking import Blanker, stand_ins
-from urc.runtime.clock import within
+from urc.runtime.blanking import stand_ins
 from urc.runtime.hub import Note, Tap, Traffic
 from urc.runtime.selftest import sample_settings
 from urc.web.dev import wire
 from urc.web.dev.preview import Preview, preview
-from urc.web.dev.rows import Row, held_row, note_row, traffic_row
+from urc.web.dev.rows import Row, note_row, traffic_row
 from urc.web.dev.tryout import pasted_bytes, try_out
 from urc.web.dev.watch import ProfileWatch
-from urc.web.fleet.robots import Robot, SessionFailed, missing_settings
+from urc.web.fleet.robots import SessionFailed, missing_settings
 from urc.web.socket import STALL_S, Allowance, Flow, Line
 from urc.web.wire.messages import (
     CLOSE_BAD_MESSAGES,
@@ -144,14 +143,13 @@ class DevClient:
                 try:
                     live = await self._station.live()
                 except SessionFailed as error:
-                    self._put(note_row(self._note(str(error)), Blanker(())))
+                    self._put(note_row(self._note(str(error))))
                     await self._clock.sleep(RETRY_S)
                     continue
-                robot = self._station.robot
                 with live.session.hub.tap(with_traffic=True) as tap:
                     for note in live.session.hub.notes:
-                        self._put(note_row(note, Blanker.of(robot.profile, robot.settings)))
-                    listening = asyncio.ensure_future(self._listen(tap, robot))
+                        self._put(note_row(note))
+                    listening = asyncio.ensure_future(self._listen(tap))
                     ended = asyncio.ensure_future(live.ended.wait())
                     try:
                         await asyncio.wait((listening, ended), return_when=asyncio.FIRST_COMPLETED)
@@ -159,37 +157,26 @@ class DevClient:
                         listening.cancel()
                         ended.cancel()
 
-    async def _listen(self, tap: Tap, robot: Robot) -> None:
-        blanker = Blanker.of(robot.profile, robot.settings)
-        specs = robot.profile.driver.transports
-        streams = {name for name, spec in specs.items() if spec.framing.type != "datagram"}
+    async def _listen(self, tap: Tap) -> None:
         dropped = 0
         while True:
-            try:
-                async with within(self._clock, HELD_S):
-                    await tap.filled()
-            except TimeoutError:
-                for key, data in blanker.rest():
-                    self._put(held_row(key, data, self._clock.now()))
-                continue
+            await tap.filled()
             for one in tap.take():
                 if isinstance(one, Traffic):
-                    is_stream = one.transport in streams
-                    self._put(traffic_row(one, blanker, is_stream=is_stream))
+                    self._put(traffic_row(one))
                 elif isinstance(one, Note):
-                    self._put(note_row(one, blanker))
+                    self._put(note_row(one))
             if tap.dropped > dropped:
                 lost, dropped = tap.dropped - dropped, tap.dropped
                 text = f"{lost} pieces of traffic were lost: they came faster than they are read"
-                self._put(note_row(self._note(text), blanker))
+                self._put(note_row(self._note(text)))
 
     def _note(self, text: str) -> Note:
         return Note(self._clock.now(), "warning", "URC", text)
 
-    def _put(self, row: Row | None) -> None:
-        if row is not None:
-            self._backlog.put(row)
-            self._news.set()
+    def _put(self, row: Row) -> None:
+        self._backlog.put(row)
+        self._news.set()
 
     # -- writing
 

@@ -8,7 +8,6 @@ import json
 import msgspec
 
 from urc.model.codec import Envelope
-from urc.runtime.blanking import Blanker
 from urc.runtime.hub import Note, Traffic
 from urc.web.wire.text import cut
 
@@ -17,7 +16,6 @@ __all__ = [
     "Row",
     "fill",
     "grouped",
-    "held_row",
     "note_row",
     "traffic_row",
 ]
@@ -58,57 +56,37 @@ class Row(msgspec.Struct, omit_defaults=True):
         return 100 + len(self.data) + len(self.text) + len(self.more)
 
 
-def traffic_row(traffic: Traffic, blanker: Blanker, *, is_stream: bool) -> Row | None:
-    """Return the row of a piece of traffic; None while all of it may be part of a secret.
-
-    Args:
-        traffic: as recorded.
-        blanker: takes the secrets out.
-        is_stream: whether the next piece may go on where this one ends.
-    """
+def traffic_row(traffic: Traffic) -> Row:
+    """Return the row of a piece of traffic."""
     row = Row(0, traffic.time_s, traffic.direction, traffic.transport)
     if traffic.envelope is not None:
-        fill(row, traffic.envelope, blanker)
-        return row
-    if is_stream:
-        data = blanker.stream((traffic.transport, traffic.direction), traffic.data)
-        if not data and traffic.data:
-            return None
+        fill(row, traffic.envelope)
     else:
-        data = blanker.whole(traffic.data)
-    _fill_bytes(row, data)
+        _fill_bytes(row, traffic.data)
     return row
 
 
-def held_row(key: tuple[str, str], data: bytes, time_s: float) -> Row:
-    """Return the row of what was held back."""
-    row = Row(0, time_s, key[1], key[0])
-    _fill_bytes(row, data)
-    return row
-
-
-def note_row(note: Note, blanker: Blanker) -> Row:
+def note_row(note: Note) -> Row:
     """Return the row of a fault or a change of state."""
-    text = blanker.text(cut(note.text))
-    return Row(0, note.time_s, "note", note.source, level=note.level, text=text)
+    return Row(0, note.time_s, "note", note.source, level=note.level, text=cut(note.text))
 
 
-def fill(row: Row, envelope: Envelope, blanker: Blanker) -> None:
+def fill(row: Row, envelope: Envelope) -> None:
     """Write a message into a row: verb, address, the other attributes, and the body."""
     named = [name for name in _NAMES if envelope.attributes.get(name) is not None]
     told = [str(envelope.attributes[name]) for name in named]
-    row.verb, row.address = envelope.verb, blanker.text(cut(" ".join(told)))
+    row.verb, row.address = envelope.verb, cut(" ".join(told))
     more = [
         f"{name}={value}"
         for name, value in envelope.attributes.items()
         if value is not None and name not in named
     ]
-    row.more = blanker.text(cut(" ".join(more)))
+    row.more = cut(" ".join(more))
     body = envelope.body
     if isinstance(body, bytes):
-        _fill_bytes(row, blanker.whole(body))
+        _fill_bytes(row, body)
     elif body is not None:
-        text = blanker.text(json.dumps(body, default=repr, ensure_ascii=False))
+        text = json.dumps(body, default=repr, ensure_ascii=False)
         row.size = len(text.encode("utf-8", "replace"))
         row.text = cut(text)
 

@@ -20,7 +20,6 @@ import msgspec
 from urc.model.codec import Envelope
 from urc.model.driver import Argument, Command, Driver
 from urc.problems import Problem, to_text
-from urc.runtime.blanking import Blanker
 from urc.web.dev.preview import Preview, Written
 from urc.web.dev.rows import SHOWN_BYTES, Row, fill, grouped
 from urc.web.dev.tryout import Finding, Piece, Taker
@@ -296,7 +295,7 @@ def _frame(written: Written) -> _Frame:
     if not isinstance(payload, Envelope):
         return _Frame(written.transport, data=payload[:SHOWN_BYTES], size=len(payload))
     row = Row(0, 0.0, "sent", written.transport)
-    fill(row, payload, Blanker(()))
+    fill(row, payload)
     return _Frame(
         written.transport, "", row.data, row.size, row.verb, row.address, row.more, row.text
     )

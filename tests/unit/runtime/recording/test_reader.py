@@ -17,7 +17,6 @@ from mcap.writer import Writer
 
 from urc.model.values import Sample
 from urc.problems import UrcError
-from urc.runtime.blanking import Blanker
 from urc.runtime.hub import LinkStatus, Note
 from urc.runtime.recording import reader
 from urc.runtime.recording.reader import Recording, open_recording
@@ -31,7 +30,7 @@ COUNT = 60
 def file(tmp_path: Path) -> Path:
     """A recording of several chunks: a value a second, the number of the second."""
     made = tmp_path / "bot.mcap"
-    kept = Recorder(made, line_profile(), Blanker(()), document="urc: 1\n")
+    kept = Recorder(made, line_profile(), document="urc: 1\n")
     while not kept.is_begun:
         time.sleep(0.001)
     kept._shapes._utc_ns = lambda time_s: round(time_s * 1e9)
@@ -194,7 +193,7 @@ def test_what_is_no_plain_file_is_told_in_one_line(tmp_path: Path) -> None:
 
 def test_nothing_recorded_is_told_in_one_line(tmp_path: Path) -> None:
     empty = tmp_path / "empty.mcap"
-    Recorder(empty, line_profile(), Blanker(()), document="urc: 1\n").close()
+    Recorder(empty, line_profile(), document="urc: 1\n").close()
     with pytest.raises(UrcError) as refused:
         open_recording(empty)
     assert str(refused.value) == f"{empty} holds nothing that can be played: it has just been begun"

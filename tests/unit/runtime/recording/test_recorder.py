@@ -14,7 +14,6 @@ from mcap.reader import make_reader
 from urc.config.load import load_profile
 from urc.model.values import Sample
 from urc.problems import UrcError
-from urc.runtime.blanking import Blanker
 from urc.runtime.catalog import built_in_catalog
 from urc.runtime.hub import Note
 from urc.runtime.recording import recorder as module
@@ -29,7 +28,7 @@ DOCUMENT = "urc: 1\nkind: robot\n"
 
 
 def recorder(file: Path) -> Recorder:
-    return Recorder(file, PROFILE, Blanker(()), document=DOCUMENT)
+    return Recorder(file, PROFILE, document=DOCUMENT)
 
 
 def wait(is_so: Callable[[], bool]) -> None:
@@ -114,9 +113,7 @@ def test_another_recording_is_never_written_over(file: Path) -> None:
 
 def test_recordings_in_a_folder_have_names_of_their_own(tmp_path: Path) -> None:
     folder = tmp_path / "kept.here"
-    kept = [
-        Recorder(folder, PROFILE, Blanker(()), is_folder=True, document=DOCUMENT) for _ in range(3)
-    ]
+    kept = [Recorder(folder, PROFILE, is_folder=True, document=DOCUMENT) for _ in range(3)]
     for one in kept:
         one.close()
     assert len({one.file for one in kept}) == 3
@@ -136,7 +133,7 @@ def test_a_file_that_is_removed_is_missed(file: Path, monkeypatch: pytest.Monkey
 
 
 def test_the_document_is_in_it_without_the_folders_of_who_recorded(file: Path) -> None:
-    kept = Recorder(file, load_profile(shipped("robots") / "turtlebot4.yaml", CATALOG), Blanker(()))
+    kept = Recorder(file, load_profile(shipped("robots") / "turtlebot4.yaml", CATALOG))
     kept.put(readings(1))
     kept.close()
     document = open_recording(file).document
@@ -157,7 +154,7 @@ def test_a_place_that_takes_no_file_is_told(tmp_path: Path, place: str, said: st
 
 def test_a_document_that_is_gone_is_told_in_the_recording(file: Path) -> None:
     """Its profile was loaded once, and the robot is driven; it can be played with another."""
-    kept = Recorder(file, PROFILE, Blanker(()))
+    kept = Recorder(file, PROFILE)
     kept.put(readings(1))
     kept.close()
     assert kept.fault == ""

@@ -1,10 +1,8 @@
 """What a recording says of each thing that happens, and what is made of it again."""
 
-import base64
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
-from urllib.parse import quote
 
 import jsonschema
 import pytest
@@ -12,7 +10,6 @@ import pytest
 from urc.model.driver import Argument, Command, Driver, FramingSpec, Hold, TransportSpec
 from urc.model.values import Reading, Sample, Signal
 from urc.runtime.audit import Entry
-from urc.runtime.blanking import Blanker
 from urc.runtime.hub import LinkStatus, Moved, Note, Tapped, Told, Traffic
 from urc.runtime.recording.events import event_of
 from urc.runtime.recording.shapes import DRIVING, LOG, Shapes, channels
@@ -84,12 +81,12 @@ FOXGLOVE: Mapping[str, Any] = {
 }
 
 
-def shapes(*secrets: str) -> Shapes:
-    return Shapes(DRIVER, Blanker(secrets), lambda time_s: BORN_NS + round(time_s * 1e9))
+def shapes() -> Shapes:
+    return Shapes(DRIVER, lambda time_s: BORN_NS + round(time_s * 1e9))
 
 
-def told(event: Tapped, *secrets: str) -> tuple[str, int, bytes]:
-    (message,) = shapes(*secrets).messages(event)
+def told(event: Tapped) -> tuple[str, int, bytes]:
+    (message,) = shapes().messages(event)
     return message
 
 
@@ -196,71 +193,6 @@ def test_a_clock_that_is_set_moves_nothing() -> None:
     made.messages(Told(1.0, Entry(1_900_000_000.0, "bot", "lease")))
     ((_, time_ns, _),) = made.messages(Sample("battery", 1, 2.0))
     assert time_ns == BORN_NS + 2_000_000_000
-
-
-WORD = 'pa"ss\\wörd é'
-FORMS = {
-    "as it is": WORD,
-    "in JSON": json.dumps(WORD)[1:-1],
-    "in JSON, letters as they are": json.dumps(WORD, ensure_ascii=False)[1:-1],
-    "in a URL": quote(WORD, safe=""),
-    "in hex": WORD.encode().hex(),
-    "in base64": base64.b64encode(b"user:" + WORD.encode() + b":x").decode(),
-}
-
-
-def hides(made: Shapes, events: Sequence[Tapped], *forms: str) -> None:
-    """See that no message of these holds a secret, in any form, and that each is JSON still."""
-    found = [message for event in events for message in made.messages(event)]
-    found += made.rest(9.0)
-    assert found
-    shown = "".join(data.decode() for _, _, data in found)
-    for form in (*FORMS.values(), *forms):
-        assert form not in shown
-    for _, _, data in found:
-        json.loads(data)
-    pieces = [json.loads(data).get("text", "") for _, _, data in found]
-    for form in (*FORMS.values(), *forms):
-        assert form not in "".join(pieces)
-
-
-@pytest.mark.parametrize("form", FORMS.values(), ids=FORMS)
-def test_secrets_are_kept_out_of_all_of_it(form: str) -> None:
-    events: list[Tapped] = [
-        Sample("word", f"it is {form}", 1.0),
-        Sample("pose", {form: ("", form), "in": {"x": form.encode()}}, 1.0),
-        Sample("dump", form.encode(), 1.0),
-        LinkStatus("wire", "lost", f"tcp {form}", 1.0, f"refused {form}"),
-        Note(1.0, "info", form, form),
-        Moved(1.0, "drive", {"word": form}),
-        Told(1.0, Entry(1.0, "bot", "ran", command="drive", arguments=form, outcome=form)),
-        Traffic(1.0, "wire", "received", f"echo {form}\n".encode()),
-        Traffic(1.2, "udp", "sent", b"\xff" + form.encode()),
-    ]
-    hides(shapes(WORD), events)
-
-
-@pytest.mark.parametrize("form", FORMS.values(), ids=FORMS)
-@pytest.mark.parametrize("size", [1, 2, 5, 9])
-def test_a_secret_that_comes_in_pieces_is_kept_out(form: str, size: int) -> None:
-    """However long it takes: nobody waits for what a recording shows."""
-    data = f"a {form} b\n".encode()
-    pieces = [data[at : at + size] for at in range(0, len(data), size)]
-    events = [Traffic(1.0, "wire", "received", piece) for piece in pieces]
-    hides(shapes(WORD), events)
-
-
-def test_a_secret_number_is_kept_out() -> None:
-    made = shapes("4711")
-    hides(made, [Sample("battery", 4711, 1.0), Sample("ranges", (1.0, 4711), 1.0)], "4711")
-    assert json.loads(told(Sample("battery", 14711, 1.0), "4711")[2]) == {"value": 14711}
-
-
-def test_what_may_begin_a_secret_is_told_when_nothing_follows() -> None:
-    made = shapes("hunter2")
-    (first,) = made.messages(Traffic(1.0, "wire", "received", b"battery low h"))
-    (rest,) = made.rest(2.0)
-    assert json.loads(first[2])["text"] + json.loads(rest[2])["text"] == "battery low h"
 
 
 @pytest.mark.parametrize(
