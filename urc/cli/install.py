@@ -5,10 +5,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from urc.cli.failures import Misuse
+from urc.cli.output import complain
+from urc.cli.update import difference_lines
 
 if TYPE_CHECKING:
     from urc.packages.lock import Lock
     from urc.packages.plan import Plan
+    from urc.packages.store import Store
+    from urc.packages.update import Difference
 
 EXAMPLE = "urc install drivers/puppet@^1.0"
 
@@ -21,6 +25,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="NAME or drivers/NAME, with @VERSION if one is wanted; a bundle, archive or folder",
     )
     parser.add_argument("--yes", action="store_true", help="install without asking")
+    parser.add_argument(
+        "--allow-more",
+        action="store_true",
+        help="with --yes: also another version that may do more than the one in use",
+    )
     parser.add_argument(
         "--signed-by",
         metavar="SHA256:…",
@@ -41,7 +50,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Show what it may do, ask, install."""
-    from urc.cli.packages import is_agreed, is_path, open_store, planned
+    from urc.cli.packages import is_agreed_to, is_path, keep_in_use, open_store, planned, used_lock
     from urc.packages.disk import put_file
     from urc.packages.install import origin_lines
 
@@ -55,14 +64,20 @@ def run(arguments: argparse.Namespace) -> int:
         folder = change.stage(plan)
         if arguments.signed_by is not None:
             _check_signer(plan, arguments.signed_by)
+        used = used_lock(store, plan.lock.key)
         _show(plan, folder, origin_lines(plan, store))
-        if not arguments.yes and not is_agreed("Install it?"):
+        difference = _compare(used, plan, store, folder)
+        if not is_agreed_to(difference, arguments, "Install it?"):
             print("nothing is installed")
             return 1
+        if used is not None and used.version != plan.lock.version:
+            keep_in_use(used)
         change.commit(plan)
     if lock_file is not None and pinned is None:
         put_file(lock_file, plan.lock.to_bytes(), lock_file.resolve().parent)
     print(f"installed {plan.lock}")
+    if used is not None and (used.key, used.version) != (plan.lock.key, plan.lock.version):
+        print(f"{used} stays in use; the settings of the robot choose the version")
     return 0
 
 
@@ -83,6 +98,28 @@ def _pinned(file: Path | None) -> "Lock | None":
         return None
     with open(file, "rb") as opened:
         return read_lock(opened.read(1 << 20), str(file))
+
+
+def _compare(
+    used: "Lock | None", plan: "Plan", store: "Store", folder: Path
+) -> "Difference | None":
+    """Print what another version changes, and return it; None where nothing is compared."""
+    from urc.packages.update import staged_difference
+    from urc.problems import UrcError, printable
+    from urc.runtime.look import look
+
+    if used is None or used.key != plan.lock.key or used == plan.lock:
+        return None
+    try:
+        found = staged_difference(used, plan, store, folder, look)
+    except UrcError as error:
+        line = str(error).strip().partition("\n")[0]
+        complain(f"urc install: what changes is not known: {used} cannot be read: {line}")
+        return None
+    print(f"{used} is in use; this changes:")
+    for line in difference_lines(found):
+        print(printable(line))
+    return found
 
 
 def _show(plan: "Plan", folder: Path, origins: list[str]) -> None:

@@ -1,5 +1,6 @@
 """What the verbs about packages share: the store, the repositories, a question, installed names."""
 
+import argparse
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -12,21 +13,26 @@ from urc.cli.output import complain
 if TYPE_CHECKING:
     from urc.packages.index import Entry
     from urc.packages.lock import Lock
+    from urc.packages.names import Key
     from urc.packages.plan import Plan
     from urc.packages.repositories import Repositories
     from urc.packages.signature import Signer
     from urc.packages.store import Store
+    from urc.packages.update import Difference
 
 __all__ = [
     "installed_document",
     "is_agreed",
+    "is_agreed_to",
     "is_path",
+    "keep_in_use",
     "known_entries",
     "open_store",
     "planned",
     "repositories",
     "search_repositories",
     "signer",
+    "used_lock",
 ]
 
 
@@ -47,7 +53,7 @@ def repositories() -> "Repositories":
 def installed_document(word: str) -> Path | None:
     """Return the document of the installed robot or driver that a word names, or None.
 
-    A robot goes before a driver of the same name.
+    Without a version that is the one in use; see `urc.runtime.kept.in_use`.
     """
     if not (data_folder() / "packages" / "state.json").is_file():
         return None
@@ -57,7 +63,12 @@ def installed_document(word: str) -> Path | None:
         wish = parse_wish(word)
     except PackageError:
         return None  # a path, for example
+    from urc.runtime.kept import in_use
+
     store = open_store()
+    used = in_use(data_folder() / "robots", wish.name, store.installed())
+    if used is not None and wish.range == "*" and wish.kind in ("", used.key.kind):
+        return store.document(used)
     for kind in ("robot", "driver"):
         if wish.kind in ("", kind) and (lock := store.find(wish._replace(kind=kind))):
             return store.document(lock)
@@ -107,6 +118,47 @@ def is_agreed(question: str) -> bool:
         return input(f"{question} Type yes: ").strip().lower() == "yes"
     except EOFError:
         return False
+
+
+def is_agreed_to(
+    difference: "Difference | None", arguments: argparse.Namespace, question: str
+) -> bool:
+    """Ask a person, or take `--yes`, which is not enough where a version may do more.
+
+    Args:
+        difference: to what is installed; None where nothing is.
+        arguments: with ``yes`` and ``allow_more``.
+        question: as ``Update it?``.
+    """
+    gains = difference is not None and bool(difference.gained)
+    if not arguments.yes:
+        return is_agreed(f"It may do more than before. {question}" if gains else question)
+    if gains and not arguments.allow_more:
+        complain(
+            "urc: it may do more than before, which --yes alone does not agree to;"
+            " add --allow-more, or leave --yes out and be asked"
+        )
+        return False
+    return True
+
+
+def used_lock(store: "Store", key: "Key") -> "Lock | None":
+    """Return what is in use of a package: of what is driven, whatever has its name."""
+    from urc.runtime.kept import DRIVEN, in_use
+
+    installed = store.installed()
+    if key.kind in DRIVEN:
+        return in_use(data_folder() / "robots", key.name, installed)
+    mine = [lock for lock in installed if lock.key == key]
+    return max(mine, key=lambda lock: lock.number, default=None)
+
+
+def keep_in_use(lock: "Lock") -> None:
+    """Let dashboards go on with a version, whatever else is installed."""
+    from urc.runtime.kept import DRIVEN, pin
+
+    if lock.key.kind in DRIVEN:
+        pin(data_folder() / "robots", lock)
 
 
 def signer(file: Path | None = None) -> "Signer | None":

@@ -79,6 +79,7 @@ def _all(store: "Store") -> "list[tuple[Lock, str]]":
 
 def _update(old: "Lock", plan: "Plan", store: "Store", arguments: argparse.Namespace) -> bool:
     """Show what changes, ask, and do it; return whether it was done."""
+    from urc.cli.packages import is_agreed_to
     from urc.packages.install import origin_lines
     from urc.packages.update import staged_difference
     from urc.problems import printable
@@ -89,7 +90,7 @@ def _update(old: "Lock", plan: "Plan", store: "Store", arguments: argparse.Names
         difference = staged_difference(old, plan, store, staged, look)
         for line in _told(old, plan, difference, origin_lines(plan, store)):
             print(printable(line))
-        if not _is_agreed(difference, arguments):
+        if not is_agreed_to(difference, arguments, "Update it?"):
             print(f"{old} stays")
             return False
         change.replace(old, plan)
@@ -104,28 +105,18 @@ def _told(old: "Lock", plan: "Plan", difference: "Difference", origins: list[str
     lines = [headline(old, plan.lock)]
     lines += [f"  {line}" for line in difference.versions if not line.startswith(f"{old} → ")]
     lines += [f"  {line}" for line in origins if "kept from before" not in line]
-    lines += [f"  may from now on: {line}" for line in difference.gained]
+    return lines + difference_lines(difference)
+
+
+def difference_lines(difference: "Difference") -> list[str]:
+    """Return what another version may do and send that the one before does not, for people."""
+    lines = [f"  may from now on: {line}" for line in difference.gained]
     lines += [f"  may no longer: {line}" for line in difference.lost]
     if not difference.gained:
         lines.append("  it may do no more than before")
     if difference.wire:
         lines += ["  on the wire:", *(f"    {line}" for line in difference.wire)]
     return lines
-
-
-def _is_agreed(difference: "Difference", arguments: argparse.Namespace) -> bool:
-    from urc.cli.packages import is_agreed
-
-    if not arguments.yes:
-        more = "It may do more than before. " if difference.gained else ""
-        return is_agreed(f"{more}Update it?")
-    if difference.gained and not arguments.allow_more:
-        complain(
-            "urc update: it may do more than before, which --yes alone does not agree to;"
-            " add --allow-more, or leave --yes out and be asked"
-        )
-        return False
-    return True
 
 
 def _back(arguments: argparse.Namespace) -> int:

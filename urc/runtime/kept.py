@@ -15,7 +15,7 @@ from urc.packages.lock import Lock
 from urc.private_files import put_private
 from urc.problems import UrcError
 
-__all__ = ["DRIVEN", "Kept", "KeptFile", "names_kept"]
+__all__ = ["DRIVEN", "Kept", "KeptFile", "in_use", "names_kept", "pin"]
 
 DRIVEN: Final = ("robot", "driver")
 """Kinds of packages that settings are filled in for; of one name, the robot goes first."""
@@ -110,3 +110,43 @@ def names_kept(folder: Path, removed: Iterable[Lock], left: Iterable[Lock]) -> l
         for name, package in sorted(roots.items())
         if name not in stay and KeptFile(folder, name).is_of(package)
     ]
+
+
+def in_use(folder: Path, name: str, installed: Iterable[Lock]) -> Lock | None:
+    """Return the installed package that is driven under a name, or None.
+
+    That is the version that was chosen. Without a choice it is the newest, and of a robot and a
+    driver of one name the robot.
+
+    Args:
+        folder: of the files.
+        name: of the robot.
+        installed: all that is installed.
+    """
+    locks = [lock for lock in installed if lock.key.kind in DRIVEN and lock.key.name == name]
+    try:
+        kept = KeptFile(folder, name).load()
+    except UrcError:
+        kept = Kept()
+    if any(lock.root == kept.package for lock in locks):
+        locks = [lock for lock in locks if lock.root == kept.package]
+    chosen = [lock for lock in locks if lock.version == kept.version]
+    return max(
+        chosen or locks,
+        key=lambda lock: (-DRIVEN.index(lock.key.kind), lock.number),
+        default=None,
+    )
+
+
+def pin(folder: Path, lock: Lock) -> None:
+    """Let a robot go on with a version, whatever else is installed; raise `UrcError`.
+
+    Args:
+        folder: of the files.
+        lock: what `in_use` returned.
+    """
+    file = KeptFile(folder, lock.key.name)
+    kept = file.load()
+    chosen = msgspec.structs.replace(kept, version=lock.version, package=lock.root)
+    if chosen != kept:
+        file.save(chosen)

@@ -21,7 +21,7 @@ from urc.packages.package import open_package
 from urc.packages.store import Store
 from urc.problems import UrcError
 from urc.runtime.destination import destination_of
-from urc.runtime.kept import DRIVEN, Kept, KeptFile
+from urc.runtime.kept import DRIVEN, Kept, KeptFile, in_use
 from urc.runtime.opened import open_document
 from urc.runtime.session import Session
 from urc.runtime.settings import parse_setting
@@ -211,15 +211,13 @@ class Garage:
     def parked(self) -> dict[str, list[Lock]]:
         """Return the installed packages that can be driven: name → its versions, oldest first.
 
-        Of a robot and a driver of one name there is the robot.
+        Of a robot and a driver of one name there is the one that is in use.
         """
+        locks = self.store.installed()
         found: dict[str, list[Lock]] = {}
-        for kind in DRIVEN:
-            mine: dict[str, list[Lock]] = {}
-            for lock in _ascending(self.store.installed()):
-                if lock.key.kind == kind:
-                    mine.setdefault(lock.key.name, []).append(lock)
-            found = {**mine, **found}
+        for name in {lock.key.name for lock in locks if lock.key.kind in DRIVEN}:
+            used = in_use(self.workshop.data / "robots", name, locks)
+            found[name] = [one for one in _ascending(locks) if used and one.key == used.key]
         return dict(sorted(found.items()))
 
     def chosen(self, locks: list[Lock], version: str) -> Lock:

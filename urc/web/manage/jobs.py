@@ -16,12 +16,13 @@ from urc._phrases import phrase
 from urc.packages.index import Entry
 from urc.packages.install import origin_lines, plan_file, plan_wish
 from urc.packages.lock import Lock
-from urc.packages.names import PackageError, Wish
+from urc.packages.names import Key, PackageError, Wish
 from urc.packages.plan import Plan
 from urc.packages.sources import FileSource, Source
 from urc.packages.store import Store, kinds_in
 from urc.packages.update import Difference, plan_update, staged_difference
 from urc.problems import UrcError, printable
+from urc.runtime.kept import DRIVEN
 from urc.runtime.look import look
 from urc.runtime.permissions import permissions
 from urc.web.daemon import in_daemon
@@ -52,6 +53,8 @@ class _Planned(NamedTuple):
     may: tuple[str, ...]
     old: Lock | None = None
     """What an update takes the place of."""
+    stays: Lock | None = None
+    """What is in use, and stays so: another version is installed beside it."""
     changes: Difference | None = None
 
 
@@ -87,6 +90,7 @@ class Job:
             gained=_clean(changes.gained if changes is not None else ()),
             lost=_clean(changes.lost if changes is not None else ()),
             wire=_clean(changes.wire if changes is not None else ())[:_WIRE_MOST],
+            stays=planned.stays.version if planned is not None and planned.stays else "",
             notes=_clean(dict.fromkeys(self.notes)),
         )
 
@@ -130,14 +134,17 @@ class Jobs:
         self,
         store: Store,
         sources: Callable[[Callable[[str], None]], Sequence[Source]],
+        used: Callable[[Key], Lock | None] = lambda _: None,
     ) -> None:
         """Do nothing yet.
 
         Args:
             store: what is changed.
             sources: returns the repositories, whose complaints go to what is given.
+            used: returns what is in use of a package, or under its name.
         """
         self._store = store
+        self._used = used
         self._sources = sources
         self._numbers = count(1)
         self._task: asyncio.Task[None] | None = None
@@ -156,10 +163,12 @@ class Jobs:
         self._task = loop.create_task(self._work(job, partial(self._plan, job, what)))
         return job
 
-    def replaced(self, number: int) -> Lock | None:
-        """Return what a job takes the place of, if it is an update."""
+    def touched(self, number: int) -> tuple[Key | None, Lock | None]:
+        """Return which package a job installs, and what is in use and must stay so."""
         planned = self._asked(number).planned
-        return planned.old if planned is not None else None
+        if planned is None:
+            return None, None
+        return planned.plan.lock.key, None if planned.old else self._used(planned.plan.lock.key)
 
     async def agree(self, number: int) -> Job:
         """Install what a job has planned; raise `Busy` when it does not ask."""
@@ -239,11 +248,41 @@ class Jobs:
             widgets = [key.name for key in kinds_in(lock, "widget")]
             document = folder / lock.root / f"{lock.key.kind}.yaml"
             may = permissions(document, folder, widgets)
-            changes = None
-            if old is not None:
-                changes = staged_difference(old, plan, self._store, folder, look)
+            before, stays = old, None
+            used = self._used(lock.key)
+            if old is None and used is not None and used != lock:
+                is_chosen = used.key == lock.key and used.key.kind in DRIVEN
+                stays = used if is_chosen and used.version != lock.version else None
+                before = used
+            changes = self._changes(job, before, plan, folder)
         origins = origin_lines(plan, self._store)
-        return _Planned(plan, tuple(origins), tuple(may), old, changes)
+        return _Planned(plan, tuple(origins), tuple(may), old, stays, changes)
+
+    def _changes(
+        self, job: Job, before: Lock | None, plan: Plan, folder: Path
+    ) -> Difference | None:
+        """Return what is another thing than in the version before, where that can be told."""
+        if before is None:
+            return None
+        if before.key != plan.lock.key:
+            job.notes.append(
+                phrase(
+                    "{package} stays in use under this name: remove it to use the other one",
+                    package=before,
+                )
+            )
+            return None
+        try:
+            return staged_difference(before, plan, self._store, folder, look)
+        except UrcError as error:
+            job.notes.append(
+                phrase(
+                    "what changes is not known: {package} cannot be read: {why}",
+                    package=before,
+                    why=_line(error),
+                )
+            )
+            return None
 
     def _fetched(self, job: Job, what: Wanted, known: Sequence[Source]) -> Plan:
         if isinstance(what, (Wish, Lock)) and not known:

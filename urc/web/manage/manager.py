@@ -6,6 +6,7 @@ Floor 5. It has no route and no page: `urc.web.manage.routes` asks it.
 import asyncio
 import logging
 from collections.abc import Callable, Iterable
+from pathlib import Path
 from urllib.parse import quote
 
 from urc.model.profile import Profile
@@ -15,7 +16,7 @@ from urc.packages.names import Key, PackageError, Wish, parse_wish
 from urc.packages.repositories import Repository
 from urc.packages.sources import Source
 from urc.problems import UrcError, printable
-from urc.runtime.kept import names_kept
+from urc.runtime.kept import DRIVEN, in_use, names_kept, pin
 from urc.web.daemon import in_daemon
 from urc.web.fleet.fleet import Broken, Fleet
 from urc.web.fleet.garage import Garage
@@ -52,13 +53,15 @@ class Manager:
         self.fleet = fleet
         self._renew = renew
         self.catalogue = Catalogue(garage.workshop.data / "packages", now)
-        self.jobs = Jobs(garage.store, self._sources)
+        self.jobs = Jobs(garage.store, self._sources, self._used)
         self._parked: dict[str, Lock] = {}
         """Robots that stand on the menu because they are installed: name → what is served."""
         self._offered: dict[str, str] = {}
         """Interfaces that robots offer because they are installed: name → digest."""
         self._seen: object = None
         """What told the state of the store apart from others when it was looked at last."""
+        self._is_behind = False
+        """Whether something waits until a robot is no longer driven."""
         self._changing = asyncio.Lock()
 
     def _sources(self, complain: Callable[[str], None]) -> list[Source]:
@@ -78,6 +81,8 @@ class Manager:
             return
         parked = await asyncio.to_thread(self.garage.parked)
         for name in [one for one in self._parked if one not in parked]:
+            if self._waits(name):
+                continue
             await self.fleet.remove(name)
             del self._parked[name]
         for name, locks in parked.items():
@@ -88,8 +93,10 @@ class Manager:
     async def _park(self, name: str, locks: list[Lock]) -> None:
         try:
             kept = await asyncio.to_thread(self.garage.kept(name).load)
-            lock = self.garage.chosen(locks, kept.version)
-            if self._parked.get(name) == lock and name in self.fleet.robots:
+            lock, served = self.garage.chosen(locks, kept.version), self._parked.get(name)
+            if served in locks and not kept.version:
+                lock = served  # another program installed a newer one: it is chosen by hand
+            if name in self.fleet.robots and (served == lock or self._waits(name)):
                 return
             profile = await asyncio.to_thread(self.garage.profile, lock)
             robot = await asyncio.to_thread(self.garage.robot, name, profile, kept)
@@ -102,6 +109,12 @@ class Manager:
             text = str(error).strip().partition("\n")[0]
             self.fleet.broken[name] = Broken(name, text)
             self._parked.setdefault(name, locks[-1])
+
+    def _waits(self, name: str) -> bool:
+        """Return whether a robot is driven: what became of its package is looked at later."""
+        is_driven = name in self.fleet.robots and bool(self.fleet.driven_by(name))
+        self._is_behind = self._is_behind or is_driven
+        return is_driven
 
     async def refurnish(self) -> None:
         """Offer the interfaces that are installed now, on every robot that nobody drives."""
@@ -159,9 +172,12 @@ class Manager:
         """Bring the menu up to date with what is installed."""
         async with self._changing:
             self._seen = await asyncio.to_thread(self.garage.stamp)
+            self._is_behind = False
             try:
                 await self.park()
                 await self.refurnish()
+                if self._is_behind:
+                    self._seen = None
             except (UrcError, OSError) as error:  # the managers' pages tell it, too
                 log.warning("what is installed cannot be read: %s", error)
 
@@ -200,7 +216,7 @@ class Manager:
         """Return the robots for which something was filled in that goes with a package; raise."""
         meant = self._meant(wish)
         left = [lock for lock in self.garage.store.installed() if lock not in meant]
-        return names_kept(self.garage.workshop.data / "robots", meant, left)
+        return names_kept(self._kept_folder, meant, left)
 
     async def remove(self, text: str, *, forgets: bool = True) -> list[str]:
         """Remove a package and what only it needed; return what is gone.
@@ -228,10 +244,15 @@ class Manager:
         return gone
 
     async def agree(self, number: int) -> Job:
-        """Install what the job has planned; raise `Busy` while its robot is being driven."""
-        old = self.jobs.replaced(number)
-        if old is not None:
-            self._check_idle_of(old.key)
+        """Install what the job has planned; raise `Busy` while its robot is being driven.
+
+        What is in use of the package stays so, but for an update.
+        """
+        key, used = await asyncio.to_thread(self.jobs.touched, number)
+        if key is not None:
+            self._check_idle_of(key)
+        if used is not None and used.key.kind in DRIVEN:
+            await asyncio.to_thread(pin, self._kept_folder, used)
         job = await self.jobs.agree(number)
         await self.changed()
         return job
@@ -258,8 +279,20 @@ class Manager:
 
     def _check_idle_of(self, key: Key) -> None:
         for name, lock in self._parked.items():
-            if lock.key == key:
+            if lock.key == key or (name == key.name and key.kind in DRIVEN):
                 self.check_idle(name)
+
+    def _used(self, key: Key) -> Lock | None:
+        """Return what is in use of a package, or, of what is driven, under its name."""
+        installed = self.garage.store.installed()
+        if key.kind in DRIVEN:
+            return in_use(self._kept_folder, key.name, installed)
+        mine = [lock for lock in installed if lock.key == key]
+        return max(mine, key=lambda lock: lock.number, default=None)
+
+    @property
+    def _kept_folder(self) -> Path:
+        return self.garage.workshop.data / "robots"
 
     def check_idle(self, name: str) -> None:
         """Raise `Busy` while somebody drives a robot."""

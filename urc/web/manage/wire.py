@@ -98,6 +98,8 @@ class JobNews(Message, frozen=True):
     lost: tuple[str, ...] = ()
     wire: tuple[str, ...] = ()
     """Of an update: what changes in what goes to the robot."""
+    stays: str = ""
+    """The version that is in use, and stays so until another one is chosen; "": none does."""
     notes: tuple[str, ...] = ()
     """What should be known beside, as a repository that did not answer."""
 

@@ -124,7 +124,7 @@ export class JobDialog {
       cancelled: `◆ ${t("given up; nothing has changed")}`,
     }[job.state];
     return [
-      title(job.isUpdate ? t("Update {name}", { name: job.title }) : t("Install {name}", { name: job.title })),
+      title(isSwap(job) ? t("Update {name}", { name: job.title }) : t("Install {name}", { name: job.title })),
       made("p", { role: "status", "data-job-line": true, class: job.state === "failed" ? "urc-bad" : "" }, line),
       job.state === "working" && progress(job),
       ...(isAsking ? this.question(job) : []),
@@ -132,7 +132,7 @@ export class JobDialog {
       made(
         "div",
         { class: "urc-ways" },
-        isAsking && button(job.isUpdate ? t("Update") : t("Install"), "yes", () => void this.agree(job), { class: "urc-button-main" }),
+        isAsking && button(isSwap(job) ? t("Update") : t("Install"), "yes", () => void this.agree(job), { class: "urc-button-main" }),
         isOver
           ? button(t("Close"), "close", () => this.close(), { class: "urc-button-main" })
           : button(t("Give up"), "no", () => this.leave()),
@@ -143,7 +143,10 @@ export class JobDialog {
   /** @param {Job} job */
   question(job) {
     const { isUpdate } = job;
+    const version = job.stays;
+    const stays = t("{version} stays in use until another version is chosen in the settings of the robot.", { version });
     return [
+      job.stays !== "" && made("p", { class: "urc-caution" }, `◆ ${stays}`),
       isUpdate && heading(t("What changes")),
       isUpdate && list(job.packages),
       heading(isUpdate ? t("It may do more than before") : t("It may do this")),
@@ -167,6 +170,11 @@ export class JobDialog {
     const answer = await this.act("job/agree", { number: job.number });
     if (!answer) this.close();
   }
+}
+
+/** @param {Job} job @returns {boolean} whether it takes the place of what is in use */
+function isSwap({ isUpdate, stays }) {
+  return isUpdate && stays === "";
 }
 
 /** @param {string} text */

@@ -15,6 +15,7 @@
  * @property {string[]} gained
  * @property {string[]} lost
  * @property {string[]} wire
+ * @property {string} stays
  * @property {string[]} notes
  *
  * @typedef {object} Place
