@@ -22,6 +22,7 @@ __all__ = [
     "link_poll",
     "link_refusals",
     "link_reply",
+    "said_on",
 ]
 
 
@@ -114,7 +115,7 @@ def link_poll(linker: Linker, part: Part, poll: Poll) -> None:
         linker.template(part.must("when"), poll.when, linker.driver.signals)
     if not poll.run:
         linker.transport(part, "to", poll.transport)
-        linker.templates(part.must("send"), poll.send, (COUNTERS,))
+        linker.templates(part.must("send"), poll.send, said_on(linker.driver, poll.transport))
         if poll.reply is not None and "reply" in part.data:
             link_reply(linker, part.must("reply"), poll.reply, (), poll.send)
         return
@@ -183,6 +184,12 @@ def link_refusals(linker: Linker, part: Part, faults: tuple[ErrorReply, ...]) ->
             linker.template(inner.must("text"), fault.text, fault.read.fields)
 
 
+def said_on(driver: Driver, transport: str) -> Iterable[str]:
+    """Return what all that is said on a line knows: its counters, and what its login learnt."""
+    learnt = driver.learnt(transport) if transport in driver.transports else frozenset()
+    return (COUNTERS, *learnt)
+
+
 def link_keepalives(linker: Linker, part: Part) -> None:
     """Check what keeps the lines alive."""
     for name, inner in part.named("transports").items():
@@ -192,7 +199,7 @@ def link_keepalives(linker: Linker, part: Part) -> None:
         linker.transport(inner, "type", name)  # it is used by this
         place = inner.must("keepalive")
         if keepalive.send is not None:
-            linker.templates(place.must("send"), keepalive.send, (COUNTERS,))
+            linker.templates(place.must("send"), keepalive.send, said_on(linker.driver, name))
             continue
         command = find_command(linker, place.must("run"), keepalive.run)
         if command is not None:

@@ -65,15 +65,18 @@ def link_sequences(linker: Linker, part: Part) -> None:
         for key, steps in (("on_connect", spec.on_connect), ("on_close", spec.on_close)):
             if steps:
                 linker.transport(inner, "type", name)  # it is used by them
-                _Walk(linker, is_named=False).steps(inner.must(key), steps)
+                is_late = key != "on_connect"
+                _Walk(linker, is_named=False, is_late=is_late).steps(inner.must(key), steps)
 
 
 class _Walk:
     """One sequence: what its later steps know."""
 
-    def __init__(self, linker: Linker, *, is_named: bool) -> None:
+    def __init__(self, linker: Linker, *, is_named: bool, is_late: bool = True) -> None:
         self._linker = linker
         self._is_named = is_named
+        self._is_late = is_late
+        """It comes after the login of its lines, and so knows what that has learnt."""
         self._known: set[str] = set(linker.driver.signals)
 
     def steps(self, part: Part, steps: tuple[Step, ...]) -> None:
@@ -84,7 +87,7 @@ class _Walk:
         match step:
             case SendStep():
                 self._transport(part, "to", step.transport)
-                known = {*self._known, COUNTERS}
+                known = {*self._known, COUNTERS, *self._learnt(step.transport)}
                 self._linker.templates(part.must("send"), step.send, known)
             case ExpectStep():
                 self._expect(part, step)
@@ -158,8 +161,16 @@ class _Walk:
             refuse_two_person(self._linker, part.must("run"), command)
             refuse_moving(self._linker.findings, part.must("run"), command, step.arguments)
         if command.reply is not None:
-            reads = [command.reply.read, *(one.read for one in command.reply.stages)]
-            self._known |= {f"_{name.lstrip('_')}" for read in reads for name in read.fields}
+            self._known |= command.reply.names
+
+    def _learnt(self, transport: str) -> frozenset[str]:
+        """Return what is known on a line beside what the steps read; not to the login itself."""
+        driver = self._linker.driver
+        return (
+            driver.learnt(transport)
+            if self._is_late and transport in driver.transports
+            else frozenset()
+        )
 
     def _otherwise(self, part: Part, steps: tuple[Step, ...] | None) -> None:
         inner = part.get("else")

@@ -5,7 +5,13 @@ from collections.abc import Iterable, Mapping
 
 from urc.config.forms import read_form, write_form
 from urc.config.gather import Sources
-from urc.config.link_flow import link_command, link_keepalives, link_poll, link_refusals
+from urc.config.link_flow import (
+    link_command,
+    link_keepalives,
+    link_poll,
+    link_refusals,
+    said_on,
+)
 from urc.config.link_frames import check_frames
 from urc.config.link_messages import check_messages, check_via
 from urc.config.link_options import check_option
@@ -222,7 +228,8 @@ def link_driver(
     for name, inner in part.named("commands").items():
         command = driver.commands[name]
         linker.transport(inner, "to", command.transport)
-        linker.templates(inner.must("send"), command.send, (*command.arguments, COUNTERS))
+        known = (*command.arguments, *said_on(driver, command.transport))
+        linker.templates(inner.must("send"), command.send, known)
         _check_arguments_used(inner, command.send, findings)
         link_command(linker, inner, command)
     link_keepalives(linker, part)
@@ -234,7 +241,7 @@ def link_driver(
         linker.transport(inner, "from", message.transport)
         linker.fields(inner, message.read)
         if message.answer is not None:
-            known = (*message.read.fields, *driver.signals, COUNTERS)
+            known = (*message.read.fields, *driver.signals, *said_on(driver, message.transport))
             linker.templates(inner.must("answer"), message.answer, known)
     return linker.uses
 

@@ -9,6 +9,7 @@ from urc.model.flow import (
     Asides,
     Confirm,
     ErrorReply,
+    ExpectStep,
     Hold,
     Keepalive,
     Offline,
@@ -16,9 +17,11 @@ from urc.model.flow import (
     Queue,
     Requirement,
     Retry,
+    RunStep,
     Stage,
     Step,
     Verify,
+    all_steps,
 )
 from urc.model.values import NOTHING, ElementType, Reading, Signal, Value
 from urc.patterns import Pattern
@@ -128,6 +131,12 @@ class Reply(NamedTuple):
                 for one in self.stages
             ),
         )
+
+    @property
+    def names(self) -> set[str]:
+        """What a step that runs the request knows afterwards: each field as ``_field``."""
+        reads = (self.read, *(stage.read for stage in self.stages))
+        return {f"_{name.lstrip('_')}" for read in reads for name in read.fields}
 
     @property
     def is_asked_again(self) -> bool:
@@ -256,3 +265,14 @@ class Driver(NamedTuple):
     polls: tuple[Poll, ...] = ()
     discovery: tuple[str, ...] = ()
     """Types of services by which such robots announce themselves: ``_rosbridge._tcp``."""
+
+    def learnt(self, transport: str) -> frozenset[str]:
+        """Return the names that the login of a line reads: ``_nonce``; known while it is open."""
+        names: set[str] = set()
+        for step in all_steps(self.transports[transport].on_connect):
+            if isinstance(step, ExpectStep):
+                names |= {name for name in step.read.fields if name.startswith("_")}
+            elif isinstance(step, RunStep) and step.command in self.commands:
+                reply = self.commands[step.command].reply
+                names |= reply.names if reply is not None else set()
+        return frozenset(names)

@@ -27,8 +27,7 @@ from urc.protocol.asking import Builder
 from urc.protocol.codec import Frame, NotWritable
 from urc.protocol.encode import BadArgument
 from urc.protocol.events import Samples
-from urc.protocol.exchange import Ask, Exchange, LineEvent, expires_at
-from urc.protocol.gate import Counters
+from urc.protocol.exchange import UNTOLD, Ask, Exchange, LineEvent, expires_at
 from urc.protocol.reins import Reins
 from urc.protocol.steps import Action, Program, Runner
 
@@ -169,16 +168,16 @@ def _sending(ask: Ask, step: SendStep) -> Action:
         view = runner.names(now)
         namespace = {name: view[name] for name in names if name in view}
         try:
-            data = ask.encode({**namespace, COUNTERS: Counters().draw()})
+            data = ask.made(namespace)
         except BadArgument as error:
-            why = "it cannot be written with what is known" if step.is_secret else str(error)
+            why = UNTOLD if step.is_secret else str(error)
             runner.stop("bad-argument", f"{ask.label}: {why}")
             return []
         exchange = Exchange(
             ask,
             runner,
             namespace,
-            None if ask.has_counters else data,
+            data,
             expires_at(ask, now),
         ).mark(
             is_privileged=runner.privileged_on == step.transport,

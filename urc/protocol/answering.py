@@ -117,6 +117,8 @@ class Answering(Connection):
             wait_s = exchange.ask.retry.wait_s(exchange.ask.retries - exchange.tries_left)
             exchange.waits_until = now + wait_s
             exchange.gives_up_at = expires_at(exchange.ask, now + wait_s)
+            if self.is_per_request and exchange.ask.learnt:
+                exchange.data = None  # the next connection has a login of its own
             self._outbox.put_back(exchange)
             return events + self.give_up(text, now) if self.is_per_request else events
         events.append(Ended(exchange, Outcome("timed-out", text)))

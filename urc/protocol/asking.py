@@ -41,6 +41,7 @@ class Builder:
     """
 
     def __init__(self, driver: Driver, readings: Readings, known: Known) -> None:
+        self._driver = driver
         self._readings = readings
         self._known = known
         self.lines: dict[str, Line] = {}
@@ -73,11 +74,15 @@ class Builder:
                 encode = build_encode(one.answer, framing, context)
                 counts = COUNTERS in one.answer.names
                 counters = (lambda: self.lines[name].counters) if counts else None
-                decode = answering(encode, self._known.view, counters, replies, decode)
+                decode = answering(encode, partial(self._view, name), counters, replies, decode)
             if decode is not matcher.decode:
                 matchers[place] = matcher._replace(decode=decode, make_fast=None)
         line = self.lines[name] = Line(spec, matchers)
         line.inbox.replies, line.inbox.collectors = replies, kept
+
+    def _view(self, line: str, now: float, found: Mapping[str, object]) -> Mapping[str, object]:
+        """Return what the answer to a message knows: fields, signals and what the login learnt."""
+        return self._known.view(now, {**self.lines[line].learnt, **found})
 
     def command(self, command: Command) -> Ask:
         """Return what a command asks."""
@@ -129,6 +134,7 @@ class Builder:
         context = CodecContext(line.spec.encoding, self._readings.settings)
         encode = build_encode(send, line.framing, context, arguments)
         has_counters = COUNTERS in send.names
+        learnt = (send.names & self._driver.learnt(transport)) - arguments.keys()
         is_numbered = send.options.get("verb") in NUMBERED
         is_local = send.names <= arguments.keys()
         if reply is None:
@@ -138,6 +144,7 @@ class Builder:
                 has_counters=has_counters,
                 is_numbered=is_numbered,
                 is_local=is_local,
+                learnt=learnt,
                 queue_s=queue_limit_s(line.spec, None),
             )
         reply = reply.with_errors(line.spec.errors, line.spec.faults)
@@ -156,6 +163,7 @@ class Builder:
             has_counters=has_counters,
             is_numbered=is_numbered,
             is_local=is_local and reply.match is None,
+            learnt=learnt,
             queue_s=queue_limit_s(line.spec, answers[0].timeout_s),
             quick=None if is_numbered else self._quick(reply, context),
             starts=_starts(reply.read, context.encoding),

@@ -7,12 +7,11 @@ from collections.abc import Mapping
 from functools import partial
 from typing import Final, NamedTuple
 
-from urc.expressions import COUNTERS, ExpressionError
+from urc.expressions import ExpressionError
 from urc.model.driver import STOPPED, Command
 from urc.model.flow import Confirm, Verify
 from urc.model.values import Reading
 from urc.protocol.exchange import Ask, Asked, Exchange, LineEvent, Outcome, expires_at
-from urc.protocol.gate import Counters
 from urc.protocol.known import Known
 from urc.protocol.steps import Sink
 
@@ -130,14 +129,13 @@ def exchange_of(
         BadArgument: it cannot be written with these arguments.
     """
     names = values if ask.is_local else {**known.names, **values}
-    data = ask.encode({**names, COUNTERS: Counters().draw()} if ask.has_counters else names)
     return Exchange(
         ask,
         (sink if type(sink) is Asked else Plain(sink))
         if command.verify is None
         else CommandRun(command.verify, values, sink, verifications),
         names,
-        None if ask.has_counters else data,
+        ask.made(names),
         expires_at(ask, now),
     ).mark(
         on_sent=sink.on_sent if isinstance(sink, Asked) else None,

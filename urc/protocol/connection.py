@@ -8,7 +8,7 @@ from typing import Literal
 
 from urc.model.driver import TransportSpec
 from urc.protocol.answer import Matcher
-from urc.protocol.events import Close, Fault
+from urc.protocol.events import Close, Fault, Ready
 from urc.protocol.exchange import Ended, Exchange, Leaving, LineEvent, Outcome
 from urc.protocol.flights import Flights
 from urc.protocol.framing import build_framing
@@ -33,6 +33,8 @@ class Connection:
         """Whether anybody may talk here; else only those who make it so, or say good-bye."""
         self.last_sent = float("-inf")
         self.counters = Counters()
+        self.learnt: dict[str, object] = {}
+        """What the steps of this connection have read: ``_name`` → value."""
         self.on_ready: Callable[[], None] | None = None
         """Called when anybody may talk here; must not call the line back."""
         self._flights = Flights()
@@ -69,7 +71,7 @@ class Connection:
     def ready(self, now: float) -> list[LineEvent]:
         """Let everybody talk: the connection is as it must be."""
         self._get_ready()
-        return self._pump(now)
+        return [Ready(self.spec.name), *self._pump(now)]
 
     def _get_ready(self) -> None:
         self.is_ready = True
@@ -140,6 +142,7 @@ class Connection:
         self._misses = 0
         self._silent_at = None
         self.is_behind = False
+        self.learnt = {}
         if state == "open":
             self.counters.begin()
 

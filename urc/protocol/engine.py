@@ -43,6 +43,7 @@ from urc.protocol.events import (
     Failed,
     Fault,
     Open,
+    Ready,
     Replied,
     Request,
     Samples,
@@ -65,7 +66,7 @@ from urc.protocol.times import soonest
 
 __all__ = ["Engine"]
 
-_PLAIN = frozenset((Send, Fault, Open, Replied, Failed))
+_PLAIN = frozenset((Send, Fault, Open, Ready, Replied, Failed))
 """Events that mean nothing to the engine itself."""
 
 
@@ -164,7 +165,9 @@ class Engine:
 
             limit_s = line.spec.timeouts.on_connect_s
             ends_at = None if limit_s is None else now + limit_s
-            self._begin(Runner(self, greeting, greeted, transport, ends_at=ends_at))
+            runner = Runner(self, greeting, greeted, transport, ends_at=ends_at)
+            runner.variables = line.learnt
+            self._begin(runner)
         return self._settle(events, now) + self._ask(now)
 
     def closed(self, transport: str, reason: str, now: float) -> list[Event]:
@@ -272,7 +275,9 @@ class Engine:
             return self._send(found, values, sink, now, privileged_on, unless)
         if any(runner.program is program for runner in self._runners):
             return sink(Outcome("busy", f"{command} is at work already"), now)
-        self._begin(Runner(self, program, sink, privileged_on, confirmed_by))
+        runner = Runner(self, program, sink, privileged_on, confirmed_by)
+        runner.wait_for_logins(now)
+        self._begin(runner)
         return []
 
     def _send(

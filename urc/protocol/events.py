@@ -6,7 +6,18 @@ from typing import NamedTuple
 from urc.model.codec import Payload
 from urc.model.values import NOTHING, Reading, Sample
 
-__all__ = ["Close", "Event", "Failed", "Fault", "Open", "Replied", "Request", "Samples", "Send"]
+__all__ = [
+    "Close",
+    "Event",
+    "Failed",
+    "Fault",
+    "Open",
+    "Ready",
+    "Replied",
+    "Request",
+    "Samples",
+    "Send",
+]
 
 
 class Request(NamedTuple):
@@ -42,6 +53,12 @@ class Close(NamedTuple):
     transport: str
     reason: str = ""
     """"" for the normal end of a per-request connection."""
+
+
+class Ready(NamedTuple):
+    """The steps of a connection are done: its login has succeeded, and anybody may talk."""
+
+    transport: str
 
 
 class Samples(NamedTuple):
@@ -82,4 +99,4 @@ class Fault(NamedTuple):
     message: str
 
 
-Event = Open | Send | Close | Samples | Replied | Failed | Fault
+Event = Open | Send | Close | Ready | Samples | Replied | Failed | Fault

@@ -7,7 +7,7 @@ the queue to its end. What it waits for is an `urc.protocol.answer.Answer`.
 from collections.abc import Callable, Mapping
 from typing import Final, NamedTuple, Protocol
 
-from urc.expressions import Template
+from urc.expressions import COUNTERS, Template
 from urc.model.codec import Payload
 from urc.model.flow import Retry
 from urc.model.values import NOTHING, Reading
@@ -15,10 +15,11 @@ from urc.protocol.answer import Answer, Heard, Quick
 from urc.protocol.encode import Encode
 from urc.protocol.events import Event, Failed, Replied, Request
 from urc.protocol.framings.base import Framing
-from urc.protocol.gate import REALTIME, Bucket
+from urc.protocol.gate import REALTIME, Bucket, Counters
 
 __all__ = [
     "DONE",
+    "UNTOLD",
     "Ask",
     "Asked",
     "Ended",
@@ -41,6 +42,8 @@ class Outcome(NamedTuple):
 
 
 DONE: Final = Outcome()
+UNTOLD: Final = "it cannot be written with what is known"
+"""Why something secret is not sent: the reason itself would show it."""
 new = tuple.__new__
 """Makes a named tuple without the detour through its class, where each command needs one."""
 
@@ -68,6 +71,8 @@ class Ask(NamedTuple):
     has_counters: bool = False
     is_motion: bool = False
     """It moves the robot: it must not wait until the line is usable and take effect then."""
+    learnt: frozenset[str] = frozenset()
+    """Names in it that the login of the line has read."""
     is_local: bool = False
     """Its templates use nothing but its arguments."""
     queue_s: float = 0.0
@@ -86,6 +91,24 @@ class Ask(NamedTuple):
         """Whether its bytes depend on its arguments alone, and a free line is all it waits for."""
         has_more = self.has_counters or self.is_numbered or self.framing or self.bucket
         return self.is_local and not has_more
+
+    @property
+    def is_made_late(self) -> bool:
+        """Whether it is made when it is sent: what is in it is not known before."""
+        return self.has_counters or bool(self.learnt)
+
+    def made(self, names: Mapping[str, object]) -> Payload | None:
+        """Return what is sent, as far as it is known now; None where it is made when it is sent.
+
+        Raises:
+            BadArgument: it cannot be written with these names.
+        """
+        if self.learnt:
+            return None
+        if not self.has_counters:
+            return self.encode(names)
+        self.encode({**names, COUNTERS: Counters().draw()})
+        return None
 
     @property
     def is_in_order(self) -> bool:
@@ -132,7 +155,7 @@ class Exchange:
         self.namespace = namespace
         """What its templates know; without counters."""
         self.data = data
-        """None: there are counters in it, so it is made when it is sent."""
+        """None: it `Ask.is_made_late`."""
         self.gives_up_at = gives_up_at
         """When it fails for having waited too long to be sent."""
         self.tries_left = ask.retries

@@ -24,10 +24,10 @@ from urc.protocol.answering import Answering
 from urc.protocol.codec import Frame
 from urc.protocol.encode import BadArgument
 from urc.protocol.events import Fault, Open, Send
-from urc.protocol.exchange import DONE, Asked, Ended, Exchange, LineEvent, Outcome
+from urc.protocol.exchange import DONE, UNTOLD, Asked, Ended, Exchange, LineEvent, Outcome
 from urc.protocol.flights import Flight
 from urc.protocol.framings.base import FrameFault
-from urc.protocol.outbox import counted
+from urc.protocol.outbox import written
 from urc.protocol.times import soonest
 
 __all__ = ["Line"]
@@ -147,9 +147,10 @@ class Line(Answering):
         data = exchange.data
         if data is None:
             try:
-                data = counted(exchange, self.counters)
+                data = written(exchange, self.counters, self.learnt)
             except BadArgument as error:
-                return [Ended(exchange, Outcome("bad-argument", str(error)))]
+                why = UNTOLD if exchange.is_secret else str(error)
+                return [Ended(exchange, Outcome("bad-argument", why))]
         if exchange.is_secret:
             self.inbox.secrets.add(traffic_of(data), self.spec.encoding)
         number = None

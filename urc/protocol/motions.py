@@ -107,7 +107,8 @@ class Motions:
         values = check_arguments(found, {} if hold is None else hold.release)
         counters = self._lines[found.transport].counters
         draw = counters.draw()
-        names = {**self._known.names, **values, COUNTERS: draw}
+        learnt = self._lines[found.transport].learnt
+        names = {**self._known.names, **learnt, **values, COUNTERS: draw}
         data = self._asks[command].encode(names)
         counters.reserve(draw)
         return data
@@ -151,7 +152,7 @@ class Motions:
             if refused is not None:
                 raise NotNow(refused.message)
         way.warm_up()
-        names = values if ask.is_local else {**self._known.names, **values}
+        names = values if ask.is_local else {**self._known.names, **line.learnt, **values}
         if not ask.has_counters:
             return ask.encode(names)
         draw = line.counters.draw()

@@ -3,6 +3,8 @@
 Floor 3, pure. See `urc.protocol.line` for the theory of operation.
 """
 
+from collections.abc import Mapping
+
 from urc.expressions import COUNTERS
 from urc.model.codec import Payload
 from urc.model.driver import TransportSpec
@@ -10,7 +12,7 @@ from urc.protocol.exchange import Exchange, Outcome
 from urc.protocol.flights import Flights
 from urc.protocol.gate import Counters, Waiting
 
-__all__ = ["Outbox", "counted"]
+__all__ = ["Outbox", "written"]
 
 
 class Outbox(Waiting[Exchange]):
@@ -90,15 +92,20 @@ def _free_at(exchange: Exchange) -> float:
     return exchange.waits_until if bucket is None else max(bucket.free_at, exchange.waits_until)
 
 
-def counted(exchange: Exchange, counters: Counters) -> Payload:
+def written(exchange: Exchange, counters: Counters, learnt: Mapping[str, object]) -> Payload:
     """Make a frame with the next numbers of its counters; sent again, it keeps them.
+
+    Args:
+        exchange: of an ask that is made late.
+        counters: of the connection.
+        learnt: what its login has read.
 
     Raises:
         BadArgument: it cannot be written with these numbers, which are used up nevertheless.
     """
     draw = counters.draw()
     try:
-        data = exchange.ask.encode({**exchange.namespace, COUNTERS: draw})
+        data = exchange.ask.encode({**learnt, **exchange.namespace, COUNTERS: draw})
     finally:
         counters.count(draw)
     exchange.data, exchange.numbers = data, draw.values

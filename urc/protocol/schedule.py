@@ -6,14 +6,12 @@ Floor 3, pure.
 from collections.abc import Callable, Iterator, Mapping
 from functools import partial
 
-from urc.expressions import COUNTERS
 from urc.model.driver import Driver, Poll
 from urc.model.flow import Keepalive
 from urc.protocol.asking import Builder
 from urc.protocol.encode import BadArgument
 from urc.protocol.events import Fault
 from urc.protocol.exchange import Ask, Exchange, LineEvent, Outcome, expires_at
-from urc.protocol.gate import Counters
 from urc.protocol.known import Known
 from urc.protocol.line import Line
 from urc.protocol.steps import Sink
@@ -218,14 +216,7 @@ def _submit(
     line: Line, ask: Ask, owner: PollState | KeptAlive, names: Mapping[str, object], now: float
 ) -> list[LineEvent]:
     try:
-        data = ask.encode({**names, COUNTERS: Counters().draw()} if ask.has_counters else names)
+        data = ask.made(names)
     except BadArgument as error:
         return [Fault(line.spec.name, "bad-argument", f"{ask.label}: {error}")]
-    exchange = Exchange(
-        ask,
-        owner,
-        names,
-        None if ask.has_counters else data,
-        expires_at(ask, now),
-    )
-    return line.submit(exchange, now)
+    return line.submit(Exchange(ask, owner, names, data, expires_at(ask, now)), now)

@@ -11,6 +11,7 @@ from typing import NamedTuple, Protocol
 
 from urc.expressions import Template
 from urc.protocol.answer import Ear, Offer
+from urc.protocol.bounds import queue_limit_s
 from urc.protocol.exchange import DONE, Exchange, LineEvent, Outcome
 from urc.protocol.known import Known
 from urc.protocol.line import Line
@@ -101,6 +102,8 @@ class Runner:
         self._began_at = 0.0
         self._otherwise: tuple[Action, ...] | None = None
         self._late_text = ""
+        self._logins: list[Line] = []
+        """Lines whose logins it waits for before its first step."""
         program.reins.begin()
 
     @property
@@ -111,6 +114,8 @@ class Runner:
     @property
     def can_go_on(self) -> bool:
         """Whether `advance` has something to do."""
+        if self._logins and all(line.is_ready for line in self._logins):
+            return not self.is_over
         return not self.is_over and (self._outcome is not None or not self.is_waiting)
 
     @property
@@ -123,6 +128,9 @@ class Runner:
     def advance(self, now: float) -> list[LineEvent]:
         """Do steps until one must wait or all are done."""
         events: list[LineEvent] = []
+        if self._logins and all(line.is_ready for line in self._logins):
+            self._logins = []
+            self._resume()
         self._obey()
         while self._outcome is None and not self.is_waiting:
             is_outermost = len(self._stack) == 1
@@ -144,6 +152,20 @@ class Runner:
             events += sink(self._outcome, now)
         return events
 
+    def wait_for_logins(self, now: float) -> None:
+        """Do no step before the connections that are open are usable; a command waits as long."""
+        lines = (self.host.lines[name] for name in self.program.transports)
+        self._logins = [
+            line
+            for line in lines
+            if line.is_open
+            and not (line.is_ready or line.is_per_request or line.spec.name == self.privileged_on)
+        ]
+        if self._logins:
+            limit_s = max(queue_limit_s(line.spec, None) for line in self._logins)
+            self._late_text = "the steps of the connection were not done in time"
+            self.sleep(now + limit_s)
+
     def _obey(self) -> None:
         """Do what people want of it."""
         reins = self.program.reins
@@ -159,6 +181,9 @@ class Runner:
             return
         if self.program.reins.is_paused:
             self.stop("timed-out", f"it was paused for {PAUSE_S:g} s")
+            return
+        if self._logins:
+            self.stop("timed-out", self._late_text)
             return
         if self._listening is None and self._awaited is None:
             self._resume()

@@ -20,6 +20,7 @@ from urc.protocol.events import (
     Failed,
     Fault,
     Open,
+    Ready,
     Replied,
     Request,
     Samples,
@@ -91,6 +92,9 @@ class Port(Protocol):
 
     def heard(self) -> None:
         """A good frame arrived."""
+
+    def ready(self) -> None:
+        """The steps of the connection are done."""
 
     def count(self, fault: Fault) -> None:
         """Something was not as declared."""
@@ -282,6 +286,8 @@ class Dispatcher:
                 ports[event.transport].count(event)
             elif type(event) is Open:
                 ports[event.transport].want_open()
+            elif type(event) is Ready:
+                ports[event.transport].ready()
             elif type(event) is Close:
                 ports[event.transport].want_close(event.reason)
         if samples:

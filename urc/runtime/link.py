@@ -7,7 +7,9 @@ by side; whatever ends it (the robot, the engine, a rule below) goes through `_e
 taken down in one place.
 
 A connection is good from the first good frame on, and only that resets the back-off: a robot that
-accepts and closes again is not hammered. Lines shown to people follow `LinkState`; while attempts
+accepts and closes again is not hammered. Where there are steps of a connection (``on_connect``),
+nothing counts before they are done: a robot that greets, and then refuses the login, is not good.
+Lines shown to people follow `LinkState`; while attempts
 fail the state stays what it is and the count rises.
 
 The link needs the five members of a transport and nothing else, and does not care in which process
@@ -46,6 +48,7 @@ _GRACE_S = 1.0
 """What a transport may take beyond the time it promised."""
 _LOOK_S = 0.01
 _NOTHING_YET = "connected; nothing received yet"
+_LOGGING_IN = "connected; the steps of the connection are not done yet"
 
 log = logging.getLogger(__name__)
 
@@ -99,6 +102,12 @@ class Link:
         """Set when the engine has closed the line: what arrives now is nobody's."""
         self._heard_s = 0.0
         self._is_reader_waiting = False
+        self._is_ready = False
+        """The steps of the connection are done, or there are none."""
+        self._has_heard = False
+        """A good frame came before they were."""
+        self._has_stood = False
+        """It has stood for `SETTLE_S`."""
 
         self._is_overdue = False
         """The robot took a request and has not said anything since."""
@@ -153,13 +162,26 @@ class Link:
         self._report.publish()
 
     def heard(self) -> None:
-        """A good frame arrived: whatever was wrong is over."""
+        """A good frame arrived: whatever was wrong is over, unless the login is still to come."""
+        self._has_heard = True
+        if not self._is_ready:
+            return
         if self._report.is_well and not self._is_overdue:
             return
         self._report.attempts = 0
         self._is_overdue = False
         self._report.show("live")
         self._report.publish()
+
+    def ready(self) -> None:
+        """The steps of the connection are done: what came before counts from now on."""
+        self._is_ready = True
+        if self._has_heard:
+            self.heard()
+        elif self._has_stood:
+            self._stand()
+        else:
+            self._greet()
 
     def count(self, fault: Fault) -> None:
         """Count something that was not as declared, and tell of it now and then."""
@@ -244,7 +266,8 @@ class Link:
         self._ended = asyncio.get_running_loop().create_future()
         self._close_reason = None
         self._heard_s = self._clock.now()
-        self._is_reader_waiting = False
+        self._is_reader_waiting = self._has_heard = self._has_stood = False
+        self._is_ready = not self._spec.on_connect
         transport, prompt = self._transport, None
         if self._is_stream and isinstance(transport, Prompt):
             prompt = transport
@@ -272,7 +295,9 @@ class Link:
         """Show what a connection without any frame means."""
         if self._report.attempts or self._report.state == "silent":
             return  # it has to prove itself first, see `_settled`
-        if self._is_persistent and not self._expects_frames:
+        if not self._is_ready and self._is_persistent:
+            self._report.show("connecting", _LOGGING_IN)
+        elif self._is_persistent and not self._expects_frames:
             self._report.show("live")
         elif self._report.state != "live":
             self._report.show("connecting", _NOTHING_YET)
@@ -394,14 +419,22 @@ class Link:
 
     def _settled(self) -> float | None:
         """The connection stands: a robot that closes at once would have done so by now."""
-        if self._report.state == "lost":
-            if self._expects_frames or not self._is_persistent:
-                self._report.show("connecting", _NOTHING_YET)
-            else:
-                self._report.attempts = 0
-                self._report.show("live")
-            self.publish()
+        self._has_stood = True
+        self._stand()
+        self.publish()
         return None
+
+    def _stand(self) -> None:
+        """Show what a connection that stands means."""
+        if self._report.state not in ("lost", "connecting"):
+            return
+        if not self._is_ready:
+            self._report.show("connecting", _LOGGING_IN)
+        elif self._expects_frames or not self._is_persistent:
+            self._report.show("connecting", _NOTHING_YET)
+        else:
+            self._report.attempts = 0
+            self._report.show("live")
 
     def _check_idle(self) -> float | None:
         """Close a line that has been silent for too long, else say how long it still may be."""

@@ -327,3 +327,31 @@ polls:
     talk = Dialogue(profile_of(tmp_path, body))
     talk.wait(2.0)
     assert set(talk.values) == {"level"}
+
+
+SESSION = """
+signals: { volts: { type: integer } }
+commands:
+  get:
+    send: "{{ _id }} GET {{ n }}"
+    args: { n: { type: integer } }
+    reply: { regex: "^= (?P<_value>[0-9]+)$" }
+polls: [{ every: 1s, send: "{{ _id }} VOLTS", reply: { regex: '^V(?P<volts>\\d+)$' } }]
+"""
+
+
+@pytest.mark.parametrize("connection", ["persistent", "per_request"])
+def test_a_session_that_the_robot_gives_comes_back_in_every_request(
+    tmp_path: Path, connection: str
+) -> None:
+    """The emulated robot greets with some session, and knows the requests that carry it."""
+    lines = HEAD.replace("rx: LF } }", "rx: LF }, connection: CONNECTION, on_connect: STEPS }")
+    lines = lines.replace("CONNECTION", connection)
+    lines = lines.replace("STEPS", "[{ send: HI }, { expect: '^ID (?P<_id>\\w+)$' }]")
+    (tmp_path / "robot.yaml").write_text(lines + SESSION, "utf-8")
+    talk = Dialogue(load_profile(tmp_path / "robot.yaml", built_in_catalog()))
+    talk.run("get", n=3)
+    talk.wait(1.5)
+    assert [type(one) for one in talk.replies] == [Replied]
+    assert "volts" in talk.values
+    assert talk.faults == []
