@@ -97,7 +97,7 @@ def served(robot_port: int, document: str, work: Path) -> Iterator[str]:
     file = work / "bench.yaml"
     file.write_text(TRANSPORT.format(port=robot_port) + document, "utf-8")
     with Server([file], work / "data") as server:
-        yield f"http://127.0.0.1:{server.port}/robots/bench/"
+        yield f"http://127.0.0.1:{server.port}/robots/bench/?key={server.key}"
 
 
 @asynccontextmanager
@@ -109,9 +109,12 @@ async def opened(browser: Browser, address: str, *, script: str = "") -> AsyncIt
     try:
         if script:
             await context.add_init_script(script)
+        url, _, key = address.partition("?key=")
+        if key:
+            await context.request.get(address)  # hands it in
         page = await context.new_page()
         page.set_default_timeout(LOAD_MS)
-        await page.goto(address)
+        await page.goto(url)
         line = await context.new_cdp_session(page)
         await line.send("Performance.enable", {"timeDomain": "threadTicks"})
         found = await _metrics(line)

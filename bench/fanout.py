@@ -25,6 +25,7 @@ from bench.watching import cost_s, speaking
 from urc._loop import run as run_loop
 from urc.model.values import Sample, Signal
 from urc.testing.dashboard import FakeRobot, dashboard_profile
+from urc.testing.entry import ACCESS
 from urc.web.app import Robot, build_app
 
 __all__ = ["run"]
@@ -72,7 +73,7 @@ async def _urc(clients: int, ticks: int) -> tuple[float, int]:
     """Return the processor time, and how many bytes a page got a tick."""
     signals = {f"s{place}": Signal(f"s{place}") for place in range(CHANNELS)}
     robot = FakeRobot(dashboard_profile(signals=signals, uses=[]))
-    app = build_app({"puppet": Robot(robot.profile, {}, robot.open)})
+    app = build_app({"puppet": Robot(robot.profile, {}, robot.open)}, access=ACCESS)
 
     def tell(tick: int) -> None:
         now_s = robot.clock.now()

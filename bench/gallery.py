@@ -15,6 +15,7 @@ import urllib.request
 from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
+from typing import NamedTuple
 from urllib.parse import urlsplit
 
 from websockets.asyncio.client import connect
@@ -35,6 +36,14 @@ LOOKS_A_SECOND = 8
 _TICK_S = 1 / os.sysconf("SC_CLK_TCK")
 
 
+class Dashboard(NamedTuple):
+    """The demo's."""
+
+    address: str
+    headers: dict[str, str]
+    """What a program sends with each request."""
+
+
 def run(*, full: bool) -> Sequence[Result]:
     """Measure."""
     lasts_s = LASTS_IF_FULL_S if full else LASTS_S
@@ -45,62 +54,67 @@ def run(*, full: bool) -> Sequence[Result]:
         text=True,
     )
     try:
-        address = _address(demo)
-        names = re.findall(r'data-look="([^"]+)"', _get(address).decode())
-        _get(address.rstrip("/") + names[0])
+        demo_page = _address(demo)
+        names = re.findall(r'data-look="([^"]+)"', _get(demo_page).decode())
+        _get(demo_page, names[0])
         first_s = time.monotonic() - began
         results = [
             _result("seconds to the first moving picture", first_s, FIRST_PICTURE_S),
             _result("of which the processor's", _seconds(demo.pid), FIRST_PICTURE_S),
         ]
-        results += asyncio.run(_measured(demo.pid, address, names, lasts_s))
+        results += asyncio.run(_measured(demo.pid, demo_page, names, lasts_s))
     finally:
         demo.send_signal(signal.SIGINT)
         code = demo.wait(READY_S)
     return [*results, _result("exit code after Ctrl-C", float(code), 0.0)]
 
 
-def _address(demo: "subprocess.Popen[str]") -> str:
+def _address(demo: "subprocess.Popen[str]") -> Dashboard:
     assert demo.stdout is not None
     for line in demo.stdout:
-        if match := re.search(r"dashboard (http://\S+)", line):
-            return match[1]
+        if match := re.search(r"dashboard (http://\S+)\?key=(\S+)", line):
+            return Dashboard(match[1], {"Authorization": f"Bearer {match[2]}"})
     raise SystemExit("bench: the demo did not begin")
 
 
-def _get(url: str) -> bytes:
-    with urllib.request.urlopen(url, timeout=READY_S) as answer:  # noqa: S310 - of this machine
+def _get(at: Dashboard, path: str = "") -> bytes:
+    url = at.address + path.removeprefix("/")
+    asked = urllib.request.Request(url, headers=at.headers)  # noqa: S310 - of this machine
+    with urllib.request.urlopen(asked, timeout=READY_S) as answer:  # noqa: S310
         return bytes(answer.read())
 
 
-async def _measured(pid: int, address: str, looks: Sequence[str], lasts_s: float) -> list[Result]:
+async def _measured(pid: int, at: Dashboard, looks: Sequence[str], lasts_s: float) -> list[Result]:
     """Measure alone, then with a page of cards, then with every robot connected as well."""
     results = await _cost(pid, f"{len(looks)} robots emulated, alone", lasts_s)
     async with asyncio.TaskGroup() as group:
-        tasks = [group.create_task(_look(address, looks))]
+        tasks = [group.create_task(_look(at, looks))]
         results += await _cost(pid, "with a page of live cards", lasts_s)
         for look in looks:
-            tasks.append(group.create_task(_visit(address, look.split("/")[2])))
+            tasks.append(group.create_task(_visit(at, look.split("/")[2])))
         results += await _cost(pid, "with every robot connected as well", lasts_s)
         for task in tasks:
             task.cancel()
     return results
 
 
-async def _look(address: str, looks: Sequence[str]) -> None:
+async def _look(at: Dashboard, looks: Sequence[str]) -> None:
     place = 0
     while True:
-        await asyncio.to_thread(_get, address.rstrip("/") + looks[place % len(looks)])
+        await asyncio.to_thread(_get, at, looks[place % len(looks)])
         place += 1
         await asyncio.sleep(1 / LOOKS_A_SECOND)
 
 
-async def _visit(address: str, robot: str) -> None:
+async def _visit(at: Dashboard, robot: str) -> None:
     """Be a page of a robot: take what is said."""
-    place = urlsplit(address).netloc
+    place = urlsplit(at.address).netloc
     line = f"ws://{place}/ws?robot={robot}"
     with suppress(ConnectionClosed):
-        async with connect(line, max_size=None, origin=Origin(f"http://{place}")) as page:
+        origin = Origin(f"http://{place}")
+        async with connect(
+            line, max_size=None, origin=origin, additional_headers=at.headers
+        ) as page:
             async for _ in page:
                 pass
 

@@ -22,6 +22,7 @@ from urc._loop import run as run_loop
 from urc.model.interface import WidgetUse
 from urc.model.values import Sample, Signal
 from urc.testing.dashboard import FakeRobot, dashboard_profile
+from urc.testing.entry import ACCESS
 from urc.web.app import Robot, build_app
 
 __all__ = ["run"]
@@ -113,7 +114,7 @@ async def _naive(images: int, *, is_json: bool) -> float:
 async def _urc(images: int) -> float:
     use = WidgetUse("cam", "camera", {"image": "cam"})
     robot = FakeRobot(dashboard_profile(signals={"cam": Signal("cam", "image")}, uses=[use]))
-    app = build_app({"puppet": Robot(robot.profile, {}, robot.open)})
+    app = build_app({"puppet": Robot(robot.profile, {}, robot.open)}, access=ACCESS)
 
     def tell(_: int) -> None:
         robot.hub.put((Sample("cam", IMAGE, robot.clock.now()),))

@@ -42,14 +42,16 @@ def run(*, full: bool) -> Sequence[Result]:
         place = Path(folder)
         ours, theirs = _profiles(place, robots.ports)
         with Server(ours, place / "data") as server, Server(theirs, place / "data-2") as elsewhere:
-            page = TimedPage(Plan(1, "127.0.0.1", server.port, "path", "", 0))
+            page = TimedPage(Plan(1, "127.0.0.1", server.port, "path", "", 0, key=server.key))
             page.take_controls()
             for number in range(len(WAYS) * (rounds + 1)):
                 way = tuple(WAYS)[number % len(WAYS)]
                 is_else = way == "flood elsewhere"
-                port = elsewhere.port if is_else else server.port
+                near = elsewhere if is_else else server
                 robot = "lane-2" if is_else else "lane-1"
-                other = Plan(number, "127.0.0.1", port, robot, WAYS[way], 0, life_s=LIFE_S)
+                other = Plan(
+                    number, "127.0.0.1", near.port, robot, WAYS[way], 0, life_s=LIFE_S, key=near.key
+                )
                 operators.start(other._asdict())
                 operators.await_told("dying", number)
                 page.wait(time.monotonic_ns() + 200_000_000)

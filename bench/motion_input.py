@@ -110,7 +110,7 @@ def run(*, full: bool) -> Sequence[Result]:
             DOCUMENT.replace("PORT", str(robots.ports[0])), encoding="utf-8"
         )
         server = stack.enter_context(Server([folder / "hand.yaml"], folder / "data"))
-        address = f"http://127.0.0.1:{server.port}/robots/hand/"
+        address = f"http://127.0.0.1:{server.port}/robots/hand/?key={server.key}"
         found = asyncio.run(_let_go(address, server.pid, robots, each))
     return [_told(way, trials, each) for way, trials in found.items()]
 

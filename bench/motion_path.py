@@ -144,7 +144,7 @@ def _urc(folder: Path, ticks: int) -> Iterator[Callable[[], list[float]]]:
             def one_round() -> list[float]:
                 # A page of its own: one that waits for the others' rounds answers no ping, and is
                 # closed.
-                page = TimedPage(Plan(1, "127.0.0.1", server.port, "path", "", 0))
+                page = TimedPage(Plan(1, "127.0.0.1", server.port, "path", "", 0, key=server.key))
                 try:
                     page.take_controls()
                     page.wait(time.monotonic_ns() + 100_000_000)

@@ -11,9 +11,12 @@ import selectors
 import socket
 import sys
 
+from urc.testing.entry import BEARER
+
 HANDSHAKE = (
     "GET {path} HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\nUpgrade: websocket\r\n"
     "Origin: http://127.0.0.1:{port}\r\n"
+    f"Authorization: {BEARER['authorization']}\r\n"
     "Connection: Upgrade\r\nSec-WebSocket-Version: 13\r\n"
     "Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n\r\n"
 )

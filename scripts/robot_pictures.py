@@ -20,6 +20,7 @@ from PIL import Image
 from playwright.async_api import Browser
 
 from tests.e2e.browser import LOCALE, running_browser
+from tests.e2e.keys import enter
 from tests.e2e.processes import UrcProcess
 from urc.config.load import load_profile
 from urc.runtime.catalog import built_in_catalog
@@ -54,6 +55,7 @@ async def take(browser: Browser, address: str, name: str) -> None:
         reduced_motion="reduce",
     )
     try:
+        await enter(context, address)
         page = await context.new_page()
         await page.goto(f"{address}robots/{name}/?interface=default")
         badge = page.locator("[data-badge][data-state='good']")

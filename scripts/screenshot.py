@@ -15,6 +15,7 @@ from pathlib import Path
 from playwright.async_api import Browser
 
 from tests.e2e.browser import LOCALE, SIZES, running_browser
+from tests.e2e.keys import enter
 from tests.e2e.processes import UrcProcess
 
 PICTURE = Path(__file__).resolve().parents[1] / "docs" / "images" / "dashboard.png"
@@ -85,6 +86,7 @@ async def take_one(browser: Browser, address: str, shot: Shot) -> None:
         locale=LOCALE,
         reduced_motion="reduce",
     )
+    await enter(context, address)
     page = await context.new_page()
     await page.goto(address)
     await page.evaluate("theme => localStorage.setItem('urc-theme', theme)", shot.theme)

@@ -15,6 +15,7 @@ from playwright.async_api import Browser, Page
 
 from tests.e2e.browser import LOCALE, running_browser
 from tests.e2e.dashboards import running_dashboard
+from tests.e2e.keys import known_here
 from urc.config.parse_widget import Shelf
 from urc.shipped import shipped
 from urc.testing.dashboard import FakeRobot, dashboard_profile
@@ -44,6 +45,7 @@ async def take(browser: Browser, address: str, name: str) -> None:
         viewport={"width": WIDTH, "height": 700}, locale=LOCALE, reduced_motion="reduce"
     )
     try:
+        await known_here(context)
         page: Page = await context.new_page()
         await page.goto(f"{address}widgets/{name}/")
         await page.wait_for_selector("[data-gallery][data-ready]", timeout=READY_MS)

@@ -12,6 +12,7 @@ from starlette.routing import Route
 from starlette.testclient import TestClient
 
 from tests.unit.web.test_manage_routes import ADDRESS, stock, workshop
+from urc.testing.entry import ACCESS, HERE
 from urc.web.api_document import DOCUMENT, api_document
 from urc.web.app import build_app
 
@@ -21,7 +22,7 @@ DIALECT = "https://json-schema.org/draft/2020-12/schema"
 @pytest.fixture
 def app(tmp_path: Path) -> Starlette:
     stock(tmp_path)
-    return build_app({}, data=tmp_path, workshop=workshop(tmp_path), remake={})
+    return build_app({}, access=ACCESS, data=tmp_path, workshop=workshop(tmp_path), remake={})
 
 
 @pytest.fixture
@@ -60,9 +61,7 @@ def test_answers_are_what_the_document_says(app: Starlette, document: dict[str, 
         schema = {"$schema": DIALECT, "$ref": f"#/components/schemas/{name}", **document}
         jsonschema.validate(answer, schema)
 
-    with TestClient(
-        app, base_url=ADDRESS, headers={"origin": ADDRESS}, client=("127.0.0.1", 5)
-    ) as client:
+    with TestClient(app, base_url=ADDRESS, headers={"origin": ADDRESS}, cookies=HERE) as client:
         assert client.get(DOCUMENT).json() == document
         fits("Shelf", client.get("/api/v1/packages").json())
         fits("Healthy", client.get("/healthz").json())

@@ -12,6 +12,7 @@ from urc.config.load import Shelf
 from urc.model.interface import WidgetUse
 from urc.shipped import shipped
 from urc.testing.dashboard import FakeRobot, dashboard_profile, plain_widget
+from urc.testing.entry import ACCESS, HERE
 from urc.web.app import Robot, build_app
 from urc.web.load.foreign import OURS, Border
 
@@ -42,7 +43,8 @@ def use_of(widget: str) -> WidgetUse:
 def client(robot: FakeRobot, host: str = "localhost:8080", *trusted: str) -> TestClient:
     """Return a browser's place."""
     served = Robot(robot.profile, {}, robot.open)
-    return TestClient(build_app({"puppet": served}, trusted=trusted), base_url=f"http://{host}")
+    app = build_app({"puppet": served}, access=ACCESS, trusted=trusted)
+    return TestClient(app, base_url=f"http://{host}", cookies=HERE)
 
 
 def test_each_widget_that_ships_is_named() -> None:

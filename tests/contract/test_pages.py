@@ -13,6 +13,7 @@ from urc.model.interface import WidgetUse
 from urc.model.profile import Setting
 from urc.problems import UrcError
 from urc.testing.dashboard import FakeRobot, dashboard_profile, plain_widget
+from urc.testing.entry import ACCESS, HERE
 from urc.web.app import build_app
 from urc.web.fleet.robots import Robot
 
@@ -50,7 +51,7 @@ def dashboard() -> Starlette:
         name: Robot(robot.profile, {}, robot.open)
         for name, robot in {"puppet": ready, "needy": needy, "hostile": hostile}.items()
     }
-    return build_app(robots, allowed_hosts=["robot-pi"])
+    return build_app(robots, access=ACCESS, allowed_hosts=["robot-pi"])
 
 
 @pytest.fixture(scope="module")
@@ -59,6 +60,7 @@ def client() -> Iterator[TestClient]:
     with TestClient(
         dashboard(),
         base_url="http://localhost:8080",
+        cookies=HERE,
         follow_redirects=False,
         raise_server_exceptions=False,
     ) as started:
@@ -146,7 +148,7 @@ def test_a_bug_is_told_in_one_sentence_under_the_policy(monkeypatch: pytest.Monk
 
     monkeypatch.setattr("urc.web.app.menu_page", broken)
     with TestClient(
-        dashboard(), base_url="http://localhost", raise_server_exceptions=False
+        dashboard(), base_url="http://localhost", cookies=HERE, raise_server_exceptions=False
     ) as client:
         answer = client.get("/")
     assert answer.status_code == 500
@@ -281,7 +283,9 @@ def test_two_different_widgets_of_one_name_are_refused(tmp_path: Path) -> None:
 
 def test_a_dashboard_without_robots_says_what_to_do() -> None:
     """It is not an empty page."""
-    with TestClient(build_app({}), base_url="http://localhost") as client:
+    with TestClient(
+        build_app({}, access=ACCESS), base_url="http://localhost", cookies=HERE
+    ) as client:
         assert "urc serve" in client.get("/").text
 
 

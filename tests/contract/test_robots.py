@@ -15,6 +15,7 @@ from urc.runtime.catalog import built_in_catalog
 from urc.runtime.coverage import measure
 from urc.runtime.selftest import exercise, sample_settings
 from urc.testing.dashboard import FakeRobot
+from urc.testing.entry import ACCESS, HERE
 from urc.web.app import build_app
 from urc.web.fleet.robots import Robot
 
@@ -103,7 +104,8 @@ def test_its_page_is_made_with_every_slot_of_each_interface(file: Path) -> None:
     """The default interface and all others, the one for finding faults among them."""
     profile = profile_of(file)
     robot = Robot(profile, sample_settings(profile.settings), FakeRobot(profile).open)
-    with TestClient(build_app({profile.name: robot}), base_url="http://localhost:8080") as client:
+    app = build_app({profile.name: robot}, access=ACCESS)
+    with TestClient(app, base_url="http://localhost:8080", cookies=HERE) as client:
         for name, interface in profile.interfaces.items():
             page = client.get(f"/robots/{profile.name}/?interface={name}")
             assert page.status_code == 200, name

@@ -9,8 +9,9 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from urllib.request import urlopen
+from urllib.request import Request, urlopen
 
+from tests.e2e.keys import headers_for
 from tests.e2e.processes import ROOT
 
 URC = (sys.executable, "-m", "urc.cli.main")
@@ -94,5 +95,6 @@ def wait_for_listener(port: int) -> None:
 
 
 def page(url: str) -> str:
-    with urlopen(url, timeout=TIMEOUT_S) as answer:  # noqa: S310 (URC's own address)
+    asked = Request(url, headers=headers_for(url))  # noqa: S310 (URC's own address)
+    with urlopen(asked, timeout=TIMEOUT_S) as answer:  # noqa: S310
         return str(answer.read().decode())

@@ -19,6 +19,7 @@ from tests.e2e.browser import (
     running_browser,
 )
 from tests.e2e.command_line import BOT
+from tests.e2e.keys import entering, known_here
 from tests.e2e.processes import UrcProcess
 from tests.e2e.together import Together
 from tests.e2e.transports.packets import sweep
@@ -87,7 +88,9 @@ class PageMaker:
         )
         self._contexts.append(context)
         await context.add_init_script(WATCH_POLICY)
+        await known_here(context)
         page = await context.new_page()
+        entering(page)
         page.set_default_timeout(PAGE_TIMEOUT_MS)
         self._faults[page] = PageFaults(page)
         return page

@@ -8,8 +8,11 @@ from playwright.async_api import Page
 from websockets.asyncio.client import ClientConnection
 from websockets.exceptions import ConnectionClosed
 
+from tests.e2e.browser import PLAIN_HOST
 from urc.testing.dashboard import FakeRobot
+from urc.testing.entry import ACCESS
 from urc.web.app import Robot, build_app, serve
+from urc.web.serve.access import Access
 from urc.web.serve.connection import CONNECTIONS, REQUEST_S
 
 WAIT_S = 30.0
@@ -22,6 +25,7 @@ async def running_dashboard(
     request_s: float = REQUEST_S,
     connections: int = CONNECTIONS,
     trusted: Iterable[str] = (),
+    access: Access = ACCESS,
 ) -> AsyncIterator[str]:
     """Serve the robots on this machine; give the address, and end cleanly.
 
@@ -30,6 +34,8 @@ async def running_dashboard(
     ready: asyncio.Future[str] = asyncio.get_running_loop().create_future()
     app = build_app(
         {robot.profile.name: Robot(robot.profile, {}, robot.open) for robot in robots},
+        access=access,
+        allowed_hosts=[PLAIN_HOST],
         linger_s=0.2,
         trusted=trusted,
     )

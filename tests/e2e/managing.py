@@ -17,6 +17,7 @@ from urc.packages.install import plan_wish
 from urc.packages.names import parse_wish
 from urc.packages.repositories import Repositories
 from urc.packages.store import Store
+from urc.testing.entry import ACCESS
 from urc.web.app import build_app, serve
 from urc.web.fleet.garage import Garage
 
@@ -150,15 +151,17 @@ def set_up(data: Path, port: int, host: str = "127.0.0.1") -> None:
 
 @asynccontextmanager
 async def running_managed(
-    data: Path, profiles: Sequence[Profile] = (), *, is_dev: bool = False, is_open: bool = False
+    data: Path, profiles: Sequence[Profile] = (), *, is_dev: bool = False
 ) -> AsyncIterator[str]:
     """Serve what `urc serve --data-dir DATA` would; give the address, and end cleanly."""
-    place = Place("127.0.0.1", 0, data=data, is_managed=is_open, shows_installed=not profiles)
+    place = Place("127.0.0.1", 0, data=data, shows_installed=not profiles)
     workshop = workshop_of(place)
     garage = Garage(workshop)
     robots = {one.name: garage.robot(one.name, one) for one in profiles}
     remake = {name: partial(garage.robot, name) for name in robots} if is_dev else None
-    app = build_app(robots, data=data, remake=remake, workshop=workshop, linger_s=0.2)
+    app = build_app(
+        robots, access=ACCESS, data=data, remake=remake, workshop=workshop, linger_s=0.2
+    )
     ready: asyncio.Future[str] = asyncio.get_running_loop().create_future()
     task = asyncio.create_task(serve(app, port=0, on_ready=ready.set_result))
     try:

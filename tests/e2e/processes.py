@@ -13,6 +13,8 @@ from typing import IO
 
 from anyio import to_thread
 
+from tests.e2e.keys import learn
+
 ROOT = Path(__file__).resolve().parents[2]
 READY_TIMEOUT_S = 40.0
 EXIT_TIMEOUT_S = 40.0
@@ -126,7 +128,7 @@ class UrcProcess:
     def _read_lines(self, stream: IO[str], lines: list[str]) -> None:
         for line in stream:
             with self._changed:
-                lines.append(line.rstrip("\n"))
+                lines.append(learn(line.rstrip("\n")))
                 self._changed.notify_all()
         with self._changed:
             self._open_streams -= 1

@@ -21,6 +21,7 @@ from urc.model.interface import WidgetUse
 from urc.model.values import Signal, Value
 from urc.runtime.session import CommandFailed
 from urc.testing.dashboard import FakeRobot, dashboard_profile
+from urc.testing.entry import BEARER
 from urc.web.drive.once import HELD
 
 pytestmark = pytest.mark.anyio
@@ -299,7 +300,7 @@ async def test_a_command_that_must_be_held_is_given_by_no_tap(new_page: PageMake
         await page.click(MAIN, force=True)
         origin = address.rstrip("/")
         url = address.replace("http://", "ws://") + "ws?robot=puppet"
-        async with connect(url, origin=Origin(origin), compression=None) as line:
+        async with connect(url, origin=Origin(origin), additional_headers=BEARER) as line:
             await line.send(json.dumps({"t": "run", "id": 1, "command": "ring"}))
             async with asyncio.timeout(30):
                 while (reply := json.loads(await line.recv()))["t"] != "reply":

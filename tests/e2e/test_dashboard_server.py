@@ -12,11 +12,13 @@ from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from tests.e2e.dashboards import running_dashboard, until, until_closed
+from tests.e2e.keys import headers_for
 from tests.e2e.processes import UrcProcess
 from urc.model.interface import WidgetUse
 from urc.model.values import Signal
 from urc.problems import UrcError
 from urc.testing.dashboard import FakeRobot, dashboard_profile
+from urc.testing.entry import BEARER
 from urc.web.app import build_app, serve
 from urc.web.serve.addresses import local_addresses
 from urc.web.serve.policy import REFUSAL_HEADERS
@@ -29,7 +31,8 @@ def joined(address: str, **options: object) -> connect:
     """Return a connection to the robot's socket, as its own page makes it."""
     origin = address.rstrip("/")
     url = address.replace("http://", "ws://") + "ws?robot=puppet"
-    return connect(url, origin=origin, **{"compression": None, **options})  # type: ignore[arg-type]
+    options = {"compression": None, "additional_headers": headers_for(address) or BEARER, **options}
+    return connect(url, origin=origin, **options)  # type: ignore[arg-type]
 
 
 async def next_value(line: ClientConnection) -> object:
@@ -81,7 +84,7 @@ async def test_values_are_not_compressed_and_the_socket_names_its_robot() -> Non
             assert line.protocol.extensions == []
             assert json.loads(await line.recv())["robot"] == "puppet"
         url = address.replace("http://", "ws://") + "ws?robot=nobody"
-        async with connect(url, origin=address.rstrip("/")) as line:  # type: ignore[arg-type]
+        async with connect(url, origin=address.rstrip("/"), additional_headers=BEARER) as line:  # type: ignore[arg-type]
             assert await until_closed(line) == 4404
 
 

@@ -15,6 +15,7 @@ from tests.e2e.browser import Size
 from tests.e2e.conftest import PageMaker
 from tests.e2e.dashboards import until
 from tests.e2e.dev_pages import LAMP, PICTURE, ROBOT, WORD, Start, served
+from tests.e2e.keys import headers_for
 from tests.e2e.transports.test_mqtt import broker, publish
 
 pytestmark = pytest.mark.anyio
@@ -237,6 +238,13 @@ async def talk_over_the_broker(page: Page, port: int) -> None:
     assert WORD not in await page.content()
 
 
+def joined(url: str, address: str) -> connect:
+    """Return a connection to a socket of the server at `address`, as its own page makes it."""
+    headers = headers_for(address)
+    origin = Origin(address.rstrip("/"))
+    return connect(url, origin=origin, additional_headers=headers, compression=None)
+
+
 async def test_without_dev_there_is_no_such_page(urc_process: Start, tmp_path: Path) -> None:
     """One line says how to turn it on; its socket is not there either."""
     file = tmp_path / "lamp.yaml"
@@ -246,6 +254,7 @@ async def test_without_dev_there_is_no_such_page(urc_process: Start, tmp_path: P
     port = int(address.rstrip("/").rpartition(":")[2])
     reader, writer = await asyncio.open_connection("127.0.0.1", port)
     head = f"GET /robots/lamp/dev HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\nConnection: close"
+    head += "".join(f"\r\n{name}: {value}" for name, value in headers_for(address).items())
     writer.write(f"{head}\r\n\r\n".encode())
     async with asyncio.timeout(30):
         answer = (await reader.read()).decode()
@@ -254,7 +263,7 @@ async def test_without_dev_there_is_no_such_page(urc_process: Start, tmp_path: P
     assert "The dev page is off. Start URC with --dev to turn it on." in answer
     url = address.replace("http://", "ws://") + "robots/lamp/dev/ws"
     with pytest.raises(InvalidStatus, match="404"):
-        async with connect(url, origin=Origin(address.rstrip("/"))):
+        async with joined(url, address):
             pass
 
 
@@ -279,7 +288,7 @@ async def test_a_foreign_page_cannot_listen(
         with pytest.raises(InvalidStatus, match="403"):
             async with connect(url, origin=Origin("http://example.com")):
                 pass
-        async with connect(url, origin=Origin(address.rstrip("/")), compression=None) as line:
+        async with joined(url, address) as line:
             async with asyncio.timeout(30):
                 assert json.loads(await line.recv())["t"] == "hello"
 

@@ -8,6 +8,7 @@ from playwright.async_api import Browser, Page, expect
 
 from tests.e2e.conftest import PageMaker
 from tests.e2e.dashboards import running_dashboard, until
+from tests.e2e.keys import known_here
 from tests.e2e.motion.driving import CALM_LEASE_S, Wire
 from urc.testing.dashboard import FakeRobot, dashboard_profile
 from urc.web.words import LANGUAGES, table
@@ -151,6 +152,7 @@ async def test_a_robot_is_driven_in_another_language(new_page: PageMaker, tag: s
 async def test_the_browsers_wish_is_followed_without_a_choice(browser: Browser) -> None:
     """Also by a page that is not there."""
     context = await browser.new_context(locale="fr-CH", service_workers="block")
+    await known_here(context)
     try:
         async with running_dashboard(FakeRobot(dashboard_profile())) as address:
             page = await context.new_page()

@@ -16,6 +16,7 @@ from urllib.request import Request, urlopen
 import pytest
 
 from tests.e2e.command_line import TIMEOUT_S
+from tests.e2e.keys import headers_for
 from tests.e2e.package_people import Person
 from tests.e2e.processes import ROOT, UrcProcess
 from tests.unit.packages.made import package, write_package
@@ -77,7 +78,8 @@ def server(handler: Callable[..., BaseHTTPRequestHandler]) -> Iterator[str]:
 
 def got(url: str, **headers: str) -> tuple[int, bytes, str]:
     try:
-        request = Request(url, headers=headers)  # noqa: S310 (addresses of our own servers)
+        sent = headers_for(url) | headers
+        request = Request(url, headers=sent)  # noqa: S310 (addresses of our own servers)
         with urlopen(request, timeout=TIMEOUT_S) as answer:  # noqa: S310
             return answer.status, answer.read(), answer.headers["etag"]
     except HTTPError as error:

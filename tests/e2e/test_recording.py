@@ -20,6 +20,7 @@ from websockets.asyncio.client import connect
 from tests.e2e.axe import faults, prepare
 from tests.e2e.command_line import PUPPET, at, run
 from tests.e2e.conftest import PageMaker
+from tests.e2e.keys import headers_for
 from tests.e2e.ports import free_port
 from tests.e2e.processes import UrcProcess
 from urc.problems import UrcError
@@ -261,7 +262,8 @@ async def _keyboard_moves_it(page: Page) -> None:
 async def test_nothing_is_commanded_through_a_recording(replayed: str) -> None:
     """Whatever is sent by hand: no lease, no stop, no command."""
     origin = replayed.partition("/robots/")[0]
-    async with httpx2.AsyncClient(base_url=origin, headers={"origin": origin}) as client:
+    key = headers_for(origin)
+    async with httpx2.AsyncClient(base_url=origin, headers={"origin": origin, **key}) as client:
         stopped = await client.post("/api/v1/robots/rover/stop")
         assert stopped.status_code == 409
         for body in ({"positionS": 1e999}, {"positionS": "far"}, {"other": 1}):
@@ -274,7 +276,9 @@ async def test_nothing_is_commanded_through_a_recording(replayed: str) -> None:
         assert 0 <= state["positionS"] <= state["lengthS"]
     line = replayed.partition("//")[2].partition("/")[0]
     said = []
-    async with connect(f"ws://{line}/ws?robot=rover", origin=origin) as socket:
+    async with connect(
+        f"ws://{line}/ws?robot=rover", origin=origin, additional_headers=key
+    ) as socket:
         for message in (
             {"t": "take"},
             {"t": "stop"},

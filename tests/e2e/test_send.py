@@ -12,6 +12,7 @@ import pytest
 from websockets.asyncio.client import connect
 
 from tests.e2e.command_line import run
+from tests.e2e.keys import headers_for
 from tests.e2e.ports import free_port
 from tests.e2e.processes import UrcProcess
 from tests.e2e.shy_bridge import shy_bridge
@@ -223,7 +224,11 @@ async def test_whoever_drives_on_a_running_server_is_not_driven_against(
     url = (await server.wait_for_async(r"dashboard (http://\S+)"))[1]
     assert (await send(profile, "go", *place)).returncode == 0
     address = urlsplit(url).netloc
-    async with connect(f"ws://{address}/ws?robot=cart", origin=f"http://{address}") as screen:
+    async with connect(
+        f"ws://{address}/ws?robot=cart",
+        origin=f"http://{address}",
+        additional_headers=headers_for(url),
+    ) as screen:
         await screen.send(json.dumps({"t": "drive", "verb": "take"}))
         async for said in screen:
             lease = json.loads(said)

@@ -154,7 +154,7 @@ async def test_what_is_done_with_an_emulated_robot_leaves_the_real_ones_stop_as_
     real.write_text('{"epoch": 7, "latched_by": "screen 1"}', "utf-8")
     how = ("serve", tello, "--simulate", "--port", "0", "--data-dir", str(tmp_path))
     async with running(*how) as (_, said, _), httpx2.AsyncClient() as page:
-        address = (await said.readline()).split()[1].decode()
+        address = (await said.readline()).split()[1].decode().partition("?")[0]
         stopped = await page.post(
             f"{address}api/v1/robots/tello/stop", headers={"Origin": address.rstrip("/")}
         )

@@ -10,6 +10,7 @@ from functools import partial
 from pathlib import Path
 
 from urc._folders import data_folder
+from urc.cli.entrance import Entrance, access_for, announce
 from urc.cli.failures import Misuse
 from urc.cli.faults import Faulty
 from urc.cli.output import complain
@@ -20,7 +21,6 @@ from urc.problems import UrcError
 from urc.runtime.catalog import built_in_catalog
 from urc.runtime.kept import Kept
 from urc.runtime.selftest import sample_settings
-from urc.runtime.servers import announced
 from urc.runtime.session import Motion, Session
 from urc.simulator.stand_in import stand_in
 from urc.simulator.twin import Twin
@@ -55,8 +55,8 @@ class Place:
     """Whether a process of its own stops what moves when this one cannot."""
     tiles: Path | None = None
     """Folder of map pictures; None: maps are grids."""
-    is_managed: bool = False
-    """Whether other machines may install packages and change settings, too."""
+    token: str = ""
+    """Of those who manage from other machines; "": none may."""
     shows_installed: bool = False
     """Whether the robots and drivers that are installed are on the menu."""
     trusted: Sequence[str] = ()
@@ -70,7 +70,7 @@ def run_dashboard(
     place: Place,
     *,
     is_simulated: bool,
-    on_ready: Callable[[str], None],
+    on_ready: Callable[[Entrance], None],
     given: SettingsOf = _nothing,
     is_dev: bool = False,
     faults: Sequence[str] = (),
@@ -81,7 +81,7 @@ def run_dashboard(
         profiles: the robots that are there from the start.
         place: address, port, the names it answers to, and what is kept where.
         is_simulated: each robot is emulated, over a real socket, instead of the real one.
-        on_ready: called once with the address.
+        on_ready: called once with the way in.
         given: the settings of a profile that were given at the start.
         is_dev: whether there are dev pages, and documents are read again when they are saved.
         faults: what goes wrong with emulated robots, as ``loss=5%`` or ``tello:loss=5%``.
@@ -102,13 +102,20 @@ async def _serve(
     profiles: Sequence[Profile],
     place: Place,
     faulty: Faulty | None,
-    on_ready: Callable[[str], None],
+    on_ready: Callable[[Entrance], None],
     given: SettingsOf,
     is_dev: bool,
     faults: Sequence[str],
 ) -> int:
     async with AsyncExitStack() as stack:
         workshop = workshop_of(place, given, faulty)
+        access = access_for(place.host, place.token)
+
+        def ready(url: str) -> None:
+            entrance = Entrance(url, access)
+            announce(stack, workshop.data, place.host, entrance)
+            on_ready(entrance)
+
         garage = Garage(workshop)
         robots: dict[str, Robot] = {}
         for profile in profiles:
@@ -129,6 +136,7 @@ async def _serve(
         remade = {name: partial(garage.robot, name) for name in robots} if is_dev else None
         app = build_app(
             robots,
+            access=access,
             allowed_hosts=place.allowed_hosts,
             data=workshop.data,
             tiles=place.tiles,
@@ -138,11 +146,6 @@ async def _serve(
         )
         gc.collect()
         gc.freeze()  # what is loaded by now stays: looking through it again would hold us up
-
-        def ready(url: str) -> None:
-            stack.enter_context(announced(workshop.data, url))
-            on_ready(url)
-
         await serve(app, host=place.host, port=place.port, on_ready=ready)
     return 0
 
@@ -168,7 +171,6 @@ def workshop_of(
         tried=partial(_session, "none", None, faulty),
         given=given,
         shows_installed=place.shows_installed,
-        is_open=place.is_managed,
     )
 
 

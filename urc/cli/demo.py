@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from contextlib import suppress
 
 from urc.cli.arguments import add_dev, add_host, add_port, is_loopback
+from urc.cli.entrance import Entrance
 from urc.cli.failures import Misuse
 from urc.cli.faults import add_faults
 from urc.problems import UrcError
@@ -43,9 +44,12 @@ def run(arguments: argparse.Namespace) -> int:
     if not profiles:
         raise UrcError(f"there are no robots in {shipped('robots')}")
 
-    def announce(url: str) -> None:
-        print(f"dashboard {url}   (Ctrl-C ends it)", flush=True)
+    def announce(entrance: Entrance) -> None:
+        first, *others = entrance.lines()
+        print("\n".join((f"{first}   (Ctrl-C ends it)", *others)), flush=True)
         if not arguments.no_browser and has_screen(sys.platform, os.environ):
+            # Everyone on this machine can read the command line of a browser.
+            url = entrance.address_once
             threading.Thread(target=_open_browser, args=(url,), daemon=True).start()
 
     return run_dashboard(

@@ -5,13 +5,14 @@ import json
 import os
 from collections.abc import Callable
 from contextlib import suppress
+from http import HTTPStatus
 from http.client import HTTPConnection, HTTPException
 from pathlib import Path
 from urllib.parse import quote, urlsplit
 
 from urc.problems import printable
 from urc.runtime.latch import LatchFile
-from urc.runtime.servers import servers
+from urc.runtime.servers import Server, headers, servers
 
 __all__ = ["Hindrance"]
 
@@ -79,20 +80,22 @@ class Hindrance:
 
     def _asked(self) -> str:
         """Return what the first server says that has something against it."""
-        for file, url in servers(self._data).items():
-            why = self._answer(file, url)
+        for file, server in servers(self._data).items():
+            why = self._answer(file, server)
             if why:
                 return why
         return ""
 
-    def _answer(self, file: Path, url: str) -> str:
+    def _answer(self, file: Path, server: Server) -> str:
+        url = server.address
         place = urlsplit(url)
         line = HTTPConnection(place.hostname or "", place.port, timeout=_ANSWER_S)
         try:
-            line.request("GET", f"/api/v1/robots/{quote(self._robot, safe='')}/controls")
+            path = f"/api/v1/robots/{quote(self._robot, safe='')}/controls"
+            line.request("GET", path, headers=headers(server))
             answer = line.getresponse()
             text = answer.read(_MOST_BYTES)
-            if answer.status != 200:  # it does not serve this robot
+            if answer.status == HTTPStatus.NOT_FOUND:  # it does not serve this robot
                 return ""
             found = json.loads(text)
             by, holder = str(found["latched"]), str(found["holder"])

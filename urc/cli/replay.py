@@ -6,6 +6,7 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
 from urc.cli.arguments import add_host, add_port, duration, load
+from urc.cli.entrance import Entrance, access_for, print_entrance
 from urc.cli.failures import Misuse
 from urc.cli.output import complain
 from urc.problems import ProblemsError, UrcError
@@ -80,7 +81,11 @@ async def _serve(player: "Player", host: str, port: int) -> int:
 
     profile = player.profile
     robot = Robot(profile, player.settings, player.session, tape=player)
-    await serve(build_app({profile.name: robot}), host=host, port=port, on_ready=_print_address)
+    access = access_for(host)
+    app = build_app({profile.name: robot}, access=access)
+    await serve(
+        app, host=host, port=port, on_ready=lambda url: print_entrance(Entrance(url, access))
+    )
     return 0
 
 
@@ -94,10 +99,6 @@ def _profile_in(recording: "Recording") -> "Profile":
         except ProblemsError as error:
             line = str(error).partition("\n")[0].replace(str(file), recording.file.name)
             raise UrcError(f"{line}; --profile names another profile to show it with") from None
-
-
-def _print_address(url: str) -> None:
-    print(f"dashboard {url}", flush=True)
 
 
 def _speed(text: str) -> float:

@@ -50,7 +50,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--manage",
         action="store_true",
-        help="other machines, too, may install packages and change settings",
+        help="other machines, too, may install packages and change settings; needs --token",
+    )
+    parser.add_argument(
+        "--token",
+        dest="token_file",
+        metavar="FILE",
+        type=Path,
+        help="holds the token of those who manage from other machines; made where it is missing",
     )
     parser.add_argument(
         "--no-guard",
@@ -92,12 +99,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Serve until Ctrl-C or SIGTERM."""
     from urc.cli.dashboard import Place, run_dashboard
+    from urc.cli.entrance import print_entrance, token_in
     from urc.cli.settings import settings_given
     from urc.runtime.settings import resolve_settings
     from urc.runtime.shelves import hidden_beside
 
     if arguments.dev and not is_loopback(arguments.host):
         raise Misuse(f"--dev shows all traffic and is for this machine alone, not {arguments.host}")
+    if arguments.manage and not arguments.token_file and not is_loopback(arguments.host):
+        raise Misuse(
+            f"--manage lets others at {arguments.host} install packages and change settings:"
+            " add --token FILE, and only those with the token in that file may"
+        )
+    if arguments.token_file and not arguments.manage:
+        raise Misuse("--token is for those who manage from other machines: add --manage")
     if arguments.faults and not arguments.simulate:
         raise Misuse("--fault is for emulated robots: add --simulate")
     if arguments.tiles and not arguments.tiles.is_dir():
@@ -136,13 +151,13 @@ def run(arguments: argparse.Namespace) -> int:
             arguments.data,
             arguments.has_guard,
             arguments.tiles,
-            arguments.manage,
+            token_in(arguments.token_file) if arguments.token_file else "",
             arguments.installed or not profiles,
             tuple(arguments.trusted),
             arguments.recordings,
         ),
         is_simulated=arguments.simulate,
-        on_ready=_print_address,
+        on_ready=print_entrance,
         given=given,
         is_dev=arguments.dev,
         faults=arguments.faults,
@@ -154,11 +169,3 @@ def _warn(arguments: argparse.Namespace) -> None:
         f"urc serve: {arguments.host} can be reached by others, and there is no sign-in yet:"
         " anyone on that network can drive these robots"
     )
-    if arguments.manage:
-        complain(
-            "urc serve: --manage: anyone on that network can install packages and change settings"
-        )
-
-
-def _print_address(url: str) -> None:
-    print(f"dashboard {url}", flush=True)

@@ -312,7 +312,8 @@ class Server(Program):
         self.host = host
         super().__init__(command, inside=inside)
         url = self.wait_for("dashboard", READY_S)[1]
-        self.port = int(url.rstrip("/").rpartition(":")[2])
+        address, _, self.key = url.partition("?key=")
+        self.port = int(address.rstrip("/").rpartition(":")[2])
 
     @property
     def guards(self) -> list[int]:

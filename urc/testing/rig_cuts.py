@@ -226,6 +226,7 @@ class CutRig:
             "number": number,
             "host": "127.0.0.1",
             "port": self.server.port,
+            "key": self.server.key,
             "robot": f"lane-{lane}",
             "death": "outside",
             "drive_s": 0.0,

@@ -180,7 +180,7 @@ class Rig:
         self._numbers += 1
         plan = Plan(
             self._numbers, self.host, self.server.port, f"lane-{lane}", death, drive_s,
-            life_s=LIFE_S, has_spare=has_spare,
+            life_s=LIFE_S, key=self.server.key, has_spare=has_spare,
         )  # fmt: skip
         self.operators.start(plan._asdict())
         return self._numbers

@@ -52,6 +52,8 @@ class Plan(NamedTuple):
     """How long it lives after that at most, where nobody ends it."""
     command: str = "go"
     argument: str = "t"
+    key: str = ""
+    """Of the server, which it printed; "" comes as a stranger."""
     has_spare: bool = False
     """Whether it says everything about held controls on a second line, too."""
 
@@ -88,8 +90,9 @@ class Page:
         head = (
             f"GET {self.path}?robot={plan.robot} HTTP/1.1\r\nHost: {place}\r\nOrigin: http://{place}\r\n"
             "Upgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\n"
-            f"Sec-WebSocket-Key: {key}\r\n\r\n"
+            f"Sec-WebSocket-Key: {key}\r\n"
         )
+        head += f"Authorization: Bearer {plan.key}\r\n\r\n" if plan.key else "\r\n"
         self.socket.sendall(head.encode())
         answer = b""
         while b"\r\n\r\n" not in answer:

@@ -113,7 +113,7 @@ _CALLS: Final = (
     ),
     _Call(
         "/api/v1/robots/{name}/timeline",
-        "What made a robot move, newest first; on the machine that runs URC only.",
+        "What made a robot move, newest first; with the start key only.",
         Timeline,
         is_post=False,
         query=("last", "since"),
@@ -132,7 +132,7 @@ _CALLS: Final = (
     ),
     _Call(
         "/api/v1/robots/{name}/dev/start",
-        "Read a robot's documents anew; with --dev, on the machine that runs URC only.",
+        "Read a robot's documents anew; with --dev, and the start key only.",
         Started,
     ),
 )

@@ -32,6 +32,7 @@ from urc.web.api_document import DOCUMENT, document
 from urc.web.dev.routes import Dev, dev_url, no_dev_routes
 from urc.web.dev.start import DevStart, no_dev_start
 from urc.web.dev.watch import Remake
+from urc.web.door import Door, Stoppable
 from urc.web.drive.once import can_move
 from urc.web.drive.spare import Spare
 from urc.web.fleet.fleet import Fleet
@@ -44,6 +45,7 @@ from urc.web.load.foreign import Border
 from urc.web.manage.manager import Manager
 from urc.web.manage.routes import ManageRoutes
 from urc.web.manage.settings_routes import SettingsRoutes
+from urc.web.serve.access import Access
 from urc.web.serve.policy import Policy
 from urc.web.serve.server import serve
 from urc.web.show.card import Cards
@@ -56,7 +58,7 @@ from urc.web.show.pages import Head, error_page, robot_page
 from urc.web.socket import Client
 from urc.web.tape import move_tape, tape_state
 from urc.web.timeline import timeline
-from urc.web.visitor import guest_of, is_here
+from urc.web.visitor import guest_of, is_here, may_manage
 from urc.web.wire import messages as wire
 
 __all__ = ["Robot", "build_app", "serve"]
@@ -67,6 +69,7 @@ _PAGE = {"cache-control": "no-store"}
 def build_app(
     robots: Mapping[str, Robot],
     *,
+    access: Access | None = None,
     allowed_hosts: Iterable[str] = (),
     linger_s: float = LINGER_S,
     data: Path | None = None,
@@ -79,6 +82,7 @@ def build_app(
 
     Args:
         robots: by the name in their URL.
+        access: the keys; None makes some that nobody has.
         allowed_hosts: names it answers to, besides addresses, ``localhost`` and ``*.local``.
         linger_s: how long a robot stays connected after its last client has gone, in seconds.
         data: folder in which a stop is kept over a restart, and the audit; None: neither is.
@@ -117,7 +121,7 @@ def build_app(
         dev = Dev(fleet.stations, remake, renew, is_here)
         routes.dev_start = DevStart(fleet, remake, renew, routes.ways, is_here)
     files = FileRoutes(vendored(), tiles, routes.widget_files)
-    return _Dashboard(routes, files, frozenset(allowed_hosts), dev)
+    return _Dashboard(routes, files, access or Access(), frozenset(allowed_hosts), dev)
 
 
 def _latch(data: Path | None, robot: Robot) -> LatchFile | None:
@@ -138,8 +142,15 @@ class _Dashboard(Starlette):
     """Starlette with the page policy outermost, so that its own error answers pass through it."""
 
     def __init__(
-        self, routes: "_Routes", files: FileRoutes, allowed_hosts: frozenset[str], dev: Dev | None
+        self,
+        routes: "_Routes",
+        files: FileRoutes,
+        access: Access,
+        allowed_hosts: frozenset[str],
+        dev: Dev | None,
     ) -> None:
+        self._access = access
+        self._stoppable = routes.stoppable
         self._allowed_hosts = allowed_hosts
         routes.dev = dev
         gallery = routes.gallery = Gallery(
@@ -178,8 +189,8 @@ class _Dashboard(Starlette):
 
     def build_middleware_stack(self) -> ASGIApp:
         """Put the policy around everything, the handler of unexpected errors included."""
-        inside = words.Reader(super().build_middleware_stack())
-        return Policy(inside, allowed_hosts=self._allowed_hosts)
+        door = Door(super().build_middleware_stack(), self._access, self._stoppable)
+        return Policy(words.Reader(door), self._access, allowed_hosts=self._allowed_hosts)
 
 
 @dataclass(slots=True)
@@ -208,8 +219,16 @@ class _Routes:
         """Return the routes of the managers, where there are any."""
         if self.manager is None:
             return []
-        manage = ManageRoutes(self.manager, self.ways, is_here)
+        manage = ManageRoutes(self.manager, self.ways, is_here, may_manage)
         return [*manage.routes(), *SettingsRoutes(self.manager, manage, self.ways).routes()]
+
+    def stoppable(self) -> list[Stoppable]:
+        """Return the robots that move."""
+        return [
+            Stoppable(name, each.profile.title or name)
+            for name, each in self.robots.items()
+            if each.tape is None and can_move(each.profile.driver)
+        ]
 
     def profiles(self) -> list[Profile]:
         """Return what the robots are."""

@@ -1,6 +1,6 @@
 """Why did it move? The audit of one robot, as JSON for the dev page.
 
-Floor 5. It shows what went over a robot's lines, so it is for who sits at this machine, as the dev
+Floor 5. It shows what went over a robot's lines, so it needs the start key, as the dev
 page is. ``?last=`` says how many entries, newest first, ``?since=`` from when on (UTC, seconds).
 """
 
@@ -28,10 +28,10 @@ async def timeline(
         request: its query says how much of it.
         log: where it is kept; None: nowhere.
         robot: whose.
-        is_here: whether this machine asks.
+        is_here: whether who asks has the start key.
     """
     if not is_here:
-        text = "the timeline is only shown on the machine that runs URC"
+        text = "the timeline needs the key in the address that URC printed"
         return JSONResponse({"error": text}, 403, _HEADERS)
     if log is None:
         text = "no audit is kept: this server has no folder for its data"

@@ -1,29 +1,46 @@
-"""Who asks: whoever sits at this machine may do more; a page may choose to watch only.
+"""What who asks may do: the holder of the start key more; a page may choose to watch only.
 
-Floor 5. Pure. Until people sign in, this is all that is known of them.
+Floor 5. Pure.
 """
 
 from ipaddress import ip_address
 
 from starlette.requests import HTTPConnection
 
+from urc.web.serve.access import STRANGER, Visitor
 from urc.web.socket import Guest
 
-__all__ = ["guest_of", "is_here"]
+__all__ = ["guest_of", "is_here", "may_manage", "visitor_of"]
+
+
+def visitor_of(connection: HTTPConnection) -> Visitor:
+    """Return who asks, as the policy found it out."""
+    found: Visitor = getattr(connection.state, "visitor", STRANGER)
+    return found
 
 
 def guest_of(connection: HTTPConnection) -> Guest:
-    """Return who asks."""
+    """Return who asks, for the robot's other screens."""
     host = connection.client.host if connection.client else ""
-    try:
-        is_local = ip_address(host.partition("%")[0]).is_loopback
-    except ValueError:
-        is_local = False
+    has_key = is_here(connection)
+    place = "" if has_key and _is_loopback(host) else host
     if "watch" in connection.query_params:
-        return Guest("" if is_local else host, "viewer")
-    return Guest("", "engineer") if is_local else Guest(host, "driver")
+        return Guest(place, "viewer")
+    return Guest(place, "engineer" if has_key else "driver")
 
 
 def is_here(connection: HTTPConnection) -> bool:
-    """Return whether somebody at this machine asks."""
-    return not guest_of(connection).place
+    """Return whether who asks has the start key: an address says nothing of that."""
+    return visitor_of(connection).standing == "here"
+
+
+def may_manage(connection: HTTPConnection) -> bool:
+    """Return whether who asks may install packages and change settings."""
+    return visitor_of(connection).standing in ("here", "manager")
+
+
+def _is_loopback(host: str) -> bool:
+    try:
+        return ip_address(host.partition("%")[0]).is_loopback
+    except ValueError:
+        return False

@@ -14,6 +14,7 @@ from urc.model.driver import Argument, Command
 from urc.model.flow import Hold
 from urc.model.interface import Given, WidgetUse
 from urc.testing.dashboard import FakeRobot, dashboard_profile
+from urc.testing.entry import ACCESS
 from urc.testing.movers import FakeMovers
 from urc.web.app import Robot, build_app, serve
 
@@ -113,7 +114,9 @@ async def driven(
     """Serve a robot that moves; give it and the address of its page."""
     wire = robot or Wire()
     ready: asyncio.Future[str] = asyncio.get_running_loop().create_future()
-    app = build_app({"puppet": Robot(wire.profile, {}, wire.open)}, linger_s=0.2, data=data)
+    app = build_app(
+        {"puppet": Robot(wire.profile, {}, wire.open)}, access=ACCESS, linger_s=0.2, data=data
+    )
     task = asyncio.create_task(serve(app, port=0, on_ready=ready.set_result))
     try:
         async with asyncio.timeout(WAIT_S):

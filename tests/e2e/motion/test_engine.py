@@ -65,7 +65,9 @@ def idle(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Idle]:
         served(tmp_path_factory.mktemp("idle"), robots) as server,
         Operators() as operators,
     ):
-        plan = Plan(1, "127.0.0.1", server.port, "lane-0", "outside", 0.3, life_s=2 * IDLE_S + 60)
+        life_s = 2 * IDLE_S + 60
+        place = ("127.0.0.1", server.port, "lane-0")
+        plan = Plan(1, *place, "outside", 0.3, life_s=life_s, key=server.key)
         operators.start(plan._asdict())
         robots.wait_until(lambda: len(robots.heard[0]) > 3, WAIT_S, "motion")
         operators.order(json.dumps({"let_go": 1}))
@@ -89,7 +91,7 @@ def served(folder: Path, robots: Robots, *, inside: tuple[str, ...] = ()) -> Ser
 @contextmanager
 def opened(server: Server) -> Iterator[Page]:
     """Open the page of the first robot."""
-    page = Page(Plan(1, "127.0.0.1", server.port, "lane-0", "", 0))
+    page = Page(Plan(1, "127.0.0.1", server.port, "lane-0", "", 0, key=server.key))
     try:
         yield page
     finally:

@@ -37,7 +37,7 @@ def page(robots: Robots, tmp_path: Path) -> Iterator[Page]:
     file = tmp_path / "lane-0.yaml"
     file.write_text(lane_profile(0, "127.0.0.1", robots.ports[0]), "utf-8")
     with Server([file], tmp_path / "data") as server:
-        made = Page(Plan(1, "127.0.0.1", server.port, "lane-0", "", 0))
+        made = Page(Plan(1, "127.0.0.1", server.port, "lane-0", "", 0, key=server.key))
         try:
             made.take_controls()
             yield made

@@ -11,6 +11,7 @@ import pytest
 from tests.e2e.browser import LOCALE, PAGE_TIMEOUT_MS, SIZES, running_browser
 from tests.e2e.conftest import PageMaker
 from tests.e2e.dashboards import until
+from tests.e2e.keys import known_here
 from tests.e2e.motion.driving import (
     CALM_LEASE_S,
     LEASE_S,
@@ -278,7 +279,9 @@ async def test_a_renderer_that_stands_still_stops_within_the_lease() -> None:
         running_browser(is_whole=True) as browser,
         lateness() as late,
     ):
-        page = await (await browser.new_context(locale=LOCALE)).new_page()
+        context = await browser.new_context(locale=LOCALE)
+        await known_here(context)
+        page = await context.new_page()
         page.set_default_timeout(PAGE_TIMEOUT_MS)
         await page.goto(address)
         await page.wait_for_selector("[data-cell='0'] .joystick[data-phase='idle']")

@@ -21,6 +21,7 @@ from urc.runtime.selftest import sample_settings
 from urc.runtime.session import Session
 from urc.simulator.stand_in import stand_in
 from urc.simulator.twin import Twin, TwinLine
+from urc.testing.entry import ACCESS
 from urc.web.app import Robot, build_app, serve
 
 __all__ = ["FOLDER", "Overheard", "alive"]
@@ -122,7 +123,7 @@ async def alive(name: str, data: Path, patch: pytest.MonkeyPatch) -> AsyncIterat
 async def served(robot: Robot) -> AsyncIterator[str]:
     """Serve one robot in this loop; give the address of the menu."""
     ready: asyncio.Future[str] = asyncio.get_running_loop().create_future()
-    app = build_app({robot.profile.name: robot}, linger_s=0.2)
+    app = build_app({robot.profile.name: robot}, access=ACCESS, linger_s=0.2)
     task = asyncio.create_task(serve(app, port=0, on_ready=ready.set_result))
     try:
         async with asyncio.timeout(WAIT_S):

@@ -7,24 +7,25 @@ from starlette.testclient import TestClient
 
 from urc.model.profile import Profile
 from urc.testing.dashboard import FakeRobot, dashboard_profile
+from urc.testing.entry import HERE, OPEN
 from urc.web.app import build_app
 from urc.web.dev.routes import HOW_TO_TURN_ON
 from urc.web.fleet.robots import Robot
 
 HOSTILE = '"><script>alert(1)</script>{{ 7*7 }}'
-HERE = ("127.0.0.1", 50_000)
 
 
-def client(*, is_dev: bool, address: tuple[str, int] = HERE) -> TestClient:
-    """Talk to a dashboard from an address."""
+def client(*, is_dev: bool, has_key: bool = True) -> TestClient:
+    """Talk to a dashboard, with the start key or without."""
     robot = FakeRobot(dashboard_profile()._replace(title=HOSTILE))
     served = Robot(robot.profile, {}, robot.open)
 
     def remake(profile: Profile) -> Robot:
         return Robot(profile, {}, robot.open)
 
-    app = build_app({"puppet": served}, remake={"puppet": remake} if is_dev else None)
-    return TestClient(app, base_url="http://localhost:8080", client=address)
+    app = build_app({"puppet": served}, access=OPEN, remake={"puppet": remake} if is_dev else None)
+    cookies = HERE if has_key else None
+    return TestClient(app, base_url="http://localhost:8080", cookies=cookies)
 
 
 def test_a_dev_page_has_the_policy_of_every_page_and_no_markup_of_a_robot() -> None:
@@ -48,17 +49,17 @@ def test_the_menu_leads_to_it() -> None:
 
 
 @pytest.mark.parametrize(
-    ("is_dev", "address", "path", "status", "told"),
+    ("is_dev", "has_key", "path", "status", "told"),
     [
-        (False, HERE, "/robots/puppet/dev", 404, HOW_TO_TURN_ON),
-        (True, HERE, "/robots/nobody/dev", 404, "No robot of that name is served here."),
-        (True, ("192.168.1.9", 50_000), "/robots/puppet/dev", 403, "only shown on the machine"),
+        (False, True, "/robots/puppet/dev", 404, HOW_TO_TURN_ON),
+        (True, True, "/robots/nobody/dev", 404, "No robot of that name is served here."),
+        (True, False, "/robots/puppet/dev", 403, "needs the key"),
     ],
 )
 def test_where_there_is_no_dev_page_a_line_says_why(
-    is_dev: bool, address: tuple[str, int], path: str, status: int, told: str
+    is_dev: bool, has_key: bool, path: str, status: int, told: str
 ) -> None:
-    """Off, unknown, or asked for from elsewhere."""
-    answer = client(is_dev=is_dev, address=address).get(path)
+    """Off, unknown, or asked for without the key."""
+    answer = client(is_dev=is_dev, has_key=has_key).get(path)
     assert answer.status_code == status
     assert told in answer.text

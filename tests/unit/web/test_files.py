@@ -14,6 +14,7 @@ from urc.runtime.catalog import built_in_catalog
 from urc.runtime.permissions import permissions
 from urc.shipped import shipped
 from urc.testing.dashboard import FakeRobot, dashboard_profile
+from urc.testing.entry import ACCESS, HERE
 from urc.web.app import build_app
 from urc.web.fleet.robots import Robot
 from urc.web.load.files import linked_options
@@ -38,8 +39,8 @@ def robot_in(folder: Path, options: str, *, name: str = "robot") -> WidgetUse | 
 
 def client_of(use: WidgetUse, tiles: Path | None = None) -> TestClient:
     robot = FakeRobot(dashboard_profile(uses=[use]))
-    app = build_app({"puppet": Robot(robot.profile, {}, robot.open)}, tiles=tiles)
-    return TestClient(app, base_url="http://localhost:8080")
+    app = build_app({"puppet": Robot(robot.profile, {}, robot.open)}, access=ACCESS, tiles=tiles)
+    return TestClient(app, base_url="http://localhost:8080", cookies=HERE)
 
 
 def test_a_file_beside_the_document_has_an_address_and_nothing_else_has(tmp_path: Path) -> None:

@@ -17,6 +17,7 @@ from urc.model.values import Value
 from urc.packages.store import Store
 from urc.runtime.kept import Kept, KeptFile
 from urc.testing.dashboard import FakeRobot
+from urc.testing.entry import ACCESS, HERE
 from urc.web.app import build_app
 from urc.web.fleet.garage import Workshop
 from urc.web.fleet.robots import Robot
@@ -61,10 +62,10 @@ def served(
         shows_installed=True,
     )
     with TestClient(
-        build_app({}, data=data, workshop=workshop),
+        build_app({}, access=ACCESS, data=data, workshop=workshop),
         base_url=ADDRESS,
         headers={"origin": ADDRESS},
-        client=("127.0.0.1", 50000),
+        cookies=HERE,
         follow_redirects=False,
     ) as client:
         yield client

@@ -15,13 +15,12 @@ from urc.packages.package import Package
 from urc.packages.store import Store
 from urc.runtime.kept import Kept, KeptFile
 from urc.testing.dashboard import FakeRobot, dashboard_profile
+from urc.testing.entry import HERE, MANAGER, OPEN
 from urc.web.app import build_app
 from urc.web.fleet.garage import Workshop
 from urc.web.fleet.robots import Robot
 from urc.web.manage.given import given_source
 
-HERE = ("127.0.0.1", 50000)
-AWAY = ("192.168.1.9", 50000)
 ADDRESS = "http://localhost:8080"
 
 
@@ -43,16 +42,16 @@ def workshop(data: Path, **more: Any) -> Workshop:
 
 @contextmanager
 def served(
-    data: Path, *profiles: Profile, client: tuple[str, int] = HERE, **more: Any
+    data: Path, *profiles: Profile, cookies: dict[str, str] = HERE, **more: Any
 ) -> Iterator[TestClient]:
-    """Give a browser, at this machine or elsewhere, at a dashboard with its managers."""
+    """Give a browser, with a key or without, at a dashboard with its managers."""
     robots = {one.name: Robot(one, {}, FakeRobot(one).open) for one in profiles}
-    app = build_app(robots, data=data, workshop=workshop(data, **more))
+    app = build_app(robots, access=OPEN, data=data, workshop=workshop(data, **more))
     with TestClient(
         app,
         base_url=ADDRESS,
         headers={"origin": ADDRESS},
-        client=client,
+        cookies=cookies,
         follow_redirects=False,
     ) as started:
         yield started
@@ -81,13 +80,13 @@ POSTS = [
 
 
 @pytest.mark.parametrize(("path", "body"), POSTS)
-def test_only_who_sits_here_may_change_anything(
+def test_only_who_has_a_key_may_change_anything(
     tmp_path: Path, path: str, body: dict[str, object]
 ) -> None:
-    """Not another machine, not a foreign page, and nothing that a foreign page could send."""
+    """No stranger, not a foreign page, and nothing that a foreign page could send."""
     stock(tmp_path)
     before = Store(tmp_path / "packages").installed()
-    with served(tmp_path, client=AWAY) as client:
+    with served(tmp_path, cookies={}) as client:
         answer = client.post(f"/api/v1/{path}", json=body)
         assert answer.status_code == 403
         assert "--manage" in answer.json()["error"]
@@ -105,10 +104,10 @@ def test_only_who_sits_here_may_change_anything(
     assert Store(tmp_path / "packages").installed() == before
 
 
-def test_others_may_where_that_was_opened(tmp_path: Path) -> None:
-    """But a path of this machine is named by who sits at it."""
+def test_who_has_the_token_of_managers_may(tmp_path: Path) -> None:
+    """But a path of this machine is only named with the start key."""
     stock(tmp_path)
-    with served(tmp_path, client=AWAY, is_open=True) as client:
+    with served(tmp_path, cookies=MANAGER) as client:
         gone = client.post("/api/v1/packages/remove", json={"package": "wide", "yes": True})
         assert gone.json()["gone"] == ["interfaces/wide 1.0.0"]
         path = client.post("/api/v1/packages/add", json={"path": "/etc/passwd"})
@@ -117,10 +116,10 @@ def test_others_may_where_that_was_opened(tmp_path: Path) -> None:
 
 
 def test_the_pages_say_who_may(tmp_path: Path) -> None:
-    with served(tmp_path, client=AWAY) as client:
+    with served(tmp_path, cookies={}) as client:
         for page in ("/drivers", "/interfaces", "/widgets/installed"):
             text = client.get(page).text
-            assert "Only the machine that runs URC may change anything here" in text
+            assert "Only with the key in the address that URC printed" in text
             assert "<form" not in text
     with served(tmp_path) as client:
         assert "data-connect" in client.get("/drivers").text

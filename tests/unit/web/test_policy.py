@@ -5,6 +5,7 @@ from collections.abc import Iterable
 import pytest
 from starlette.types import Message, Receive, Scope, Send
 
+from urc.web.serve.access import Access
 from urc.web.serve.policy import (
     BODY_BYTES,
     Authority,
@@ -155,11 +156,13 @@ async def ask(
     async def send(message: Message) -> None:
         sent.append(message)
 
-    await Policy(inner, allowed_hosts=["Robot-Pi."])(scope, receive, send)
+    await Policy(inner, Access(key=KEY), allowed_hosts=["Robot-Pi."])(scope, receive, send)
     return sent
 
 
+KEY = "the-start-key"
 HOST = ("host", "127.0.0.1:8080")
+WITH_KEY = ("authorization", f"Bearer {KEY}")
 OURS = ("origin", "http://127.0.0.1:8080")
 
 
@@ -170,6 +173,10 @@ OURS = ("origin", "http://127.0.0.1:8080")
         ([("host", "robot-pi")], "http", "GET", 200),
         ([HOST], "http", "HEAD", 200),
         ([HOST, OURS], "http", "POST", 200),
+        ([HOST, WITH_KEY], "http", "POST", 200),
+        ([HOST, WITH_KEY], "websocket", "GET", 200),
+        ([HOST, WITH_KEY, ("origin", "http://evil.example")], "http", "POST", 403),
+        ([HOST, ("authorization", "Bearer guessed")], "http", "POST", 403),
         ([HOST, ("origin", "http://evil.example")], "http", "GET", 200),
         ([], "http", "GET", 421),
         ([HOST, HOST], "http", "GET", 421),

@@ -12,6 +12,7 @@ from starlette.testclient import TestClient
 
 from urc.runtime.audit import AuditLog, Entry
 from urc.testing.dashboard import FakeRobot, dashboard_profile
+from urc.testing.entry import HERE, OPEN
 from urc.web.app import build_app
 from urc.web.fleet.robots import Robot
 from urc.web.timeline import timeline
@@ -68,24 +69,25 @@ def test_broken_file_is_told(tmp_path: Path) -> None:
     assert found.json()["error"].endswith("cannot be read: file is not a database")
 
 
-def dashboard(data: Path | None, address: str = "127.0.0.1") -> TestClient:
+def dashboard(data: Path | None, *, has_key: bool = True) -> TestClient:
     robot = FakeRobot(dashboard_profile())
-    app = build_app({"puppet": Robot(robot.profile, {}, robot.open)}, data=data)
-    return TestClient(app, base_url="http://localhost:8080", client=(address, 50_000))
+    app = build_app({"puppet": Robot(robot.profile, {}, robot.open)}, access=OPEN, data=data)
+    cookies = HERE if has_key else None
+    return TestClient(app, base_url="http://localhost:8080", cookies=cookies)
 
 
 @pytest.mark.parametrize(
-    ("has_data", "address", "path", "status", "told"),
+    ("has_data", "has_key", "path", "status", "told"),
     [
-        (True, "127.0.0.1", "nobody", 404, "no robot of that name is served here"),
-        (True, "192.168.1.9", "puppet", 403, "is only shown on the machine that runs URC"),
-        (False, "127.0.0.1", "puppet", 404, "no audit is kept: this server has no folder"),
+        (True, True, "nobody", 404, "no robot of that name is served here"),
+        (True, False, "puppet", 403, "needs the key in the address that URC printed"),
+        (False, True, "puppet", 404, "no audit is kept: this server has no folder"),
     ],
 )
 def test_where_there_is_no_timeline_a_line_says_why(
-    has_data: bool, address: str, path: str, status: int, told: str, tmp_path: Path
+    has_data: bool, has_key: bool, path: str, status: int, told: str, tmp_path: Path
 ) -> None:
-    with dashboard(tmp_path if has_data else None, address) as asked:
+    with dashboard(tmp_path if has_data else None, has_key=has_key) as asked:
         answer = asked.get(f"/api/v1/robots/{path}/timeline")
     assert answer.status_code == status
     assert told in answer.json()["error"]

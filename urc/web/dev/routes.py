@@ -1,6 +1,6 @@
 """The dev page of each robot: the wire log, the parser try-out, what a command would send.
 
-Floor 5. Only there when the server was started for it, and only for who sits at this machine: it
+Floor 5. Only there when the server was started for it, and only for who has the start key: it
 shows everything that goes over a robot's lines. `urc.web.app` knows one `Dev`, or none.
 """
 
@@ -25,7 +25,7 @@ from urc.web.wire import messages as wire
 __all__ = ["HOW_TO_TURN_ON", "Dev", "DevPage", "dev_url", "no_dev_routes"]
 
 HOW_TO_TURN_ON = "The dev page is off. Start URC with --dev to turn it on."
-_ONLY_HERE = "The dev page is only shown on the machine that runs URC."
+_ONLY_HERE = "The dev page needs the key in the address that URC printed."
 CLIENTS = 16
 """Dev pages that may be open at a time."""
 
@@ -76,7 +76,7 @@ class Dev:
             stations: by the name in their URL.
             remake: makes the robot of a new version of its profile; by the same name.
             take: goes on with that one; may raise `UrcError`.
-            is_here: tells whether a request comes from this machine.
+            is_here: tells whether who asks has the start key.
         """
         self._is_here = is_here
         self._open = 0

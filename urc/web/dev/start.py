@@ -1,6 +1,6 @@
 """The dev interface: one robot with what was fixed at the start, read anew each time it is begun.
 
-Floor 5. Only there with ``--dev``, and only for who sits at this machine. What a driver's author
+Floor 5. Only there with ``--dev``, and only for who has the start key. What a driver's author
 saves is used at once by the dev page's watch; to begin here reads everything again, saved or not
 noticed.
 """
@@ -71,7 +71,7 @@ class DevStart:
             remake: makes the robot of a profile that was read anew, by name.
             take: goes on with that one; may raise `UrcError`.
             ways: which pages there are.
-            is_here: tells whether a request comes from this machine.
+            is_here: tells whether who asks has the start key.
         """
         self._fleet = fleet
         self._remake = remake
@@ -89,7 +89,9 @@ class DevStart:
     async def page(self, request: Request) -> Response:
         """Show what is fixed."""
         if not self._is_here(request):
-            raise HTTPException(403, t("The dev interface is for the machine that runs URC."))
+            raise HTTPException(
+                403, t("The dev interface needs the key in the address that URC printed.")
+            )
         head = Head(request.state.nonce, t("Dev interface"))
         robots = tuple(
             _fixed(name, self._fleet.robots[name])
@@ -103,7 +105,7 @@ class DevStart:
         """Read everything anew, and tell where the robot is."""
         name = request.path_params["name"]
         if not self._is_here(request):
-            return told(403, "the dev interface is for the machine that runs URC")
+            return told(403, "the dev interface needs the key in the address that URC printed")
         if name not in self._remake or name not in self._fleet.robots:
             return told(404, "no robot of that name is served here")
         driver = self._fleet.driven_by(name)

@@ -48,8 +48,6 @@ class Workshop:
     Raises `UrcError` for those that no longer fit."""
     shows_installed: bool = False
     """Whether the menu has the robots and drivers that are installed."""
-    is_open: bool = False
-    """Whether other machines may manage packages and settings, too."""
 
 
 class Filled(NamedTuple):

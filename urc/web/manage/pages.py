@@ -33,7 +33,7 @@ class ManagePage:
     may_manage: bool
     """Whether who asks may change anything."""
     may_name_paths: bool
-    """Whether a path of this machine may be named: only who sits at it."""
+    """Whether a path of this machine may be named: only with the start key."""
     is_shown: bool
     """Whether the menu has what is installed."""
 

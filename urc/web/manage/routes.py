@@ -1,7 +1,7 @@
 """The managers over HTTP: their pages, and what these ask for under ``/api/v1``.
 
 Floor 5. Everything that changes something is a POST with a JSON body, from this server's own pages
-(`urc.web.serve.policy` sees to it), by somebody who sits at this machine or where that was opened.
+(`urc.web.serve.policy` sees to it), by holders of the start key or of the token of --manage.
 """
 
 import asyncio
@@ -32,9 +32,7 @@ _KINDS: Final = tuple(FOLDERS.values())
 _T = TypeVar("_T")
 _Handler = Callable[["ManageRoutes", Request], Awaitable[Response]]
 
-ONLY_HERE: Final = (
-    "this is done on the machine that runs URC; started with --manage, other machines may, too"
-)
+ONLY_HERE: Final = "this needs the key in the address that URC printed, or the token of --manage"
 
 
 class Refusal(Exception):
@@ -89,18 +87,24 @@ class ManageRoutes:
     """The routes of the managers of one dashboard."""
 
     def __init__(
-        self, manager: Manager, ways: Ways, is_here: Callable[[HTTPConnection], bool]
+        self,
+        manager: Manager,
+        ways: Ways,
+        is_here: Callable[[HTTPConnection], bool],
+        may_manage: Callable[[HTTPConnection], bool],
     ) -> None:
         """Answer nothing yet.
 
         Args:
             manager: does the work.
             ways: which pages there are.
-            is_here: tells whether a request comes from this machine.
+            is_here: tells whether who asks has the start key.
+            may_manage: tells whether who asks may change anything.
         """
         self._manager = manager
         self._ways = ways
         self._is_here = is_here
+        self.may_manage = may_manage
 
     def routes(self) -> list[Route]:
         """Return the pages, and what they ask for."""
@@ -123,10 +127,6 @@ class ManageRoutes:
             Route("/api/v1/packages", self.shelf),
             *(Route(f"/api/v1/{path}", one, methods=["POST"]) for path, one in posts.items()),
         ]
-
-    def may_manage(self, connection: HTTPConnection) -> bool:
-        """Return whether who asks may change anything."""
-        return self._manager.garage.workshop.is_open or self._is_here(connection)
 
     def check(self, connection: HTTPConnection) -> None:
         """Raise `Refusal` when who asks may not change anything."""
@@ -265,7 +265,7 @@ class ManageRoutes:
             except PackageError:
                 pass  # a folder of this machine may be called so
         if not self._is_here(request):
-            raise Refusal(403, "a path of this machine is only named by who sits at it")
+            raise Refusal(403, "a path of this machine is only named with the key that URC printed")
         place = Path(path).expanduser()
         if not place.is_absolute():
             raise PackageError(

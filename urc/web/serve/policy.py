@@ -15,6 +15,8 @@ from typing import NamedTuple
 from starlette.exceptions import HTTPException
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from urc.web.serve.access import Access
+
 __all__ = [
     "BODY_BYTES",
     "REFUSAL_HEADERS",
@@ -172,10 +174,11 @@ def frame_policy(scope: Scope, widget: str, digest: str) -> str:
 
 
 class Policy:
-    """The ASGI layer. Puts the page's nonce into ``scope["state"]["nonce"]``."""
+    """The ASGI layer. Puts ``nonce``, the page's, and ``visitor``, who asks, into the state."""
 
-    def __init__(self, app: ASGIApp, *, allowed_hosts: Iterable[str] = ()) -> None:
+    def __init__(self, app: ASGIApp, access: Access, *, allowed_hosts: Iterable[str] = ()) -> None:
         self._app = app
+        self._access = access
         self._names = frozenset(name.lower().removesuffix(".") for name in allowed_hosts)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -184,7 +187,9 @@ class Policy:
             await self._app(scope, receive, send)
             return
         nonce = secrets.token_urlsafe(16)
-        scope.setdefault("state", {})["nonce"] = nonce
+        state = scope.setdefault("state", {})
+        state["nonce"] = nonce
+        state["visitor"] = self._access.visitor(scope["headers"])
         answer = _Answer(scope, send, nonce)
         refusal = self._refusal(scope)
         if refusal is None:
@@ -200,7 +205,9 @@ class Policy:
         is_upgrade = scope["type"] == "websocket"
         if is_upgrade or scope["method"] not in _SAFE_METHODS:
             origins = _values(scope, b"origin")
-            if len(origins) != 1 or not is_origin_ours(origins[0], scope["scheme"], authority):
+            if not origins and scope["state"]["visitor"].is_program:
+                pass  # no page of another site can send the key
+            elif len(origins) != 1 or not is_origin_ours(origins[0], scope["scheme"], authority):
                 return 403, "Only this server's own pages may do that."
         lengths = _values(scope, b"content-length")
         if any(not text.isdecimal() or int(text[:20]) > BODY_BYTES for text in lengths):

@@ -64,6 +64,7 @@ const socket = new Socket(address.href, {
       asks.lost();
       input.spendAll(t("the connection to URC was lost"));
     }
+    tellOfDoor();
     wake();
   },
 });
@@ -122,6 +123,12 @@ const note = part(root, "[data-note]");
 const tell = (/** @type {string} */ text) => {
   note.textContent = text;
 };
+const AT_THE_DOOR = t("URC was started again: open the address that it printed, then this page goes on.");
+/** Say what to do where the server knows this browser no more; STOP works all the same. */
+function tellOfDoor() {
+  if (socket.isShutOut) tell(AT_THE_DOOR);
+  else if (note.textContent === AT_THE_DOOR) tell("");
+}
 new FullScreen(root.querySelector("[data-fullscreen]"), tell);
 const wakeLock = new WakeLock(tell);
 const stage = new Stage(root, { store, run, input, asks, host, panel: panel.el, wake });

@@ -17,6 +17,8 @@ const PING_EVERY_MS = 1000;
 /** So many ticks in a row may find no answer: three seconds, of a page that runs. A page that was
  * held up has had one tick only, however long that was, and then reads what has come meanwhile. */
 const SILENT_TICKS = 3;
+/** How a server that was started again closes: it knows no browser of before. */
+const NOT_LET_IN = 4401;
 
 export class Socket {
   /**
@@ -38,6 +40,8 @@ export class Socket {
     /** Why the server closed, in its words. */
     this.reason = "";
     this.isUp = false;
+    /** Whether the server wants its printed address to be opened first. */
+    this.isShutOut = false;
     /** @type {WebSocket | null} */
     this.line = null;
     this.waitMs = FIRST_WAIT_MS;
@@ -97,7 +101,9 @@ export class Socket {
       if (line === this.line) this.take(event.data);
     });
     line.addEventListener("close", (event) => {
-      if (line === this.line) this.lose(event.reason);
+      if (line !== this.line) return;
+      this.isShutOut = event.code === NOT_LET_IN;
+      this.lose(event.reason);
     });
   }
 
@@ -111,6 +117,7 @@ export class Socket {
     if (message.t === "hello") {
       this.waitMs = FIRST_WAIT_MS;
       this.reason = "";
+      this.isShutOut = false;
       this.failures = 0;
       this.pingedMs = 0;
       this.isUp = true;

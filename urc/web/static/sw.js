@@ -39,6 +39,7 @@ worker.addEventListener("fetch", (/** @type {AskEvent} */ event) => {
   const { request } = event;
   const url = new URL(request.url);
   if (request.method !== "GET" || url.origin !== location.origin) return;
+  if (url.searchParams.has("key")) return; // an address with a key is kept nowhere
   if (!KEPT.test(url.pathname) || NEVER.test(url.pathname)) return;
   event.respondWith(answer(event, request));
 });

@@ -49,6 +49,7 @@ __all__ = [
     "CLOSE_BAD_MESSAGES",
     "CLOSE_FAILED",
     "CLOSE_FULL",
+    "CLOSE_NOT_LET_IN",
     "CLOSE_NO_ROBOT",
     "CLOSE_NOT_READY",
     "CLOSE_TOO_FAST",
@@ -75,6 +76,7 @@ _AS_THEY_ARE = frozenset((float, bool, type(None)))
 _EXACT = 2**53 - 1  # beyond it a browser's numbers skip integers
 
 CLOSE_BAD_MESSAGES = 4400
+CLOSE_NOT_LET_IN = 4401
 CLOSE_NO_ROBOT = 4404
 CLOSE_NOT_READY = 4409
 CLOSE_TOO_FAST = 4429

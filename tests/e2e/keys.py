@@ -1,0 +1,76 @@
+"""Keys of the dashboards that tests start: handed in by their pages and programs, as by people.
+
+A process prints its address with a key. `UrcProcess` keeps the key here and tells tests the address
+without it, so that they append their paths.
+"""
+
+import re
+from typing import Any
+from urllib.parse import urlsplit
+
+from playwright.async_api import BrowserContext, Page
+
+from tests.e2e.browser import PLAIN_HOST
+from urc.testing.entry import ACCESS, HERE
+
+__all__ = ["enter", "entering", "headers_for", "known_here", "learn"]
+
+_PRINTED = re.compile(r"(dashboard )(https?://[^/\s]+)/\?key=(\S+)")
+_keys: dict[str, str] = {}
+"""Origin → key."""
+
+
+def learn(line: str) -> str:
+    """Return a line of a dashboard without its key, which is kept."""
+    found = _PRINTED.match(line)
+    if found is None:
+        return line
+    _keys[found[2]] = found[3]
+    return f"{found[1]}{found[2]}/{line[found.end() :]}"
+
+
+def headers_for(address: str) -> dict[str, str]:
+    """Return what a program sends to the dashboard of a process; nothing where no key is known."""
+    key = _keys.get(_origin(address))
+    return {"Authorization": f"Bearer {key}"} if key else {}
+
+
+async def enter(context: BrowserContext, address: str) -> None:
+    """Hand in the key of the dashboard at `address`, if it is one of a process."""
+    key = _keys.get(_origin(address))
+    if key is not None:
+        await context.request.get(f"{_origin(address)}/?key={key}")
+
+
+def entering(page: Page) -> None:
+    """Let a page hand in keys by itself, before it opens an address for the first time."""
+    goto, entered = page.goto, set[str]()
+
+    async def opened(url: str, **how: Any) -> Any:
+        key = _keys.get(_origin(url), "")
+        if key not in entered:
+            entered.add(key)
+            await enter(page.context, url)
+        return await goto(url, **how)
+
+    setattr(page, "goto", opened)  # noqa: B010 - a method, for this page alone
+
+
+async def known_here(context: BrowserContext) -> None:
+    """Let a browser be known to every dashboard that runs in the tests' own process."""
+    hosts = ("127.0.0.1", "localhost", PLAIN_HOST)
+    value = HERE[ACCESS.cookie]
+    await context.add_cookies(
+        [
+            {
+                "name": ACCESS.cookie, "value": value, "domain": host, "path": "/",
+                "httpOnly": True, "sameSite": "Strict",
+            }
+            for host in hosts
+        ]
+    )  # fmt: skip
+
+
+def _origin(address: str) -> str:
+    parts = urlsplit(address)
+    return f"{parts.scheme}://{parts.netloc}"

@@ -1,0 +1,146 @@
+"""The door: lets in browsers that open the printed address, and shows others how to come in.
+
+Floor 5. An ASGI layer inside the page policy. STOP goes through for everyone, and so do the files
+that the page at the door is made of.
+"""
+
+import re
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import NamedTuple
+from urllib.parse import parse_qsl, quote, unquote, urlencode
+
+from starlette.responses import HTMLResponse, JSONResponse
+from starlette.types import ASGIApp, Receive, Scope, Send
+
+from urc.web.serve.access import PARAMETER, Access, Visitor
+from urc.web.show.pages import Head, render
+from urc.web.wire.messages import CLOSE_NOT_LET_IN, encode_error
+
+__all__ = ["Door", "DoorPage", "Stoppable"]
+
+SAID = "open the address that URC printed when it started: it has the key"
+"""To programs and sockets; `words.js` knows it, too."""
+_OPEN = re.compile(
+    r"/healthz|/favicon\.ico|/app\.webmanifest|/sw\.js|/(?:static|vendor|words|widgets)/.+\.\w+"
+)
+"""What says nothing of a robot. Frames of widgets have no cookies, so their files are open."""
+_STOP = re.compile(r"/api/v1/robots/[^/]+/stop")
+_HEADERS = {"cache-control": "no-store"}
+_REFUSED = {**_HEADERS, "www-authenticate": 'Bearer realm="URC"'}
+
+
+class Stoppable(NamedTuple):
+    """A robot with a STOP."""
+
+    name: str
+    """In its URL."""
+    title: str
+
+    @property
+    def stop_url(self) -> str:
+        """Where STOP goes."""
+        return f"/api/v1/robots/{quote(self.name, safe='')}/stop"
+
+
+@dataclass(frozen=True, slots=True)
+class DoorPage:
+    """``door.html.j2``: how to come in, or where to go on; and STOP."""
+
+    head: Head
+    url: str
+    """Where to go on, a path; "" where there is no way on but the printed address."""
+    is_old: bool
+    """Whether a key came that opens nothing, which is told before going on."""
+    path: str
+    """Of this page, to ask again from here: a link of another site sends no key along."""
+    robots: tuple[Stoppable, ...]
+
+
+class Door:
+    """The layer."""
+
+    def __init__(
+        self, app: ASGIApp, access: Access, robots: Callable[[], Iterable[Stoppable]]
+    ) -> None:
+        """Let nobody in yet.
+
+        Args:
+            app: what is behind it.
+            access: who is known.
+            robots: returns those that can be stopped.
+        """
+        self._app = app
+        self._access = access
+        self._robots = robots
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Hand on what may go on, and answer the rest."""
+        if scope["type"] == "lifespan":
+            await self._app(scope, receive, send)
+            return
+        visitor: Visitor = scope["state"]["visitor"]
+        query = parse_qsl(scope["query_string"].decode("latin-1"), keep_blank_values=True)
+        word = next((value for name, value in query if name == PARAMETER), None)
+        is_let_in = self._access.is_open or visitor.standing != "stranger"
+        if word is not None and scope["type"] == "http" and scope["method"] in ("GET", "HEAD"):
+            answer = self._answer_to(word, query, scope)
+            await answer(scope, receive, send)
+        elif is_let_in or self._is_for_all(scope):
+            await self._app(scope, receive, send)
+        elif scope["type"] == "websocket":
+            await _turn_away(receive, send)
+        else:
+            await self._refusal(scope)(scope, receive, send)
+
+    def _is_for_all(self, scope: Scope) -> bool:
+        if scope["type"] == "websocket":
+            return False
+        path = scope["path"]
+        is_asked = scope["method"] in ("GET", "HEAD") and _OPEN.fullmatch(path)
+        return bool(is_asked or (scope["method"] == "POST" and _STOP.fullmatch(path)))
+
+    def _answer_to(self, word: str, query: list[tuple[str, str]], scope: Scope) -> HTMLResponse:
+        """Return the answer to a browser that hands in a key."""
+        rest = urlencode([pair for pair in query if pair[0] != PARAMETER])
+        # Never "//…", which would be another host.
+        path = "/" + quote(scope["path"].lstrip("/"))
+        url = f"{path}?{rest}" if rest else path
+        session = self._access.admit(word)
+        if session is None and scope["state"]["visitor"].standing == "stranger":
+            return self._page(scope, url=url if self._access.is_open else "", is_old=True)
+        # A page, not a redirect: who comes from another site sends no strict cookie after one.
+        page = self._page(scope, url=url)
+        if session is not None:
+            is_secure = scope["scheme"] == "https"
+            for line in self._access.cookies(session, scope["headers"], is_secure=is_secure):
+                page.headers.append("set-cookie", line)
+        return page
+
+    def _refusal(self, scope: Scope) -> ASGIApp:
+        if scope["path"].startswith("/api/") or scope["method"] not in ("GET", "HEAD"):
+            return JSONResponse({"error": SAID}, 401, _REFUSED)
+        return self._page(scope)
+
+    def _page(self, scope: Scope, *, url: str = "", is_old: bool = False) -> HTMLResponse:
+        path = scope["path"].split("/")
+        robots = tuple(() if url else self._robots())
+        asked = unquote(path[2]) if path[1:2] == ["robots"] and len(path) > 2 else ""
+        page = DoorPage(
+            head=Head(scope["state"]["nonce"], "URC"),
+            url=url,
+            is_old=is_old,
+            path="/" + quote(scope["path"].lstrip("/")),
+            robots=tuple(one for one in robots if one.name == asked) or robots,
+        )
+        html = render("door.html.j2", page)
+        is_in = url and not is_old
+        return HTMLResponse(html, 200 if is_in else 401, _HEADERS if is_in else _REFUSED)
+
+
+async def _turn_away(receive: Receive, send: Send) -> None:
+    """Accept a socket and close it with the reason: a refused handshake tells a page nothing."""
+    await receive()
+    await send({"type": "websocket.accept"})
+    await send({"type": "websocket.send", "text": encode_error("refused", SAID)})
+    await send({"type": "websocket.close", "code": CLOSE_NOT_LET_IN, "reason": SAID})

@@ -1,0 +1,144 @@
+"""Who asks: known by a secret of this start, never by an address.
+
+Floor 5. Pure. The address that URC prints carries the start key. A browser hands it in once and
+gets a session, kept in a cookie that scripts cannot read; a program sends the key with each
+request. Keys and sessions end with the server.
+"""
+
+import secrets
+from collections.abc import Iterable, Iterator
+from hmac import compare_digest
+from typing import Literal, NamedTuple
+from urllib.parse import quote
+
+__all__ = ["PARAMETER", "STRANGER", "Access", "Standing", "Visitor"]
+
+PARAMETER = "key"
+"""Of the query of an address that lets a browser in."""
+PREFIX = "urc-start-"
+SESSIONS = 1000
+"""Browsers that are known at once; the one that came first is forgotten."""
+CODES = 16
+OLD_COOKIES = 8
+"""Cookies of earlier starts that a browser may keep; one more, and all are taken away."""
+
+Standing = Literal["here", "manager", "stranger"]
+"""``here``: has the start key. ``manager``: has the token of ``--manage``. Else a stranger."""
+_Headers = Iterable[tuple[bytes, bytes]]
+
+
+class Visitor(NamedTuple):
+    """Who asks, as far as it is known."""
+
+    standing: Standing = "stranger"
+    name: str = ""
+    """Tells one browser, or the programs, from others; "" for strangers. No secret."""
+    is_program: bool = False
+    """Whether the request itself carries the key: no foreign page can have made it."""
+
+
+STRANGER = Visitor()
+
+
+class Access:
+    """The keys of one start of the server, and the browsers that have handed one in."""
+
+    def __init__(
+        self, *, is_open: bool = False, key: str = "", instance: str = "", token: str = ""
+    ) -> None:
+        """Make the key, and know no browser.
+
+        Args:
+            is_open: strangers may watch and drive; else they may only press STOP.
+            key: the start key; "" makes one.
+            instance: tells the cookie of this start from others; "" makes one.
+            token: lets its holders manage; "" when there is none.
+        """
+        self.is_open = is_open
+        self.key = key or secrets.token_urlsafe(24)
+        self.instance = instance or secrets.token_hex(4)
+        self.cookie = PREFIX + self.instance
+        self._token = token
+        self._sessions: dict[str, Visitor] = {}
+        self._codes: dict[str, None] = {}
+        self._count = 0
+
+    def address(self, url: str) -> str:
+        """Return `url`, which has no query, as the address that lets a browser in."""
+        return f"{url}?{PARAMETER}={quote(self.key, safe='')}"
+
+    def address_once(self, url: str) -> str:
+        """Return an address that lets in the first browser only, and leaves the key unsaid.
+
+        For what others see, as the command line of a browser.
+        """
+        code = secrets.token_urlsafe(24)
+        self._codes[code] = None
+        while len(self._codes) > CODES:
+            self._codes.pop(next(iter(self._codes)))
+        return f"{url}?{PARAMETER}={code}"
+
+    def address_of_managers(self, url: str) -> str:
+        """Return the address for those who manage from elsewhere; "" when there is no token."""
+        return f"{url}?{PARAMETER}={quote(self._token, safe='')}" if self._token else ""
+
+    def admit(self, word: str) -> str | None:
+        """Return the new session of a browser that hands in `word`; None when it opens nothing."""
+        standing = self._standing(word)
+        if standing is None and word in self._codes:
+            del self._codes[word]
+            standing = "here"
+        if standing is None:
+            return None
+        self._count += 1
+        session = secrets.token_urlsafe(24)
+        self._sessions[session] = Visitor(standing, f"browser {self._count}")
+        while len(self._sessions) > SESSIONS:
+            self._sessions.pop(next(iter(self._sessions)))
+        return session
+
+    def cookies(self, session: str, headers: _Headers, *, is_secure: bool) -> list[str]:
+        """Return the ``Set-Cookie`` headers that keep a session.
+
+        Args:
+            session: what `admit` returned.
+            headers: of the request.
+            is_secure: whether it came over TLS.
+        """
+        secure = "; Secure" if is_secure else ""
+        kept = [f"{self.cookie}={session}; Path=/; HttpOnly; SameSite=Strict{secure}"]
+        old = {name for name, _ in _cookies(headers) if name.startswith(PREFIX)} - {self.cookie}
+        if len(old) > OLD_COOKIES:
+            kept += (f"{name}=; Path=/; Max-Age=0; HttpOnly; SameSite=Strict" for name in old)
+        return kept
+
+    def visitor(self, headers: _Headers) -> Visitor:
+        """Return who makes a request with these headers (names in lower case)."""
+        pairs = list(headers)
+        for name, value in pairs:
+            scheme, _, word = value.decode("latin-1").partition(" ")
+            if name == b"authorization" and scheme.lower() == "bearer":
+                standing = self._standing(word.strip())
+                return Visitor(standing, f"program {standing}", True) if standing else STRANGER
+        for cookie, session in _cookies(pairs):
+            if cookie == self.cookie and session in self._sessions:
+                return self._sessions[session]
+        return STRANGER
+
+    def _standing(self, word: str) -> Standing | None:
+        if _is_same(word, self.key):
+            return "here"
+        return "manager" if self._token and _is_same(word, self._token) else None
+
+
+def _is_same(said: str, wanted: str) -> bool:
+    return compare_digest(said.encode(), wanted.encode())
+
+
+def _cookies(headers: _Headers) -> Iterator[tuple[str, str]]:
+    """Yield name and value of each cookie; one name may come more than once."""
+    for name, value in headers:
+        if name == b"cookie":
+            for part in value.decode("latin-1").split(";"):
+                key, _, word = part.strip().partition("=")
+                yield key, word
