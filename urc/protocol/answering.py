@@ -3,6 +3,8 @@
 Floor 3, pure. See `urc.protocol.line` for the theory of operation.
 """
 
+from collections.abc import Mapping, Sequence
+
 from urc.model.codec import Envelope
 from urc.protocol.answer import Offer
 from urc.protocol.codec import Frame
@@ -10,6 +12,7 @@ from urc.protocol.connection import Connection
 from urc.protocol.events import Fault
 from urc.protocol.exchange import Ended, Exchange, LineEvent, Outcome, expires_at
 from urc.protocol.flights import Flight
+from urc.protocol.held_replies import Refusal
 from urc.protocol.topics import frame_of
 
 __all__ = ["MISSES_UNTIL_CLOSED", "Answering"]
@@ -27,13 +30,56 @@ class Answering(Connection):
         if envelope.verb == "response":
             flight = self._flights.numbered(attributes.get("id"))
             if flight is None:
-                return []  # nobody wants to know, or it was told already that it is late
+                is_motion = attributes.get("id") is None and self.held.is_listening(now)
+                return self._motion_response(frame, attributes, now) if is_motion else []
             if attributes.get("ok", True):
                 return self._answer(flight, flight.answer(frame), frame, now)
             reason = str(attributes.get("reason") or "the robot refused")
             return self._answer(flight, flight.refused(frame, reason), frame, now)
         answered = self._flights.offer(frame) if self._flights else None
-        return self._answer(*answered, frame, now) if answered else self.inbox.tell(frame, now)
+        if answered:
+            return self._answer(*answered, frame, now)
+        told = self._of_motion(frame, now) if self.held.is_listening(now) else None
+        return self.inbox.tell(frame, now) if told is None else told
+
+    def _motion_response(
+        self, frame: Frame, attributes: Mapping[str, object], now: float
+    ) -> list[LineEvent]:
+        """Return what follows from the response to a frame of motion."""
+        if attributes.get("ok", True):
+            return self._of_motion(frame, now) or []
+        reason = str(attributes.get("reason") or "the robot refused")
+        return self._motion_refused(self.held.refuse(frame, reason, now), frame, now)
+
+    def _of_motion(self, frame: Frame, now: float) -> list[LineEvent] | None:
+        """Return what follows from an answer to a frame of motion; None: it is no such answer."""
+        refused = self.held.refusals(frame, now)
+        if refused:
+            return self._motion_refused(refused, frame, now)
+        if self.inbox.is_listening:
+            return None  # a sequence waits for a frame, and may mean this one
+        message = self.inbox.message(frame, now)
+        accepted = self.held.accepted(frame, now) if message is None else None
+        if accepted is None:
+            return message
+        answer, offer = accepted
+        events = self.inbox.dropped(offer) if offer.dropped else []
+        if offer.fields is not None:
+            events += self.inbox.samples(answer.matcher, offer.fields, now)[0]
+        return events
+
+    def _motion_refused(
+        self, refused: Sequence[Refusal], frame: Frame, now: float
+    ) -> list[LineEvent]:
+        events: list[LineEvent] = [*(self.inbox.message(frame, now) or ())]
+        for command, offer in refused:
+            if offer.told is not None:
+                events += self.inbox.samples(*offer.told, now)[0]
+            why = self.inbox.secrets.hide(offer.refusal)
+            events.append(Fault(self.spec.name, "motion-refused", f"{command}: {why}"))
+            if self.on_refused is not None:
+                self.on_refused(command, why)
+        return events
 
     def _answer(
         self, flight: Flight, offer: Offer, frame: Frame | None, now: float

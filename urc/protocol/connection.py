@@ -14,6 +14,7 @@ from urc.protocol.flights import Flights
 from urc.protocol.framing import build_framing
 from urc.protocol.framings.base import Framing
 from urc.protocol.gate import Counters
+from urc.protocol.held_replies import HeldReplies
 from urc.protocol.inbox import Inbox
 from urc.protocol.outbox import Outbox
 
@@ -37,9 +38,13 @@ class Connection:
         """What the steps of this connection have read: ``_name`` → value."""
         self.on_ready: Callable[[], None] | None = None
         """Called when anybody may talk here; must not call the line back."""
+        self.on_refused: Callable[[str, str], None] | None = None
+        """Told a held command and why the robot refuses it; must not call the line back."""
         self._flights = Flights()
         self._outbox = Outbox(spec, self._flights)
         self.inbox = Inbox(spec, self.framing, messages)
+        self.held = HeldReplies()
+        """Of the commands that move the robot for as long as they are held."""
         self.is_behind = False
         """Whether something that came in waits for `go_on`."""
         self._is_leaving = False
@@ -138,6 +143,7 @@ class Connection:
         self.state = state
         self.is_ready = self._is_leaving = False
         self._flights.clear()
+        self.held.forget()
         self.inbox.reset(is_new=state == "open")
         self._misses = 0
         self._silent_at = None

@@ -208,6 +208,8 @@ class Line(Answering):
         """
         if self.state != "open" or self._may_recut or self.is_scripted or self._outbox:
             return None
+        if self.held.is_listening(now):
+            return None
         inbox, flights = self.inbox, self._flights
         if self.is_per_request or self.is_behind or inbox.is_listening:
             return None
@@ -231,7 +233,7 @@ class Line(Answering):
         """
         inbox = self.inbox
         events: list[LineEvent] = []
-        may_rush = not (self.is_scripted or self._may_recut)
+        may_rush = not (self.is_scripted or self._may_recut or self.held.is_listening(now))
         while self.state == "open":
             if self._may_recut:
                 self._recut()
@@ -280,11 +282,12 @@ class Line(Answering):
         if isinstance(cut, FrameFault):
             fault = Fault(self.spec.name, cut.code, cut.message)
             return [fault, *self.give_up(cut.message, now)] if cut.closes else [fault]
+        is_motion = self.held.is_listening(now)
         if not self._flights:
-            told = self.inbox.quick(cut, now)
+            told = None if is_motion else self.inbox.quick(cut, now)
             if told is not None:
                 return told
-        elif len(self._flights) == 1:
+        elif len(self._flights) == 1 and not is_motion:
             told = self._quick(self._flights[0], cut, now)
             if told is not None:
                 return told
@@ -298,7 +301,8 @@ class Line(Answering):
                 return told if message is None else message + told
             if message is not None:
                 return message
-        return self.inbox.tell(frame, now)
+        told = self._of_motion(frame, now) if is_motion else None
+        return self.inbox.tell(frame, now) if told is None else told
 
     def _quick(self, flight: Flight, payload: bytes, now: float) -> list[LineEvent] | None:
         """Do what is done with most frames, or return None for all others.

@@ -75,9 +75,14 @@ class Motions:
         """Told the line on which a number was used up that the stops made so far come after."""
         self.on_ready: Callable[[str], None] = _nobody
         """Told the line that was connected, and is ready for everybody."""
+        self.on_refused: Callable[[str, str], None] = _unrefused
+        """Told a held command that the robot refuses, and in which words."""
         for one, command in self._held.items():
             line = command.transport
             lines[line].on_ready = partial(self._told_ready, line)
+            lines[line].on_refused = self._told_refused
+            if asks[one].answers:
+                lines[line].held.add(one, asks[one].answers[0], asks[one].match)
             if asks[one].has_counters:
                 lines[line].counters.counted = partial(self._counted, line)
 
@@ -141,6 +146,7 @@ class Motions:
             is_heard = line.spec.stale_after_s is None or not line.is_silent
             data = way.write(arguments) if is_heard else None
             if data is not None:
+                line.held.gave(command, arguments, now)
                 return data
         values = way.check(arguments)
         if not (line.is_open and line.is_ready):
@@ -152,6 +158,7 @@ class Motions:
             if refused is not None:
                 raise NotNow(refused.message)
         way.warm_up()
+        line.held.gave(command, values, now)
         names = values if ask.is_local else {**self._known.names, **line.learnt, **values}
         if not ask.has_counters:
             return ask.encode(names)
@@ -166,11 +173,18 @@ class Motions:
     def _told_ready(self, line: str) -> None:
         self.on_ready(line)
 
+    def _told_refused(self, command: str, why: str) -> None:
+        self.on_refused(command, why)
+
     def _found(self, command: str) -> Command:
         found = self._held.get(command)
         if found is None:
             raise BadArgument(f"{command!r} is no command with a release")
         return found
+
+
+def _unrefused(command: str, why: str) -> None:
+    """Nobody wants to know."""
 
 
 def _nobody(line: str) -> None:

@@ -22,6 +22,8 @@ class Frames(Protocol):
     """To be set: told a line on which a number was used up that its stops must come after."""
     on_ready: Callable[[str], None]
     """To be set: told a line that was connected, once its start-up steps are done."""
+    on_refused: Callable[[str, str], None]
+    """To be set: told a held command that the robot refuses, and in which words."""
 
     def is_lasting(self, command: str) -> bool:
         """Return whether the stop of a held command is the same for ever."""

@@ -78,6 +78,8 @@ class MotionDesk:
         """Told of every new state of the lease, and when a stop is confirmed."""
         self.on_moved: Moved = _unseen
         """Told of each tick, once its frame has gone to the movers; must neither wait nor raise."""
+        self.on_refused: Callable[[str, str], None] = _unrefused
+        """Told the control that the robot refused to move, and in which words."""
 
     @property
     def can_move(self) -> bool:
@@ -125,6 +127,7 @@ class MotionDesk:
         """Take a session's engine, and movers where anything is held; an owed stop goes out."""
         self._frames, self._movers = frames, movers
         frames.on_count, frames.on_ready = self._renew, self._ready
+        frames.on_refused = self._refused
         if movers is not None and not self._unconfirmed.isdisjoint(self._holds):
             movers.stop(self._stop_frames(self._holds))
 
@@ -286,6 +289,14 @@ class MotionDesk:
             self._movers.release(command)
             self._renew(control.line)  # the number of this stop is used up
 
+    def _refused(self, command: str, why: str) -> None:
+        """End a motion that the robot refuses: it hears the stop, and its words say why."""
+        control, movers = self._controls.get(command), self._movers
+        if control is None or movers is None or control.course != "moving":
+            return
+        self._abandon(command, control, movers, why)
+        self.on_refused(command, why)
+
     def stopped(self, command: str, reason: Reason) -> None:
         """Take note of what the movers report: the stop of a control was written."""
         control = self._controls.get(command)
@@ -386,6 +397,10 @@ class MotionDesk:
                 if control.is_armed and control.stop is not None:
                     made[name] = control.stop  # the one it was armed with
         return made
+
+
+def _unrefused(command: str, why: str) -> None:
+    """Nobody wants to know."""
 
 
 def _ignore(state: LeaseState) -> None:

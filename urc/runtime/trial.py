@@ -8,12 +8,13 @@ from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import Any, Final, Literal
 
-from urc.model.codec import Envelope, Payload
-from urc.model.driver import Driver, Poll
+from urc.model.codec import NUMBERED, Envelope, Payload
+from urc.model.driver import Command, Driver, Poll
 from urc.model.profile import Fed
 from urc.model.values import Reading, Sample, Value
 from urc.problems import UrcError
 from urc.protocol.answer import Matcher
+from urc.protocol.encode import BadArgument
 from urc.protocol.engine import Engine
 from urc.protocol.events import (
     Close,
@@ -106,6 +107,7 @@ class Trial:
         self.closed: set[str] = set()
         """Transports that were closed from this side, as long as nobody asked."""
         self._requests = 0
+        self.engine.motions.on_refused = self._refused
         self._numbers: dict[str, list[object]] = {}
         """Transport → numbers of the requests that no response answers so far."""
 
@@ -136,10 +138,34 @@ class Trial:
         self.perform(self.engine.finish(self.now))
 
     def run(self, command: str, arguments: Mapping[str, Reading]) -> None:
-        """Run a command."""
+        """Run a command; one that is held is given once, as the first frame of a gesture is."""
         self._requests += 1
+        known = self.driver.commands.get(command)
+        if known is not None and known.hold is not None:
+            self._give(known, arguments)
+            return
         request = Request(self._requests, command, arguments, confirmed_by=_TWO_PEOPLE)
         self.perform(self.engine.command(request, self.now))
+
+    def _give(self, command: Command, arguments: Mapping[str, Reading]) -> None:
+        """Send a frame of motion: it passes the queue, waits for no answer, and may be refused."""
+        name, number = command.name, self._requests
+        self.used.add(("command", name))
+        try:
+            data = self.engine.motions.motion_frame(name, arguments, self.now, _TWO_PEOPLE)
+        except UrcError as error:
+            code = "bad-argument" if isinstance(error, BadArgument) else "not-allowed"
+            self._failed(Failed(number, name, code, str(error)))
+            return
+        self.perform([Send(command.transport, data), Replied(number, name, {})])
+
+    def _refused(self, command: str, why: str) -> None:
+        """Take note that the robot refuses motion."""
+        self._failed(Failed(self._requests, command, "refused", why))
+
+    def _failed(self, failed: Failed) -> None:
+        self.failures.append(f"{failed.code}: {failed.message}")
+        self.ended.append(failed)
 
     def feed(self, transport: str, piece: Fed) -> None:
         """Let the robot say something."""
@@ -203,17 +229,16 @@ class Trial:
                     self.connect(transport)
                 case Send(transport, data):
                     self.sent.setdefault(transport, []).append(data)
-                    if isinstance(data, Envelope) and "id" in data.attributes:
-                        number = data.attributes["id"]
+                    if isinstance(data, Envelope) and data.verb in NUMBERED:
+                        number = data.attributes.get("id")  # motion by requests has none
                         self._numbers.setdefault(transport, []).append(number)
                 case Samples(_, samples):
                     self.samples.update((sample.signal, sample) for sample in samples)
                     self.fresh.update(sample.signal for sample in samples)
                 case Fault(_, code, message):
                     self.failures.append(f"{code}: {message}")
-                case Failed(_, _, code, message):
-                    self.failures.append(f"{code}: {message}")
-                    self.ended.append(event)
+                case Failed():
+                    self._failed(event)
                 case Replied():
                     self.ended.append(event)
                 case Close(transport, reason):

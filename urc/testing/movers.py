@@ -23,6 +23,7 @@ class FakeFrames:
         """Why there is no frame; "" when there is."""
         self.on_count: Callable[[str], None] = _unheard
         self.on_ready: Callable[[str], None] = _unheard
+        self.on_refused: Callable[[str, str], None] = _unrefused
         self.is_greeted = True
         """Whether the line's start-up steps are done."""
         self.number = 0
@@ -150,6 +151,10 @@ class FakeMovers:
             self.written.append((now, data.decode()))
             if self._write is not None:
                 self._write(data)
+
+
+def _unrefused(command: str, why: str) -> None:
+    """Nobody wants to know."""
 
 
 def _unheard(line: str) -> None:

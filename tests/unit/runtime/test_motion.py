@@ -392,3 +392,34 @@ def test_a_robot_of_which_only_something_moves_by_itself_can_be_stopped_without_
     assert it.desk.lease.hindrance(Client("bob")) == "ann has the controls"
     assert it.desk.lease.hindrance(Client("ann")) == ""
     assert it.desk.lease.hindrance(Client("vic", role="viewer")) == "this page only watches"
+
+
+def test_a_robot_that_refuses_ends_the_motion_in_its_own_words() -> None:
+    """It hears the stop; going on takes a release, a new lease and a new gesture."""
+    it = Scene()
+    it.drive("ann", "take")
+    assert it.tick(speed=0.5) == ""
+    told: list[tuple[str, str]] = []
+    it.desk.on_refused = lambda command, why: told.append((command, why))
+    it.heard()
+    it.frames.on_refused("drive", "the guard is open")
+    assert it.heard() == ["release drive"]
+    assert told == [("drive", "the guard is open")]
+    assert it.tick(speed=0.5) == "the guard is open"
+    it.desk.release("ann", "drive")
+    assert "take the controls" in it.tick(speed=0.5)
+    it.drive("ann", "take")
+    assert it.tick(speed=0.5) == ""
+
+
+def test_a_refusal_of_what_does_not_move_changes_nothing() -> None:
+    """The answer to the last frame comes after the hand has let go."""
+    it = Scene()
+    it.drive("ann", "take")
+    it.tick(speed=0.5)
+    it.desk.release("ann", "drive")
+    it.heard()
+    it.frames.on_refused("drive", "too late")
+    it.frames.on_refused("lift", "it never moved")
+    assert it.heard() == []
+    assert it.tick(speed=0.5) == ""

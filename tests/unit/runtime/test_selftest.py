@@ -3,6 +3,7 @@
 import pytest
 
 from urc.model.driver import Command, FramingSpec, Reply
+from urc.model.flow import Hold
 from urc.model.profile import DocumentTest, Profile, Setting
 from urc.model.values import Signal
 from urc.patterns import compile_pattern
@@ -296,3 +297,26 @@ def test_every_setting_gets_a_sample(setting: Setting, value: object) -> None:
     """Tests need no secret and no address: defaults, or something of the type."""
     found = sample_settings({"s": setting})["s"]
     assert (found, type(found)) == (value, type(value))
+
+
+@pytest.mark.parametrize(
+    ("test", "says"),
+    [
+        (trial(run="drive", sent={"wire": "drive"}), ""),
+        (trial(run="drive", feed={"wire": "ok\n"}), ""),
+        (trial(run="drive", feed={"wire": "ERR 7\n"}, fails="refused: the robot answered"), ""),
+        (trial(run="drive", feed={"wire": "hm\n"}), "no-match"),
+        (trial(run="drive", fails="timed-out"), "nothing failed"),
+    ],
+    ids=["given", "taken", "refused", "unknown words", "nobody waits"],
+)
+def test_a_held_command_is_given_as_the_wire_gives_it(test: DocumentTest, says: str) -> None:
+    """No answer is owed, an acknowledgement is taken, and a refusal ends it."""
+    profile = robot()
+    held = profile.driver.commands["stop"]._replace(
+        name="drive", send=text("drive"), hold=Hold(0.05)
+    )
+    driver = profile.driver._replace(commands={**profile.driver.commands, "drive": held})
+    found = complaint(test, profile._replace(driver=driver))
+    assert says in found
+    assert bool(found) == bool(says)

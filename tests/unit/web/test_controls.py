@@ -384,3 +384,18 @@ async def test_a_flood_costs_no_more_than_its_thinned_rate() -> None:
             await it.clock.advance(0.0005)
         assert made <= 1.0 / THINNED_S + 2
         assert made + ann.dropped + len(ann.pending) == 2000
+
+
+async def test_the_words_of_a_robot_that_refuses_to_move_are_told_at_its_control() -> None:
+    """At once, to every screen; the audit has them, too."""
+    async with scene() as it:
+        ann, bob = it.sit(), it.sit()
+        it.say(ann, "take")
+        it.tick(ann)
+        it.read(bob)
+        it.frames.on_refused("drive", "the guard is open")
+        for seat in (ann, bob):
+            (told,) = [one for one in it.read(seat) if one["t"] == "refused"]
+            assert (told["command"], told["message"]) == ("drive", "the guard is open")
+        assert it.movers.texts[-1] == "drive stop"
+        assert [one.outcome for one in it.audit if one.what == "stopped"] == ["the guard is open"]

@@ -110,6 +110,7 @@ class Controls:
         desk = MotionDesk(driver, kept=kept.state, is_owed=kept.is_owed)
         desk.on_change = self._changed
         desk.on_moved = self.trail.moved
+        desk.on_refused = self._refused
         return desk
 
     # -- sessions
@@ -327,6 +328,15 @@ class Controls:
         for seat in self._seats.values():
             seat.moved_s.pop(command, None)
             seat.notice(command, wire.encode_stopped(command, reason))
+
+    def _refused(self, command: str, why: str) -> None:
+        """Let every screen know in which words the robot refused to move."""
+        self._rehearsal.end()
+        self.trail.stopped(command, why, self._clock.now())
+        for seat in self._seats.values():
+            seat.forget(command)
+            seat.moved_s.pop(command, None)
+            seat.notice(command, wire.encode_refused("tick", command, why))
 
     def _heed(self, file: LatchFile | None) -> None:
         if file is not None:

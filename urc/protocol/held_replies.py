@@ -1,0 +1,106 @@
+"""What the robot says to frames of motion: taken, or refused.
+
+Floor 3, pure. Frames of motion do not go through the queue of their line, so nothing is in flight
+for them, and nobody waits. But a robot that answers each of them does so here: an acknowledgement
+is taken and is no stray frame, and a refusal ends the motion. A refusal counts also where the robot
+says it by itself, as a controller does whose guard was opened.
+
+A command listens from its first frame on, for as long as an answer may take after the newest one.
+"""
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+from urc.expressions import ExpressionError, Template
+from urc.protocol.answer import Answer, Ear, Fields, Offer
+from urc.protocol.codec import Frame
+from urc.protocol.word import Word
+
+__all__ = ["HeldReplies", "Refusal"]
+
+_NOTHING: Mapping[str, object] = {}
+
+
+class Refusal(NamedTuple):
+    """The robot does not do what is held."""
+
+    command: str
+    offer: Offer
+
+
+class _Listening:
+    """The newest frame of one held command."""
+
+    __slots__ = ("_match", "ear", "names", "until_s")
+
+    def __init__(self, answer: Answer, match: Template | None) -> None:
+        self.ear = Ear(answer)
+        # Which of many frames a number belongs to is not known: any of them counts.
+        self._match = None if match is None or "seq" in match.names else match
+        self.names = _NOTHING
+        self.until_s = float("-inf")
+
+    def is_mine(self, fields: Fields) -> bool:
+        """Return whether a frame is about this command, by what it carries."""
+        if self._match is None:
+            return True
+        names: dict[str, object] = dict(self.names)
+        names |= {name: Word(raw) if isinstance(raw, str) else raw for name, raw in fields.items()}
+        try:
+            return bool(self._match.evaluate(names))
+        except ExpressionError:
+            return False
+
+
+class HeldReplies:
+    """The held commands of one line that the robot answers."""
+
+    def __init__(self) -> None:
+        self._all: dict[str, _Listening] = {}
+        self._until_s = float("-inf")
+
+    def add(self, command: str, answer: Answer, match: Template | None) -> None:
+        """Listen for the answers to a command, once it has been given."""
+        self._all[command] = _Listening(answer, match)
+
+    def gave(self, command: str, names: Mapping[str, object], now: float) -> None:
+        """Take note that a frame of a command goes out, made of `names`."""
+        one = self._all.get(command)
+        if one is not None:
+            one.names = names
+            one.until_s = now + one.ear.answer.timeout_s
+            self._until_s = max(self._until_s, one.until_s)
+
+    def forget(self) -> None:
+        """Forget a connection: what comes on the next one answers nothing of this one."""
+        self._until_s = float("-inf")
+        for one in self._all.values():
+            one.until_s = float("-inf")
+
+    def is_listening(self, now: float) -> bool:
+        """Return whether an answer to a frame of motion may come."""
+        return now < self._until_s
+
+    def refusals(self, frame: Frame, now: float) -> list[Refusal]:
+        """Return the commands that a frame refuses: all that it may be about."""
+        return [
+            Refusal(name, offer)
+            for name, one in self._listening(now)
+            if (offer := one.ear.beside(frame, one.is_mine)) is not None and offer.refusal
+        ]
+
+    def refuse(self, frame: Frame, reason: str, now: float) -> list[Refusal]:
+        """Return what an answer refuses that is known as a refusal: in words of the driver."""
+        plain = [Refusal(name, Offer(refusal=reason)) for name, _ in self._listening(now)]
+        return self.refusals(frame, now) or plain
+
+    def accepted(self, frame: Frame, now: float) -> tuple[Answer, Offer] | None:
+        """Return what an acknowledgement says, or None when the frame is none."""
+        for _, one in self._listening(now):
+            offer = one.ear.offer(frame, one.is_mine)
+            if offer is not None:
+                return one.ear.answer, offer
+        return None
+
+    def _listening(self, now: float) -> list[tuple[str, _Listening]]:
+        return [(name, one) for name, one in self._all.items() if now < one.until_s]
