@@ -62,6 +62,8 @@ def line_with_flow(
     steps = StepContext(spec.name, is_named=False, forms=context)
     on_connect, on_close = part.get("on_connect"), part.get("on_close")
     errors, faults = parse_errors(part, findings, context)
+    if queue is not None and spec.type in MESSAGING:
+        refuse(queue, ("bytes",), "counts bytes, and this line carries messages", findings)
     return spec._replace(
         errors=errors,
         faults=faults,
@@ -253,7 +255,9 @@ def _queue(part: Part | None, kind: str) -> Queue:
     if part is None:
         return default
     return Queue(
-        part.integer("in_flight") or default.in_flight, part.integer("depth") or default.depth
+        part.integer("in_flight") or default.in_flight,
+        part.integer("depth") or default.depth,
+        part.integer("bytes"),
     )
 
 

@@ -30,9 +30,36 @@ def check_traffic(part: Part, driver: Driver, findings: Findings) -> None:
                 f" {rate:g} times",
                 hint="poll more slowly, or raise its 'rate_limit'",
             )
+    _check_counted(part, driver, findings)
     _check_ports(part, driver, findings)
     for name, inner in part.named("transports").items():
         _check_silence(inner, driver.transports[name], driver, findings)
+
+
+def _check_counted(part: Part, driver: Driver, findings: Findings) -> None:
+    """Warn of what fills the robot's buffer, and of which nothing tells when it has left it."""
+    requests = [
+        (inner, one.transport, one.reply, one.priority)
+        for name, inner in part.named("commands").items()
+        if (one := driver.commands[name]).hold is None
+    ]
+    requests += [
+        (inner, one.transport, one.reply, one.priority)
+        for inner, one in zip(part.listed("polls"), driver.polls, strict=True)
+        if not one.run
+    ]
+    for inner, transport, reply, priority in requests:
+        spec = driver.transports.get(transport)
+        is_counted = spec is not None and spec.queue.most_bytes is not None
+        if is_counted and reply is None and priority != "realtime":
+            findings.warn(
+                inner.must("send"),
+                "uncounted",
+                f"{transport!r} counts the bytes that the robot has not read, and nothing tells"
+                " when it has read these",
+                hint="give it the 'reply' that the robot gives, or priority: realtime where the"
+                " robot takes it past its buffer",
+            )
 
 
 def _check_ports(part: Part, driver: Driver, findings: Findings) -> None:

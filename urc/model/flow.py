@@ -64,6 +64,8 @@ class Queue(NamedTuple):
     """Requests that may wait for their answer at a time, 1 to 64."""
     depth: int = 64
     """Requests that may wait to be sent; one more is refused."""
+    most_bytes: int | None = None
+    """Bytes of requests that wait for their answers, framing included; None: any number."""
 
 
 class Keepalive(NamedTuple):

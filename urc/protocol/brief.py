@@ -38,6 +38,7 @@ def briefs(
         for name, command in driver.commands.items()
         if name in asks
         and asks[name].is_simple
+        and lines[command.transport].spec.queue.most_bytes is None
         and not is_guarded(command)
         and command.verify is None
     }

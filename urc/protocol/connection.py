@@ -41,7 +41,7 @@ class Connection:
         self.on_refused: Callable[[str, str], None] | None = None
         """Told a held command and why the robot refuses it; must not call the line back."""
         self._flights = Flights()
-        self._outbox = Outbox(spec, self._flights)
+        self._outbox = Outbox(spec, self._flights, self._size_of)
         self.inbox = Inbox(spec, self.framing, messages)
         self.held = HeldReplies()
         """Of the commands that move the robot for as long as they are held."""
@@ -155,6 +155,10 @@ class Connection:
     def _hear(self, now: float) -> None:
         if self.spec.stale_after_s is not None:
             self._silent_at = now + self.spec.stale_after_s
+
+    def _size_of(self, exchange: Exchange) -> int:
+        """Return how many bytes a request takes on the wire."""
+        raise NotImplementedError
 
     def _pump(self, now: float) -> list[LineEvent]:
         """Do what a change of the connection allows or asks for."""

@@ -30,6 +30,7 @@ class Flight:
         "number",
         "quick",
         "since",
+        "size",
         "stage",
         "values",
     )
@@ -43,6 +44,8 @@ class Flight:
         """Made when it is needed: hardly ever, where `quick` is enough."""
         self.due = now + ask.answers[0].timeout_s
         """When its answer is overdue; of one that is late: when it is not expected any more."""
+        self.size = 0
+        """Bytes that it takes in front of the robot's reader."""
         self.since = now
         """When its present answer began to be waited for."""
         self.is_extended = False
@@ -144,6 +147,11 @@ class Flights(list[Flight]):
     def waiting(self) -> int:
         """How many wait for an answer, real-time ones aside."""
         return sum(1 for flight in self if not flight.is_late and not flight.exchange.is_realtime)
+
+    @property
+    def size(self) -> int:
+        """How many bytes the robot may not have read yet: of all that it has not answered."""
+        return sum(flight.size for flight in self if not flight.exchange.is_realtime)
 
     @property
     def deadline(self) -> float | None:

@@ -16,7 +16,8 @@ answer of the next request, and meanwhile nothing is sent that it could be mista
 misses `urc.protocol.answering.MISSES_UNTIL_CLOSED` answers in a row is given up and opened afresh.
 """
 
-from urc.model.codec import Envelope, Payload, traffic_of
+from urc.expressions import COUNTERS
+from urc.model.codec import Envelope, Payload, size_of, traffic_of
 from urc.model.driver import TransportSpec
 from urc.model.values import Reading
 from urc.protocol.answer import Ear, Heard, Matcher
@@ -85,6 +86,10 @@ class Line(Answering):
             return self._send(exchange, now) + self._pump(now)
         if self.is_ready and not self.is_per_request and self._outbox.is_free(exchange, now):
             return self._send(exchange, now)
+        most = self.spec.queue.most_bytes
+        if most is not None and not exchange.is_realtime and self._size_of(exchange) > most:
+            text = f"it has {self._size_of(exchange)} bytes, and the robot takes {most} at a time"
+            return [Ended(exchange, Outcome("bad-argument", f"{text} (queue.bytes)"))]
         gone = self._outbox.take(exchange)
         events: list[LineEvent] = [] if gone is None else [Ended(*gone)]
         return events + self._pump(now)
@@ -168,9 +173,18 @@ class Line(Answering):
         if ask.framing is not None:
             self._may_recut = True
         flight = Flight(exchange, now)
-        flight.number = number
+        flight.number, flight.size = number, size_of(data)
         self._flights.append(flight)
         return sent
+
+    def _size_of(self, exchange: Exchange) -> int:
+        if exchange.data is not None:
+            return size_of(exchange.data)
+        names = {**self.learnt, **exchange.namespace, COUNTERS: self.counters.draw()}
+        try:
+            return size_of(exchange.ask.encode(names))
+        except BadArgument:
+            return 0  # it is told when it is sent
 
     # -- receiving
 

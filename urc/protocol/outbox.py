@@ -3,7 +3,7 @@
 Floor 3, pure. See `urc.protocol.line` for the theory of operation.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 from urc.expressions import COUNTERS
 from urc.model.codec import Payload
@@ -18,12 +18,16 @@ __all__ = ["Outbox", "written"]
 class Outbox(Waiting[Exchange]):
     """The queue of one line, with its shortest gap and its limit of requests in flight."""
 
-    __slots__ = ("_flights", "_limit", "_spec", "next_send")
+    __slots__ = ("_flights", "_limit", "_spec", "next_send", "size_of")
 
-    def __init__(self, spec: TransportSpec, flights: Flights) -> None:
+    def __init__(
+        self, spec: TransportSpec, flights: Flights, size_of: Callable[[Exchange], int]
+    ) -> None:
         super().__init__(spec.queue.depth)
         self._spec = spec
         self._flights = flights
+        self.size_of = size_of
+        """Bytes that a request takes on the wire."""
         self._limit = spec.queue.in_flight if spec.connection == "persistent" else 1
         self.next_send = float("-inf")
         """Before this time the shortest gap since the last request is not over."""
@@ -63,12 +67,19 @@ class Outbox(Waiting[Exchange]):
                 continue
             if self._flights.may_confuse(exchange):
                 continue
+            is_full = is_full or not self._has_room(exchange)
             return None if is_full or now < self.next_send else exchange
         return None
 
+    def _has_room(self, exchange: Exchange) -> bool:
+        """Return whether the robot's buffer takes it beside what it has not answered yet."""
+        most = self._spec.queue.most_bytes
+        return most is None or self._flights.size + self.size_of(exchange) <= most
+
     def is_free(self, exchange: Exchange, now: float) -> bool:
         """Return whether `exchange` may be sent at once, past an empty queue."""
-        return not (self or self._flights or now < self.next_send or _free_at(exchange) > now)
+        is_busy = bool(self or self._flights) or not self._has_room(exchange)
+        return not (is_busy or now < self.next_send or _free_at(exchange) > now)
 
     def wants_line(self, now: float) -> bool:
         """Return whether something could go if there were a connection."""
@@ -78,12 +89,18 @@ class Outbox(Waiting[Exchange]):
         """Return when time alone lets something be sent; None when only an answer does."""
         if not self or self._flights.waiting >= self._limit:
             return None
-        times = [
-            max(self.next_send, _free_at(exchange))
-            for exchange in self
-            if (is_ready or exchange.is_privileged) and not self._flights.may_confuse(exchange)
-        ]
-        return min(times, default=None)
+        first: float | None = None
+        barred_from = float("inf")
+        """What has no room holds up what is behind it from the time at which it could go."""
+        for exchange in self:
+            if not (is_ready or exchange.is_privileged) or self._flights.may_confuse(exchange):
+                continue
+            time = max(self.next_send, _free_at(exchange))
+            if not self._has_room(exchange):
+                barred_from = min(barred_from, time)
+            elif time < barred_from and (first is None or time < first):
+                first = time
+        return first
 
 
 def _free_at(exchange: Exchange) -> float:

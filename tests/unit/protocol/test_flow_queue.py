@@ -175,3 +175,79 @@ def test_a_draw_that_is_not_counted_does_not_advance() -> None:
     assert (draw("id", 0, 9), draw("id", 0, 9)) == (0, 0)
     counters.count(draw)
     assert counters.draw()("id", 0, 9) == 1
+
+
+STREAMED = """
+wire: queue: { in_flight: 16, bytes: 20 }
+commands:
+  line:
+    send: "{{ code }}"
+    args: { code: { type: string } }
+    reply: { equals: ok, errors: ['^error'] }
+    idempotent: true
+    retries: 1
+  number: { send: "N{{ seq('n', 8, 99) }}", reply: { equals: ok } }
+  hold: { send: "!!!!!!!!!!!!!!!!!!!!!", priority: realtime }
+"""
+
+
+def test_no_more_bytes_are_sent_than_the_robot_has_room_for() -> None:
+    """All that waits for its answer counts, line ends included; what is real-time does not."""
+    talk = Dialogue(STREAMED).connect()
+    for code in ("G1 X100", "G1 X200", "M3", "M5", "G0"):
+        talk.run("line", code=code)
+    assert talk.sent == ["G1 X100", "G1 X200", "M3"]  # 8 + 8 + 3 = 19
+    talk.run("hold")
+    assert talk.sent == ["!" * 21]
+    talk.says("ok")
+    assert talk.sent == ["M5", "G0"]
+    talk.says("error:1", "ok", "ok", "ok")
+    assert [talk.outcomes[one] for one in (1, 2, 3, 4, 5)] == [
+        "done",
+        "refused",
+        "done",
+        "done",
+        "done",
+    ]
+
+
+def test_a_short_line_does_not_pass_a_long_one() -> None:
+    """The order of a program is its meaning."""
+    talk = Dialogue(STREAMED).connect()
+    for code in ("G1 X100 Y100 Z", "G1 X200", "M3"):
+        talk.run("line", code=code)
+    assert talk.sent == ["G1 X100 Y100 Z"]
+    assert talk.at(0.4).sent == []
+    talk.says("ok")
+    assert talk.sent == ["G1 X200", "M3"]
+
+
+def test_a_frame_that_is_longer_than_the_room_is_refused() -> None:
+    """It would never fit, whatever else waits."""
+    talk = Dialogue(STREAMED).connect()
+    talk.run("line", code="G1 X100 Y100 Z100 F1")
+    assert talk.outcomes == {1: "bad-argument"}
+    assert talk.messages == ["it has 21 bytes, and the robot takes 20 at a time (queue.bytes)"]
+    talk.run("line", code="G1 X100 Y100 Z100 F")
+    assert talk.sent == ["G1 X100 Y100 Z100 F"]
+
+
+def test_counters_are_drawn_for_what_goes_only() -> None:
+    """The length of a frame that waits is known before its number is used up."""
+    talk = Dialogue(STREAMED).connect()
+    for _ in range(8):
+        talk.run("number")
+    assert talk.sent == ["N8", "N9", "N10", "N11", "N12"]  # 3 + 3 + 4 + 4 + 4
+    talk.says("ok")
+    assert talk.sent == ["N13"]
+
+
+def test_what_got_no_answer_takes_its_room_until_it_is_given_up() -> None:
+    """It may still lie in front of the robot's reader."""
+    talk = Dialogue(STREAMED.replace("    idempotent: true\n    retries: 1\n", "")).connect()
+    talk.run("line", code="G1 X100 Y100 Z")
+    talk.at(0.5).run("number")
+    assert talk.outcomes == {1: "timed-out"}
+    talk.at(0.9)
+    assert talk.sent == ["G1 X100 Y100 Z"]
+    assert talk.at(1.0).sent == ["N8"]
