@@ -8,22 +8,38 @@ import tempfile
 from contextlib import suppress
 from pathlib import Path
 
-__all__ = ["put_private"]
+__all__ = ["make_private", "put_private"]
+
+_OWN = 0o700
 
 
-def put_private(file: Path, data: bytes, folder_mode: int = 0o777) -> None:
+def make_private(folder: Path) -> None:
+    """Make a folder, and those above it that are missing, for their owner alone.
+
+    One that is there is left as it is.
+
+    Raises:
+        OSError: it cannot be made.
+    """
+    missing = [one for one in (folder, *folder.parents) if not one.exists()]
+    for one in reversed(missing):
+        one.mkdir(mode=_OWN, exist_ok=True)
+    if not folder.is_dir():
+        raise NotADirectoryError(20, "Not a directory", str(folder))
+
+
+def put_private(file: Path, data: bytes) -> None:
     """Write a file: after this it holds `data`, even if the power goes; before, what it held.
 
     Args:
-        file: what it is called; its folder is made.
+        file: what it is called; its folder is made, for its owner alone.
         data: all of it.
-        folder_mode: of a folder that has to be made, less the umask.
 
     Raises:
         OSError: the disk is full, for example; then nothing has changed, unless all was written
             and only the folder could not be forced to the disk.
     """
-    file.parent.mkdir(parents=True, exist_ok=True, mode=folder_mode)
+    make_private(file.parent)
     # `mkstemp` makes files that only their owner can read.
     number, name = tempfile.mkstemp(dir=file.parent, prefix=f".{file.name}.", suffix=".new")
     try:

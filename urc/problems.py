@@ -8,14 +8,27 @@ reporters over the same values.
 from collections.abc import Iterable, Sequence
 from typing import Literal, NamedTuple
 
-__all__ = ["Problem", "ProblemsError", "UrcError", "has_errors", "printable", "to_json", "to_text"]
+__all__ = [
+    "Problem",
+    "ProblemsError",
+    "UrcError",
+    "has_errors",
+    "printable",
+    "printable_json",
+    "to_json",
+    "to_text",
+]
 
 Severity = Literal["error", "warning"]
 
-_CONTROL = {code: f"\\x{code:02x}" for code in (*range(0x20), *range(0x7F, 0xA0))}
-# Marks that reorder what a terminal shows: a robot's text must not be able to fake a line.
-_CONTROL |= {code: f"\\u{code:04x}" for code in (*range(0x200E, 0x2010), *range(0x2028, 0x202F))}
-_CONTROL |= {code: f"\\u{code:04x}" for code in range(0x2066, 0x206A)}
+# Control characters, C1 included; marks that reorder what a terminal shows, and ends of lines: a
+# robot's text must not be able to fake a line. Halves of pairs cannot be written at all.
+_CONTROLS = (*range(0x20), *range(0x7F, 0xA0))
+_MARKS = (0x061C, 0x200E, 0x200F, *range(0x2028, 0x202F), *range(0x2066, 0x206A))
+_HALVES = range(0xD800, 0xE000)
+_CONTROL = {code: f"\\x{code:02x}" for code in _CONTROLS}
+_CONTROL |= {code: f"\\u{code:04x}" for code in (*_MARKS, *_HALVES)}
+_IN_JSON = {code: f"\\u{code:04x}" for code in (*_CONTROLS[0x20:], *_MARKS, *_HALVES)}
 
 
 class UrcError(Exception):
@@ -66,6 +79,11 @@ class Problem(NamedTuple):
 def printable(text: str) -> str:
     """Return `text` with control and reordering characters written as escapes."""
     return text.translate(_CONTROL)
+
+
+def printable_json(text: str) -> str:
+    """Return JSON with the same characters written as JSON escapes: it means what it meant."""
+    return text.translate(_IN_JSON)
 
 
 def has_errors(problems: Iterable[Problem]) -> bool:

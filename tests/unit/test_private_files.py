@@ -25,11 +25,14 @@ def test_a_file_is_written_with_its_folder(tmp_path: Path) -> None:
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows has other rights")
 def test_only_the_owner_may_read_it(tmp_path: Path) -> None:
-    """The folder, too, where that is asked for."""
-    file = tmp_path / "keys" / "known"
-    put_private(file, b"secret", folder_mode=0o700)
+    """The folders that are made for it, too; those that were there stay as they are."""
+    tmp_path.chmod(0o755)
+    file = tmp_path / "keys" / "lab" / "known"
+    put_private(file, b"secret")
     assert stat.S_IMODE(file.stat().st_mode) == 0o600
     assert stat.S_IMODE(file.parent.stat().st_mode) == 0o700
+    assert stat.S_IMODE(file.parent.parent.stat().st_mode) == 0o700
+    assert stat.S_IMODE(tmp_path.stat().st_mode) == 0o755
 
 
 def test_a_full_disk_changes_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

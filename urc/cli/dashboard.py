@@ -9,11 +9,11 @@ from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
-from urc._folders import data_folder
 from urc.cli.entrance import Entrance, access_for, announce
 from urc.cli.failures import Misuse
 from urc.cli.faults import Faulty
 from urc.cli.output import complain
+from urc.cli.own_data import own_folder
 from urc.cli.running import run_loop
 from urc.model.profile import Profile
 from urc.model.values import Value
@@ -166,7 +166,7 @@ def workshop_of(
 ) -> Workshop:
     """Return what makes the robots of a dashboard while it runs; `faulty`: they are emulated."""
     return Workshop(
-        place.data or data_folder(),
+        own_folder(place.data),
         make=partial(_robot, place, faulty),
         tried=partial(_session, "none", None, faulty),
         given=given,

@@ -81,7 +81,8 @@ async def _look_around(
     elif rows:
         print(_table(rows))
         if hint:
-            print(f"\nIn the profile, for what is known of them:\n\n{hint}")
+            print("\nIn the profile, for what is known of them:\n")
+            print("\n".join(map(printable, hint.split("\n"))))
     if not rows:
         complain("urc discover: nothing was found")
     return int(not rows)

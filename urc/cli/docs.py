@@ -3,6 +3,7 @@
 import argparse
 
 from urc.cli.arguments import load
+from urc.problems import printable
 
 EXAMPLE = "urc docs robots/puppet.yaml > puppet.md"
 
@@ -18,5 +19,6 @@ def run(arguments: argparse.Namespace) -> int:
     """Print the page."""
     from urc.runtime.manual import manual
 
-    print(manual(load(arguments.profile)), end="")
+    page = manual(load(arguments.profile))
+    print("\n".join(map(printable, page.split("\n"))), end="")
     return 0

@@ -4,7 +4,7 @@ import os
 import sys
 from collections.abc import Mapping
 
-from urc.problems import printable
+from urc.problems import printable, printable_json
 
 __all__ = ["complain", "json_text"]
 
@@ -18,11 +18,12 @@ def complain(line: str) -> None:
 
 
 def json_text(value: Mapping[str, object], indent: int | None = None) -> str:
-    """Return `value` as JSON that standard output's encoding can carry."""
+    """Return `value` as JSON that standard output's encoding can carry, and no terminal obeys."""
     import json
 
     takes_all = sys.stdout.encoding.lower().replace("-", "") == "utf8"
-    return json.dumps(value, indent=indent, ensure_ascii=not takes_all, default=_plain)
+    text = json.dumps(value, indent=indent, ensure_ascii=not takes_all, default=_plain)
+    return printable_json(text)
 
 
 def _plain(value: object) -> object:

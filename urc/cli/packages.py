@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from urc._folders import data_folder
 from urc.cli.failures import Misuse
 from urc.cli.output import complain
+from urc.cli.own_data import own_folder
 
 if TYPE_CHECKING:
     from urc.packages.index import Entry
@@ -40,14 +41,14 @@ def open_store() -> "Store":
     """Return this user's store."""
     from urc.packages.store import Store
 
-    return Store(data_folder() / "packages")
+    return Store(own_folder() / "packages")
 
 
 def repositories() -> "Repositories":
     """Return the repositories that this user added."""
     from urc.packages.repositories import Repositories
 
-    return Repositories(data_folder() / "packages", complain)
+    return Repositories(own_folder() / "packages", complain)
 
 
 def installed_document(word: str) -> Path | None:

@@ -5,6 +5,7 @@ import os
 from collections.abc import Iterator, Sequence
 
 from urc.cli.failures import Misuse
+from urc.cli.output import complain
 from urc.model.profile import Profile
 from urc.model.values import Value
 from urc.problems import Problem, ProblemsError, UrcError
@@ -32,6 +33,7 @@ def settings_given(
         ProblemsError: the same, in the settings file.
     """
     given: dict[str, str] = dict(arguments.settings)
+    _warn_of_secrets(profiles, arguments)
     # A single profile knows best what it has, and what was meant.
     if len(profiles) > 1:
         for name in given:
@@ -54,6 +56,20 @@ def settings_given(
         except UrcError as wrong:
             raise Misuse(str(wrong)) from wrong
     return resolved
+
+
+def _warn_of_secrets(profiles: Sequence[Profile], arguments: argparse.Namespace) -> None:
+    """Say once of each secret that was typed who reads it, and how else it is given."""
+    told: set[str] = arguments.__dict__.setdefault("told_secrets", set())
+    for name, _ in arguments.settings:
+        settings = [one.settings[name] for one in profiles if name in one.settings]
+        if name not in told and any(one.is_secret for one in settings):
+            told.add(name)
+            complain(
+                f"warning: --set {name}=… can be read by everybody on this machine, in the list of"
+                f" processes: use {environment_name(name)} in the environment, or a file with"
+                " --settings"
+            )
 
 
 def complete_settings(profile: Profile, arguments: argparse.Namespace) -> dict[str, Value]:

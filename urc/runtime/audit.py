@@ -12,6 +12,7 @@ row shows (`check`); it does not keep out who can write the whole file anew.
 import hashlib
 import json
 import logging
+import os
 import sqlite3
 import threading
 import time
@@ -21,6 +22,8 @@ from contextlib import closing, suppress
 from itertools import pairwise
 from pathlib import Path
 from typing import Final, NamedTuple
+
+from urc.private_files import make_private
 
 __all__ = ["AuditLog", "Entry", "check", "read", "shown"]
 
@@ -182,7 +185,7 @@ class AuditLog:
             return batch
 
     def _opened(self) -> sqlite3.Connection:
-        self.file.parent.mkdir(parents=True, exist_ok=True)
+        make_private(self.file.parent)
         try:
             return self._connected()
         except sqlite3.OperationalError:
@@ -196,6 +199,11 @@ class AuditLog:
             return self._connected()
 
     def _connected(self) -> sqlite3.Connection:
+        # Before SQLite makes it: the files that it puts beside have the rights of this one.
+        os.close(os.open(self.file, os.O_RDWR | os.O_CREAT, 0o600))
+        for name in ("", "-wal", "-shm"):
+            with suppress(FileNotFoundError):
+                os.chmod(f"{self.file}{name}", 0o600)
         base = sqlite3.connect(self.file, timeout=_LOCKED_S, isolation_level=None)
         try:
             base.execute(f"PRAGMA page_size = {_PAGE}")

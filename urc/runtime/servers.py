@@ -52,7 +52,7 @@ def announced(data: Path, name: str, server: Server) -> Iterator[None]:
     """
     servers(data)  # removes what servers that were killed left behind
     file = data / _FOLDER / f"{name}.json"
-    put_private(file, json.dumps(server._asdict()).encode(), folder_mode=0o700)
+    put_private(file, json.dumps(server._asdict()).encode())
     try:
         yield
     finally:

@@ -124,7 +124,7 @@ def _read(file: Path, host: str, port: int, *, is_asked_for: bool) -> Known:
 
 def _write(file: Path, text: str) -> None:
     """Replace the file as a whole, readable by its owner alone."""
-    put_private(file, text.encode(), folder_mode=0o700)
+    put_private(file, text.encode())
 
 
 def _why(fault: Exception) -> str:

@@ -153,3 +153,23 @@ def test_missing_settings_file_is_told(filed: Filed) -> None:
     with pytest.raises(ProblemsError) as told:
         settings_given([robot()], words(file="gone.yaml"))
     assert str(told.value) == "gone.yaml:1:1: error no-such-file: there is no such file"
+
+
+def test_a_secret_that_is_typed_is_warned_of_once(capsys: pytest.CaptureFixture[str]) -> None:
+    """Whoever is on this machine reads it in the list of processes; other ways are named."""
+    typed = words(("host", "lab"), ("port", "1"), ("key", "7"))
+    for _ in range(2):
+        settings_given([robot()], typed)
+    said = capsys.readouterr().err
+    assert said == (
+        "warning: --set key=… can be read by everybody on this machine, in the list of processes:"
+        " use URC_SET_KEY in the environment, or a file with --settings\n"
+    )
+
+
+def test_a_secret_from_elsewhere_is_not_warned_of(
+    filed: Filed, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("URC_SET_KEY", "2")
+    settings_given([robot()], words(("port", "1"), file=filed("key: 3\n")))
+    assert capsys.readouterr().err == ""

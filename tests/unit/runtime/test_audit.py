@@ -1,5 +1,6 @@
 """The audit keeps what happened, within its bounds, and waits for nothing."""
 
+import os
 import sqlite3
 import time
 from collections.abc import Iterator
@@ -204,3 +205,17 @@ def test_a_file_that_somebody_locks_holds_nobody_up_and_is_told_once(
     assert [text for text in told if "locked" in text] == [
         "the audit cannot be kept: database is locked; robots are driven and stopped as ever"
     ]
+
+
+@pytest.mark.skipif(os.name != "posix", reason="POSIX permissions")
+def test_only_its_owner_reads_it(file: Path) -> None:
+    """Also one of an older version, and what SQLite puts beside it."""
+    file.parent.mkdir(mode=0o755)
+    sqlite3.connect(file).close()
+    file.chmod(0o644)
+    with AuditLog(file) as log:
+        log.note(entry(1))
+        assert log.settle()
+        found = [one for one in file.parent.iterdir() if one.name.startswith(file.name)]
+        assert {one.stat().st_mode & 0o777 for one in found} == {0o600}
+        assert len(found) > 1
