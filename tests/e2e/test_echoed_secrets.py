@@ -10,6 +10,7 @@ import pytest
 from websockets.asyncio.client import connect
 
 from tests.e2e.command_line import page, run
+from tests.e2e.keys import headers_for
 from tests.e2e.processes import UrcProcess
 
 pytestmark = pytest.mark.anyio
@@ -96,7 +97,11 @@ async def test_no_page_shows_a_secret(parrot: str, tmp_path: Path, urc_process: 
     url = (await server.wait_for_async(r"dashboard (http://\S+)"))[1]
     address = urlsplit(url).netloc
     said: list[str] = []
-    line = connect(f"ws://{address}/ws?robot=parrot", origin=f"http://{address}")
+    line = connect(
+        f"ws://{address}/ws?robot=parrot",
+        origin=f"http://{address}",
+        additional_headers=headers_for(url),
+    )
     async with line as screen, asyncio.timeout(30):
         async for text in screen:
             said.append(str(text))
