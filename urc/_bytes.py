@@ -7,52 +7,34 @@ can hold: it returns a value or raises TypeError or ValueError with words for a 
 import binascii
 import struct
 from collections.abc import Callable
-from typing import Any, Final, Literal
+from typing import Any, Final
 
-__all__ = ["BYTE_FILTERS", "NUMBERS", "TEXT_FILTERS", "written_number"]
+from urc._number_bytes import writer_of
+from urc._numbers import NUMBER_NAMES, number_of
+
+__all__ = ["BYTE_FILTERS", "TEXT_FILTERS", "written_number"]
 
 MAX_BYTES: Final = 65536
-_SIZES: Final = (8, 16, 24, 32, 40, 48, 56, 64)
-_FLOATS: Final = {16: "e", 32: "f", 64: "d"}
-
-
-def _numbers() -> dict[str, tuple[str, int, Literal["big", "little"]]]:
-    found: dict[str, tuple[str, int, Literal["big", "little"]]] = {}
-    for bits in _SIZES:
-        for kind in "ui":
-            if bits == 8:
-                found[f"{kind}8"] = (kind, 8, "big")
-            else:
-                found[f"{kind}{bits}be"] = (kind, bits, "big")
-                found[f"{kind}{bits}le"] = (kind, bits, "little")
-    for bits in _FLOATS:
-        found[f"f{bits}be"] = ("f", bits, "big")
-        found[f"f{bits}le"] = ("f", bits, "little")
-    return found
-
-
-NUMBERS: Final = _numbers()
-"""Filter → kind (u, i or f), bits, byte order."""
 
 
 def written_number(name: str, value: object) -> bytes:
-    """Return `value` as the bytes of the filter called `name`, whole numbers rounded."""
-    kind, bits, endian = NUMBERS[name]
+    """Return `value` as the bytes of the type called `name`, whole numbers rounded."""
+    number = number_of(name)
+    if number is None:
+        raise ValueError(f"there is no type {_short(name)}")
     if not isinstance(value, (int, float)):
         raise TypeError(f"{name!r} takes a number, found {_short(value)}")
-    if kind == "f":
+    if number.kind == "float":
         try:
-            return struct.pack((">" if endian == "big" else "<") + _FLOATS[bits], value)
+            return writer_of(number)(value)
         except (OverflowError, struct.error):
             raise ValueError(f"{_short(value)} is too large for {name!r}") from None
     if isinstance(value, float) and not abs(value) < 1e30:
         raise ValueError(f"{name!r} takes a whole number, found {value!r}")
-    number = round(value)
-    least = -(1 << bits - 1) if kind == "i" else 0
-    most = (1 << bits - (kind == "i")) - 1
-    if not least <= number <= most:
-        raise ValueError(f"{_short(number)} does not fit into {name!r}: {least} to {most}")
-    return number.to_bytes(bits // 8, endian, signed=kind == "i")
+    whole, least, most = round(value), number.least, number.most
+    if not least <= whole <= most:
+        raise ValueError(f"{_short(whole)} does not fit into {name!r}: {least} to {most}")
+    return writer_of(number)(whole)
 
 
 def _number_filter(name: str) -> Callable[[object], bytes]:
@@ -110,7 +92,7 @@ def _b64encode(value: object) -> str:
 
 
 BYTE_FILTERS: Final[dict[str, Callable[..., Any]]] = {
-    **{name: _number_filter(name) for name in NUMBERS},
+    **{name: _number_filter(name) for name in NUMBER_NAMES},
     "b64decode": _b64decode,
     "hexbytes": _hexbytes,
     "utf8": _data,

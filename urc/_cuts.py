@@ -5,16 +5,16 @@ given, and gives no more than `MAX_PARTS` values: it returns them or raises Type
 with words for a person.
 """
 
-import struct
 from collections.abc import Callable, Mapping, Sequence
+from functools import cache
 from typing import Any, Final
 
-from urc._bytes import NUMBERS
+from urc._number_bytes import reader_of
+from urc._numbers import number_of
 
 __all__ = ["CUT_FILTERS"]
 
 MAX_PARTS: Final = 65536
-_FLOATS: Final = {16: "e", 32: "f", 64: "d"}
 _MOST_BITS: Final = 64
 
 
@@ -109,10 +109,16 @@ def _signed(value: Any, bits: Any) -> int:
     return number - (1 << size) if number >> size - 1 else number
 
 
-def _layout(name: Any) -> tuple[str, int, Any]:
-    if isinstance(name, str) and name in NUMBERS:
-        return NUMBERS[name]
-    raise ValueError(f"a type such as 'u16le' is expected, found {_short(name)}")
+class _Short(ValueError):
+    """There is no such number in these bytes."""
+
+
+@cache  # of the names of types, which are few
+def _reader(name: str) -> Callable[[bytes, int, int], tuple[Any, int]]:
+    number = number_of(name)
+    if number is None:
+        raise ValueError(f"a type such as 'u16le' is expected, found {_short(name)}")
+    return reader_of(number, _Short)
 
 
 def _bytes(value: Any) -> bytes:
@@ -123,25 +129,27 @@ def _bytes(value: Any) -> bytes:
 
 def _unpack(value: Any, name: Any, at: Any = 0) -> int | float:
     """Return the number of that type at a place of the bytes."""
-    kind, bits, order = _layout(name)
+    read = _reader(_text(name))
     data, place = _bytes(value), _whole(at, "a place", 0, MAX_PARTS)
-    piece = data[place : place + bits // 8]
-    if len(piece) < bits // 8:
-        raise ValueError(f"{len(data)} bytes have no {name!r} at {place}")
-    if kind == "f":
-        number: float = struct.unpack((">" if order == "big" else "<") + _FLOATS[bits], piece)[0]
-        return number
-    return int.from_bytes(piece, order, signed=kind == "i")
+    try:
+        number: int | float = read(data, place, len(data))[0]
+    except _Short:
+        raise ValueError(f"{len(data)} bytes have no {name!r} at {place}") from None
+    return number
 
 
 def _numbers(value: Any, name: Any) -> list[int | float]:
     """Return all numbers of that type that the bytes hold, one behind the other."""
-    size = _layout(name)[1] // 8
-    data = _bytes(value)
-    if len(data) % size:
-        raise ValueError(f"{len(data)} bytes are no numbers of {size} each")
+    read, data = _reader(_text(name)), _bytes(value)
     _check_count(len(data), "bytes")
-    return [_unpack(data, name, place) for place in range(0, len(data), size)]
+    found, place = [], 0
+    while place < len(data):
+        try:
+            number, place = read(data, place, len(data))
+        except _Short:
+            raise ValueError(f"{len(data)} bytes have no {name!r} at {place}") from None
+        found.append(number)
+    return found
 
 
 def _hexdigits(value: Any) -> str:

@@ -5,10 +5,11 @@ returns a value or raises TypeError, ValueError or ArithmeticError with words fo
 turns small operands into a large result.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any, NamedTuple
 
-from urc import _bytes, _cuts, _geometry, _lists, _rotation
+from urc import _bytes, _cuts, _geometry, _lists, _rotation, _sums
+from urc._numbers import NUMBER_NAMES
 from urc._spelling import spelt
 
 __all__ = ["FILTERS", "SCOPE", "filter_names"]
@@ -212,6 +213,8 @@ class Filter(NamedTuple):
     arity: tuple[int, int]
     gives_bytes: bool = False
     """Only what is sent by ``hex:`` and ``bytes:`` may end in it."""
+    refuses: Callable[[str], str] | None = None
+    """Word → what is wrong with it as the first argument, "" for nothing."""
 
 
 FILTERS: dict[str, Filter] = {
@@ -243,6 +246,31 @@ FILTERS |= {name: Filter(one, (more, more)) for name, (one, more) in _bytes.TEXT
 FILTERS |= {name: Filter(*one) for name, one in _lists.LIST_FILTERS.items()}
 FILTERS |= {name: Filter(*one) for name, one in _geometry.GEOMETRY_FILTERS.items()}
 FILTERS |= {name: Filter(*one) for name, one in _cuts.CUT_FILTERS.items()}
+
+
+def _refused_type(word: str) -> str:
+    if word in NUMBER_NAMES:
+        return ""
+    return f"there is no type {word[:40]!r}{_nearest(word, NUMBER_NAMES, 'u16le')}"
+
+
+def _refused_checksum(word: str) -> str:
+    if _sums.algorithm_of(word) is not None:
+        return ""
+    known = _sums.algorithm_names()
+    return f"there is no checksum {word[:40]!r}{_nearest(word, known, 'crc16-modbus')}"
+
+
+def _nearest(word: str, known: Iterable[str], otherwise: str) -> str:
+    from difflib import get_close_matches  # 6 ms that only a broken document pays
+
+    near = get_close_matches(word[:80].lower(), sorted(known), 1, 0.5)
+    return f"; did you mean {near[0]!r}?" if near else f", such as {otherwise!r}"
+
+
+for _name in ("numbers", "unpack"):
+    FILTERS[_name] = FILTERS[_name]._replace(refuses=_refused_type)
+FILTERS["checksum"] = Filter(_sums.sum_of, (1, 1), refuses=_refused_checksum)
 
 _OPERATORS = (_add, _sub, _mul, _div, _floordiv, _mod, _pow, _item, _join)
 _TESTS = (_is_defined, _is_none, _is_number, _is_string)

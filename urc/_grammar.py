@@ -338,7 +338,10 @@ class _Parser:
         if token.kind != "name" or token.text not in _filters.FILTERS:
             known = _filters.filter_names()
             raise Refused(f"there is no filter {token.text!r}; there are: {known}", token.offset)
-        arguments = self._items(")") if self._take("(") else []
+        has_arguments = self._take("(")
+        first = self._next
+        arguments = self._items(")") if has_arguments else []
+        self._check_word(token.text, first, arguments)
         least, most = _filters.FILTERS[token.text].arity
         if not least <= len(arguments) <= most:
             expected = str(least) if least == most else f"{least} to {most}"
@@ -352,6 +355,16 @@ class _Parser:
             # The only filter that may meet a missing name, so its subject is evaluated inside it.
             subject = f"lambda: {subject}"
         return f"_filter_{token.text}({', '.join((subject, *arguments))})"
+
+    def _check_word(self, name: str, first: Token, arguments: list[str]) -> None:
+        """Refuse a constant that the filter `name` cannot take."""
+        refuses = _filters.FILTERS[name].refuses
+        if refuses is None or first.kind != "string" or not arguments:
+            return
+        word = string_of(first)
+        wrong = refuses(word) if arguments[0] == repr(word) else ""
+        if wrong:
+            raise Refused(f"{name!r}: {wrong}", first.offset)
 
     def _test(self, subject: str) -> str:
         is_negated = self._take("not")

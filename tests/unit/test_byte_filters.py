@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from urc._bytes import BYTE_FILTERS, NUMBERS
+from urc._bytes import BYTE_FILTERS
+from urc._numbers import NUMBER_NAMES, number_of
 from urc.expressions import ExpressionError, compile_expression, compile_template
 
 VALUES = [
@@ -29,6 +30,14 @@ VALUES = [
      "5bdcc146bf60754e6a042426089575c75a003f089d2739839dec58b964ec3843"),
     ("'0102' | hexbytes | sha256", hashlib.sha256(b"\1\2").hexdigest()),
     ("x | u16be | length", 2),
+    # Modbus over serial line: registers of a float, the low word first
+    ("1.0 | f32cdab", b"\x00\x00\x3f\x80"),
+    # Protocol Buffers, encoding: 300, and zigzag
+    ("300 | varint", b"\xac\x02"),
+    ("-2 | zigzag", b"\x03"),
+    ("1234 | bcd16be", b"\x12\x34"),
+    ("true | bool", b"\x01"),
+    ("171 | u14by7le", b"\x2b\x01"),
 ]  # fmt: skip
 
 
@@ -72,11 +81,50 @@ def test_wrong_values_are_refused(source: str) -> None:
         compile_expression(source, allows_bytes=True).evaluate({})
 
 
-@given(st.sampled_from(sorted(NUMBERS)), st.integers(-(2**70), 2**70) | st.floats())
+@given(st.sampled_from(NUMBER_NAMES), st.integers(-(2**70), 2**70) | st.floats())
 def test_any_number_gives_its_size_or_is_refused(name: str, number: float) -> None:
     """Never an exception of another kind, never other bytes."""
     try:
         data = compile_expression(f"x | {name}", allows_bytes=True).evaluate({"x": number})
     except ExpressionError:
         return
-    assert len(data) == NUMBERS[name][1] // 8
+    kind = number_of(name)
+    assert kind is not None
+    assert 1 <= len(data) <= 10 if kind.is_variable else len(data) == kind.size
+
+
+@given(st.sampled_from(NUMBER_NAMES), st.integers(0, 99))
+def test_what_a_filter_packs_unpack_reads(name: str, number: int) -> None:
+    """Every type that a `struct` knows, both ways."""
+    value = number % 2 if name == "bool" else number
+    source = f"x | {name} | unpack('{name}')"
+    assert compile_expression(source).evaluate({"x": value}) == value
+
+
+@pytest.mark.parametrize(
+    ("source", "expected"),
+    [
+        ("'GPGLL,5057.970,N,00146.110,E,142451,A' | checksum('xor8') | hex(2)", "27"),
+        ("'N3 T0' | checksum('xor8')", 57),
+        ("'123456789' | checksum('crc16-modbus') | hex(4)", "4B37"),
+        ("'0102' | hexbytes | checksum('sum8')", 3),
+    ],
+)
+def test_a_checksum_is_a_number(source: str, expected: object) -> None:
+    """gpsd's NMEA notes, the RepRap wiki, and the check value of the catalogue of CRCs."""
+    assert compile_expression(source).evaluate({}) == expected
+
+
+def test_a_checksum_that_does_not_exist_is_refused_at_load() -> None:
+    """With the nearest one that does."""
+    with pytest.raises(ExpressionError, match="no checksum 'xor9'; did you mean 'xor8'") as refused:
+        compile_expression("x | checksum('xor9')")
+    assert refused.value.offset == 13
+
+
+@pytest.mark.parametrize("test", ["unpack('u17be')", "numbers('flot32')", "unpack('u16')"])
+def test_a_type_that_does_not_exist_is_refused_at_load(test: str) -> None:
+    """Not at the first frame, when a robot is connected."""
+    with pytest.raises(ExpressionError, match="there is no type") as refused:
+        compile_expression(f"x | hexbytes | {test}")
+    assert refused.value.offset == 15 + test.index("(") + 1

@@ -5,11 +5,11 @@ What depends on the rest of the frame (`at: end`, `over: payload`) is settled by
 
 from typing import Any, Final, NamedTuple
 
+from urc._sums import algorithm_names, algorithm_of
 from urc.config.parse_bytes import parse_bytes
 from urc.config.part import Findings, Part
 from urc.config.suggest import did_you_mean
 from urc.model.framing import (
-    FOLDED,
     PLAIN_CHECKSUMS,
     CrcSpec,
     FoldSpec,
@@ -149,18 +149,10 @@ def _algorithm(part: Part, findings: Findings) -> CrcSpec | FoldSpec | str | Non
 
 def _named(part: Part, findings: Findings) -> CrcSpec | FoldSpec | str | None:
     name: str = part.data
-    if name in PLAIN_CHECKSUMS:
-        return name
-    if name in FOLDED:
-        return FOLDED[name]
-    from anycrc import aliases, models  # 14 ms that only a driver with a CRC pays
-
-    upper = name.upper()
-    model = models.get(aliases.get(upper, upper)) if name == name.lower() else None
-    if model is not None:
-        return CrcSpec(*model[:6])
-    known = {one.lower() for one in (*models, *aliases)} | FOLDED.keys() | PLAIN_CHECKSUMS.keys()
-    hint = did_you_mean(name, known)
+    algorithm = algorithm_of(name)
+    if algorithm is not None:
+        return algorithm
+    hint = did_you_mean(name, algorithm_names())
     if not hint.startswith("did you mean"):
         hint = "for example crc16-modbus, crc32, sum8, xor8, lrc; or give 'width' and 'poly'"
     findings.error(part, "unknown-checksum", f"there is no checksum {name!r}", hint=hint)

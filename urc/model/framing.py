@@ -5,8 +5,9 @@ byte, or, when it is negative, from behind its last one.
 """
 
 from collections.abc import Mapping
-from typing import Any, Final, Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
+from urc._sums import FOLDED, PLAIN_CHECKSUMS, CrcSpec, FoldSpec
 from urc.model.values import NOTHING
 
 __all__ = [
@@ -30,36 +31,6 @@ Spelling = Literal["raw", "hex", "HEX", "dec"]
 """How a number stands in a frame: as bytes, or as digits (``HEX``: in capitals)."""
 Digits = Literal["", "hex", "HEX", "base64"]
 """How a frame spells its bytes, between its marks: "" as they are."""
-
-
-class CrcSpec(NamedTuple):
-    """A cyclic redundancy check by its Rocksoft parameters."""
-
-    width: int
-    poly: int
-    init: int = 0
-    refin: bool = False
-    refout: bool = False
-    xorout: int = 0
-
-
-class FoldSpec(NamedTuple):
-    """All numbers of a window put together by one operation."""
-
-    operation: Literal["sum", "xor"]
-    bits: int = 8
-    """Width of the result."""
-    of: int = 8
-    """Width of the numbers; the last one is filled up with zeros."""
-    complement: Literal["none", "ones", "twos"] = "none"
-    mask: int | None = None
-    """Bits of the result that are kept."""
-    added: int = 0
-    """Number that is added to the result, after the mask."""
-    ored: int = 0
-    """Bits of the result that are set, last of all."""
-    is_odd_xored: bool = False
-    """A byte that is left over by numbers of 16 bits is put to the result by exclusive or."""
 
 
 class Window(NamedTuple):
@@ -205,22 +176,3 @@ def spelt_size(bits: int, spelling: Spelling) -> int:
     if spelling == "raw":
         return size
     return 2 * size if spelling != "dec" else len(str((1 << bits) - 1))
-
-
-FOLDED: Final = {
-    "sum8": FoldSpec("sum"),
-    "sum16": FoldSpec("sum", 16),
-    "sum32": FoldSpec("sum", 32),
-    "xor8": FoldSpec("xor"),
-    "lrc": FoldSpec("sum", complement="twos"),
-}
-"""Names of common folds."""
-PLAIN_CHECKSUMS: Final = {
-    "adler32": 32,
-    "fletcher8": 8,
-    "fletcher16": 16,
-    "fletcher16-mod256": 16,
-    "fletcher32": 32,
-    "internet": 16,
-}
-"""Algorithms without parameters, and the bits of their results."""

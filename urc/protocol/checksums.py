@@ -1,23 +1,16 @@
 """Checksums: the number over part of a frame, checked when it comes in, written when it goes out.
 
-Floor 3, pure. The arithmetic of CRCs is a library's (`anycrc`, or the standard library where it has
-that very one); sums and folds are one call into C each. Nothing here takes more than linear time.
+Floor 3, pure. The arithmetic stands in `urc._sums`; nothing here takes more than linear time.
 """
 
 import binascii
-import operator
-import zlib
-from collections.abc import Callable, Mapping
-from functools import reduce
-from itertools import accumulate
-from typing import Final
+from collections.abc import Callable
 
-from urc.model.framing import ChecksumSpec, CrcSpec, FoldSpec, Salt, Window
+from urc._sums import build_algorithm
+from urc.model.framing import ChecksumSpec, Salt, Window
 from urc.problems import UrcError
 
-__all__ = ["NAMED", "BadFrame", "Checksum", "build_algorithm", "cut"]
-
-Compute = Callable[[bytes], int]
+__all__ = ["BadFrame", "Checksum", "cut"]
 
 
 class BadFrame(UrcError):
@@ -28,93 +21,6 @@ class BadFrame(UrcError):
         self.code = code
         self.closes = closes
         """Whether the connection is to be given up."""
-
-
-def build_algorithm(spec: CrcSpec | FoldSpec | str, *, is_big: bool = True) -> Compute:
-    """Return the function from bytes to the checksum's number.
-
-    Args:
-        spec: which one.
-        is_big: order of bytes in numbers that are wider than one; only folds have such.
-    """
-    if isinstance(spec, str):
-        return NAMED[spec]
-    if isinstance(spec, FoldSpec):
-        return _fold(spec, is_big)
-    builtin = _BUILT_IN.get(spec)
-    if builtin is not None:
-        return builtin
-    from anycrc import CRC  # 14 ms that only a driver with such a checksum pays
-
-    compute: Compute = CRC(*spec).calc
-    return compute
-
-
-def _fold(spec: FoldSpec, is_big: bool) -> Compute:
-    full = (1 << spec.bits) - 1
-    mask = full if spec.mask is None else spec.mask & full
-    flip, minus = spec.complement == "ones", spec.complement == "twos"
-    is_sum, size, order = spec.operation == "sum", spec.of // 8, "big" if is_big else "little"
-    is_odd_xored = spec.is_odd_xored
-
-    def compute(data: bytes) -> int:
-        last = 0
-        if is_odd_xored and len(data) % size:
-            data, last = data[:-1], data[-1]
-        numbers = data if size == 1 else _numbers(data, size, order)
-        value = sum(numbers) if is_sum else reduce(operator.xor, numbers, 0)
-        if flip:
-            value = ~value
-        elif minus:
-            value = -value
-        return (value & mask) + spec.added & full ^ last | spec.ored
-
-    return compute
-
-
-def _numbers(data: bytes, size: int, order: str) -> list[int]:
-    filled = data + bytes(-len(data) % size)
-    is_big = order == "big"
-    return [
-        int.from_bytes(filled[place : place + size], "big" if is_big else "little")
-        for place in range(0, len(filled), size)
-    ]
-
-
-def _fletcher(modulus: int, bits: int, size: int = 1) -> Compute:
-    """Return Fletcher's sum of sums; `size` is that of the little-endian numbers it adds up."""
-
-    def compute(data: bytes) -> int:
-        numbers = data if size == 1 else _numbers(data, size, "little")
-        second = sum(accumulate(numbers))
-        return second % modulus << bits | sum(numbers) % modulus
-
-    return compute
-
-
-def _internet(data: bytes) -> int:
-    """Return the checksum of RFC 1071: the ones' complement of the ones' complement sum."""
-    total = sum(_numbers(data, 2, "big"))
-    while total > 0xFFFF:
-        total = (total & 0xFFFF) + (total >> 16)
-    return ~total & 0xFFFF
-
-
-NAMED: Final[Mapping[str, Compute]] = {
-    "adler32": zlib.adler32,
-    "fletcher8": _fletcher(15, 4),
-    "fletcher16": _fletcher(255, 8),
-    "fletcher16-mod256": _fletcher(256, 8),
-    "fletcher32": _fletcher(65535, 16, 2),
-    "internet": _internet,
-}
-"""Algorithms that have no parameters."""
-
-_BUILT_IN: Final[Mapping[CrcSpec, Compute]] = {
-    CrcSpec(32, 0x04C11DB7, 0xFFFFFFFF, True, True, 0xFFFFFFFF): zlib.crc32,
-    CrcSpec(16, 0x1021): lambda data: binascii.crc_hqx(data, 0),
-    CrcSpec(16, 0x1021, 0xFFFF): lambda data: binascii.crc_hqx(data, 0xFFFF),
-}
 
 
 class Checksum:

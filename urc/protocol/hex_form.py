@@ -4,11 +4,11 @@ import re
 from collections.abc import Callable, Mapping
 from typing import Any, cast
 
+from urc._number_bytes import reader_of
 from urc.expressions import Template
 from urc.model.binary import number_of
 from urc.model.codec import Payload, WriteSpec
 from urc.protocol.codec import CodecContext, Frame, NotWritable
-from urc.protocol.struct_value import number_reader
 
 __all__ = ["BytesWriter"]
 
@@ -61,11 +61,18 @@ class BytesWriter:
             plain = _PLAIN.fullmatch(piece.source)
             name, word = (plain[1], plain[2] or "") if plain else ("", "")
             number = number_of(_word_of(piece.source))
-            after = self._end(data, at, place) if number is None else at + number.size
+            raw: Any = None
+            if number is None:
+                after = self._end(data, at, place)
+            else:
+                try:
+                    raw, after = reader_of(number, ValueError)(data, at, len(data))
+                except ValueError:
+                    return None
             if after < 0 or after > len(data):
                 return None
             if name and number is not None:
-                found[name] = number_reader(number)(data, at)
+                found[name] = raw
             elif name and word in _WORDS:
                 found[name] = _WORDS[word](data[at:after])
             at = after

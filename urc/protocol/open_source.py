@@ -9,8 +9,8 @@ import binascii
 from collections.abc import Callable
 from typing import Final
 
+from urc._sums import build_algorithm
 from urc.model.framing import ChecksumSpec, CrcSpec, FrameLayout, Salt
-from urc.protocol.checksums import build_algorithm
 from urc.protocol.generate import function_of
 
 __all__ = ["generate_open"]

@@ -9,14 +9,10 @@ other without regard to bytes. All are bounded to 64 bits.
 from collections.abc import Callable, Mapping
 from typing import Any, Final
 
+from urc._number_bytes import reader_of, words_turned, writer_of
 from urc.model.binary import Extent, Item, Number, packed_size
 from urc.protocol.codec import BadItem, NotWritable
-from urc.protocol.struct_value import (
-    checked_raw,
-    meaning_of,
-    number_reader,
-    number_writer,
-)
+from urc.protocol.struct_value import checked_raw, meaning_of, number_writer
 
 __all__ = [
     "FAULT",
@@ -34,8 +30,6 @@ Step = Callable[[bytes, int, int, Out], int]
 
 FAULT: Final = ""
 """No item is called that: `out` keeps the first fault there."""
-_MOST_BYTES: Final = 10
-"""Of a varint of 64 bits."""
 
 
 class OtherFrame(Exception):
@@ -50,110 +44,20 @@ def note(out: Out, name: str, meaning: Callable[[Any], Any], raw: Any) -> None:
         out.setdefault(FAULT, error)
 
 
-def coded_reader(number: Number) -> Callable[[bytes, int, int], tuple[int, int]]:
+def coded_reader(number: Number) -> Callable[[bytes, int, int], tuple[Any, int]]:
     """Return the function from data, begin and end to the raw number, and where it ends.
 
     It raises `OtherFrame` when there is no such number.
     """
-    if number.kind in ("varint", "zigzag"):
-        return _read_zigzag if number.kind == "zigzag" else _read_varint
-    if number.is_by_seven:
-        return _septets_reader(number)
-    read, size = number_reader(number), number.size
-    if number.are_words_swapped:
-        straight, read = read, lambda data, at: straight(_turned(data[at : at + size]), 0)
-
-    def fixed(data: bytes, at: int, end: int) -> tuple[int, int]:
-        if at + size > end:
-            raise OtherFrame
-        return read(data, at), at + size
-
-    return _bcd_reader(number) if number.kind == "bcd" else fixed
+    return reader_of(number, OtherFrame)
 
 
-def _read_varint(data: bytes, at: int, end: int) -> tuple[int, int]:
-    value = shift = 0
-    for place in range(at, min(end, at + _MOST_BYTES)):
-        byte = data[place]
-        value |= (byte & 0x7F) << shift
-        if byte < 0x80:
-            if value >> 64:
-                break
-            return value, place + 1
-        shift += 7
-    raise OtherFrame
-
-
-def _read_zigzag(data: bytes, at: int, end: int) -> tuple[int, int]:
-    value, after = _read_varint(data, at, end)
-    return value >> 1 ^ -(value & 1), after
-
-
-def _turned(data: bytes) -> bytes:
-    """Return the words of 16 bits in the other order."""
-    return b"".join(data[place : place + 2] for place in range(len(data) - 2, -1, -2))
-
-
-def _septets_reader(number: Number) -> Callable[[bytes, int, int], tuple[int, int]]:
-    size, step = number.size, -1 if number.endian == "little" else 1
-    sign = 1 << number.bits - 1 if number.is_signed else 0
-
-    def read(data: bytes, at: int, end: int) -> tuple[int, int]:
-        after = at + size
-        if after > end:
-            raise OtherFrame
-        value = 0
-        for byte in data[at:after][::step]:
-            if byte > 0x7F:
-                raise OtherFrame
-            value = value << 7 | byte
-        return (value ^ sign) - sign, after
-
-    return read
-
-
-def _septets(number: Number, raw: int) -> bytes:
-    data = bytes(raw >> shift & 0x7F for shift in range(0, number.bits, 7))
-    return data if number.endian == "little" else data[::-1]
-
-
-def _bcd_reader(number: Number) -> Callable[[bytes, int, int], tuple[int, int]]:
-    size, step = number.size, -1 if number.endian == "little" else 1
-
-    def read(data: bytes, at: int, end: int) -> tuple[int, int]:
-        after = at + size
-        if after > end:
-            raise OtherFrame
-        digits = data[at:after][::step].hex()
-        if not digits.isdecimal():
-            raise OtherFrame
-        return int(digits), after
-
-    return read
-
-
-def coded_writer(number: Number, name: str) -> Callable[[int], bytes]:
+def coded_writer(number: Number, name: str) -> Callable[[Any], bytes]:
     """Return the function from a raw number, which fits, to its bytes."""
-    if number.kind == "varint":
-        return _written_varint
-    if number.kind == "zigzag":
-        return lambda raw: _written_varint(raw << 1 if raw >= 0 else ~(raw << 1))
-    if number.is_by_seven:
-        return lambda raw: _septets(number, raw)
-    if number.kind != "bcd":
-        write = number_writer(number, name)
-        return (lambda raw: _turned(write(raw))) if number.are_words_swapped else write
-    size, step = number.size, -1 if number.endian == "little" else 1
-    return lambda raw: bytes.fromhex(f"{raw:0{2 * size}d}")[::step]
-
-
-def _written_varint(raw: int) -> bytes:
-    written = bytearray()
-    while raw > 0x7F:
-        written.append(raw & 0x7F | 0x80)
-        raw >>= 7
-    written.append(raw)
-    return bytes(written)
+    if number.kind == "float" and number.are_words_swapped:
+        write = number_writer(number._replace(are_words_swapped=False), name)
+        return lambda raw: words_turned(write(raw))
+    return writer_of(number)
 
 
 def coded_step(item: Item) -> Step:

@@ -5,10 +5,11 @@ Floor 3, pure.
 
 from typing import Any, NamedTuple
 
+from urc._number_bytes import plain_reader
 from urc.expressions import ExpressionError, Template
 from urc.model.binary import Item, Number
 from urc.protocol.codec import NotWritable
-from urc.protocol.struct_value import number_reader, number_writer, raw_of
+from urc.protocol.struct_value import number_writer, raw_of
 
 __all__ = ["GAP", "LARGEST_FRAME", "Gap", "Pen", "Scope", "evaluate", "solved"]
 
@@ -63,7 +64,7 @@ class Pen:
             raise NotWritable(f"{gap.item.id or 'a computed number'}: it was trimmed away")
         if container != gap.item.number:
             mask = (1 << gap.item.number.bits) - 1
-            raw = number_reader(container)(bytes(self.bytes), gap.at) | (raw & mask) << gap.shift
+            raw = plain_reader(container)(bytes(self.bytes), gap.at) | (raw & mask) << gap.shift
         self.bytes[gap.at : end] = number_writer(container, gap.item.id)(raw)
 
 

@@ -12,6 +12,7 @@ from collections.abc import Callable, Mapping
 from struct import unpack_from
 from typing import Any
 
+from urc._number_bytes import format_of, order_of, plain_reader
 from urc.expressions import ExpressionError, Template
 from urc.model.binary import FRAME_NAMES, Extent, Item, Switch, joined_name, least_size
 from urc.protocol.codec import BadItem
@@ -24,11 +25,8 @@ from urc.protocol.struct_coded import (
     packed_step,
 )
 from urc.protocol.struct_value import (
-    format_of,
     meaning_of,
-    number_reader,
     number_writer,
-    order_of,
     text_of_bytes,
 )
 
@@ -113,7 +111,7 @@ def _conditional(step: Step, condition: Template) -> Step:
 
 
 def _number_step(item: Item, encoding: str) -> Step:
-    read, size, meaning = number_reader(item.number), item.number.size, meaning_of(item)
+    read, size, meaning = plain_reader(item.number), item.number.size, meaning_of(item)
     const, name = const_of(item), item.id
     has_meaning = const is None and bool(name)
 
@@ -135,11 +133,11 @@ def const_of(item: Item) -> Any:
     """Return the constant as it is read: 0.1 in 32 bits is not quite 0.1."""
     if item.const is None or item.kind != "number":
         return item.const
-    return number_reader(item.number)(number_writer(item.number, item.id)(item.const), 0)
+    return plain_reader(item.number)(number_writer(item.number, item.id)(item.const), 0)
 
 
 def _bits_step(item: Item, encoding: str) -> Step:
-    read, size = number_reader(item.number), item.number.size
+    read, size = plain_reader(item.number), item.number.size
     parts = bit_parts(item)
 
     def step(data: bytes, at: int, end: int, out: Out) -> int:

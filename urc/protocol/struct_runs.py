@@ -7,9 +7,9 @@ from collections.abc import Iterator
 from struct import Struct
 from typing import Literal, NamedTuple
 
+from urc._number_bytes import format_of
 from urc.model.binary import Item, joined_name
 from urc.protocol.struct_read import BitPart, bit_parts
-from urc.protocol.struct_value import format_of
 
 __all__ = ["Leaf", "Run", "runs_of"]
 

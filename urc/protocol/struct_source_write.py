@@ -8,6 +8,7 @@ import struct
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from urc._number_bytes import format_of
 from urc.expressions import ExpressionError
 from urc.model.binary import Item, derived_sizes
 from urc.protocol.codec import NotWritable
@@ -19,7 +20,6 @@ from urc.protocol.struct_value import (
     checked_raw,
     divisor_of,
     fixed_bytes,
-    format_of,
     number_writer,
 )
 from urc.protocol.struct_write import build_write_steps, write_frame

@@ -8,6 +8,7 @@ import struct
 from collections.abc import Callable
 from typing import Any
 
+from urc._number_bytes import plain_writer
 from urc.model.binary import Item, Number
 from urc.protocol.codec import BadItem, NotWritable
 
@@ -17,37 +18,12 @@ __all__ = [
     "divisor_of",
     "fitting",
     "fixed_bytes",
-    "format_of",
     "meaning_of",
     "not_valid",
-    "number_reader",
     "number_writer",
-    "order_of",
     "raw_of",
     "text_of_bytes",
 ]
-
-_CODES = {
-    ("integer", 8): "B",
-    ("integer", 16): "H",
-    ("integer", 32): "I",
-    ("integer", 64): "Q",
-    ("float", 16): "e",
-    ("float", 32): "f",
-    ("float", 64): "d",
-    ("boolean", 8): "?",
-}
-
-
-def format_of(number: Number) -> str:
-    """Return `struct`'s letter of a number, "" where it has none: 24, 40, 48 and 56 bits."""
-    code = _CODES.get((number.kind, number.bits), "")
-    return code.lower() if number.is_signed and number.kind == "integer" else code
-
-
-def order_of(number: Number) -> str:
-    """Return `struct`'s sign of a byte order."""
-    return "<" if number.endian == "little" else ">"
 
 
 def divisor_of(scale: float) -> int:
@@ -165,23 +141,9 @@ def checked_raw(item: Item) -> Callable[[Any], tuple[Any, Any]]:
     return checked
 
 
-def number_reader(number: Number) -> Callable[[bytes, int], Any]:
-    """Return the function from bytes and a place to the raw number; the bytes must be there."""
-    code = format_of(number)
-    if code:
-        unpack = struct.Struct(order_of(number) + code).unpack_from
-        return lambda data, at: unpack(data, at)[0]
-    size, endian, is_signed = number.size, number.endian, number.is_signed
-    return lambda data, at: int.from_bytes(data[at : at + size], endian, signed=is_signed)
-
-
 def number_writer(number: Number, name: str) -> Callable[[Any], bytes]:
     """Return the function from a raw number, which fits, to its bytes."""
-    code = format_of(number)
-    if not code:
-        size, endian, is_signed = number.size, number.endian, number.is_signed
-        return lambda raw: int(raw).to_bytes(size, endian, signed=is_signed)
-    pack = struct.Struct(order_of(number) + code).pack
+    pack = plain_writer(number)
 
     def write(raw: Any) -> bytes:
         try:
@@ -190,7 +152,7 @@ def number_writer(number: Number, name: str) -> Callable[[Any], bytes]:
             text = f"{name or 'a number'}: {_short(raw)} does not fit into f{number.bits}"
             raise NotWritable(text) from None
 
-    return write
+    return write if number.kind == "float" else pack
 
 
 def text_of_bytes(item: Item, encoding: str) -> Callable[[bytes], object]:

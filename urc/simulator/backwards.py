@@ -8,8 +8,9 @@ import ast
 from collections.abc import Callable, Iterable
 from typing import Any, Final
 
-from urc._bytes import NUMBERS, written_number
+from urc._bytes import written_number
 from urc._cuts import CUT_FILTERS
+from urc._numbers import number_of
 from urc.expressions import Template, spelt
 from urc.model.codec import ReadSpec
 from urc.protocol.convert import BadValue
@@ -117,10 +118,11 @@ def _undone(chain: list[Step], value: Any) -> tuple[object, int]:
 
 def _packed(type_name: str, value: Any) -> bytes:
     """Return a value as bytes, and the nearest that there is where it does not fit."""
-    kind, bits, _ = NUMBERS[type_name]
-    if kind != "f":
-        least = -(1 << bits - 1) if kind == "i" else 0
-        value = min(max(round(value), least), (1 << bits - (kind == "i")) - 1)
+    number = number_of(type_name)
+    if number is None:
+        raise ValueError(type_name)
+    if number.kind != "float":
+        value = min(max(round(value), number.least), number.most)
     return written_number(type_name, value)
 
 

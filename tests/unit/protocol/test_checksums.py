@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from tests.effort import examples
 from tests.unit.protocol.framing_samples import NMEA, framing, spec
+from urc._sums import NAMED, build_algorithm
 from urc.config.parse_checksum import parse_checksum
 from urc.config.part import Findings, Part
 from urc.expressions import compile_template
@@ -16,7 +17,6 @@ from urc.model.codec import WriteSpec
 from urc.model.driver import Argument, Command, Driver, TransportSpec
 from urc.model.framing import FOLDED, PLAIN_CHECKSUMS, CrcSpec, FoldSpec
 from urc.problems import to_text
-from urc.protocol.checksums import NAMED, build_algorithm
 from urc.protocol.engine import Engine
 from urc.protocol.events import Request, Send
 from urc.source import parse_document

@@ -1,0 +1,204 @@
+"""The arithmetic of checksums: what an algorithm is, and the function from bytes to its number.
+
+Floor 0. That of CRCs is a library's (`anycrc`, or the standard library where it has that very one);
+sums and folds are one call into C each.
+"""
+
+import binascii
+import operator
+import zlib
+from collections.abc import Callable, Iterable, Mapping
+from functools import cache, reduce
+from itertools import accumulate
+from typing import Any, Final, Literal, NamedTuple
+
+__all__ = [
+    "FOLDED",
+    "NAMED",
+    "PLAIN_CHECKSUMS",
+    "CrcSpec",
+    "FoldSpec",
+    "algorithm_of",
+    "algorithm_names",
+    "build_algorithm",
+    "sum_of",
+]
+
+Compute = Callable[[bytes], int]
+MAX_BYTES: Final = 65536
+
+
+class CrcSpec(NamedTuple):
+    """A cyclic redundancy check by its Rocksoft parameters."""
+
+    width: int
+    poly: int
+    init: int = 0
+    refin: bool = False
+    refout: bool = False
+    xorout: int = 0
+
+
+class FoldSpec(NamedTuple):
+    """All numbers of a window put together by one operation."""
+
+    operation: Literal["sum", "xor"]
+    bits: int = 8
+    """Width of the result."""
+    of: int = 8
+    """Width of the numbers; the last one is filled up with zeros."""
+    complement: Literal["none", "ones", "twos"] = "none"
+    mask: int | None = None
+    """Bits of the result that are kept."""
+    added: int = 0
+    """Number that is added to the result, after the mask."""
+    ored: int = 0
+    """Bits of the result that are set, last of all."""
+    is_odd_xored: bool = False
+    """A byte that is left over by numbers of 16 bits is put to the result by exclusive or."""
+
+
+FOLDED: Final = {
+    "sum8": FoldSpec("sum"),
+    "sum16": FoldSpec("sum", 16),
+    "sum32": FoldSpec("sum", 32),
+    "xor8": FoldSpec("xor"),
+    "lrc": FoldSpec("sum", complement="twos"),
+}
+"""Names of common folds."""
+PLAIN_CHECKSUMS: Final = {
+    "adler32": 32,
+    "fletcher8": 8,
+    "fletcher16": 16,
+    "fletcher16-mod256": 16,
+    "fletcher32": 32,
+    "internet": 16,
+}
+"""Algorithms without parameters, and the bits of their results."""
+
+
+def algorithm_of(name: str) -> CrcSpec | FoldSpec | str | None:
+    """Return the algorithm called `name`; None when there is none."""
+    if name in PLAIN_CHECKSUMS:
+        return name
+    if name in FOLDED:
+        return FOLDED[name]
+    from anycrc import aliases, models  # 14 ms that only a driver with a CRC pays
+
+    upper = name.upper()
+    model = models.get(aliases.get(upper, upper)) if name == name.lower() else None
+    return None if model is None else CrcSpec(*model[:6])
+
+
+def algorithm_names() -> Iterable[str]:
+    """Return the names of all algorithms."""
+    from anycrc import aliases, models
+
+    return {one.lower() for one in (*models, *aliases)} | FOLDED.keys() | PLAIN_CHECKSUMS.keys()
+
+
+@cache  # of the names of algorithms, which are few
+def _named(name: str) -> Compute:
+    algorithm = algorithm_of(name)
+    if algorithm is None:
+        raise ValueError(f"there is no checksum {name[:40]!r}")
+    return build_algorithm(algorithm)
+
+
+def sum_of(value: Any, name: Any) -> int:
+    """Return the checksum of bytes, or of text as UTF-8."""
+    data = value.encode("utf-8", "surrogatepass") if isinstance(value, str) else value
+    if not isinstance(data, bytes):
+        raise TypeError(f"text or bytes are expected, found {repr(value)[:40]}")
+    if len(data) > MAX_BYTES:
+        raise ValueError(f"the text has more than {MAX_BYTES} bytes")
+    if not isinstance(name, str):
+        raise TypeError(f"the name of a checksum is expected, found {repr(name)[:40]}")
+    return _named(name)(data)
+
+
+def build_algorithm(spec: CrcSpec | FoldSpec | str, *, is_big: bool = True) -> Compute:
+    """Return the function from bytes to the checksum's number.
+
+    Args:
+        spec: which one.
+        is_big: order of bytes in numbers that are wider than one; only folds have such.
+    """
+    if isinstance(spec, str):
+        return NAMED[spec]
+    if isinstance(spec, FoldSpec):
+        return _fold(spec, is_big)
+    builtin = _BUILT_IN.get(spec)
+    if builtin is not None:
+        return builtin
+    from anycrc import CRC  # 14 ms that only a driver with such a checksum pays
+
+    compute: Compute = CRC(*spec).calc
+    return compute
+
+
+def _fold(spec: FoldSpec, is_big: bool) -> Compute:
+    full = (1 << spec.bits) - 1
+    mask = full if spec.mask is None else spec.mask & full
+    flip, minus = spec.complement == "ones", spec.complement == "twos"
+    is_sum, size, order = spec.operation == "sum", spec.of // 8, "big" if is_big else "little"
+    is_odd_xored = spec.is_odd_xored
+
+    def compute(data: bytes) -> int:
+        last = 0
+        if is_odd_xored and len(data) % size:
+            data, last = data[:-1], data[-1]
+        numbers = data if size == 1 else _numbers(data, size, order)
+        value = sum(numbers) if is_sum else reduce(operator.xor, numbers, 0)
+        if flip:
+            value = ~value
+        elif minus:
+            value = -value
+        return (value & mask) + spec.added & full ^ last | spec.ored
+
+    return compute
+
+
+def _numbers(data: bytes, size: int, order: str) -> list[int]:
+    filled = data + bytes(-len(data) % size)
+    is_big = order == "big"
+    return [
+        int.from_bytes(filled[place : place + size], "big" if is_big else "little")
+        for place in range(0, len(filled), size)
+    ]
+
+
+def _fletcher(modulus: int, bits: int, size: int = 1) -> Compute:
+    """Return Fletcher's sum of sums; `size` is that of the little-endian numbers it adds up."""
+
+    def compute(data: bytes) -> int:
+        numbers = data if size == 1 else _numbers(data, size, "little")
+        second = sum(accumulate(numbers))
+        return second % modulus << bits | sum(numbers) % modulus
+
+    return compute
+
+
+def _internet(data: bytes) -> int:
+    """Return the checksum of RFC 1071: the ones' complement of the ones' complement sum."""
+    total = sum(_numbers(data, 2, "big"))
+    while total > 0xFFFF:
+        total = (total & 0xFFFF) + (total >> 16)
+    return ~total & 0xFFFF
+
+
+NAMED: Final[Mapping[str, Compute]] = {
+    "adler32": zlib.adler32,
+    "fletcher8": _fletcher(15, 4),
+    "fletcher16": _fletcher(255, 8),
+    "fletcher16-mod256": _fletcher(256, 8),
+    "fletcher32": _fletcher(65535, 16, 2),
+    "internet": _internet,
+}
+"""Algorithms that have no parameters."""
+
+_BUILT_IN: Final[Mapping[CrcSpec, Compute]] = {
+    CrcSpec(32, 0x04C11DB7, 0xFFFFFFFF, True, True, 0xFFFFFFFF): zlib.crc32,
+    CrcSpec(16, 0x1021): lambda data: binascii.crc_hqx(data, 0),
+    CrcSpec(16, 0x1021, 0xFFFF): lambda data: binascii.crc_hqx(data, 0xFFFF),
+}
