@@ -6,7 +6,7 @@ from typing import Literal
 from urc.config.part import Findings, Part
 from urc.config.suggest import did_you_mean
 from urc.expressions import COUNTERS, Template
-from urc.model.binary import FRAME_NAMES, Item, names_of, number_of, scope_of
+from urc.model.binary import FRAME_NAMES, OUTER_NAMES, Item, names_of, number_of, scope_of
 
 __all__ = ["Scope"]
 
@@ -40,6 +40,8 @@ class Scope:
             self.know(part, name, own.get(name))
             if self._purpose == "send" and own.get(name, item).value is None:
                 self.uses.append((part, _argument(part, name)))
+        if self._purpose == "send" and item.kind == "struct":
+            self.uses += [(part, one) for one in _outer_values(item.items)]
 
     def know(self, part: Part, name: str, item: Item | None) -> None:
         """Take note of one name."""
@@ -60,24 +62,28 @@ class Scope:
 
     def expression(self, part: Part) -> Template | None:
         """Return the expression at `part`, over the items before it."""
+        return self._expression(part, frozenset())
+
+    def _expression(self, part: Part, outer: frozenset[str]) -> Template | None:
         expression = self._findings.expression(part)
-        return None if expression is None else self._checked(part, expression)
+        return None if expression is None else self._checked(part, expression, outer)
 
     def value(self, part: Part | None) -> Template | None:
         """Return what is sent: an expression, or a plain number."""
         if part is None:
             return None
         if isinstance(part.data, str):
-            return self.expression(part)
+            # What a type sends may come from outside of it; reading never looks at a 'value'.
+            return self._expression(part, OUTER_NAMES if self._purpose == "type" else frozenset())
         from urc.expressions import compile_expression
 
         return compile_expression(repr(part.data))
 
-    def _checked(self, part: Part, expression: Template) -> Template:
+    def _checked(self, part: Part, expression: Template, outer: frozenset[str]) -> Template:
         if self._purpose == "send":
             self.uses.append((part, expression))
             return expression
-        for name in sorted(expression.names - self.known.keys() - FRAME_NAMES):
+        for name in sorted(expression.names - self.known.keys() - FRAME_NAMES - outer):
             found = expression.source.find("seq" if name == COUNTERS else name)
             self._findings.error(
                 part,
@@ -92,12 +98,25 @@ class Scope:
     def _hint(self, name: str) -> str:
         if name in ("settings", COUNTERS) and self._purpose == "type":
             return (
-                "a type knows its own items alone: write this item, with its 'value',"
-                " under send: struct: beside the type"
+                "only the 'value' of a type's item knows settings and seq():"
+                " what frames are read by cannot depend on them"
             )
         if name == "settings":
             return "what a frame must hold by a setting is said in 'when', beside the struct"
         return did_you_mean(name, [*self.known, *FRAME_NAMES], "names")
+
+
+def _outer_values(items: tuple[Item, ...]) -> Iterator[Template]:
+    """Yield what the values of a type's items take from outside of it."""
+    for item in items:
+        if item.value is not None and item.value.names & OUTER_NAMES:
+            one = item.value
+            yield Template(one.source, one.python, one.names & OUTER_NAMES, one.settings)
+        yield from _outer_values(item.items)
+        if item.switch is not None:
+            for _, case in item.switch.cases:
+                yield from _outer_values(case)
+            yield from _outer_values(item.switch.default or ())
 
 
 def _argument(part: Part, name: str) -> Template:

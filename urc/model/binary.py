@@ -9,10 +9,11 @@ from collections.abc import Iterator, Mapping
 from typing import Final, Literal, NamedTuple
 
 from urc._numbers import Number, number_of, width_of
-from urc.expressions import Template
+from urc.expressions import COUNTERS, Template
 
 __all__ = [
     "FRAME_NAMES",
+    "OUTER_NAMES",
     "WORDS_OF_TYPES",
     "Extent",
     "Item",
@@ -33,6 +34,8 @@ __all__ = [
 FRAME_NAMES: Final = frozenset(("_size", "_left"))
 """Names that expressions of a struct know beside its items: the bytes of the whole frame, and the
 bytes from the item's own first one to the end."""
+OUTER_NAMES: Final = frozenset(("settings", COUNTERS))
+"""Names that the values of a type's items know although they stand outside of it."""
 WORDS_OF_TYPES: Final = ("bytes", "text")
 
 

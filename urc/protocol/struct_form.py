@@ -3,8 +3,8 @@
 from collections.abc import Mapping
 from typing import cast
 
-from urc.expressions import ExpressionError
-from urc.model.binary import Item, names_of
+from urc.expressions import COUNTERS, ExpressionError
+from urc.model.binary import Item, joined_name, names_of
 from urc.model.codec import Payload, ReadSpec, WriteSpec
 from urc.protocol.codec import BadText, CodecContext, Frame, NotWritable
 from urc.protocol.struct_source import generate_read
@@ -25,11 +25,13 @@ class StructReader:
         self.read = generate_read(self._items, context.encoding)
         """Generated; return the fields, None for another frame, raise `BadItem`."""
         self._steps = build_write_steps(self._items, context.encoding, is_lenient=True)
+        # What answers a request carries the request's number, which `match` gives.
+        self._outer = {"settings": context.settings, COUNTERS: lambda name, low, high: low}
 
     def write(self, fields: Mapping[str, object]) -> Payload:
         """Return the frame; what is not given is zero."""
         known = {name: value for name, value in fields.items() if name in self._names}
-        data = write_frame(self._steps, known)
+        data = write_frame(self._steps, {**known, **self._outer})
         try:
             found = self.read(Frame(data, self._encoding))
         except BadText as error:
@@ -73,4 +75,8 @@ def _with_counters(items: tuple[Item, ...]) -> tuple[tuple[Item, ...], dict[str,
         if counter:
             named[place] = item._replace(id=item.id or f"_seq_{counter}")
             counters[named[place].id] = f"seq.{counter}"
+        elif item.kind == "struct" and item.times is None:
+            inner, found = _with_counters(item.items)
+            named[place] = item._replace(items=inner)
+            counters |= {joined_name(item.id, name): one for name, one in found.items()}
     return tuple(named), counters

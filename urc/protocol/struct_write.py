@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 from urc.expressions import Template
 from urc.model.binary import (
     FRAME_NAMES,
+    OUTER_NAMES,
     Extent,
     Item,
     Number,
@@ -101,7 +102,9 @@ def _conditional(step: WriteStep, item: Item, condition: Template, rules: Rules)
 
 def _given(item: Item, scope: Scope, rules: Rules, zero: object) -> Any:
     """Return the value of `item`: computed, given, or zero."""
-    if item.value is not None:
+    # An answer repeats the number of its request, which is computed in the request alone.
+    is_repeated = rules.is_lenient and bool(item.id) and scope.get(item.id) is not None
+    if item.value is not None and not is_repeated:
         return evaluate(item.value, scope)
     value = scope.get(item.id) if item.id else None
     if value is not None:
@@ -280,7 +283,7 @@ def _array_step(item: Item, count: Extent, rules: Rules) -> WriteStep:
         for value in values:
             if is_struct and not isinstance(value, Mapping):
                 raise NotWritable(f"{name}: a mapping is expected, found {value!r}"[:200])
-            inner: Scope = dict(value) if is_struct else {item.id: value}
+            inner: Scope = {**value, **_outer(scope)} if is_struct else {item.id: value}
             for step in steps:
                 step(pen, inner)
 
@@ -325,10 +328,16 @@ def _struct_step(item: Item, rules: Rules) -> WriteStep:
         inner = scope
         if item.id:
             inner = {name: scope[full] for name, full in names.items() if full in scope}
+            inner |= _outer(scope)
         for step in steps:
             step(pen, inner)
 
     return struct if item.size is None else _windowed(struct, item, item.size, rules)
+
+
+def _outer(scope: Scope) -> Scope:
+    """Return what a struct knows of a scope that is not its own."""
+    return {name: scope[name] for name in OUTER_NAMES if name in scope}
 
 
 def _windowed(body: WriteStep, item: Item, size: Extent, rules: Rules) -> WriteStep:

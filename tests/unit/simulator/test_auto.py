@@ -355,3 +355,39 @@ def test_a_session_that_the_robot_gives_comes_back_in_every_request(
     assert [type(one) for one in talk.replies] == [Replied]
     assert "volts" in talk.values
     assert talk.faults == []
+
+
+def test_a_header_of_a_type_is_read_and_written(tmp_path: Path) -> None:
+    """Modbus on TCP: the transaction number of a request, and the unit, come back."""
+    profile = profile_of(
+        tmp_path,
+        """
+transports:
+  wire:
+    type: tcp
+    host: 127.0.0.1
+    port: 502
+    framing: { type: length, length: { offset: 4, size: 2, adjust: 6 }, payload: { from: 0 } }
+settings: { unit: { type: integer, default: 17 } }
+signals: { level: { type: integer, min: 3, max: 4 } }
+types:
+  header:
+    - { id: _id, type: u16be, value: "seq('id', 1, 65535)" }
+    - u16be 0
+    - { type: u16be, value: "_size - 6" }
+    - { type: u8, value: settings.unit }
+commands:
+  read:
+    send: { struct: [header, u8 3, u16be 1, u16be 1] }
+    reply: { struct: [header, u8 3, u8 2, u16be level], match: _id == seq.id }
+  write:
+    args: { level: { type: integer, min: 0, max: 9 } }
+    send: { struct: [{ id: head, type: header }, u8 6, u16be 1, u16be level] }
+    reply: { struct: [header, u8 6, u16be 1, u16be _level], match: _id == seq.id }
+""",
+    )
+    line = Twin(profile, {"unit": 17}).line("wire")
+    ask = bytes.fromhex("0005 0000 0006 11 03 0001 0001")
+    assert line.receive(ask, 0.0)[0][:-1] == bytes.fromhex("0005 0000 0005 11 03 02 00")
+    write = bytes.fromhex("0006 0000 0006 11 06 0001 0004")
+    assert line.receive(write, 0.0)[0][:9] == bytes.fromhex("0006 0000 0006 11 06 00")
