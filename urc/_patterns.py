@@ -120,8 +120,12 @@ class Pattern:
         return f"Pattern({self.source!r})"
 
 
-def compile_pattern(text: str) -> Pattern:
+def compile_pattern(text: str, *, is_over_bytes: bool = False) -> Pattern:
     """Compile a pattern.
+
+    Args:
+        text: as written in the document.
+        is_over_bytes: whether it looks at bytes, each of which is one character, and not at text.
 
     Raises:
         PatternError: no pattern, one that uses what the dialect lacks, or needs an absent RE2.
@@ -147,7 +151,7 @@ def compile_pattern(text: str) -> Pattern:
         ends_there = tree[-1] == (_constants.AT, _constants.AT_END)
         source = text[:-1] + r"\Z" if ends_there else text
         return Pattern(text, groups, re.compile(source, re.ASCII).match, True)
-    cost = _cost(tree)
+    cost = _cost(tree, 1 if is_over_bytes else _BEYOND_ASCII)
     if cost > MAX_COST:
         raise PatternError(
             f"this pattern counts to {cost} parts; {MAX_COST} are allowed: use smaller numbers in"
@@ -290,20 +294,21 @@ def cost_of(source: str) -> int:
     return _cost(_parser.parse(source, re.ASCII))
 
 
-def _cost(tree: Any) -> int:
-    return sum(_cost_of_item(operation, argument) for operation, argument in tree)
+def _cost(tree: Any, beyond: int = _BEYOND_ASCII) -> int:
+    """Return the parts of a program; `beyond` are those of all characters beyond ASCII."""
+    return sum(_cost_of_item(operation, argument, beyond) for operation, argument in tree)
 
 
-def _cost_of_item(operation: Any, argument: Any) -> int:
+def _cost_of_item(operation: Any, argument: Any, beyond: int) -> int:
     if operation is _constants.LITERAL:
-        return len(chr(argument).encode("utf-8", "surrogatepass"))
+        return 1 if beyond == 1 else len(chr(argument).encode("utf-8", "surrogatepass"))
     if operation is _constants.SUBPATTERN:
-        return _cost(argument[3]) + (0 if argument[0] is None else 2)
+        return _cost(argument[3], beyond) + (0 if argument[0] is None else 2)
     if operation is _constants.BRANCH:
-        return sum(_cost(part) + 1 for part in argument[1]) - 1
+        return sum(_cost(part, beyond) + 1 for part in argument[1]) - 1
     if operation in (_constants.MAX_REPEAT, _constants.MIN_REPEAT):
         low, high, inner = argument
-        once = _cost(inner)
+        once = _cost(inner, beyond)
         if high is _constants.MAXREPEAT:
             return int(max(low, 1) * once + 1)
         return int(high * once + (high - low))
@@ -311,7 +316,7 @@ def _cost_of_item(operation: Any, argument: Any) -> int:
     if characters is None:
         return 1
     starts = sum(1 for code in characters if code < _OTHER and code - 1 not in characters)
-    return starts + (_BEYOND_ASCII if _OTHER in characters else 0)
+    return starts + (beyond if _OTHER in characters else 0)
 
 
 def _re2_search(text: str) -> Any:

@@ -88,6 +88,14 @@ def test_the_count_follows_the_program_that_re2_makes() -> None:
         assert real / 2 <= cost_of(source) <= real * 2, source
 
 
+def test_a_byte_counts_as_one_character() -> None:
+    """A framing looks at bytes: a class of many is no larger than one of few."""
+    sentence = r"\$[^\r\n]{1,80}\r\n"
+    assert compile_pattern(sentence, is_over_bytes=True).source == sentence
+    with pytest.raises(PatternError, match="this pattern counts to"):
+        compile_pattern(r"\$[^\r\n]{1,800}\r\n", is_over_bytes=True)
+
+
 def test_a_package_whose_pattern_costs_too_much_is_refused_when_it_is_read() -> None:
     with pytest.raises(ProblemsError, match="this pattern counts to"):
         open_document(ATTACKS / "pattern-bomb" / "driver.yaml")

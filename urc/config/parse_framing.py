@@ -17,7 +17,7 @@ from urc.registry import Catalog
 __all__ = ["parse_framing"]
 
 _SWITCHABLE: Final = (
-    "delimiter", "fixed", "length", "slip", "cobs", "regex", "brackets", "json",
+    "delimiter", "fixed", "length", "slip", "cobs", "regex", "brackets", "json", "xml",
 )  # fmt: skip
 """Framings that find the end of a frame in its bytes, so that another may go on behind it."""
 
@@ -97,7 +97,7 @@ def _check_raw(
 
 def _regex(part: Part, encoding: str, findings: Findings) -> dict[str, Any]:
     inner = part.must("pattern")
-    if findings.pattern(inner) is not None:
+    if findings.pattern(inner, is_over_bytes=True) is not None:
         check_frame_pattern(inner, findings)
     return {"pattern": inner.data} | _tx(part, encoding, findings)
 
@@ -125,6 +125,7 @@ _PARSERS: Final[dict[str, Callable[[Part, str, Findings], dict[str, Any]]]] = {
     "regex": _regex,
     "brackets": _plain,
     "json": _tx,
+    "xml": _tx,
     "datagram": _plain,
 }
 

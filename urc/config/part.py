@@ -149,10 +149,10 @@ class Findings:
             return default
         return seconds
 
-    def pattern(self, part: Part) -> Pattern | None:
+    def pattern(self, part: Part, *, is_over_bytes: bool = False) -> Pattern | None:
         """Compile the pattern at `part`, or report why it cannot be."""
         try:
-            return compile_pattern(part.data)
+            return compile_pattern(part.data, is_over_bytes=is_over_bytes)
         except PatternError as error:
             self.error(part, "bad-pattern", str(error), offset=error.offset)
             return None

@@ -29,7 +29,9 @@ class XmlStep(NamedTuple):
     tag: str
     """Local name, without its namespace."""
     place: int = 1
-    """Which one of that name, from 1."""
+    """Which one of that name and these attributes, from 1."""
+    attributes: tuple[tuple[str, str], ...] = ()
+    """Name and value of each attribute that it must have."""
 
 
 class XmlPath(NamedTuple):

@@ -49,6 +49,7 @@ FRAMINGS = Table(
         "regex": "urc.protocol.framings.searched:RegexFraming.from_spec",
         "brackets": "urc.protocol.framings.searched:BracketsFraming.from_spec",
         "json": "urc.protocol.framings.json_values:JsonFraming.from_spec",
+        "xml": "urc.protocol.framings.xml_elements:XmlFraming.from_spec",
         "switch": "urc.protocol.framings.switched:SwitchFraming.from_spec",
     },
 )

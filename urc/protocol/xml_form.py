@@ -49,7 +49,7 @@ class XmlReader:
             if path is None:
                 continue
             if root is None:
-                root = ElementTree.Element(path.steps[0].tag)
+                root = ElementTree.Element(path.steps[0].tag, dict(path.steps[0].attributes))
             _put(root, path, field_text(value))
         if root is None:
             raise NotWritable("a document without any of its fields says nothing")
@@ -87,15 +87,24 @@ def _local(tag: object) -> str:
 
 
 def _child(element: ElementTree.Element, step: XmlStep) -> ElementTree.Element | None:
-    same = (child for child in element if _local(child.tag) == step.tag)
+    same = (child for child in element if _is_meant(child, step))
     for place, child in enumerate(same, 1):
         if place == step.place:
             return child
     return None
 
 
+def _is_meant(element: ElementTree.Element, step: XmlStep) -> bool:
+    if _local(element.tag) != step.tag:
+        return False
+    if not step.attributes:
+        return True
+    found = {_local(name): value for name, value in element.attrib.items()}
+    return all(found.get(name) == value for name, value in step.attributes)
+
+
 def _find(root: ElementTree.Element, path: XmlPath) -> str | None:
-    if _local(root.tag) != path.steps[0].tag:
+    if not _is_meant(root, path.steps[0]):
         return None
     element: ElementTree.Element | None = root
     for step in path.steps[1:]:
@@ -115,7 +124,7 @@ def _put(root: ElementTree.Element, path: XmlPath, text: str) -> None:
     for step in path.steps[1:]:
         child = _child(element, step)
         while child is None:
-            ElementTree.SubElement(element, step.tag)
+            ElementTree.SubElement(element, step.tag, dict(step.attributes))
             child = _child(element, step)
         element = child
     if path.attribute:

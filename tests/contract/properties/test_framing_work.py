@@ -77,6 +77,11 @@ HOSTILE = [
     (BRACKETS % 1000, b"(x"),
     (BRACKETS % 1000, b"()"),
     ("{ type: brackets, open: '~', close: '~' }", b"~"),
+    ("{ type: xml }", b"<"),
+    ("{ type: xml }", b"<a>"),
+    ("{ type: xml }", b"<a b='"),
+    ("{ type: xml }", b"<!--"),
+    ("{ type: xml }", b"<a></b>"),
     ("{ type: json }", b"["),
     ("{ type: json }", b"[{"),
     ("{ type: json }", b'["\\'),
@@ -118,8 +123,8 @@ def count_patterns(counter: Counter, monkeypatch: pytest.MonkeyPatch) -> None:
     """Count what checksums sum up, and what patterns go over."""
     window = checksums.Checksum._window
 
-    def counted(self: checksums.Checksum, frame: bytes | bytearray) -> bytes:
-        data = window(self, frame)
+    def counted(self: checksums.Checksum, frame: bytes | bytearray, place: int) -> bytes:
+        data = window(self, frame, place)
         counter.bytes += len(data)
         return data
 

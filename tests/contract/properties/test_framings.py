@@ -88,6 +88,7 @@ RESYNC = [
     "regex",
     "brackets",
     "json",
+    "xml elements without a root",
     "nmea and ubx",
     "remregs replies",
     "decimal checksum",
@@ -195,6 +196,9 @@ REFUSED = [
      "nothing between two marks that are the same is no frame"),
     ("{ type: json }", b'{"a": 1', "b'{\"a\": 1' is not one JSON object or array"),
     ("{ type: json }", b"{}{}", "b'{}{}' is not one JSON object or array"),
+    ("{ type: xml }", b"<a/><b/>", "b'<a/><b/>' is not one XML element"),
+    ("{ type: xml }", b"<a></b>", "b'<a></b>' is not one XML element"),
+    ("{ type: xml }", b"go", "b'go' is not one XML element"),
     ("{ type: regex, pattern: '[a-z]+;' }", b"ab;c;",
      "b'ab;c;' makes no frame that the pattern of the framing takes"),
     ("{ type: regex, pattern: '[a-z]+;', tx: LF }", b"a\nb", "b'a\\nb' contains b'\\n': it would be"
@@ -233,6 +237,13 @@ BAD = [
     ("{ type: json }", b"{]{}", ["bad-json"], [b"{}"]),
     ("{ type: json, max: 8 }", b'{"a":"12345"}{}', ["frame-too-long"], [b"{}"]),
     ("{ type: json }", b"[" * 300 + b"]{}", ["bad-json"], None),
+    ("{ type: xml }", b"<?xml v='1'?>\n<!-- a --> <a/>\r\n<b/>", [], [b"<a/>", b"<b/>"]),
+    ("{ type: xml }", b"<a><b></a></b><c/>", ["bad-xml"], None),
+    ("{ type: xml }", b"<a <b/><c/>", ["bad-xml"], [b"<b/>", b"<c/>"]),
+    ("{ type: xml }", b"</a><c/>", ["bad-xml"], [b"<c/>"]),
+    ("{ type: xml }", b"<!DOCTYPE a><c/>", ["bad-xml"], [b"<c/>"]),
+    ("{ type: xml, max: 8 }", b"<a>12345</a><c/>", ["frame-too-long"], None),
+    ("{ type: xml }", b"<a>" * 101 + b"<c/>", ["bad-xml"], [b"<c/>"]),
     ("{ type: regex, pattern: '[a-z]{4,}\\n', max: 8 }", b"a" * 40 + b"\nabcd\n",
      ["frame-too-long"], [b"abcd\n"]),
     ("{ type: datagram, max: 2 }", b"abc", ["frame-too-long"], []),
@@ -298,6 +309,14 @@ def test_commands_may_end_otherwise_than_what_a_pattern_cuts() -> None:
     with pytest.raises(FramingError):
         there.encode(b"none")
     assert there.reversed() == here
+
+
+def test_xml_commands_may_end_with_a_mark() -> None:
+    """As some servers want it, though an element ends by itself."""
+    here = framing("{ type: xml, tx: NUL }")
+    assert here.encode(b"<go/>") == b"<go/>\0"
+    assert here.reversed().decoder().feed(b"<go/>\0<stop/>\0") == [b"<go/>", b"<stop/>"]
+    assert here.decoder().feed(here.reversed().encode(b"<ok/>")) == [b"<ok/>"]
 
 
 def test_json_commands_may_end_with_a_line_feed() -> None:

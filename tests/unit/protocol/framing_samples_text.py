@@ -51,4 +51,19 @@ TEXT = [
         [b"foob", b"fooba", b"", b"foobar"],
         "RFC 4648, test vectors",
     ),
+    Sample(
+        "xml elements without a root",
+        "{ type: xml }",
+        b"<getProperties version='1.7'/>"
+        b"<setNumberVector device='Telescope' name='COORD'>"
+        b'<oneNumber name="RA">5.2</oneNumber><oneNumber name="a>b"/></setNumberVector>'
+        b"<message text='</x>'><!-- </message> --><![CDATA[</message>]]></message>",
+        [
+            b"<getProperties version='1.7'/>",
+            b"<setNumberVector device='Telescope' name='COORD'>"
+            b'<oneNumber name="RA">5.2</oneNumber><oneNumber name="a>b"/></setNumberVector>',
+            b"<message text='</x>'><!-- </message> --><![CDATA[</message>]]></message>",
+        ],
+        "INDI protocol 1.7; XML 1.0",
+    ),
 ]

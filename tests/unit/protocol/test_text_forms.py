@@ -32,6 +32,9 @@ NAMED = "keyvalue: { pairs: ' ', separator: '=', fields: { B: bat } }"
 JSON = """json: { a: b.c, d: "e[1].f", g: h, k: "e[0].f", q: '"x y".z' }"""
 SEARCH = 'json: { top: "max(x)", second: "x[1]" }'
 XML = 'xml: { a: s/b/@l, m: "s/m[2]" }'
+INDI = """
+xml: { ra: "v[@name='COORD']/n[@name='RA']", dec: "v[@name='COORD']/n[@name='a/b'][2]/@x" }
+"""
 
 TAIL = "split: { by: ',', fields: [_kind, null, 'joints...'] }"
 FIRST = "keyvalue: { pairs: ' ', separator: '=', first: [_kind, state], fields: { a: bat } }"
@@ -103,6 +106,10 @@ READS = [
     (XML, b"<s><b", None),
     (XML, b"<s>" * 5000 + b"</s>" * 5000, None),
     (XML, b'<!DOCTYPE s [<!ENTITY a "b">]><s><b l="&a;"/></s>', None),
+    (INDI, b"<v name='COORD'><n name='DEC'>1</n><n name='RA'> 5.2 </n></v>", {"ra": "5.2"}),
+    (INDI, b"<v name='COORD'><n name='a/b'/><n>2</n><n name='a/b' x='3'/></v>", {"dec": "3"}),
+    (INDI, b"<v name='OTHER'><n name='RA'>5.2</n></v>", None),
+    (INDI, b"<v><n name='RA'>5.2</n></v>", None),
     ("equals: pong", b"pong", {}),
     ("equals: pong", b"pong ", None),
 ]
