@@ -1,9 +1,11 @@
 """A wire that does as told, and a guard of one line on it."""
 
 import asyncio
+from collections.abc import Callable
 
 from urc.guard import wire
 from urc.guard.client import LineSpec, LocalGuard
+from urc.guard.host import Host
 from urc.model.codec import Payload
 from urc.motion.hold import Terms
 from urc.motion.stall import STALLED_S
@@ -13,8 +15,10 @@ from urc.transports.base import ConnectFailed, PeerClosed, Transport, TransportE
 __all__ = [
     "STOP",
     "TERMS",
+    "Bench",
     "CountedWire",
     "GatedWire",
+    "Prompter",
     "Rig",
     "ScatteredWire",
     "SlowWire",
@@ -128,6 +132,67 @@ class GatedWire(Wire):
     async def send(self, data: Payload) -> None:
         await self._room.acquire()
         self.written.append(data)
+
+
+class Prompter(GatedWire):
+    """One that takes bytes at once while it is let, and all else where there is room."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.is_prompt = True
+        self.is_clogged = False
+        self.sink: Callable[[bytes], bool] | None = None
+
+    def offer(self, data: bytes) -> bool:
+        assert type(data) is bytes
+        if self.is_prompt:
+            self.written.append(data)
+        return self.is_prompt
+
+    def divert(self, sink: Callable[[bytes], bool]) -> None:
+        self.sink = sink
+
+
+class Bench:
+    """The guard's side of one line, told message by message; keeps what it says."""
+
+    def __init__(
+        self, robot: Wire, *, stalled_s: float = STALLED_S, is_strict: bool = False
+    ) -> None:
+        self.robot = robot
+        self.clock = FakeClock()
+        self.said: list[wire.FromGuard] = []
+        self.host = Host(self._emit, self.clock)
+        self.host.add(wire.Make("wire", "", {}, [], "", stalled_s, is_strict), robot)
+
+    def _emit(self, said: wire.FromGuard) -> int:
+        self.said.append(said)
+        return len(said.data) if isinstance(said, wire.Received) else 0
+
+    def tell(self, *messages: wire.ToGuard) -> None:
+        """Tell it what comes together."""
+        for message in messages:
+            self.host.take(message)
+        self.host.settle()
+
+    async def open(self, turn: int = 1) -> None:
+        self.tell(wire.Open("wire", turn, 1.0))
+        await settle()
+        assert self.heard() == [wire.Opened("wire", turn, "wire")]
+
+    def heard(self) -> list[wire.FromGuard]:
+        """Return what it said since this was last asked."""
+        said, self.said[:] = [*self.said], []
+        return said
+
+    def tick(self, data: Payload, *, number: int = 1, control: str = "drive") -> None:
+        self.tell(wire.Tick(control, number, data, self.clock.now()))
+
+    async def drive(self, terms: Terms = TERMS) -> None:
+        await self.open()
+        self.tell(wire.Arm("wire", "drive", terms))
+        self.tick(b"go 1")
+        await settle()
 
 
 class Rig:

@@ -1,0 +1,392 @@
+"""The engine's side of a guard that is a process: it is told all, watched, and replaced."""
+
+import asyncio
+import logging
+import socket
+from collections.abc import AsyncIterator, Callable
+
+import pytest
+
+from tests.unit.guard.lines import TERMS, CountedWire
+from urc.guard import client, wire
+from urc.guard.client import Guard, LineSpec
+from urc.guard.pipe import Pipe
+from urc.guard.process import Door
+from urc.testing.clock import settle
+from urc.transports.base import ConnectFailed, PeerClosed
+
+pytestmark = pytest.mark.anyio
+
+BOUND_S = 10.0
+MAKE = wire.Make("wire", "urc.transports.tcp:from_setup", {}, [], "", 0.22, False)
+TURN = TERMS._replace(stop=b"halt")
+
+
+class Process:
+    """A guard's process and its end of the pipe; it ends when the pipe does, or does not."""
+
+    def __init__(self, number: int, line: socket.socket) -> None:
+        self.pid = number
+        self.heard: list[wire.ToGuard] = []
+        self.is_killed = self.is_over = False
+        self.is_stubborn = False
+        self._changed = asyncio.Event()
+        self.pipe = Pipe(
+            line,
+            wire.encoder(),
+            wire.decoder_of_guard(),
+            take=self._take,
+            settle=lambda: None,
+            gone=self._gone,
+        )
+
+    def _take(self, said: wire.ToGuard) -> None:
+        self.heard.append(said)
+        self._changed.set()
+
+    def _gone(self) -> None:
+        self.is_over = not self.is_stubborn
+        self._changed.set()
+
+    def die(self) -> None:
+        self.is_over = True
+        self.pipe.close()
+
+    def poll(self) -> int | None:
+        return 0 if self.is_over else None
+
+    def kill(self) -> None:
+        self.is_killed = True
+        self.die()
+
+    async def hears(self, count: int) -> list[wire.ToGuard]:
+        """Return all that it was told, once that is `count` things."""
+        async with asyncio.timeout(BOUND_S):
+            while len(self.heard) < count:
+                self._changed.clear()
+                await self._changed.wait()
+        return self.heard
+
+
+class House:
+    """Where guards are started; keeps each."""
+
+    def __init__(self) -> None:
+        self.started: list[Process] = []
+        self.fault: OSError | None = None
+        self._news = asyncio.Event()
+        self.guard = Guard([LineSpec(MAKE, CountedWire())])
+
+    def launch(self, *, is_inherited: bool) -> tuple[Process, socket.socket]:
+        self._news.set()
+        if self.fault is not None:
+            raise self.fault
+        ours, theirs = socket.socketpair()
+        self.started.append(Process(len(self.started) + 1, theirs))
+        return self.started[-1], ours
+
+    async def until(self, condition: Callable[[], object]) -> None:
+        async with asyncio.timeout(BOUND_S):
+            while not condition():
+                await settle()
+
+    async def nth(self, number: int) -> Process:
+        await self.until(lambda: len(self.started) >= number)
+        return self.started[number - 1]
+
+    def begin(self) -> Process:
+        self.guard.start()
+        return self.started[-1]
+
+    async def open(self) -> None:
+        """Open the line, which the guard says it has done."""
+        opening = asyncio.ensure_future(self.guard.transports["wire"].open(BOUND_S))
+        process = self.started[-1]
+        await self.until(lambda: any(isinstance(one, wire.Open) for one in process.heard))
+        process.pipe.post(wire.Opened("wire", 1, "robot:1"))
+        await opening
+
+
+@pytest.fixture
+async def house(monkeypatch: pytest.MonkeyPatch) -> AsyncIterator[House]:
+    made = House()
+    monkeypatch.setattr(client, "launch", made.launch)
+    monkeypatch.setattr(client, "_AGAIN_S", 0.02)
+    yield made
+    made.fault = None
+    await made.guard.finish()
+    for one in made.started:
+        one.die()
+
+
+async def test_guard_is_told_what_there_is(house: House) -> None:
+    """Its lines, and what was armed before it ran."""
+    assert house.guard.pid == 0
+    house.guard.arm("wire", "drive", TERMS)
+    process = house.begin()
+    assert house.guard.pid == process.pid
+    assert await process.hears(2) == [MAKE, wire.Arm("wire", "drive", TERMS)]
+
+
+async def test_guard_is_told_what_controls_do(house: House) -> None:
+    process = house.begin()
+    house.guard.tick("drive", b"nobody armed it")
+    house.guard.arm("wire", "drive", TERMS)
+    house.guard.tick("drive", b"go 1")
+    house.guard.tick("drive", b"go 2")
+    house.guard.renew("drive", b"stop 2")
+    house.guard.release("drive")
+    house.guard.stop([("wire", "drive", TERMS)])
+    _, armed, first, second, *rest = await process.hears(7)
+    assert armed == wire.Arm("wire", "drive", TERMS)
+    assert isinstance(first, wire.Tick)
+    assert isinstance(second, wire.Tick)
+    assert (first.control, first.number, first.data) == ("drive", 1, b"go 1")
+    assert (second.number, second.data) == (2, b"go 2")
+    assert first.at_s <= second.at_s
+    assert rest == [
+        wire.Renew("drive", b"stop 2"),
+        wire.Release("drive"),
+        wire.Stop([("wire", "drive", TERMS)]),
+    ]
+
+
+async def test_stop_goes_before_what_waits_and_no_old_tick_after_it(house: House) -> None:
+    """A guard that reads late finds the stop first, of each control the newest, and no more."""
+    process = house.begin()
+    await house.open()
+    for control, terms in (("drive", TERMS), ("turn", TURN), ("lift", TERMS)):
+        house.guard.arm("wire", control, terms)
+    known = len(await process.hears(5))
+    while not house.guard._pipe.is_backed_up:  # type: ignore[union-attr]
+        assert house.guard.transports["wire"].offer(b"x" * 60000)
+        house.guard.transports["wire"]._under_way_bytes = 0
+    for number in range(3):
+        for control in ("drive", "turn", "lift"):
+            house.guard.tick(control, f"{control} {number}".encode())
+    house.guard.renew("turn", b"halt 1")
+    house.guard.renew("turn", b"halt 2")
+    house.guard.release("lift")
+    house.guard.stop([("wire", "drive", TERMS)])
+    await house.until(lambda: any(isinstance(one, wire.Renew) for one in process.heard))
+    told = [one for one in process.heard[known:] if not isinstance(one, wire.Send)]
+    stop, release, tick, renewed = told
+    assert stop == wire.Stop([("wire", "drive", TERMS)])
+    assert release == wire.Release("lift")
+    assert isinstance(tick, wire.Tick)
+    assert (tick.control, tick.number, tick.data) == ("turn", 3, b"turn 2")
+    assert renewed == wire.Renew("turn", b"halt 2")
+
+
+async def test_next_guard_is_told_what_may_move(house: House) -> None:
+    """It stops that first; what only was armed stays so; what stands needs nothing."""
+    first = house.begin()
+    await house.open()
+    for control, terms in (("drive", TERMS), ("turn", TURN), ("lift", TERMS), ("aim", TERMS)):
+        house.guard.arm("wire", control, terms)
+        if control != "turn":
+            house.guard.tick(control, b"go")
+    first.pipe.post(wire.Stopped("lift", "released", 1))
+    first.pipe.post(wire.Stopped("aim", "expired", 1))
+    async with asyncio.timeout(BOUND_S):
+        stops: list[tuple[str, str]] = []
+        while len(stops) < 2:
+            stops += await house.guard.stops()
+    assert stops == [("lift", "released"), ("aim", "expired")]
+    first.die()
+    second = await house.nth(2)
+    assert house.guard.pid == second.pid
+    assert await second.hears(4) == [
+        MAKE,
+        wire.Owe("wire", "drive", TERMS),
+        wire.Arm("wire", "turn", TURN),
+        wire.Arm("wire", "lift", TERMS),
+    ]
+    with pytest.raises(PeerClosed, match="the guard of this line ended; it is started anew"):
+        await house.guard.transports["wire"].receive()
+    house.guard.arm("wire", "drive", TERMS)
+    house.guard.tick("drive", b"go on")
+    tick = (await second.hears(6))[-1]
+    assert isinstance(tick, wire.Tick)
+    assert tick.number == 1, "the new guard counts from the beginning"
+
+
+async def test_stop_of_an_older_tick_leaves_a_control_in_doubt(house: House) -> None:
+    """A newer one was under way; whether it moves only the next stop tells."""
+    first = house.begin()
+    house.guard.arm("wire", "drive", TERMS)
+    house.guard.tick("drive", b"go 1")
+    house.guard.tick("drive", b"go 2")
+    first.pipe.post(wire.Stopped("drive", "released", 1))
+    async with asyncio.timeout(BOUND_S):
+        await house.guard.stops()
+    first.die()
+    assert await (await house.nth(2)).hears(2) == [MAKE, wire.Owe("wire", "drive", TERMS)]
+
+
+async def test_guard_that_died_is_killed_for_good(house: House) -> None:
+    """There are never two of them on one line."""
+    first = house.begin()
+    first.pipe.close()
+    await house.nth(2)
+    assert first.is_killed
+    await house.until(lambda: not house.guard._reaping)
+
+
+async def test_guards_that_end_at_once_are_started_at_a_pace(
+    house: House, caplog: pytest.LogCaptureFixture
+) -> None:
+    house.begin()
+    for number in (1, 2):
+        house.started[-1].die()
+        await house.nth(number + 1)
+    house.started[-1].die()
+    await house.until(lambda: house.guard.pid == 0)
+    assert len(house.started) == 3
+    opening = asyncio.ensure_future(house.guard.transports["wire"].open(BOUND_S))
+    fourth = await house.nth(4)
+    assert await fourth.hears(2) == [MAKE, wire.Open("wire", 1, BOUND_S)]
+    fourth.pipe.post(wire.OpenFailed("wire", 1, "no robot"))
+    with pytest.raises(ConnectFailed, match="no robot"):
+        await opening
+    assert [one.levelno for one in caplog.records] == [logging.ERROR] * 3
+
+
+async def test_guard_that_opened_a_line_was_started_well(house: House) -> None:
+    """The next ones are started at once again."""
+    house.begin()
+    for _ in range(2):
+        count = len(house.started)
+        house.started[-1].die()
+        await house.nth(count + 1)
+    opening = asyncio.ensure_future(house.guard.transports["wire"].open(BOUND_S))
+    await house.started[-1].hears(2)
+    house.started[-1].pipe.post(wire.Opened("wire", 1, "robot:1"))
+    await opening
+    for _ in range(3):
+        count = len(house.started)
+        house.started[-1].die()
+        await house.until(lambda: house.guard.pid != count)  # noqa: B023 - awaited here
+        assert len(house.started) == count + 1
+
+
+async def test_guard_that_cannot_be_started_is_tried_again(
+    house: House, caplog: pytest.LogCaptureFixture
+) -> None:
+    house.fault = OSError("no more processes")
+    house.guard.start()
+    assert house.guard.pid == 0
+    house.guard.arm("wire", "drive", TERMS)
+    house.guard.release("drive")
+    house.guard.stop([("wire", "drive", TERMS)])
+    house.guard.renew("drive", b"later")
+    assert "no more processes" in caplog.text
+    house.fault = None
+    first = await house.nth(1)
+    assert await first.hears(2) == [
+        MAKE, wire.Owe("wire", "drive", TERMS._replace(stop=b"later")),
+    ]  # fmt: skip
+
+
+async def test_what_a_line_brings_is_counted_as_on_the_other_side(house: House) -> None:
+    """The guard waits for that before it reads on."""
+    process = house.begin()
+    await house.open()
+    sizes = [process.pipe.post(wire.Received("wire", 1, b"y" * 9000)) for _ in range(2)]
+    for _ in sizes:
+        assert await house.guard.transports["wire"].receive() == b"y" * 9000
+    assert (await process.hears(3))[-1] == wire.Credit("wire", 1, sum(sizes))
+
+
+async def test_end_lets_the_guard_stop_what_moves(house: House) -> None:
+    """It is told by the end of the pipe, and waited for."""
+    process = house.begin()
+    house.guard.arm("wire", "drive", TERMS)
+    house.guard.tick("drive", b"go")
+    await process.hears(3)
+    await house.guard.finish()
+    assert (process.is_over, process.is_killed) == (True, False)
+    assert len(house.started) == 1, "nothing is started after the end"
+    assert house.guard.pid == 0
+
+
+async def test_end_of_a_guard_that_has_hardly_begun_is_at_once(house: House) -> None:
+    process = house.begin()
+    await house.guard.finish()
+    assert process.is_killed
+
+
+async def test_end_waits_for_a_guard_that_has_spoken(house: House) -> None:
+    process = house.begin()
+    await house.open()
+    await house.guard.finish()
+    assert not process.is_killed
+    with pytest.raises(PeerClosed, match="the session was closed"):
+        await house.guard.transports["wire"].receive()
+
+
+async def test_guard_that_does_not_end_is_killed(
+    house: House, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(client, "_FINISH_S", 0.01)
+    process = house.begin()
+    process.is_stubborn = True
+    house.guard.arm("wire", "drive", TERMS)
+    house.guard.tick("drive", b"go")
+    await process.hears(3)
+    await house.guard.finish()
+    assert process.is_killed
+
+
+class StubDoor(Door):
+    """One to which a guard comes when it is told to, or never."""
+
+    def __init__(self) -> None:
+        self.coming: asyncio.Future[socket.socket] = asyncio.get_running_loop().create_future()
+        self.closed = 0
+
+    async def admitted(self) -> socket.socket:
+        return await self.coming
+
+    def close(self) -> None:
+        self.closed += 1
+
+
+async def test_guard_comes_to_its_door(house: House, monkeypatch: pytest.MonkeyPatch) -> None:
+    """One that does not come is another death; what it is to know it is told when it is in."""
+    doors: list[StubDoor] = []
+    lines: list[socket.socket] = []
+
+    def launch(*, is_inherited: bool) -> tuple[Process, Door]:
+        process, line = house.launch(is_inherited=is_inherited)
+        lines.append(line)
+        doors.append(StubDoor())
+        return process, doors[-1]
+
+    monkeypatch.setattr(client, "launch", launch)
+    first = house.begin()
+    await asyncio.sleep(0)
+    doors[0].coming.set_exception(TimeoutError())
+    second = await house.nth(2)
+    assert first.is_killed
+    opening = asyncio.ensure_future(house.guard.transports["wire"].open(BOUND_S))
+    await asyncio.sleep(0)
+    assert not opening.done()
+    doors[1].coming.set_result(lines[1])
+    assert await second.hears(2) == [MAKE, wire.Open("wire", 1, BOUND_S)]
+    second.pipe.post(wire.Opened("wire", 1, "robot:1"))
+    await opening
+    assert first.heard == []
+    lines[0].close()
+
+
+async def test_end_does_not_wait_for_a_guard_at_its_door(
+    house: House, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    door = StubDoor()
+    process, line = house.launch(is_inherited=False)
+    monkeypatch.setattr(client, "launch", lambda is_inherited: (process, door))
+    house.guard.start()
+    await house.guard.finish()
+    assert (process.is_killed, door.closed) == (True, 1)
+    line.close()
