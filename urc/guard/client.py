@@ -229,24 +229,15 @@ class Guard(Client):
         if self._pipe is not None:
             self._pipe.post(said)
 
-    def tick(self, control: str, data: Payload) -> None:
-        """Renew the lease of `control`; `data` is its newest frame. Never waits."""
-        held, pipe = self._held.get(control), self._pipe
-        if held is not None:
-            held.number += 1
-            held.may_move = True
-            if pipe is not None:
-                pipe.post(wire.Tick(control, held.number, data, monotonic()), slot=control)
-
     def rehearse(self, control: str, data: Payload) -> None:
         """Let the guard go the way of a tick, and write nothing; what has to wait is left out."""
         held, pipe = self._held.get(control), self._pipe
         if held is not None and pipe is not None and not pipe.is_backed_up:
             pipe.post(wire.Rehearsal(control, held.number, data, monotonic()))
 
-    def _pass_renewed(self, said: wire.Renew) -> None:
+    def _pass_newest(self, slot: str, said: wire.ToGuard) -> None:
         if self._pipe is not None:
-            self._pipe.post(said, slot=f"{said.control} stop")
+            self._pipe.post(said, slot=slot)
 
     def _pass_stop(self, said: wire.Stop) -> None:
         if self._pipe is not None:

@@ -47,7 +47,7 @@ class Host:
         if type(said) is wire.Tick and not self._is_finishing:
             line = self._controls.get(said.control)
             if line is not None:
-                line.reins.tick(said.control, said.number, said.data, said.at_s)
+                line.reins.tick(said.control, said.number, said.data, said.at_s, said.count)
                 self._stirred.add(line)
         elif not self._is_finishing:
             self._handlers[type(said)](said)
@@ -79,7 +79,7 @@ class Host:
 
     def _send(self, said: wire.Send) -> None:
         line = self._lines[said.line]
-        line.send(said.turn, said.number, said.data)
+        line.send(said)
         self._stirred.add(line)
 
     def _release(self, said: wire.Release) -> None:
@@ -95,7 +95,7 @@ class Host:
     def _renew(self, said: wire.Renew) -> None:
         line = self._controls.get(said.control)
         if line is not None:
-            line.reins.renew(said.control, said.stop)
+            line.reins.renew(said.control, said.stop, said.stops)
 
     def _stop(self, said: wire.Stop) -> None:
         for name, control, terms in said.controls:

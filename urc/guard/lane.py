@@ -66,7 +66,7 @@ class Lane(Generic[_Tag]):
         self._clock = clock
         self._done = done
         self._after = after
-        self._waiting: deque[tuple[Payload, _Tag]] = deque()
+        self._waiting: deque[tuple[Callable[[], Payload | None], _Tag]] = deque()
         self._filled = asyncio.Event()
         self._is_free = asyncio.Event()
         self._is_free.set()
@@ -83,12 +83,17 @@ class Lane(Generic[_Tag]):
         """Return when everything was handed over."""
         await self._is_free.wait()
 
-    def put(self, data: Payload, tag: _Tag) -> None:
-        """Send `data` after what waits."""
+    def put(self, make: Callable[[], Payload | None], tag: _Tag) -> None:
+        """Send something after what waits.
+
+        Args:
+            make: asked for it when its turn has come; None: it is not to be sent any more.
+            tag: what `done` is told; not where nothing was sent.
+        """
         if not self._waiting:
             self.busy_since_s = self._clock.now()
             self._is_free.clear()
-        self._waiting.append((data, tag))
+        self._waiting.append((make, tag))
         self._filled.set()
         if self._task is None:
             self._task = asyncio.get_running_loop().create_task(self._run())
@@ -115,13 +120,15 @@ class Lane(Generic[_Tag]):
             while self._waiting:
                 if self._after is not None:
                     await self._after.until_idle()
-                data, tag = self._waiting[0]
-                fault = await self._send(data)
+                make, tag = self._waiting[0]
+                data = make()
+                fault = None if data is None else await self._send(data)
                 self._waiting.popleft()
                 self.busy_since_s = self._clock.now()
                 if not self._waiting:
                     self._empty()
-                self._done(tag, fault)
+                if data is not None:
+                    self._done(tag, fault)
 
     async def _send(self, data: Payload) -> TransportError | None:
         try:

@@ -11,6 +11,7 @@ import asyncio
 import logging
 from collections import deque
 from collections.abc import Callable, Coroutine
+from functools import partial
 from typing import Any, Final
 
 from urc.guard import wire
@@ -18,6 +19,7 @@ from urc.guard.double import Double
 from urc.guard.lane import Clock, Lane, Ring, why_broken
 from urc.guard.pipe import UNFIT
 from urc.guard.reins import Reins
+from urc.guard.tally import Tally
 from urc.model.codec import Payload
 from urc.transports.base import PeerClosed, Transport, TransportError
 from urc.transports.hurry import HURRY, Hurry
@@ -66,6 +68,7 @@ class Line:
         self._emit = emit
         self._clock = clock
         self._is_dear = make.is_strict
+        self._tally = Tally()
         self.reins = Reins(
             transport,
             clock,
@@ -73,6 +76,8 @@ class Line:
             is_strict=make.is_strict,
             told=lambda control, reason, number: self._told(control, reason, number),
             failed=self._stall,
+            tally=self._tally,
+            counted=self._tell_counted,
         )
         self._double = Double(transport, clock)
         self._offer: Callable[[bytes], bool] | None = getattr(transport, "offer", None)
@@ -101,6 +106,10 @@ class Line:
         self._credited = asyncio.Event()
         self._is_reading = False
         self._acked = 0
+        self._counted = 0
+        """Number of the newest frame with counters that the engine sent, and that has left."""
+        self._round = 0
+        """How often what the engine sent was refused because its numbers were used up."""
 
     # -- what the engine says
 
@@ -126,17 +135,44 @@ class Line:
             self.reins.look()
             self._switch(self._shut(turn))
 
-    def send(self, turn: int, number: int, data: Payload) -> None:
-        """Send what is no motion; told by `Sent` or `Refused`."""
-        if turn != self._turn or not self._is_handed:
-            return  # of an earlier connection
+    def send(self, said: wire.Send) -> None:
+        """Send what is no motion; told by `Sent`, `Refused` or `Stale`."""
+        if said.turn != self._turn or not self._is_handed or said.round != self._round:
+            return  # of an earlier connection, or made again meanwhile
+        data, number = said.data, said.number
         offer = self._offer if self._is_free() and isinstance(data, bytes) else None
-        if offer is None or not offer(data):  # type: ignore[arg-type] # no envelope, see above
-            self._lane.put(data, number)
-        elif getattr(self.transport, "is_clogged", False):
-            self._lane.put(b"", number)  # is handed over with the rest
+        if offer is not None and not self._tally.fits(said.count):
+            self._refuse(number)
+        elif offer is None or not offer(data):  # type: ignore[arg-type] # no envelope, see above
+            self._lane.put(partial(self._leave, said), number)
         else:
-            self._acked = number
+            self._count(said)
+            if getattr(self.transport, "is_clogged", False):
+                self._lane.put(lambda: b"", number)  # is handed over with the rest
+            else:
+                self._acked = number
+
+    def _leave(self, said: wire.Send) -> Payload | None:
+        """Return what is sent, now that its turn has come; None: it must not be sent any more."""
+        if said.round != self._round:
+            return None
+        if not self._tally.fits(said.count):
+            self._refuse(said.number)
+            return None
+        self._count(said)
+        # Told once the transport has the frame: the engine may answer at once.
+        asyncio.get_running_loop().call_soon(self.reins.tell_counted)
+        return said.data
+
+    def _count(self, said: wire.Send) -> None:
+        self._tally.left(said.count)
+        if said.count is not None:
+            self._counted = said.number
+
+    def _refuse(self, number: int) -> None:
+        """Send nothing of this round any more: other frames have used its numbers up."""
+        self._round += 1
+        self._emit(wire.Stale(self.name, self._turn, number, self._tally.stand))
 
     def credit(self, turn: int, amount: int) -> None:
         """Take note that the engine has taken so much."""
@@ -149,6 +185,7 @@ class Line:
         if self._acked:
             number, self._acked = self._acked, 0
             self._emit(wire.Sent(self.name, self._turn, number))
+        self.reins.tell_counted()
 
     def rehearse(self, said: wire.Rehearsal) -> None:
         """Go the way of a tick, and write nothing."""
@@ -239,13 +276,14 @@ class Line:
         self._forget_waiting()
         self._is_rescuing = False
         self._is_handed = True
-        self._acked = 0
+        self._acked = self._counted = self._round = 0
         self._credit = WINDOW_BYTES
         self._handed.set()
         divert = getattr(self.transport, "divert", None)
         if divert is not None:
             divert(self._arrived)
-        self._emit(wire.Opened(self.name, self._turn, self.transport.address))
+        address, stand = self.transport.address, self._tally.stand
+        self._emit(wire.Opened(self.name, self._turn, address, stand))
 
     async def _serve(self) -> None:
         try:
@@ -383,6 +421,11 @@ class Line:
 
     def _told(self, control: str, reason: str, number: int) -> None:
         self._emit(wire.Stopped(control, reason, number))  # type: ignore[arg-type]
+
+    def _tell_counted(self, stale: list[tuple[str, int]]) -> None:
+        if self._is_handed:
+            stand = self._tally.stand
+            self._emit(wire.Counted(self.name, self._turn, self._counted, stand, stale))
 
     def _sent(self, number: int, fault: TransportError | None) -> None:
         if fault is None:

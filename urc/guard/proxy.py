@@ -4,14 +4,16 @@ What it is told of an earlier connection it does not take: each has its turn.
 """
 
 import asyncio
+import logging
 from collections import deque
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Mapping
+from dataclasses import dataclass
 from typing import Final
 
 from urc.guard import wire
 from urc.guard.line import WINDOW_BYTES
 from urc.guard.pipe import UNFIT
-from urc.model.codec import Payload, size_of
+from urc.model.codec import Counted, Numbered, Payload, size_of
 from urc.transports.base import ConnectFailed, PeerClosed, TransportError
 
 __all__ = ["GuardedTransport"]
@@ -24,13 +26,37 @@ _OFFERED_BYTES: Final = 65536
 """What may be under way that nobody waits for."""
 _CLOGGED_BYTES: Final = 4096
 
+log = logging.getLogger(__name__)
+
 Post = Callable[[wire.ToGuard], object]
+Stands = Callable[[str, Mapping[str, int], bool], None]
+
+
+@dataclass(slots=True)
+class _Sent:
+    """Something that the guard has not handed over yet, as far as is known."""
+
+    number: int
+    size: int
+    data: Payload
+    taken: asyncio.Future[None] | None
+    """Who waits for it."""
+    counted: Counted | None
+    left: Callable[[Payload], None] | None
+    """Told what was handed over."""
 
 
 class GuardedTransport:
     """One line, opened as often as it is needed. Also a `Prompt`."""
 
-    def __init__(self, name: str, address: str, post: Post, ready: Callable[[], Awaitable[None]]):
+    def __init__(
+        self,
+        name: str,
+        address: str,
+        post: Post,
+        ready: Callable[[], Awaitable[None]],
+        stands: Stands,
+    ) -> None:
         """Prepare.
 
         Args:
@@ -38,7 +64,10 @@ class GuardedTransport:
             address: where it leads, for people.
             post: passes a message on; never waits.
             ready: returns when there is somebody who takes it.
+            stands: told how the counters of the line stand, and whether nothing with a counter is
+                under way.
         """
+        self._stands = stands
         self._name = name
         self._address = address
         self._post = post
@@ -56,8 +85,9 @@ class GuardedTransport:
         self._taken_bytes = 0
         """Not told to the guard yet."""
         self._number = 0
-        self._under_way: deque[tuple[int, int, asyncio.Future[None] | None]] = deque()
-        """Number, size, and who waits for it."""
+        self._under_way: deque[_Sent] = deque()
+        self._round = 0
+        """How often the guard has refused what was under way."""
         self._under_way_bytes = 0
 
     @property
@@ -132,6 +162,25 @@ class GuardedTransport:
         self._put(data, None)
         return True
 
+    def offer_counted(self, counted: Counted, left: Callable[[Payload], None]) -> bool:
+        """Pass a frame with counters on, which is made again until its numbers are the next ones.
+
+        Returns:
+            Whether it was taken; then `left` is told what was handed over.
+        """
+        if not self._is_open or self._under_way_bytes > _OFFERED_BYTES:
+            return False
+        self._put(counted.numbered.data, None, counted, left)
+        return True
+
+    async def send_counted(self, counted: Counted, left: Callable[[Payload], None]) -> None:
+        """Do the same, waiting while the line is full; raise `TransportError` if it broke."""
+        if not self._is_open:
+            raise PeerClosed(self._ended)
+        taken: asyncio.Future[None] = asyncio.get_running_loop().create_future()
+        self._put(counted.numbered.data, taken, counted, left)
+        await taken
+
     @property
     def is_clogged(self) -> bool:
         """Whether so much is under way that one should wait for it."""
@@ -158,8 +207,13 @@ class GuardedTransport:
                 self._received(data, size)
             case wire.Sent(turn=turn, number=number) if turn == self._turn:
                 self._sent(number)
+            case wire.Counted(turn=turn) if turn == self._turn:
+                self._counted(said)
+            case wire.Stale(turn=turn) if turn == self._turn:
+                self._send_again(said)
             case wire.Opened(turn=turn) if turn == self._turn and self._opening is not None:
                 self._opened(said.address)
+                self._stands(self._name, said.stand, True)
             case wire.OpenFailed(turn=turn) if turn == self._turn and self._opening is not None:
                 if not self._opening.done():
                     self._opening.set_result(said.message)
@@ -177,7 +231,7 @@ class GuardedTransport:
         self._ended = ""
         self._sink = None
         self._inbox.clear()
-        self._taken_bytes = self._number = 0
+        self._taken_bytes = self._number = self._round = 0
         if self._opening is not None and not self._opening.done():
             self._opening.set_result("")
 
@@ -204,22 +258,54 @@ class GuardedTransport:
             amount, self._taken_bytes = self._taken_bytes, 0
             self._post(wire.Credit(self._name, self._turn, amount))
 
-    def _put(self, data: Payload, taken: asyncio.Future[None] | None) -> None:
+    def _put(
+        self,
+        data: Payload,
+        taken: asyncio.Future[None] | None,
+        counted: Counted | None = None,
+        left: Callable[[Payload], None] | None = None,
+    ) -> None:
         self._number += 1
-        size = size_of(data)
-        self._under_way.append((self._number, size, taken))
-        self._under_way_bytes += size
+        sent = _Sent(self._number, size_of(data), data, taken, counted, left)
+        self._under_way.append(sent)
+        self._under_way_bytes += sent.size
         try:  # noted before: the answer may come at once
-            self._post(wire.Send(self._name, self._turn, self._number, data))
+            self._pass(sent, None if counted is None else counted.numbered)
         except UNFIT as fault:
             self._under_way.pop()
-            self._under_way_bytes -= size
+            self._under_way_bytes -= sent.size
             raise TransportError(f"this message cannot be passed on ({fault})") from fault
 
+    def _pass(self, sent: _Sent, numbered: Numbered | None) -> None:
+        if numbered is not None:
+            sent.data = numbered.data
+        count = None if numbered is None else numbered.takes
+        self._post(wire.Send(self._name, self._turn, sent.number, sent.data, count, self._round))
+
+    def _counted(self, said: wire.Counted) -> None:
+        under_way = (one for one in self._under_way if one.counted is not None)
+        is_settled = all(one.number <= said.sent for one in under_way)
+        self._stands(self._name, said.stand, is_settled)
+
+    def _send_again(self, said: wire.Stale) -> None:
+        """Make what was not sent again, with the numbers that are next now, in the same order."""
+        self._round += 1
+        self._stands(self._name, said.stand, True)
+        for sent in [one for one in self._under_way if one.number >= said.number]:
+            numbered = None if sent.counted is None else sent.counted.again()
+            if numbered is not None or sent.counted is None:
+                self._pass(sent, numbered)
+                continue
+            log.warning("%s: a frame cannot be written with the next number", self._address)
+            sent.counted = sent.left = None  # it is done with what is handed over next
+
     def _sent(self, number: int, fault: TransportError | None = None) -> None:
-        while self._under_way and self._under_way[0][0] <= number:
-            at, size, taken = self._under_way.popleft()
+        while self._under_way and self._under_way[0].number <= number:
+            sent = self._under_way.popleft()
+            at, size, taken = sent.number, sent.size, sent.taken
             self._under_way_bytes -= size
+            if sent.left is not None and fault is None:
+                sent.left(sent.data)
             if taken is None:
                 if fault is not None and at == number:
                     self._end(str(fault))
@@ -238,8 +324,8 @@ class GuardedTransport:
         self._is_open = False
         self._ended = reason
         self._arrived.set()
-        for _, _, taken in self._under_way:
-            if taken is not None and not taken.done():
-                taken.set_exception(PeerClosed(reason))
+        for sent in self._under_way:
+            if sent.taken is not None and not sent.taken.done():
+                sent.taken.set_exception(PeerClosed(reason))
         self._under_way.clear()
         self._under_way_bytes = 0

@@ -9,11 +9,14 @@ every few milliseconds, because nobody tells when the kernel has got rid of its 
 cut, it is owed a stop.
 """
 
+import asyncio
 from collections.abc import Callable
+from functools import partial
 from typing import Final
 
 from urc.guard.lane import Clock, Lane, Ring
-from urc.model.codec import Payload
+from urc.guard.tally import Tally
+from urc.model.codec import Count, Numbered, Payload
 from urc.motion.hold import Mover, Reason, Terms
 from urc.motion.stall import IN_FLIGHT_S, StallWatch
 from urc.transports.base import Transport, TransportError
@@ -38,6 +41,8 @@ class Reins:
         is_strict: bool,
         told: Callable[[str, Reason, int], None],
         failed: Callable[[str], None],
+        tally: Tally | None = None,
+        counted: Callable[[list[tuple[str, int]]], None] | None = None,
     ) -> None:
         """Prepare; nothing is written before `begin`.
 
@@ -50,6 +55,9 @@ class Reins:
             is_strict: motion waits until nothing at all is unsent.
             told: has each stop that was written: control, reason, number of its newest tick.
             failed: told why when the line is stalled, or takes nothing any more.
+            tally: the counters of the line.
+            counted: told when these have changed, with control and number of each tick that cannot
+                be written any more.
         """
         self._clock = clock
         self._unsent: Callable[[], int] | None = getattr(transport, "unsent", None)
@@ -58,6 +66,11 @@ class Reins:
         self._is_strict = is_strict or self._forget is not None
         self._told = told
         self._failed = failed
+        self._tally = tally or Tally()
+        self._counted = counted
+        self._counts: dict[str, Count | None] = {}
+        """Control → what its newest tick does to the counters."""
+        self._stale: list[tuple[str, int]] = []
         self._watch = StallWatch(stalled_s)
         self.lane: Lane[tuple[str, bool]] = Lane(transport, clock, self._sent)
         """For what cannot be handed over at once."""
@@ -92,26 +105,32 @@ class Reins:
         """Take ticks of `control`."""
         self._mover(control, terms).arm()
 
-    def tick(self, control: str, number: int, data: Payload, at_s: float) -> None:
+    def tick(
+        self, control: str, number: int, data: Payload, at_s: float, count: Count | None = None
+    ) -> None:
         """Take sampled input of the time `at_s`."""
         mover = self._movers.get(control)
         if mover is None:
             return
         self._numbers[control] = number
+        self._counts[control] = count
         now = self._clock.now()
-        if now - at_s < mover.terms.lease_s:  # else it waited so long that it renews nothing
-            mover.tick(data, min(at_s, now))
+        if now - at_s >= mover.terms.lease_s:
+            return  # it waited so long that it renews nothing
+        is_stale = not self._tally.fits(count)
+        if mover.tick(None if is_stale else data, min(at_s, now)) and is_stale:
+            self._stale.append((control, number))
 
     def moving(self, control: str) -> Terms | None:
         """Return the terms under which `control` moves; None: it does not."""
         mover = self._movers.get(control)
         return mover.terms if mover is not None and mover.state == "moving" else None
 
-    def renew(self, control: str, stop: Payload) -> None:
+    def renew(self, control: str, stop: Payload, stops: tuple[Numbered, ...] = ()) -> None:
         """Stop `control` with `stop` from now on."""
         mover = self._movers.get(control)
         if mover is not None:
-            mover.renew(mover.terms._replace(stop=stop))
+            mover.renew(mover.terms._replace(stop=stop, stops=stops))
 
     def release(self, control: str) -> None:
         """Stop what was let go."""
@@ -160,6 +179,8 @@ class Reins:
     def begin(self) -> None:
         """Take note that the line is open: what is owed is written first."""
         self._is_open = True
+        self._tally.begin()
+        self._stale.clear()
         self._watch.reset()
         now = self._clock.now()
         for mover in self._movers.values():
@@ -193,11 +214,26 @@ class Reins:
             elif mover.is_waiting:
                 waiting.append((control, mover))
         for control, mover in waiting:
-            if self._is_clear(now):
+            if self._tally.fits(self._counts.get(control)) and self._is_clear(now):
                 data = mover.due(now, is_clear=True)
                 if data is not None:
                     self._write(control, data, now, is_stop=False)
         self._set_alarm(now)
+        self.tell_counted()
+
+    def tell_counted(self) -> None:
+        """Tell how the counters stand, where they have changed, and what cannot be written now."""
+        if self._tally.is_changed:
+            for control, mover in self._movers.items():
+                if mover.is_waiting and not self._tally.fits(self._counts.get(control)):
+                    mover.forget()
+                    self._stale.append((control, self._numbers[control]))
+        elif not self._stale:
+            return
+        self._tally.is_changed = False
+        stale, self._stale = self._stale, []
+        if self._counted is not None:
+            self._counted(stale)
 
     def _is_clear(self, now: float) -> bool:
         if not self.lane.is_idle:
@@ -220,17 +256,51 @@ class Reins:
             self._watch.gave_up()
         self._is_stop_under_way |= is_stop
         offer = self._offer
+        data, count = self._turn(control, data, is_stop=is_stop)
         if offer is None or type(data) is not bytes or not self.lane.is_idle or not offer(data):
             self._doubtful.add(control)
-            self.lane.put(data, (control, is_stop))
-        elif is_stop:
-            self._tell(control)
+            if is_stop:
+                self.lane.put(partial(self._leave_stop, control, data), (control, is_stop))
+            else:
+                self.lane.put(partial(self._leave, control, data, count), (control, is_stop))
+        else:
+            self._tally.left(count)
+            if is_stop:
+                self._tell(control)
         if self._unsent is not None:
             # What a message takes on the line is seen at the next look; a guess that is too high
             # would make it seem that something had left.
             self._watch.wrote(len(data) if isinstance(data, bytes) else 0, now)
             self._doubtful.add(control)
             self._look_s = _LOOK_S
+
+    def _turn(self, control: str, data: Payload, *, is_stop: bool) -> tuple[Payload, Count | None]:
+        """Return what is written now, and what it does to the counters."""
+        if not is_stop:
+            return data, self._counts.get(control)
+        stops = self._movers[control].terms.stops
+        return self._tally.choose(stops) if stops else (data, None)
+
+    def _leave_stop(self, control: str, data: Payload) -> Payload:
+        """Return a stop, now that its turn in the lane has come."""
+        data, count = self._turn(control, data, is_stop=True)
+        self._tally.left(count)
+        self._tell_soon()
+        return data
+
+    def _leave(self, control: str, data: Payload, count: Count | None) -> Payload | None:
+        """Return a frame of motion in its turn; None: its numbers were used up before."""
+        fits = self._tally.fits(count)
+        if fits:
+            self._tally.left(count)
+        else:
+            self._stale.append((control, self._numbers[control]))
+        self._tell_soon()
+        return data if fits else None
+
+    def _tell_soon(self) -> None:
+        """Tell of the counters once the transport has the frame: the engine may answer at once."""
+        asyncio.get_running_loop().call_soon(self.tell_counted)
 
     def _sent(self, tag: tuple[str, bool], fault: TransportError | None) -> None:
         control, is_stop = tag

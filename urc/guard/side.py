@@ -6,21 +6,24 @@
 import asyncio
 import time
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final, NamedTuple
 
 from urc.guard import wire
 from urc.guard.host import Host
 from urc.guard.lane import Clock
-from urc.guard.proxy import GuardedTransport
-from urc.model.codec import Payload, size_of
-from urc.motion.hold import Reason, Terms
+from urc.guard.proxy import GuardedTransport, Stands
+from urc.model.codec import Count, Counted, Numbered, Payload, Series, size_of
+from urc.motion.hold import STOP_FOR_S, Reason, Terms
 from urc.transports.base import Transport
 
 __all__ = ["Client", "LineSpec", "LocalGuard"]
 
 _MOST_STOPS: Final = 256
+_TELLING_S: Final = 0.5
+"""What it may take until the guard has what it is told."""
+_UNCOUNTED: Final = Count({}, {})
 _OVERHEAD_BYTES: Final = 32
 """What a message counts for beside its payload."""
 
@@ -42,7 +45,13 @@ class _Held:
     is_armed: bool = False
     number: int = 0
     """Of the newest tick."""
+    at_s: float = 0.0
+    """When that was taken."""
+    counted: Counted | None = None
+    """Its frame, while it is held, where that carries a number."""
     may_move: bool = False
+    stopped_s: float = float("-inf")
+    """When its last stop was told."""
 
 
 class Client:
@@ -53,11 +62,14 @@ class Client:
         self._lines = tuple(lines)
         self.transports = {
             spec.make.line: GuardedTransport(
-                spec.make.line, spec.transport.address, self._post, self._ready
+                spec.make.line, spec.transport.address, self._post, self._ready, self._stands
             )
             for spec in lines
         }
         self._held: dict[str, _Held] = {}
+        self.on_stand: Stands = _unheard
+        """Told how the counters of a line stand, and whether no frame of the engine that carries
+        one is still on its way."""
         self._stops: deque[tuple[str, Reason]] = deque(maxlen=_MOST_STOPS)
         self._stopped = asyncio.Event()
 
@@ -77,27 +89,35 @@ class Client:
         held.is_armed = True
         self._post(wire.Arm(line, control, terms))
 
-    def tick(self, control: str, data: Payload) -> None:
+    def tick(self, control: str, data: Payload | Counted) -> None:
         """Renew the lease of `control`; `data` is its newest frame. Never waits."""
         held = self._held.get(control)
         if held is not None:
             held.number += 1
+            held.at_s = self._now()
             held.may_move = True
-            self._post(wire.Tick(control, held.number, data, self._now()))
+            held.counted = data if isinstance(data, Counted) else None
+            numbered = data.numbered if isinstance(data, Counted) else Numbered(data, _UNCOUNTED)
+            self._pass_tick(control, held, numbered)
+
+    def _pass_tick(self, control: str, held: _Held, numbered: Numbered) -> None:
+        count = numbered.takes if numbered.takes.after else None
+        tick = wire.Tick(control, held.number, numbered.data, held.at_s, count)
+        self._pass_newest(control, tick)
 
     def rehearse(self, control: str, data: Payload) -> None:
         """Let the guard go the way of a tick, and write nothing, where it is another process."""
 
-    def renew(self, control: str, stop: Payload) -> None:
+    def renew(self, control: str, stop: Payload | Series) -> None:
         """Let `stop` be what stops `control` from now on; it arms nothing."""
         held = self._held.get(control)
         if held is not None:
-            held.terms = held.terms._replace(stop=stop)
-            self._pass_renewed(wire.Renew(control, stop))
+            held.terms = terms = held.terms.stopped_by(stop)
+            self._pass_newest(f"{control} stop", wire.Renew(control, terms.stop, terms.stops))
 
     def release(self, control: str) -> None:
         """Stop `control`, which was let go."""
-        self._drop(control)
+        self._let_go(control)
         self._post(wire.Release(control))
 
     def stop(self, controls: Sequence[tuple[str, str, Terms]]) -> None:
@@ -106,8 +126,15 @@ class Client:
             held = self._remember(line, control, terms)
             held.is_armed = False
             held.may_move = True  # until it is known that the stop was written
-            self._drop(control)
+            self._let_go(control)
         self._pass_stop(wire.Stop(list(controls)))
+
+    def is_stopping(self, control: str) -> bool:
+        """Return whether `control` may be moving, or its stop may still be repeated."""
+        held = self._held.get(control)
+        if held is None:
+            return False
+        return held.may_move or self._now() - held.stopped_s < STOP_FOR_S + _TELLING_S
 
     async def stops(self) -> Sequence[tuple[str, Reason]]:
         """Wait for the next stops that were written; being cancelled loses none."""
@@ -117,6 +144,13 @@ class Client:
         found = tuple(self._stops)
         self._stops.clear()
         return found
+
+    def _let_go(self, control: str) -> None:
+        """Forget a tick that waits, and make none again: it would begin a motion."""
+        self._drop(control)
+        held = self._held.get(control)
+        if held is not None:
+            held.counted = None
 
     def _remember(self, line: str, control: str, terms: Terms) -> _Held:
         held = self._held.get(control)
@@ -132,14 +166,31 @@ class Client:
             self._note(said)
         elif not isinstance(said, wire.Beat):
             self.transports[said.line].take(said, size)
+            if isinstance(said, wire.Counted):
+                self._tick_again(said)
+
+    def _stands(self, line: str, stand: Mapping[str, int], is_settled: bool) -> None:
+        self.on_stand(line, stand, is_settled)
+
+    def _tick_again(self, said: wire.Counted) -> None:
+        """Make ticks again whose numbers were used up; they are as old as they were."""
+        for control, number in said.stale:
+            held = self._held.get(control)
+            if held is None or held.counted is None or held.number != number:
+                continue  # it was let go, or a newer one is under way
+            numbered = held.counted.again()
+            if numbered is not None:
+                self._pass_tick(control, held, numbered)
 
     def _note(self, said: wire.Stopped) -> None:
         held = self._held.get(said.control)
         if held is not None:
+            held.stopped_s = self._now()
             if said.number == held.number:  # else there is a newer tick under way
                 held.may_move = False
             if said.reason != "released":
                 held.is_armed = False
+                held.counted = None
         self._stops.append((said.control, said.reason))
         self._stopped.set()
 
@@ -151,7 +202,8 @@ class Client:
     def _post(self, said: wire.ToGuard) -> None:
         raise NotImplementedError
 
-    def _pass_renewed(self, said: wire.Renew) -> None:
+    def _pass_newest(self, slot: str, said: wire.ToGuard) -> None:
+        """Pass on what takes the place of what waits in its slot."""
         self._post(said)
 
     def _pass_stop(self, said: wire.Stop) -> None:
@@ -162,6 +214,10 @@ class Client:
 
     async def _ready(self) -> None:
         """Return when there is a guard."""
+
+
+def _unheard(line: str, stand: Mapping[str, int], is_settled: bool) -> None:
+    """Nobody counts."""
 
 
 class LocalGuard(Client):

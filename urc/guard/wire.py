@@ -10,7 +10,7 @@ from typing import Any
 
 import msgspec
 
-from urc.model.codec import Payload
+from urc.model.codec import Count, Numbered, Payload
 from urc.motion.hold import Reason, Terms
 
 __all__ = [
@@ -18,6 +18,7 @@ __all__ = [
     "Beat",
     "Close",
     "Closed",
+    "Counted",
     "Credit",
     "FromGuard",
     "Lost",
@@ -33,6 +34,7 @@ __all__ = [
     "Renew",
     "Send",
     "Sent",
+    "Stale",
     "Stop",
     "Stopped",
     "Tick",
@@ -75,6 +77,10 @@ class Send(msgspec.Struct, array_like=True, frozen=True, tag=3):
     number: int
     """Counts up with each of a connection."""
     data: Payload
+    count: Count | None = None
+    """Where it carries numbers of counters: it is sent only while these are next."""
+    round: int = 0
+    """How many `Stale` of the connection it comes after; else it is not sent."""
 
 
 class Close(msgspec.Struct, array_like=True, frozen=True, tag=4):
@@ -109,6 +115,8 @@ class Tick(msgspec.Struct, array_like=True, frozen=True, tag=7):
     data: Payload
     at_s: float
     """When it was taken, on this machine's monotonic clock: one that waited here is as old."""
+    count: Count | None = None
+    """As with `Send`."""
 
 
 class Release(msgspec.Struct, array_like=True, frozen=True, tag=8):
@@ -136,6 +144,7 @@ class Renew(msgspec.Struct, array_like=True, frozen=True, tag=11):
 
     control: str
     stop: Payload
+    stops: tuple[Numbered, ...] = ()
 
 
 class Rehearsal(msgspec.Struct, array_like=True, frozen=True, tag=12):
@@ -154,6 +163,8 @@ class Opened(msgspec.Struct, array_like=True, frozen=True, tag=21):
     turn: int
     address: str
     """Where it leads, for people; may be known better now."""
+    stand: dict[str, int]
+    """Counters that stops have used already."""
 
 
 class OpenFailed(msgspec.Struct, array_like=True, frozen=True, tag=22):
@@ -222,10 +233,45 @@ class Beat(msgspec.Struct, array_like=True, frozen=True, tag=29):
     """By how much its own timer was late."""
 
 
+class Counted(msgspec.Struct, array_like=True, frozen=True, tag=30):
+    """Frames with counters have left."""
+
+    line: str
+    turn: int
+    sent: int
+    """Number of the newest `Send` with counters among them."""
+    stand: dict[str, int]
+    """Counter → the last number that has left."""
+    stale: list[tuple[str, int]]
+    """Control and number of ticks that cannot be written: another frame has used their numbers."""
+
+
+class Stale(msgspec.Struct, array_like=True, frozen=True, tag=31):
+    """A `Send` and all that follow it in its round were not sent: its numbers were used up."""
+
+    line: str
+    turn: int
+    number: int
+    """Of that one."""
+    stand: dict[str, int]
+
+
 ToGuard = (
     Make | Open | Send | Close | Credit | Arm | Tick | Release | Renew | Stop | Owe | Rehearsal
 )
-FromGuard = Opened | OpenFailed | Received | Sent | Refused | Lost | Closed | Stopped | Beat
+FromGuard = (
+    Opened
+    | OpenFailed
+    | Received
+    | Sent
+    | Refused
+    | Lost
+    | Closed
+    | Stopped
+    | Beat
+    | Counted
+    | Stale
+)
 
 
 def _plain(value: object) -> object:

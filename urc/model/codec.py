@@ -9,7 +9,7 @@ whose name starts with ``_`` stays inside the document (conditions, correlation,
 """
 
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Final, NamedTuple
 
 from urc.expressions import Template
@@ -19,10 +19,14 @@ from urc.patterns import Pattern
 __all__ = [
     "NUMBERED",
     "Collect",
+    "Count",
+    "Counted",
     "Envelope",
     "FramingSpec",
+    "Numbered",
     "Payload",
     "ReadSpec",
+    "Series",
     "WriteSpec",
     "size_of",
     "traffic_of",
@@ -47,6 +51,36 @@ NUMBERED: Final = frozenset(("call", "goal", "request"))
 
 Payload = bytes | Envelope
 """One frame without its framing."""
+
+
+class Count(NamedTuple):
+    """What a frame does to the counters of its connection."""
+
+    before: dict[str, int]
+    """Last number of each counter in the frame, when the frame leaves; none: not used so far."""
+    after: dict[str, int]
+    """Number of each counter in the frame."""
+
+
+class Numbered(NamedTuple):
+    """A frame with counters. It may leave only while its numbers are the next ones."""
+
+    data: Payload
+    takes: Count
+
+
+class Series(NamedTuple):
+    """One frame, rendered once for each of the numbers that may be next when it leaves."""
+
+    frames: tuple[Numbered, ...]
+
+
+class Counted(NamedTuple):
+    """A frame with counters, and how to make it again."""
+
+    numbered: Numbered
+    again: Callable[[], Numbered | None]
+    """Renders it with the numbers that are next now; None: the frame is no longer possible."""
 
 
 class FramingSpec(NamedTuple):

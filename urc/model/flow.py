@@ -4,7 +4,7 @@ Everything here is data, made by `urc.config` and acted upon by `urc.protocol`.
 """
 
 from collections.abc import Iterator, Mapping
-from typing import Literal, NamedTuple
+from typing import Final, Literal, NamedTuple
 
 from urc.expressions import Template
 from urc.model.codec import FramingSpec, ReadSpec, WriteSpec
@@ -15,6 +15,7 @@ __all__ = [
     "MAX_STEPS",
     "MAX_STEPS_DONE",
     "MAX_STEP_S",
+    "MOST_STOPS",
     "RESENDS",
     "Asides",
     "Confirm",
@@ -108,6 +109,10 @@ class Stage(NamedTuple):
     timeout_s: float | None = None
     """None: the transport's ``timeouts.reply``."""
     asides: Asides = Asides()
+
+
+MOST_STOPS: Final = 11
+"""How often the stop of one motion is sent at most: where it may be lost, it is repeated."""
 
 
 class Hold(NamedTuple):

@@ -15,7 +15,7 @@ written when the line is back. Nothing else that waited is kept.
 
 from typing import Final, Literal, NamedTuple
 
-from urc.model.codec import Payload
+from urc.model.codec import Numbered, Payload, Series
 from urc.motion.pace import Pace
 
 __all__ = ["LEASE_S", "LONGEST_LEASE_S", "SHORTEST_LEASE_S", "Mover", "Terms"]
@@ -32,7 +32,7 @@ Reason = Literal["released", "expired", "stopped", "revoked"]
 
 
 class Terms(NamedTuple):
-    """What is agreed when a control is armed; nothing in it changes while it moves."""
+    """What is agreed when a control is armed; nothing in it but the stop changes while it moves."""
 
     stop: Payload
     """Written to stop the motion, framing included."""
@@ -42,6 +42,14 @@ class Terms(NamedTuple):
     """How long the motion lasts after the last tick, 0.1 to 1.0."""
     is_lossy: bool = False
     """The line may lose what is written (datagrams, serial, topics): a stop is repeated there."""
+    stops: tuple[Numbered, ...] = ()
+    """The stop with each number that it may have when it leaves; none: it carries no number."""
+
+    def stopped_by(self, stop: Payload | Series) -> "Terms":
+        """Return the same terms with another stop."""
+        if isinstance(stop, Series):
+            return self._replace(stop=stop.frames[0].data, stops=stop.frames)
+        return self._replace(stop=stop, stops=())
 
 
 class Mover:
@@ -104,8 +112,10 @@ class Mover:
         """Take ticks from now on; nothing moves before the first of them."""
         self.is_armed = True
 
-    def tick(self, data: Payload, now: float) -> bool:
+    def tick(self, data: Payload | None, now: float) -> bool:
         """Take a tick of sampled input: it renews the lease, and `data` is the newest value.
+
+        None renews the lease, and nothing is written: the value cannot be sent as it is.
 
         Returns:
             Whether it was taken; False when the control is to be armed anew.
@@ -118,6 +128,10 @@ class Mover:
         self._waiting = data
         self._expires_at = now + self.terms.lease_s
         return True
+
+    def forget(self) -> None:
+        """Do not write the value that waits; the lease goes on."""
+        self._waiting = None
 
     def stop(self, reason: Reason, now: float) -> None:
         """Stop; only a release asks whether anything moves, because STOP is never refused."""

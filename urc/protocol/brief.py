@@ -88,7 +88,7 @@ class Brief:
         line.send_idle(Exchange(ask, Asked(request), NOTHING, data, now + ask.queue_s), now)
         if request.on_sent is not None:
             request.on_sent(data)
-        sent = new(Send, (self._name, data, False))
+        sent = new(Send, (self._name, data, False, None))
         return [sent] if ask.answers else [sent, Replied(request.id, request.command)]
 
     def _warm_up(self) -> None:

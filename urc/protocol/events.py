@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
-from urc.model.codec import Payload
+from urc.model.codec import Counted, Payload
 from urc.model.values import NOTHING, Reading, Sample
 
 __all__ = [
@@ -45,6 +45,8 @@ class Send(NamedTuple):
     data: Payload
     is_secret: bool = False
     """Its text must not be shown or logged."""
+    counted: Counted | None = None
+    """The same frame, where others send frames with counters on this connection, too."""
 
 
 class Close(NamedTuple):

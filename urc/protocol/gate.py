@@ -4,12 +4,13 @@ Floor 3, pure. Everything is bounded, and everything that is dropped is given ba
 """
 
 from bisect import insort, insort_left
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Final, Protocol, TypeVar
 
+from urc.model.codec import Count, Numbered, Payload, Series
 from urc.model.flow import Priority
 
-__all__ = ["RANKS", "REALTIME", "Bucket", "Counters", "Draw", "Waiting"]
+__all__ = ["RANKS", "REALTIME", "Bucket", "Counters", "Draw", "Made", "Waiting"]
 
 RANKS: Final[dict[Priority, int]] = {"realtime": 0, "high": 1, "normal": 2, "low": 3}
 """Of two that wait, the one with the lower rank goes first."""
@@ -40,12 +41,17 @@ class Bucket:
         self._next_s = max(self._next_s, now) + self._period_s
 
 
+Stand = tuple[tuple[str, int], ...]
+"""How counters stand: their last numbers, by name in the order of the names."""
+Made = dict[Stand, Numbered]
+
+
 class Draw:
     """The counters of one frame: asked twice for the same one, it gives the same number."""
 
     __slots__ = ("_last", "values")
 
-    def __init__(self, last: dict[str, int]) -> None:
+    def __init__(self, last: Mapping[str, int]) -> None:
         self._last = last
         self.values: dict[str, int] = {}
         """Counter → number that the frame carries."""
@@ -57,14 +63,31 @@ class Draw:
             self.values[name] = last + 1 if low <= last < high else low
         return self.values[name]
 
+    @property
+    def count(self) -> Count:
+        """What the frame does to the counters."""
+        before = {name: self._last[name] for name in self.values if name in self._last}
+        return Count(before, dict(self.values))
+
 
 class Counters:
-    """The counters of one connection."""
+    """The counters of one connection.
 
-    __slots__ = ("_last", "counted")
+    Numbers are allotted in the order in which frames leave. A line that only the engine writes to
+    has that order by itself. A line whose motion is written by the guard is *shared*: there the
+    engine only proposes numbers, and is told how the counters stand.
+    """
+
+    __slots__ = ("_known", "_last", "ahead", "counted", "is_shared")
 
     def __init__(self) -> None:
-        self._last: dict[str, int] = {}
+        self._last: Mapping[str, int] = {}
+        """How they stand once all that was sent has left."""
+        self._known: Mapping[str, int] = {}
+        """How they stood when that was last known for sure."""
+        self.ahead = 0
+        """Frames that were counted since then."""
+        self.is_shared = False
         self.counted: Callable[[], None] | None = None
         """Called when a frame was counted; must not count any."""
 
@@ -72,19 +95,60 @@ class Counters:
         """Return the numbers of the next frame; nothing is counted yet."""
         return Draw(self._last)
 
+    def draw_urgent(self) -> Draw:
+        """Return the numbers of a frame that overtakes all that is still on its way."""
+        return Draw(self._known)
+
     def count(self, draw: Draw) -> None:
         """Count the frame that was made with `draw`."""
-        self._last.update(draw.values)
+        if not draw.values:
+            return
+        self._last = {**self._last, **draw.values}
+        if self.is_shared:
+            self.ahead += 1
+        else:
+            self._known = self._last
         if self.counted is not None:
             self.counted()
 
-    def reserve(self, draw: Draw) -> None:
-        """Keep the numbers of `draw` for a frame that may be sent later: no other gets them."""
-        self._last.update(draw.values)
+    def told(self, stand: Mapping[str, int], *, is_settled: bool) -> None:
+        """Take how shared counters stand.
+
+        Args:
+            stand: counter → the last number that has left.
+            is_settled: whether nothing that was counted here is still on its way.
+        """
+        self._known = dict(stand)
+        if is_settled:
+            self._last, self.ahead = self._known, 0
+
+    def series(self, encode: Callable[[Draw], Payload], length: int, made: Made) -> Series:
+        """Render a frame for each of the next numbers, and for the first of a new connection.
+
+        Args:
+            encode: renders it.
+            length: how many.
+            made: frames that need not be rendered again; takes those of this series.
+        """
+        frames: dict[Stand, Numbered] = {}
+        for begin, most in ((self._known, length + self.ahead), ({}, length)):
+            stand: Mapping[str, int] = begin
+            for _ in range(most):
+                key = tuple(sorted(stand.items()))
+                one = frames.get(key) or made.get(key)
+                if one is None:
+                    draw = Draw(stand)
+                    one = Numbered(encode(draw), draw.count)
+                frames[key] = one
+                stand = {**stand, **one.takes.after}
+        made.clear()
+        made.update(frames)
+        return Series(tuple(frames.values()))
 
     def begin(self) -> None:
-        """Begin anew, as each connection does."""
-        self._last = {}
+        """Begin anew, as each connection does. Shared counters begin when that is told."""
+        if not self.is_shared:
+            self._last = self._known = {}
 
 
 class Rankable(Protocol):

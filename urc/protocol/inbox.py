@@ -5,6 +5,7 @@ Floor 3, pure. See `urc.protocol.line` for the theory of operation.
 
 from collections.abc import Sequence
 
+from urc.model.codec import Counted
 from urc.model.driver import TransportSpec
 from urc.model.values import Sample
 from urc.patterns import Pattern
@@ -247,7 +248,10 @@ class Inbox:
             events.append(Samples(name, tuple(samples)))
         events += [Fault(name, "bad-value", line) for line in refused]
         if self.replies:
-            events += [Send(name, data) for data in self.replies]
+            for one in self.replies:
+                shared = one if isinstance(one, Counted) else None
+                data = one.numbered.data if isinstance(one, Counted) else one
+                events.append(Send(name, data, counted=shared))
             self.replies.clear()
         return events
 

@@ -16,8 +16,10 @@ answer of the next request, and meanwhile nothing is sent that it could be mista
 misses `urc.protocol.answering.MISSES_UNTIL_CLOSED` answers in a row is given up and opened afresh.
 """
 
+from functools import partial
+
 from urc.expressions import COUNTERS
-from urc.model.codec import Envelope, Payload, size_of, traffic_of
+from urc.model.codec import Counted, Envelope, Numbered, Payload, size_of, traffic_of
 from urc.model.driver import TransportSpec
 from urc.model.values import Reading
 from urc.protocol.answer import Ear, Heard, Matcher
@@ -149,24 +151,26 @@ class Line(Answering):
             why_not = exchange.why_not(now)
             if why_not:
                 return [Ended(exchange, Outcome("not-allowed", why_not))]
-        data = exchange.data
-        if data is None:
+        number = None
+        if ask.is_numbered:
+            number = self._number = self._number + 1
+        count = None
+        if exchange.data is None:
             try:
-                data = written(exchange, self.counters, self.learnt)
+                count = written(exchange, self.counters, self.learnt).takes
             except BadArgument as error:
                 why = UNTOLD if exchange.is_secret else str(error)
                 return [Ended(exchange, Outcome("bad-argument", why))]
-        if exchange.is_secret:
-            self.inbox.secrets.add(traffic_of(data), self.spec.encoding)
-        number = None
-        if isinstance(data, Envelope) and ask.is_numbered:
-            number = self._number = self._number + 1
-            data = data._replace(attributes={**data.attributes, "id": number})
+        data = self._as_sent(exchange, number)
         if exchange.on_sent is not None and not exchange.is_secret:
             exchange.on_sent(data)
         self.last_sent = exchange.sent_at = now
         self._outbox.sent(exchange, now)
-        sent: list[LineEvent] = [Send(self.spec.name, data, exchange.is_secret)]
+        shared = None
+        if count is not None and count.after and self.counters.is_shared:
+            again = partial(self._count_again, exchange, number)
+            shared = Counted(Numbered(data, count), again)
+        sent: list[LineEvent] = [Send(self.spec.name, data, exchange.is_secret, shared)]
         if not ask.answers:
             sent.append(Ended(exchange, DONE))
             return sent
@@ -185,6 +189,24 @@ class Line(Answering):
             return size_of(exchange.ask.encode(names))
         except BadArgument:
             return 0  # it is told when it is sent
+
+    def _as_sent(self, exchange: Exchange, number: int | None) -> Payload:
+        """Return the frame of a request; what is secret in it is not shown from now on."""
+        data = exchange.data
+        assert data is not None  # noqa: S101 - it was made just before
+        if exchange.is_secret:
+            self.inbox.secrets.add(traffic_of(data), self.spec.encoding)
+        if isinstance(data, Envelope) and number is not None:
+            data = data._replace(attributes={**data.attributes, "id": number})
+        return data
+
+    def _count_again(self, exchange: Exchange, number: int | None) -> Numbered | None:
+        """Make the frame of a request again: another frame has used up its numbers."""
+        try:
+            made = written(exchange, self.counters, self.learnt)
+        except BadArgument:
+            return None  # its answer does not come, which is told in time
+        return made._replace(data=self._as_sent(exchange, number))
 
     # -- receiving
 

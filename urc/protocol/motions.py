@@ -5,23 +5,29 @@ the newest one, and the stop before anything else. All that a command must fulfi
 a frame of motion must fulfil, too.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Container, Mapping
 from functools import partial
+from typing import Final
 
 from urc.expressions import COUNTERS
-from urc.model.codec import Payload
+from urc.model.codec import Counted, Numbered, Payload, Series
 from urc.model.driver import Command
+from urc.model.flow import MOST_STOPS
 from urc.model.values import Reading
 from urc.problems import UrcError
 from urc.protocol.brief import Write, made_for
 from urc.protocol.commands import is_guarded, why_refused
 from urc.protocol.encode import BadArgument, check_arguments
 from urc.protocol.exchange import Ask
+from urc.protocol.gate import Made
 from urc.protocol.generate import WARM_AFTER
 from urc.protocol.known import Known
 from urc.protocol.line import Line
 
 __all__ = ["Motions", "NotNow"]
+
+_SPARE_STOPS: Final = 8
+"""Numbers that other frames may use up before the stops are rendered again."""
 
 Check = Callable[[Mapping[str, object]], dict[str, Reading]]
 
@@ -71,6 +77,12 @@ class Motions:
         self._asks = asks
         self._lines = lines
         self._known = known
+        self._counting: dict[str, int] = {}
+        """Line → how many controls it has whose frames carry numbers; none: left out."""
+        self._made: dict[str, Made] = {}
+        """Command → its stops that were rendered already."""
+        self._lengths: dict[str, int] = {}
+        """Line that is shared → stops of each control that are rendered in advance."""
         self.on_count: Callable[[str], None] = _nobody
         """Told the line on which a number was used up that the stops made so far come after."""
         self.on_ready: Callable[[str], None] = _nobody
@@ -85,6 +97,29 @@ class Motions:
                 lines[line].held.add(one, asks[one].answers[0], asks[one].match)
             if asks[one].has_counters:
                 lines[line].counters.counted = partial(self._counted, line)
+                self._counting[line] = self._counting.get(line, 0) + 1
+
+    def share(self, repeating: Container[str]) -> None:
+        """Leave the numbers of frames to whoever writes motion, who says how they stand.
+
+        Args:
+            repeating: lines on which a stop is sent several times, because it may be lost.
+        """
+        for line, controls in self._counting.items():
+            self._lines[line].counters.is_shared = True
+            self._lengths[line] = controls * (MOST_STOPS if line in repeating else 1) + _SPARE_STOPS
+
+    def told(self, line: str, stand: Mapping[str, int], is_settled: bool) -> None:
+        """Take how the shared counters of a line stand.
+
+        Args:
+            line: its name.
+            stand: counter → the last number that has left.
+            is_settled: whether no frame of the engine is still on its way.
+        """
+        if line in self._lengths:
+            self._lines[line].counters.told(stand, is_settled=is_settled)
+            self.on_count(line)
 
     def is_lasting(self, command: str) -> bool:
         """Return whether its stop is the same bytes for ever; else it is to be made anew.
@@ -99,24 +134,27 @@ class Motions:
         line = self._lines[self._found(command).transport]
         return line.is_open and line.is_ready
 
-    def stop_frame(self, command: str) -> Payload:
+    def stop_frame(self, command: str) -> Payload | Series:
         """Return what stops the motion of `command`: bytes, framing included, or an envelope.
 
-        It needs no connection. A number in it is its own: no other frame gets that one.
+        It needs no connection. Where it carries a number, that is a series: the frame for each
+        number that it may have when it leaves, as many as all stops of the line may need.
 
         Raises:
             BadArgument: it is no motion, or cannot be written.
         """
         found = self._found(command)
-        hold = found.hold
+        hold, ask, line = found.hold, self._asks[command], self._lines[found.transport]
         values = check_arguments(found, {} if hold is None else hold.release)
-        counters = self._lines[found.transport].counters
-        draw = counters.draw()
-        learnt = self._lines[found.transport].learnt
-        names = {**self._known.names, **learnt, **values, COUNTERS: draw}
-        data = self._asks[command].encode(names)
-        counters.reserve(draw)
-        return data
+        names = {**self._known.names, **line.learnt, **values}
+        if not ask.has_counters:
+            return ask.encode(names)
+        return line.counters.series(
+            lambda draw: ask.encode({**names, COUNTERS: draw}),
+            self._lengths.get(found.transport, 1),
+            # What the robot says may have changed since.
+            self._made.setdefault(command, {}) if ask.is_local else {},
+        )
 
     def motion_frame(
         self,
@@ -124,8 +162,11 @@ class Motions:
         arguments: Mapping[str, object],
         now: float,
         confirmed_by: tuple[str, ...] = (),
-    ) -> Payload:
+    ) -> Payload | Counted:
         """Return the frame of `command` with these arguments, as it is to be written now.
+
+        On a line that is shared, a number in it is only proposed: it counts once the frame has
+        left, which `told` says.
 
         Args:
             command: one with `hold`.
@@ -162,10 +203,27 @@ class Motions:
         names = values if ask.is_local else {**self._known.names, **line.learnt, **values}
         if not ask.has_counters:
             return ask.encode(names)
-        draw = line.counters.draw()
+        draw = line.counters.draw_urgent()
         data = ask.encode({**names, COUNTERS: draw})
-        line.counters.count(draw)
-        return data
+        if not line.counters.is_shared:
+            line.counters.count(draw)
+            return data
+        again = partial(self._again, command, arguments, now, confirmed_by)
+        return Counted(Numbered(data, draw.count), again)
+
+    def _again(
+        self,
+        command: str,
+        arguments: Mapping[str, object],
+        now: float,
+        confirmed_by: tuple[str, ...],
+    ) -> Numbered | None:
+        """Make a frame of motion again: another frame has used up its numbers."""
+        try:
+            made = self.motion_frame(command, arguments, now, confirmed_by)
+        except UrcError:
+            return None
+        return made.numbered if isinstance(made, Counted) else None
 
     def _counted(self, line: str) -> None:
         self.on_count(line)

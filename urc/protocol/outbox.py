@@ -6,7 +6,7 @@ Floor 3, pure. See `urc.protocol.line` for the theory of operation.
 from collections.abc import Callable, Mapping
 
 from urc.expressions import COUNTERS
-from urc.model.codec import Payload
+from urc.model.codec import Count, Numbered
 from urc.model.driver import TransportSpec
 from urc.protocol.exchange import Exchange, Outcome
 from urc.protocol.flights import Flights
@@ -109,7 +109,7 @@ def _free_at(exchange: Exchange) -> float:
     return exchange.waits_until if bucket is None else max(bucket.free_at, exchange.waits_until)
 
 
-def written(exchange: Exchange, counters: Counters, learnt: Mapping[str, object]) -> Payload:
+def written(exchange: Exchange, counters: Counters, learnt: Mapping[str, object]) -> Numbered:
     """Make a frame with the next numbers of its counters; sent again, it keeps them.
 
     Args:
@@ -121,9 +121,11 @@ def written(exchange: Exchange, counters: Counters, learnt: Mapping[str, object]
         BadArgument: it cannot be written with these numbers, which are used up nevertheless.
     """
     draw = counters.draw()
+    count = Count({}, {})
     try:
         data = exchange.ask.encode({**learnt, **exchange.namespace, COUNTERS: draw})
+        count = draw.count
     finally:
         counters.count(draw)
     exchange.data, exchange.numbers = data, draw.values
-    return data
+    return Numbered(data, count)

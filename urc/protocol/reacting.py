@@ -6,10 +6,11 @@ that is a message. What is collected is forgotten with the connection; what is a
 """
 
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Final
 
 from urc.expressions import COUNTERS, ExpressionError, Template
-from urc.model.codec import Collect, Payload
+from urc.model.codec import Collect, Counted, Numbered, Payload
 from urc.protocol.convert import Unusable
 from urc.protocol.encode import BadArgument, Encode
 from urc.protocol.gate import Counters
@@ -21,7 +22,7 @@ MOST_REPLIES: Final = 256
 """Answers that are made before they are told; a frame makes one at most."""
 
 
-class Replies(list[Payload]):
+class Replies(list[Payload | Counted]):
     """Answers to messages, in their order, that are still to be sent."""
 
 
@@ -119,15 +120,27 @@ def answering(
 
     def decode_answered(found: Mapping[str, object], now: float) -> tuple[list[object], list[str]]:
         samples, refused = decode(found, now)
-        draw = None if counters is None else counters().draw()
         try:
-            data = encode(names(now, found if draw is None else {**found, COUNTERS: draw}))
+            reply = made(now, found)
         except BadArgument as error:
             return samples, [*refused, f"the answer cannot be sent: {error}"]  # type: ignore[return-value]
-        if draw is not None and counters is not None:
-            counters().count(draw)
         if len(replies) < MOST_REPLIES:
-            replies.append(data)
+            replies.append(reply)
         return samples, refused  # type: ignore[return-value]
+
+    def made(now: float, found: Mapping[str, object]) -> Payload | Counted:
+        if counters is None:
+            return encode(names(now, found))
+        own = counters()
+        numbered = drawn(own, now, found)
+        if not own.is_shared:
+            return numbered.data
+        return Counted(numbered, partial(drawn, own, now, found))
+
+    def drawn(own: Counters, now: float, found: Mapping[str, object]) -> Numbered:
+        draw = own.draw()
+        numbered = Numbered(encode(names(now, {**found, COUNTERS: draw})), draw.count)
+        own.count(draw)
+        return numbered
 
     return decode_answered  # type: ignore[return-value]

@@ -11,7 +11,7 @@ import logging
 from collections.abc import Callable, Mapping, Sequence
 from typing import Literal, Protocol
 
-from urc.model.codec import Payload
+from urc.model.codec import Counted, Payload
 from urc.model.driver import Command
 from urc.model.values import NOTHING, Sample
 from urc.protocol.events import (
@@ -89,6 +89,9 @@ class Port(Protocol):
 
     def queue(self, data: Payload, *, is_secret: bool = False) -> None:
         """Write bytes or an envelope; secret ones are not shown to whoever watches the traffic."""
+
+    def queue_counted(self, counted: Counted, *, is_secret: bool = False) -> None:
+        """Do the same with a frame whose numbers count once it has left."""
 
     def heard(self) -> None:
         """A good frame arrived."""
@@ -192,7 +195,12 @@ class Dispatcher:
             self._survive(bug)
             return answer
         if len(events) == 1 and type(sent := events[0]) is Send:
-            self._ports[sent.transport].send(sent.data, is_secret=sent.is_secret)
+            port_of_it = self._ports[sent.transport]
+            if sent.counted is None:
+                port_of_it.send(sent.data, is_secret=sent.is_secret)
+            else:
+                port_of_it.queue_counted(sent.counted, is_secret=sent.is_secret)
+                port_of_it.publish()
         elif events:
             self._perform(events, None)
         self._arm_after(now)
@@ -275,7 +283,11 @@ class Dispatcher:
                 if event.transport:
                     ports[event.transport].heard()
             elif type(event) is Send:
-                ports[event.transport].queue(event.data, is_secret=event.is_secret)
+                if event.counted is None:
+                    ports[event.transport].queue(event.data, is_secret=event.is_secret)
+                else:
+                    port = ports[event.transport]
+                    port.queue_counted(event.counted, is_secret=event.is_secret)
             elif type(event) is Replied:
                 answers.append(event)
                 if heard_on is not None and not samples:

@@ -6,7 +6,7 @@ from typing import Final
 
 from urc.guard import wire
 from urc.guard.client import CAN_GUARD, Client, Guard, LineSpec, LocalGuard
-from urc.model.codec import Payload
+from urc.model.codec import Payload, Series
 from urc.model.driver import Driver, TransportSpec
 from urc.model.values import Value
 from urc.motion.hold import Mover, Reason, Terms
@@ -14,7 +14,7 @@ from urc.motion.stall import STALLED_S, WAITED_S
 from urc.problems import UrcError
 from urc.registry import Table
 from urc.runtime.clock import Clock
-from urc.runtime.held import is_lossy, period_of
+from urc.runtime.held import Frames, is_lossy, period_of
 from urc.runtime.lines import Made, make_lines
 from urc.transports.base import Transport
 
@@ -39,7 +39,8 @@ class GuardedMovers:
         self._driver = driver
         self.client = client
         self.tick, self.rehearse = client.tick, client.rehearse
-        self._armed: dict[str, Terms] = {}
+        self._known: dict[str, Terms] = {}
+        """Of every control that was armed or stopped."""
 
     @property
     def transports(self) -> Mapping[str, Transport]:
@@ -50,9 +51,20 @@ class GuardedMovers:
         """Begin; needs a running loop."""
         self.client.start()
 
-    def stop_all(self) -> None:
-        """Stop what may be moving."""
-        self.stop({name: terms.stop for name, terms in self._armed.items()})
+    def stop_all(self, frames: Frames) -> None:
+        """Stop what may be moving, with the frames as they are now."""
+        stops: dict[str, Payload | Series] = {}
+        for name, terms in self._known.items():
+            if self.is_stopping(name):
+                try:
+                    stops[name] = frames.stop_frame(name)
+                except UrcError:
+                    stops[name] = _stop_in(terms)
+        self.stop(stops)
+
+    def is_stopping(self, command: str) -> bool:
+        """Return whether `command` may be moving, or its stop may still be repeated."""
+        return self.client.is_stopping(command)
 
     async def finish(self) -> None:
         """Stop what may be moving, close every line, and leave nothing behind."""
@@ -70,21 +82,21 @@ class GuardedMovers:
             Mover(terms)
         except ValueError as fault:
             raise UrcError(f"{command}: {fault}") from fault
-        self._armed[command] = terms
+        self._known[command] = terms
         self.client.arm(self._driver.commands[command].transport, command, terms)
 
-    def renew(self, command: str, stop: Payload) -> None:
+    def renew(self, command: str, stop: Payload | Series) -> None:
         """Let `stop` be what stops `command` from now on; it arms nothing."""
-        terms = self._armed.get(command)
+        terms = self._known.get(command)
         if terms is not None:
-            self._armed[command] = terms._replace(stop=stop)
+            self._known[command] = terms.stopped_by(stop)
             self.client.renew(command, stop)
 
     def release(self, command: str) -> None:
         """Stop `command`, which was let go."""
         self.client.release(command)
 
-    def stop(self, stops: Mapping[str, Payload]) -> None:
+    def stop(self, stops: Mapping[str, Payload | Series]) -> None:
         """Stop at once, whatever moves; these are the stop frames of all held commands."""
         if stops:
             self.client.stop([self._stop_of(command, frame) for command, frame in stops.items()])
@@ -97,15 +109,18 @@ class GuardedMovers:
         """Wait for the next stop frames that were written: command, and why it stopped."""
         return await self.client.stops()
 
-    def _stop_of(self, command: str, frame: Payload) -> tuple[str, str, Terms]:
+    def _stop_of(self, command: str, frame: Payload | Series) -> tuple[str, str, Terms]:
         known = self._driver.commands[command]
-        terms = self._armed.get(command)
-        if terms is not None:
-            terms = self._armed[command] = terms._replace(stop=frame)
-        else:
+        terms = self._known.get(command)
+        if terms is None:
             lossy = is_lossy(self._driver, known.transport)
-            terms = Terms(frame, period_s=period_of(self._driver, known), is_lossy=lossy)
+            terms = Terms(b"", period_s=period_of(self._driver, known), is_lossy=lossy)
+        terms = self._known[command] = terms.stopped_by(frame)
         return known.transport, command, terms
+
+
+def _stop_in(terms: Terms) -> Payload | Series:
+    return Series(terms.stops) if terms.stops else terms.stop
 
 
 def take_reins(

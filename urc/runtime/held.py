@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal, Protocol
 
-from urc.model.codec import Payload
+from urc.model.codec import Counted, Payload, Series
 from urc.model.driver import Command, Driver
 from urc.model.flow import Hold
 from urc.model.values import Reading
@@ -31,10 +31,12 @@ class Frames(Protocol):
     def is_ready(self, command: str) -> bool:
         """Return whether its line is connected, and its start-up steps are done."""
 
-    def stop_frame(self, command: str) -> Payload:
+    def stop_frame(self, command: str) -> Payload | Series:
         """Return what stops the motion of a held command; raise `UrcError` when it cannot."""
 
-    def motion_frame(self, command: str, arguments: Mapping[str, Reading], now: float) -> Payload:
+    def motion_frame(
+        self, command: str, arguments: Mapping[str, Reading], now: float
+    ) -> Payload | Counted:
         """Return the frame of a held command; raise `UrcError` that says why not."""
 
 
@@ -44,14 +46,17 @@ class Movers(Protocol):
     def arm(self, command: str, terms: Terms) -> None:
         """Take ticks of `command` from now on, under these terms."""
 
-    def tick(self, command: str, data: Payload) -> None:
+    def tick(self, command: str, data: Payload | Counted) -> None:
         """Renew the lease of `command`; `data` is its newest frame."""
 
     def rehearse(self, command: str, data: Payload) -> None:
         """Do what a tick takes, and write nothing."""
 
-    def renew(self, command: str, stop: Payload) -> None:
+    def renew(self, command: str, stop: Payload | Series) -> None:
         """Let `stop` be what stops `command` from now on; it arms nothing."""
+
+    def is_stopping(self, command: str) -> bool:
+        """Return whether `command` may be moving, or its stop may still be repeated."""
 
     def is_open(self, command: str) -> bool:
         """Return whether its line is connected, by the newest that is known."""
@@ -59,7 +64,7 @@ class Movers(Protocol):
     def release(self, command: str) -> None:
         """Stop `command`, which was let go."""
 
-    def stop(self, stops: Mapping[str, Payload]) -> None:
+    def stop(self, stops: Mapping[str, Payload | Series]) -> None:
         """Stop at once, whatever moves; these are the stop frames of all held commands."""
 
     async def stops(self) -> Sequence[tuple[str, Reason]]:
@@ -88,7 +93,7 @@ class Control:
     """What stops it is the same for as long as it is armed."""
     course: Literal["rest", "moving", "ending"] = "rest"
     """``ending``: it was let go, and nobody has said yet that its stop was written."""
-    stop: Payload | None = None
+    stop: Payload | Series | None = None
     """What stops it, as the movers know it."""
     is_owed_again: bool = False
     """Its stop went out on a line that was not ready: it is repeated when it is."""

@@ -23,7 +23,7 @@ import logging
 from collections.abc import Callable, Coroutine
 from typing import Any
 
-from urc.model.codec import Envelope, Payload
+from urc.model.codec import Counted, Envelope, Payload
 from urc.model.driver import TransportSpec
 from urc.protocol.events import Fault
 from urc.runtime.clock import Clock, Repeating, within
@@ -153,6 +153,12 @@ class Link:
         ended = self._ended
         if ended is not None and self._close_reason is None and not ended.done():
             self._outgoing.put(data, is_secret=is_secret)
+
+    def queue_counted(self, counted: Counted, *, is_secret: bool = False) -> None:
+        """Do what `queue` does with a frame whose numbers count once it has left."""
+        ended = self._ended
+        if ended is not None and self._close_reason is None and not ended.done():
+            self._outgoing.put(counted.numbered.data, is_secret=is_secret, counted=counted)
 
     def send(self, data: Payload, *, is_secret: bool = False) -> None:
         """Do what `queue` and `publish` do, for the only thing that is to be written now."""

@@ -19,7 +19,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from secrets import randbelow
 
-from urc.model.codec import Payload
+from urc.model.codec import Counted, Payload, Series
 from urc.model.driver import Driver
 from urc.model.values import Reading
 from urc.motion.fresh import Freshness, Input
@@ -258,12 +258,14 @@ class MotionDesk:
         finally:
             self._is_making = False
         if not counts:
-            movers.rehearse(command, data)
+            if not isinstance(data, Counted):
+                movers.rehearse(command, data)
             return ""
         self.lease.touch(now)
         control.course = "moving"
         movers.tick(command, data)
-        self.on_moved(screen.client, epoch, command, arguments, data, now)
+        shown = data.numbered.data if isinstance(data, Counted) else data
+        self.on_moved(screen.client, epoch, command, arguments, shown, now)
         return ""
 
     def _abandon(self, command: str, control: Control, movers: Movers, why: str) -> None:
@@ -345,7 +347,9 @@ class MotionDesk:
         if frames is None or movers is None:
             return
         for name, control in self._controls.items():
-            if control.line != line or not control.is_armed or frames.is_lasting(name):
+            if control.line != line or frames.is_lasting(name):
+                continue
+            if not (control.is_armed or movers.is_stopping(name)):
                 continue
             try:
                 stop = frames.stop_frame(name)
@@ -361,12 +365,13 @@ class MotionDesk:
     def _terms(self, command: str, frames: Frames) -> Terms:
         control = self._controls[command]
         control.stop = stop = frames.stop_frame(command)
-        return Terms(
-            stop,
+        terms = Terms(
+            b"",
             period_s=control.period_s,
             lease_s=control.hold.lease_s,
             is_lossy=self._is_lossy[command],
         )
+        return terms.stopped_by(stop)
 
     def _settle(self, outcome: Changed | None, *, is_stopped: bool = False) -> None:
         if outcome is None:
@@ -385,9 +390,11 @@ class MotionDesk:
         if moving and self._movers is not None:
             self._movers.stop(self._stop_frames(moving))
 
-    def _stop_frames(self, commands: Sequence[str] | Mapping[str, object]) -> dict[str, Payload]:
+    def _stop_frames(
+        self, commands: Sequence[str] | Mapping[str, object]
+    ) -> dict[str, Payload | Series]:
         """Return the stop frames; one that cannot be made must not keep back the others."""
-        made: dict[str, Payload] = {}
+        made: dict[str, Payload | Series] = {}
         for name in commands:
             control = self._controls[name]
             try:

@@ -6,10 +6,12 @@ wait before them: they go straight to the kernel, in the call that queues them o
 """
 
 import asyncio
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
+from functools import partial
+from typing import NamedTuple, Protocol, runtime_checkable
 
-from urc.model.codec import Payload, size_of
+from urc.model.codec import Counted, Payload, size_of
 from urc.runtime.clock import Clock
 from urc.runtime.hub import Hub
 from urc.runtime.report import REDACTED, LinkReport
@@ -21,6 +23,27 @@ MAX_QUEUED_BYTES = 262_144
 """Bytes that may wait to be written; with more the line is given up, and says so."""
 STUCK_S = 5.0
 """A robot that takes no byte for this long is gone."""
+
+
+class _Waiting(NamedTuple):
+    """Something to be written."""
+
+    data: Payload
+    shown: Payload
+    """What the traffic shows of it."""
+    counted: Counted | None = None
+    """Its numbers count once it has left: it goes by itself."""
+
+
+@runtime_checkable
+class _Shared(Protocol):
+    """A transport on which others send frames with counters, too."""
+
+    def offer_counted(self, counted: Counted, left: Callable[[Payload], None]) -> bool:
+        """Pass it on without waiting; return whether it was taken. `left` is told what left."""
+
+    async def send_counted(self, counted: Counted, left: Callable[[Payload], None]) -> None:
+        """Pass it on, waiting until it has left."""
 
 
 class Outgoing:
@@ -53,8 +76,8 @@ class Outgoing:
         self._give_up = give_up
         self._is_stream = is_stream
         self._prompt: Prompt | None = None
-        self._waiting: list[tuple[Payload, Payload]] = []
-        """What is written, and what the traffic shows of it."""
+        self._shared = transport if isinstance(transport, _Shared) else None
+        self._waiting: list[_Waiting] = []
         self._bytes = 0
         self._has_some = asyncio.Event()
         self._is_idle = False
@@ -78,14 +101,17 @@ class Outgoing:
         self._has_some.clear()
         self._is_idle = False
 
-    def put(self, data: Payload, *, is_secret: bool = False) -> None:
+    def put(
+        self, data: Payload, *, is_secret: bool = False, counted: Counted | None = None
+    ) -> None:
         """Write `data` with the next `flush` or turn of the loop; secrets are shown to nobody."""
         size = size_of(data)
         if self._bytes + size > MAX_QUEUED_BYTES:
             dropped = self._bytes + size
             self._give_up(f"the robot takes no more bytes; {dropped} waiting ones were dropped")
             return
-        self._waiting.append((data, REDACTED if is_secret else data))
+        shared = counted if self._shared is not None else None
+        self._waiting.append(_Waiting(data, REDACTED if is_secret else data, shared))
         self._bytes += size
         if self._prompt is None:
             self._has_some.set()
@@ -111,15 +137,27 @@ class Outgoing:
         if not self._is_idle or self._has_some.is_set():
             self._has_some.set()
             return
-        data, shown = self._next()
-        if not isinstance(data, bytes) or not prompt.offer(data):
-            self._waiting.append((data, shown))
-            self._has_some.set()  # the writer finds out why
-            return
-        self._bytes = 0
-        self._report.saw("sent", shown)
+        while self._waiting:
+            item = self._next()
+            if not self._offer(prompt, item):
+                self._waiting.insert(0, item)
+                self._has_some.set()  # the writer finds out why
+                return
+            self._bytes -= size_of(item.data)
         if prompt.is_clogged:
             self._wait_for_rest()
+
+    def _offer(self, prompt: Prompt, item: _Waiting) -> bool:
+        if item.counted is not None and self._shared is not None:
+            return self._shared.offer_counted(item.counted, partial(self._left, item))
+        if not isinstance(item.data, bytes) or not prompt.offer(item.data):
+            return False
+        self._report.saw("sent", item.shown)
+        return True
+
+    def _left(self, item: _Waiting, data: Payload) -> None:
+        """Show a frame as it left: with numbers that may be others than those it was made with."""
+        self._report.saw("sent", data if item.shown is item.data else item.shown)
 
     def wake(self) -> None:
         """Let the writer look again: the line is to be closed once all is written."""
@@ -137,28 +175,31 @@ class Outgoing:
             self._is_idle = False
             self._has_some.clear()
             while self._waiting:
-                data, shown = self._next()
+                item = self._next()
                 with self._watched():
-                    await self._transport.send(data)
-                self._bytes -= size_of(data)
-                self._report.saw("sent", shown)
+                    if item.counted is not None and self._shared is not None:
+                        await self._shared.send_counted(item.counted, partial(self._left, item))
+                    else:
+                        await self._transport.send(item.data)
+                        self._report.saw("sent", item.shown)
+                self._bytes -= size_of(item.data)
             if is_closing() and not self._waiting:
                 self._give_up("")
 
     def _wait_for_rest(self) -> None:
         """Let the writer see to it that what the kernel has not taken goes, in time."""
-        self._waiting.append((b"", b""))
+        self._waiting.append(_Waiting(b"", b""))
         self._has_some.set()
 
-    def _next(self) -> tuple[Payload, Payload]:
-        """Take what is sent at once, and what is shown of it: all of a stream, else one item."""
-        if not self._is_stream:
-            return self._waiting.pop(0)
-        if len(self._waiting) == 1:
-            return self._waiting.pop()
-        data, shown = zip(*self._waiting, strict=True)
-        self._waiting.clear()
-        return b"".join(data), b"".join(shown)
+    def _next(self) -> _Waiting:
+        """Take what is sent at once: all of a stream up to a frame with counters, else one item."""
+        waiting = self._waiting
+        if not self._is_stream or len(waiting) == 1 or waiting[0].counted is not None:
+            return waiting.pop(0)
+        counted = (place for place, item in enumerate(waiting) if item.counted is not None)
+        end = next(counted, len(waiting))
+        items, waiting[:end] = waiting[:end], []
+        return _Waiting(_joined(item.data for item in items), _joined(i.shown for i in items))
 
     @contextmanager
     def _watched(self) -> Iterator[None]:
@@ -169,3 +210,7 @@ class Outgoing:
             yield
         finally:
             alarm.cancel()
+
+
+def _joined(parts: Iterable[Payload]) -> bytes:
+    return b"".join(part for part in parts if isinstance(part, bytes))

@@ -22,6 +22,7 @@ from urc.registry import Table
 from urc.runtime.blanking import Blanker
 from urc.runtime.clock import Clock, LoopClock, within
 from urc.runtime.dispatcher import Dispatcher
+from urc.runtime.held import is_lossy
 from urc.runtime.hub import Hub
 from urc.runtime.lines import make_transports
 from urc.runtime.link import Link
@@ -110,6 +111,8 @@ class Session:
             self.movers = take_reins(
                 driver, self.settings, transports, self._clock, is_guarded=motion == "guarded"
             )
+            engine.motions.share([name for name in driver.transports if is_lossy(driver, name)])
+            self.movers.client.on_stand = engine.motions.told
         self._dispatcher = Dispatcher(
             engine,
             self.hub,
@@ -159,7 +162,7 @@ class Session:
     ) -> None:
         try:
             if self.movers is not None:
-                self.movers.stop_all()  # before anything is said in good order
+                self.movers.stop_all(self.frames)  # before anything is said in good order
             await self._say_goodbye()
             await self._end(kind, error, trace)
         finally:

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import Any, Final, Literal
 
-from urc.model.codec import NUMBERED, Envelope, Payload
+from urc.model.codec import NUMBERED, Counted, Envelope, Payload
 from urc.model.driver import Command, Driver, Poll
 from urc.model.profile import Fed
 from urc.model.values import Reading, Sample, Value
@@ -152,11 +152,12 @@ class Trial:
         name, number = command.name, self._requests
         self.used.add(("command", name))
         try:
-            data = self.engine.motions.motion_frame(name, arguments, self.now, _TWO_PEOPLE)
+            made = self.engine.motions.motion_frame(name, arguments, self.now, _TWO_PEOPLE)
         except UrcError as error:
             code = "bad-argument" if isinstance(error, BadArgument) else "not-allowed"
             self._failed(Failed(number, name, code, str(error)))
             return
+        data = made.numbered.data if isinstance(made, Counted) else made
         self.perform([Send(command.transport, data), Replied(number, name, {})])
 
     def _refused(self, command: str, why: str) -> None:

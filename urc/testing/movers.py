@@ -3,7 +3,7 @@
 import asyncio
 from collections.abc import Callable, Mapping, Sequence
 
-from urc.model.codec import Payload
+from urc.model.codec import Counted, Payload, Series
 from urc.model.driver import Driver
 from urc.model.values import Reading
 from urc.motion.hold import Mover, Reason, Terms
@@ -44,13 +44,10 @@ class FakeFrames:
         return number
 
     def _numbered(self) -> str:
-        if not self.number:
-            return ""
-        self.number += 1
-        return f"{self.number} "
+        return f"{self.number + 1} " if self.number else ""
 
     def stop_frame(self, command: str) -> Payload:
-        """Return what stops it."""
+        """Return what stops it; it uses no number up before it leaves."""
         return f"{self._numbered()}{command} stop".encode()
 
     def motion_frame(self, command: str, arguments: Mapping[str, Reading], now: float) -> Payload:
@@ -61,6 +58,7 @@ class FakeFrames:
         text = " ".join((command, *(f"{name}={value!r}" for name, value in values.items())))
         data = f"{self._numbered()}{text}".encode()
         if self.number:
+            self.number += 1
             self.on_count(self.driver.commands[command].transport)
         return data
 
@@ -96,8 +94,9 @@ class FakeMovers:
             mover = self._movers[command] = Mover(terms)
         mover.arm()
 
-    def tick(self, command: str, data: Payload) -> None:
+    def tick(self, command: str, data: Payload | Counted) -> None:
         """Renew the lease."""
+        assert not isinstance(data, Counted)  # noqa: S101 - nobody shares its counters
         if self._movers[command].tick(data, self._clock.now()):
             self.ticked_s = self._clock.now()
         self.step()
@@ -106,10 +105,14 @@ class FakeMovers:
         """Count it: nothing is written."""
         self.rehearsed.append(data)
 
-    def renew(self, command: str, stop: Payload) -> None:
+    def renew(self, command: str, stop: Payload | Series) -> None:
         """Stop it with these bytes from now on."""
         mover = self._movers[command]
-        mover.renew(mover.terms._replace(stop=stop))
+        mover.renew(mover.terms.stopped_by(stop))
+
+    def is_stopping(self, command: str) -> bool:
+        """Return whether it moves."""
+        return command in self._movers and self._movers[command].state != "idle"
 
     def is_open(self, command: str) -> bool:
         """Return whether its line is there."""
@@ -121,10 +124,11 @@ class FakeMovers:
             self._movers[command].stop("released", self._clock.now())
         self.step()
 
-    def stop(self, stops: Mapping[str, Payload]) -> None:
+    def stop(self, stops: Mapping[str, Payload | Series]) -> None:
         """Stop everything."""
         for command, frame in stops.items():
-            mover = self._movers.setdefault(command, Mover(Terms(frame, period_s=0.05)))
+            terms = Terms(b"", period_s=0.05).stopped_by(frame)
+            mover = self._movers.setdefault(command, Mover(terms))
             mover.stop("stopped", self._clock.now())
         self.step()
 

@@ -20,14 +20,16 @@ class Guard:
         self.said: list[wire.ToGuard] = []
         self.is_there = is_there
         self.answers = True
-        self.line = GuardedTransport("wire", "tcp robot:1", self.post, self.ready)
+        self.line = GuardedTransport(
+            "wire", "tcp robot:1", self.post, self.ready, lambda line, stand, is_settled: None
+        )
 
     def post(self, said: wire.ToGuard) -> None:
         self.said.append(said)
         if not self.answers:
             return
         if isinstance(said, wire.Open):
-            self.tell(wire.Opened("wire", said.turn, "tcp robot:2"))
+            self.tell(wire.Opened("wire", said.turn, "tcp robot:2", {}))
         elif isinstance(said, wire.Close):
             self.tell(wire.Closed("wire", said.turn))
 

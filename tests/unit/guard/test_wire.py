@@ -3,12 +3,15 @@
 import pytest
 
 from urc.guard import wire
-from urc.model.codec import Envelope
+from urc.model.codec import Count, Envelope, Numbered
 from urc.model.values import NOTHING
 from urc.motion.hold import Terms
 
 PUBLISH = Envelope("publish", {"topic": "/cmd_vel"}, {"linear": {"x": 0.5}})
 IMAGE = Envelope("message", {"topic": "/camera"}, b"\xff\xd8")
+FIRST = Count({}, {"n": 5})
+SIXTH = Count({"n": 5}, {"n": 6})
+STOPS = (Numbered(b"5 stop", FIRST), Numbered(PUBLISH, SIXTH))
 
 TO_GUARD: list[wire.ToGuard] = [
     wire.Make(
@@ -17,18 +20,22 @@ TO_GUARD: list[wire.ToGuard] = [
     wire.Open("wire", 3, 2.5),
     wire.Send("wire", 3, 7, b"\x00\xff"),
     wire.Send("wire", 3, 8, PUBLISH),
+    wire.Send("wire", 3, 9, b"5 hello", FIRST, 2),
     wire.Close("wire", 3),
     wire.Credit("wire", 3, 65536),
     wire.Arm("wire", "drive", Terms(b"stop", 0.05, 0.3, True)),
     wire.Arm("wire", "drive", Terms(PUBLISH, 0.05)),
     wire.Tick("drive", 9, b"go", 12.5),
     wire.Tick("drive", 9, PUBLISH, 12.5),
+    wire.Tick("drive", 9, b"5 go", 12.5, SIXTH),
     wire.Release("drive"),
+    wire.Renew("drive", b"5 stop", STOPS),
     wire.Stop([("wire", "drive", Terms(b"stop", 0.05))]),
+    wire.Stop([("wire", "drive", Terms(b"5 stop", 0.05, stops=STOPS))]),
     wire.Owe("wire", "drive", Terms(b"stop", 0.05)),
 ]
 FROM_GUARD: list[wire.FromGuard] = [
-    wire.Opened("wire", 3, "tcp 10.0.0.1:1"),
+    wire.Opened("wire", 3, "tcp 10.0.0.1:1", {"n": 5}),
     wire.OpenFailed("wire", 3, "nothing listens"),
     wire.Received("wire", 3, b"hello"),
     wire.Received("wire", 3, IMAGE),
@@ -38,6 +45,8 @@ FROM_GUARD: list[wire.FromGuard] = [
     wire.Closed("wire", 3),
     wire.Stopped("drive", "expired", 9),
     wire.Beat(0.001),
+    wire.Counted("wire", 3, 8, {"n": 6}, [("drive", 9)]),
+    wire.Stale("wire", 3, 8, {"n": 6}),
 ]
 
 

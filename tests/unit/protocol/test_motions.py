@@ -3,12 +3,13 @@
 import pytest
 
 from tests.dialogue import Dialogue, driver_of
-from urc.model.flow import Confirm
+from urc.model.codec import Count, Counted, Numbered, Payload, Series
+from urc.model.flow import MOST_STOPS, Confirm
 from urc.problems import UrcError
 from urc.protocol.encode import BadArgument
 from urc.protocol.engine import Engine
-from urc.protocol.events import Request
-from urc.protocol.motions import NotNow
+from urc.protocol.events import Request, Send
+from urc.protocol.motions import Motions, NotNow
 
 DRIVER = """
 signals:
@@ -34,7 +35,7 @@ def test_what_stops_it_needs_neither_the_robot_nor_a_connection() -> None:
     """It is rendered when a control is armed, and must be there whatever happens then."""
     motions = Dialogue(DRIVER).engine.motions
     assert motions.stop_frame("drive") == b"DRIVE 0 2\n"
-    assert motions.stop_frame("turn") == b"0 TURN 0\n"
+    assert stops(motions)[0] == b"0 TURN 0\n"
     for command in ("ping", "nothing"):
         with pytest.raises(BadArgument, match=command):
             motions.stop_frame(command)
@@ -88,15 +89,60 @@ def test_two_people_must_confirm_where_one_is_not_enough() -> None:
     assert move("turn", {"v": 1}, 0.1, ("ann", "bob")) == b"0 TURN 1\n"
 
 
-def test_counters_go_on_over_motion_stops_and_commands() -> None:
-    """Each frame that is made has a number of its own, the stop made in advance too."""
+def stops(motions: Motions) -> list[Payload]:
+    """Return the stops of ``turn`` that are made in advance."""
+    series = motions.stop_frame("turn")
+    assert isinstance(series, Series)
+    return [one.data for one in series.frames]
+
+
+def numbered(frame: Payload | Counted) -> Numbered:
+    """Return a frame that says what it does to the counters."""
+    assert isinstance(frame, Counted)
+    return frame.numbered
+
+
+def test_counters_go_on_over_motion_and_commands_and_a_stop_uses_none_before_it_leaves() -> None:
     talk = Dialogue(DRIVER).connect()
     motions = talk.engine.motions
     assert motions.motion_frame("turn", {"v": 1}, 0.1) == b"0 TURN 1\n"
-    assert motions.stop_frame("turn") == b"1 TURN 0\n"
-    assert motions.motion_frame("turn", {"v": 1}, 0.2) == b"2 TURN 1\n"
+    assert stops(motions)[0] == stops(motions)[0] == b"1 TURN 0\n"
+    assert motions.motion_frame("turn", {"v": 1}, 0.2) == b"1 TURN 1\n"
     talk.run("ping")
-    assert motions.motion_frame("turn", {"v": 0}, 0.3) == b"4 TURN 0\n"
+    assert motions.motion_frame("turn", {"v": 0}, 0.3) == b"3 TURN 0\n"
+
+
+def test_stops_are_made_for_each_repeat_and_for_a_new_connection() -> None:
+    """Whoever stops alone has one for each number that may be next."""
+    motions = Dialogue(DRIVER.replace("0, 9", "0, 999")).connect().engine.motions
+    motions.share(["wire"])
+    motions.told("wire", {"n": 499}, True)
+    made = [one for one in stops(motions) if isinstance(one, bytes)]
+    length = len(made) // 2
+    assert length >= MOST_STOPS
+    assert made[:length] == [b"%d TURN 0\n" % (500 + at) for at in range(length)]
+    assert made[length:] == [b"%d TURN 0\n" % at for at in range(length)]
+
+
+def test_numbers_of_a_shared_line_count_when_their_frames_have_left() -> None:
+    """A tick that is replaced by a newer one uses no number up."""
+    talk = Dialogue(DRIVER).connect()
+    motions = talk.engine.motions
+    motions.share(["wire"])
+    first = motions.motion_frame("turn", {"v": 1}, 0.1)
+    assert numbered(first) == Numbered(b"0 TURN 1\n", Count({}, {"n": 0}))
+    assert numbered(motions.motion_frame("turn", {"v": -1}, 0.2)).data == b"0 TURN -1\n"
+    motions.told("wire", {"n": 0}, True)
+    next_one = numbered(motions.motion_frame("turn", {"v": 1}, 0.3))
+    assert next_one == Numbered(b"1 TURN 1\n", Count({"n": 0}, {"n": 1}))
+    (sent,) = talk.engine.command(Request(1, "ping"), 0.4)[:1]
+    assert isinstance(sent, Send)
+    assert sent.counted is not None
+    assert sent.counted.numbered == Numbered(b"1 PING\n", Count({"n": 0}, {"n": 1}))
+    motions.told("wire", {"n": 7}, True)
+    assert sent.counted.again() == Numbered(b"8 PING\n", Count({"n": 7}, {"n": 8}))
+    assert isinstance(first, Counted)
+    assert first.again() == Numbered(b"8 TURN 1\n", Count({"n": 7}, {"n": 8})), "it overtakes"
 
 
 def test_whoever_keeps_a_stop_is_told_when_its_number_is_used_up() -> None:
@@ -108,7 +154,7 @@ def test_whoever_keeps_a_stop_is_told_when_its_number_is_used_up() -> None:
     for _ in range(2):
         talk.connect()
         motions.motion_frame("turn", {"v": 1}, 0.1)
-        motions.stop_frame("turn")
+        stops(motions)
         talk.run("ping")
         assert used == ["wire", "wire"]
         used.clear()

@@ -58,6 +58,9 @@ class Movers:
         assert isinstance(stop, bytes)
         self.told.append(f"stop is {stop.decode()}")
 
+    def is_stopping(self, command: str) -> bool:
+        return False
+
     def is_open(self, command: str) -> bool:
         return self.is_up
 

@@ -70,6 +70,9 @@ class Line:
         if command in self.movers:
             self.movers[command].renew(self.movers[command].terms._replace(stop=stop))
 
+    def is_stopping(self, command: str) -> bool:
+        return command in self.movers and self.movers[command].state != "idle"
+
     def is_open(self, command: str) -> bool:
         return self.is_up
 
