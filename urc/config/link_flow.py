@@ -58,8 +58,9 @@ def link_command(linker: Linker, part: Part, command: Command) -> None:
     if command.verify is not None:
         linker.template(part.must("verify").must("expr"), command.verify.condition, known)
     if command.hold is not None:
-        release = part.must("hold").must("release")
-        link_arguments(linker.findings, release, command, release.entries(), "release")
+        release = part.must("hold").get("release")
+        if release is not None:
+            link_arguments(linker.findings, release, command, release.entries(), "release")
         _link_slew(linker.findings, part.must("hold").named("slew"), command)
         if _needs_two(command):
             linker.findings.error(

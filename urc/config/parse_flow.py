@@ -293,20 +293,26 @@ def _rate(part: Part | None, findings: Findings) -> float | None:
 def _hold(part: Part, findings: Findings) -> Hold:
     repeat_s = findings.duration(part, "repeat", 0.05, least=0.01, most=10)
     lease_s = findings.duration(part, "lease", 0.25, least=0.1, most=1.0)
-    release = part.get("release")
-    if release is None:
+    release, step = part.get("release"), part.get("step")
+    step_s = findings.duration(part, "step", 0.0, least=0.001, most=10) if step else None
+    if step is not None:
+        text = "means nothing beside 'step': the robot stops by itself after each"
+        refuse(part, ("release", "watchdog"), text, findings)
+    elif release is None:
         findings.error(
             part,
             "missing-release",
             "nothing says how the motion stops when it is let go",
             key=True,
-            hint="write release: { … } with the arguments that mean standstill",
+            hint="write release: { … } with the arguments that mean standstill, or step: with the"
+            " time of a step after which the robot stops by itself",
         )
         return Hold(repeat_s)
-    values = {name: given(inner.data) for name, inner in release.entries().items()}
+    entries = release.entries() if release is not None else {}
+    values = {name: given(inner.data) for name, inner in entries.items()}
     slew = {name: float(inner.data) for name, inner in part.named("slew").items()}
     on_stall = cast("Literal['abort', 'wait'] | None", part.text("on_stall") or None)
-    return Hold(repeat_s, values, lease_s, _watchdog_s(part, findings), slew, on_stall)
+    return Hold(repeat_s, values, lease_s, _watchdog_s(part, findings), slew, on_stall, step_s)
 
 
 def _watchdog_s(part: Part, findings: Findings) -> float | None:

@@ -34,7 +34,10 @@ def check_motion(part: Part, driver: Driver, findings: Findings) -> None:
     ]
     for inner, command, hold in held:
         _check_line(inner, driver.transports.get(command.transport), findings)
-        _check_watchdog(inner, command, hold, findings)
+        if hold.step_s is None:
+            _check_watchdog(inner, command, hold, findings)
+        else:
+            _check_step(inner, hold, hold.step_s, findings)
         _check_lease(inner, hold, findings)
     for name, spec in driver.transports.items():
         on_line = [one for one in held if one[1].transport == name]
@@ -94,6 +97,25 @@ def _check_watchdog(part: Part, command: Command, hold: Hold, findings: Findings
             f"it is repeated every {shown_duration(hold.repeat_s)}, and the robot stops by itself"
             f" after {shown_duration(watchdog_s)}: it would stutter",
             hint="repeat it three times within the watchdog, so that one may be lost",
+        )
+
+
+def _check_step(part: Part, hold: Hold, step_s: float, findings: Findings) -> None:
+    if hold.repeat_s < step_s / _ROUNDING:
+        findings.error(
+            part.must("repeat"),
+            "steps-pile-up",
+            f"it is repeated every {shown_duration(hold.repeat_s)}, and a step takes"
+            f" {shown_duration(step_s)}: steps would wait in the robot, and move it when it was let"
+            " go",
+            hint="repeat it as often as steps are done, or make the steps smaller",
+        )
+    if step_s > LONG_LEASE_S:
+        findings.warn(
+            part.must("step"),
+            "long-step",
+            f"the robot moves on for {shown_duration(step_s)} when it was let go",
+            hint="make the steps smaller, or faster: nothing ends one that has begun",
         )
 
 

@@ -254,6 +254,9 @@ class Reins:
             # motion has gone since, and that one is not to be given up.
             self._forget()
             self._watch.gave_up()
+        if data == b"":  # the step that moves the robot ends by itself
+            self._tell(control)
+            return
         self._is_stop_under_way |= is_stop
         offer = self._offer
         data, count = self._turn(control, data, is_stop=is_stop)

@@ -131,6 +131,9 @@ class Hold(NamedTuple):
     """Argument → most that it may grow in a second, away from the value that stops the motion."""
     on_stall: Literal["abort", "wait"] | None = None
     """What becomes of a line that takes nothing while it moves; None: as is usual on its kind."""
+    step_s: float | None = None
+    """How long a step takes at most, after which the robot stops by itself: nothing is sent to stop
+    it. None: it moves until it is stopped."""
 
 
 class Confirm(NamedTuple):

@@ -35,7 +35,8 @@ class Terms(NamedTuple):
     """What is agreed when a control is armed; nothing in it but the stop changes while it moves."""
 
     stop: Payload
-    """Written to stop the motion, framing included."""
+    """Written to stop the motion, framing included; no bytes where the robot moves in steps, each
+    of which ends by itself: then nothing is written, and all else holds."""
     period_s: float
     """Mean time between two writes, at least."""
     lease_s: float = LEASE_S
@@ -73,7 +74,7 @@ class Mover:
         """Whether whoever it concerns was told of that stop; kept for the owner of the line."""
         self.owes_stop = False
         """The line was cut before the robot can have had the stop."""
-        self._pace = Pace(terms.period_s)
+        self._pace = Pace(terms.period_s, is_strict=terms.stop == b"")
         self._waiting: Payload | None = None
         self._expires_at = 0.0
         self._stop_at = 0.0
@@ -143,7 +144,8 @@ class Mover:
         self.is_told = False
         self._waiting = None
         self._stop_at = now
-        self._stop_until = now + STOP_FOR_S if self.terms.is_lossy else now
+        is_repeated = self.terms.is_lossy and self.terms.stop != b""
+        self._stop_until = now + STOP_FOR_S if is_repeated else now
 
     def due(self, now: float, *, is_clear: bool) -> Payload | None:
         """Return what is to be written now, or None.

@@ -13,26 +13,28 @@ _ROUNDING_S: Final = 1e-9
 
 
 class Pace:
-    """At most one every `period_s` seconds on average, and two in a row."""
+    """At most one every `period_s` seconds on average, and two in a row unless it `is_strict`."""
 
-    __slots__ = ("_due", "_period_s")
+    __slots__ = ("_due", "_early_s", "_period_s")
 
-    def __init__(self, period_s: float) -> None:
+    def __init__(self, period_s: float, *, is_strict: bool = False) -> None:
         if not period_s > 0:
             raise ValueError(f"a period is more than 0 s, not {period_s:g}")
         self._period_s = period_s
+        self._early_s = 0.0 if is_strict else period_s
+        """How much earlier than at exactly this rate one may go."""
         self._due = float("-inf")
         """When the next one would come at exactly this rate."""
 
     @property
     def free_at(self) -> float:
         """When the next one may go."""
-        return self._due - self._period_s
+        return self._due - self._early_s
 
     def take(self, now: float) -> bool:
         """Count one that goes now, if it may."""
         due, period_s = self._due, self._period_s
-        if now < due - period_s - _ROUNDING_S:
+        if now < due - self._early_s - _ROUNDING_S:
             return False
         self._due = (now if now > due else due) + period_s
         return True

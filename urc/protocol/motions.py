@@ -139,12 +139,15 @@ class Motions:
 
         It needs no connection. Where it carries a number, that is a series: the frame for each
         number that it may have when it leaves, as many as all stops of the line may need.
+        A robot that moves in steps stops by itself, and is told nothing: no bytes at all.
 
         Raises:
             BadArgument: it is no motion, or cannot be written.
         """
         found = self._found(command)
         hold, ask, line = found.hold, self._asks[command], self._lines[found.transport]
+        if hold is not None and hold.step_s is not None:
+            return b""
         values = check_arguments(found, {} if hold is None else hold.release)
         names = {**self._known.names, **line.learnt, **values}
         if not ask.has_counters:

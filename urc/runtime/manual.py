@@ -226,7 +226,11 @@ def _need(argument: Argument) -> str:
 def _releases(driver: Driver) -> Iterator[str]:
     """Yield what the server sends when a control is let go of, or the one who holds it is gone."""
     for command in driver.commands.values():
-        if command.hold is not None:
+        if command.hold is not None and command.hold.step_s is not None:
+            lasts = shown_duration(command.hold.step_s)
+            yield f"- {_code(command.name)}: nothing is sent"
+            yield f"  - The robot moves in steps and stops by itself after each: {lasts} at most."
+        elif command.hold is not None:
             values = {
                 name: command.hold.release.get(name, argument.default)
                 for name, argument in command.arguments.items()

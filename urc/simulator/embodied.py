@@ -121,9 +121,9 @@ class Embodied:
 
 
 def failsafe_of(driver: Driver) -> Failsafe | None:
-    """Return what the `watchdog` of the held commands says; None when one of them never stops."""
+    """Return what the held commands say of it, by `watchdog` or `step`; None: it never stops."""
     held = {name: one.hold for name, one in driver.commands.items() if one.hold is not None}
-    times = [hold.watchdog_s for hold in held.values()]
+    times = [hold.step_s or hold.watchdog_s for hold in held.values()]
     if not times or any(one is None or not math.isfinite(one) for one in times):
         return None
     return Failsafe(max(one for one in times if one is not None), tuple(held))

@@ -211,3 +211,15 @@ def test_a_robot_that_says_nothing_any_more_is_not_moved() -> None:
     assert talk.engine.motions.stop_frame("turn"), "it is stopped all the same"
     talk.says("MODE manual")
     assert move("turn", {"v": 1}, 2.2)
+
+
+def test_a_robot_that_moves_in_steps_is_told_nothing_to_stop_it() -> None:
+    """Each frame is a step, and ends by itself."""
+    talk = Dialogue(
+        """
+commands:
+  jog: { send: "JOG {{ x }}", args: { x: { default: 0 } }, hold: { repeat: 100ms, step: 100ms } }
+"""
+    ).connect()
+    assert talk.engine.motions.motion_frame("jog", {"x": 2}, 0.1) == b"JOG 2\n"
+    assert talk.engine.motions.stop_frame("jog") == b""
