@@ -5,7 +5,7 @@ from playwright.async_api import expect
 
 from tests.e2e.browser import running_browser
 from tests.e2e.conftest import PageMaker
-from tests.e2e.dashboards import running_dashboard, until
+from tests.e2e.dashboards import running_dashboard, until, until_attribute
 from tests.e2e.motion.driving import CALM_LEASE_S, driven, held, number
 from urc.model.codec import WriteSpec
 from urc.model.driver import Command
@@ -33,6 +33,38 @@ BARS = """() => {
     isWide: document.documentElement.scrollWidth > innerWidth,
   };
 }"""
+
+
+NARROW_PX = (320, 360, 390, 430, 500, 560, 599, 600, 700, 820)
+LEAST_TITLE_PX = 72
+"""Six letters of a robot's name."""
+BAR = """() => {
+  const box = (name) => document.querySelector(name).getBoundingClientRect();
+  const [title, badge, bar] = [".urc-bar-title", ".urc-badge", ".urc-bar"].map(box);
+  return {
+    title: title.width, rows: bar.height / title.height,
+    isSecondRow: badge.top >= title.bottom, isWide: document.documentElement.scrollWidth > innerWidth,
+  };
+}"""
+
+
+@pytest.mark.parametrize("is_live", [True, False])
+async def test_the_robots_name_keeps_its_room_on_narrow_screens(
+    new_page: PageMaker, *, is_live: bool
+) -> None:
+    """The badge takes a row of its own on phones, whatever it says; it never crushes the title."""
+    robot = FakeRobot(dashboard_profile())
+    async with running_dashboard(robot) as address:
+        page = await new_page(size="phone")
+        await page.goto(f"{address}robots/puppet/")
+        robot.link("live" if is_live else "lost")
+        await until_attribute(page, "[data-badge]", "data-state", "good" if is_live else "bad")
+        for width in NARROW_PX:
+            await page.set_viewport_size({"width": width, "height": 900})
+            bar = await page.evaluate(BAR)
+            assert bar["title"] >= LEAST_TITLE_PX, width
+            assert bar["isSecondRow"] is (width < 600), width
+            assert not bar["isWide"], width
 
 
 @pytest.mark.parametrize("size_px", [24, 32])
