@@ -67,10 +67,10 @@
         }
       }
     }
-    // A canvas may be larger than what is meant to be seen of it, as a map's is.
+    // A canvas may be larger than its visible part, and so may the drawing of a map.
     for (const el of cell.querySelectorAll("svg, button, input, select, [role=slider]")) {
       if (!el.checkVisibility({ opacityProperty: true, visibilityProperty: true })) continue;
-      if (el.closest(".urc-hidden") || el.parentElement.closest("svg")) continue;
+      if (el.closest(".urc-hidden, .leaflet-overlay-pane") || el.parentElement.closest("svg")) continue;
       const each = el.getBoundingClientRect();
       if (each.width <= 1 || each.height <= 1) continue;
       let up = el.parentElement;

@@ -70,7 +70,6 @@ class Chart {
       // Its controls set markup from text, which the page's policy forbids.
       zoomControl: false,
       attributionControl: false,
-      preferCanvas: true,
       zoomAnimation: !isStill(),
       fadeAnimation: !isStill(),
       markerZoomAnimation: !isStill(),

@@ -1,9 +1,11 @@
 """What the widgets that look at the world show: values pushed, pixels and words seen."""
 
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
 import pytest
+from PIL import Image
 
 from tests.e2e.conftest import PageMaker
 from tests.e2e.dashboards import until, until_attribute, until_text
@@ -254,6 +256,23 @@ async def test_a_map_of_a_floor_has_metres(new_page: PageMaker) -> None:
         place = robot.commands[0][1]
         assert abs(float(place["x"]) - 3.5) < 0.1  # type: ignore[arg-type]
         assert abs(float(place["y"]) + 1.0) < 0.1  # type: ignore[arg-type]
+
+
+async def test_a_robot_leaves_a_trail_on_the_map(new_page: PageMaker) -> None:
+    """Two metres to the east and one back: the line stays while the map follows the robot."""
+    signals = {name: Signal(name, "number", unit="m", stale_after_s=60) for name in ("px", "py")}
+    use = WidgetUse("m", "map", {"x": "px", "y": "py"}, options={"trail_step": 0.2})
+    page = await new_page(size="desktop")
+    async with shown(page, signals, use) as robot:
+        robot.say("py", 0.1)  # off the axes of the grid
+        for step in (*range(11), *range(9, 4, -1)):
+            robot.say("px", step / 5)
+            await until_text(page, ".map-text", f"x {step / 5:.2f} m, y 0.10 m")
+        x, y = await centre(page, ".map-area")
+        for left in (-25, 20):  # behind the robot, and where it came back from
+            clip = {"x": x + left, "y": y - 4, "width": 4, "height": 8}
+            picture = Image.open(BytesIO(await page.screenshot(clip=clip))).convert("L")  # type: ignore[arg-type]
+            assert picture.getextrema()[0] < 140, left  # type: ignore[operator]
 
 
 async def test_a_panorama_is_looked_around_in(new_page: PageMaker) -> None:
