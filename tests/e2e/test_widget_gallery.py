@@ -35,6 +35,7 @@ pytestmark = pytest.mark.anyio
 LOW = (
     *("joystick", "dpad", "axis", "tilt", "keyboard", "value"),
     *("button", "number", "select", "switch", "text", "sequence", "log"),
+    *("slider", "battery", "plot"),
 )
 LOW_CELLS = (
     (126, 128),

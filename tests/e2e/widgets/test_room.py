@@ -1,0 +1,88 @@
+"""The room that widgets give to what matters, in the cells that pages really have."""
+
+import pytest
+from playwright.async_api import Page
+
+from tests.e2e.conftest import PageMaker
+from tests.e2e.dashboards import running_dashboard, until
+from tests.e2e.gallery import resize
+from urc.model.interface import Grid, Interface, Slot, WidgetUse
+from urc.model.values import Signal
+from urc.testing.dashboard import FakeRobot, dashboard_profile
+
+pytestmark = pytest.mark.anyio
+
+BATTERY = """() => {
+  const cell = document.querySelector("[data-widget=battery][data-state-name=normal]");
+  const box = (part) => cell.querySelector(part).getBoundingClientRect();
+  return {
+    picture: box(".battery-inner").height / cell.getBoundingClientRect().height,
+    facts: [...cell.querySelectorAll(".battery-facts > li")].filter((one) => one.offsetHeight > 0).length,
+  };
+}"""
+SPEEDS = """() => [...document.querySelectorAll(".joystick .urc-speed, .joystick .urc-speed-next")]
+  .filter((one) => one.offsetWidth && one.scrollWidth > one.clientWidth)
+  .map((one) => one.textContent.trim())"""
+ENTRIES = """() => {
+  const frame = document.querySelector(".plot-legend").getBoundingClientRect();
+  return [...document.querySelectorAll(".plot-entry")].filter((one) => {
+    const box = one.getBoundingClientRect();
+    return box.width > 0 && box.left >= frame.left - 1 && box.right <= frame.right + 1
+      && box.top >= frame.top - 1 && box.bottom <= frame.bottom + 1;
+  }).length;
+}"""
+
+
+async def gallery(page: Page, address: str, widget: str) -> None:
+    """Open the states of a widget."""
+    await page.goto(f"{address}widgets/{widget}/")
+    await page.wait_for_selector("[data-gallery][data-ready]")
+
+
+@pytest.mark.parametrize(("width", "height"), [(165, 155), (221, 152), (305, 150), (358, 180)])
+async def test_a_battery_in_a_wider_cell_is_no_smaller(
+    new_page: PageMaker, width: int, height: int
+) -> None:
+    """The picture has a third of the height or more; volts and amperes stand next to it."""
+    async with running_dashboard(FakeRobot(dashboard_profile())) as address:
+        page = await new_page(size="desktop")
+        await gallery(page, address, "battery")
+        await resize(page, width, height)
+        battery = await page.evaluate(BATTERY)
+    assert battery["picture"] >= 0.3
+    assert battery["facts"] == (3 if width > 200 else 0)
+
+
+@pytest.mark.parametrize("width", [260, 310, 345, 410])
+async def test_a_speed_step_never_runs_out_of_its_button(new_page: PageMaker, width: int) -> None:
+    """Steps take two rows where one is too narrow for their figures."""
+    async with running_dashboard(FakeRobot(dashboard_profile())) as address:
+        page = await new_page(size="desktop")
+        await gallery(page, address, "joystick")
+        for height in (220, 260, 300, 318):
+            await resize(page, width, height)
+            assert await page.evaluate(SPEEDS) == [], height
+
+
+@pytest.mark.parametrize(
+    ("width", "height"), [(1440, 900), (1180, 820), (390, 844), (358, 640)]
+)
+async def test_the_legend_of_a_plot_shows_every_signal(
+    new_page: PageMaker, width: int, height: int
+) -> None:
+    """Six joints, six entries with their values: none is past an edge."""
+    names = [f"joint_{number}" for number in range(6)]
+    signals = {name: Signal(name, unit="°", stale_after_s=60) for name in names}
+    plot = WidgetUse("plot", "plot", lists={"series": tuple(names)})
+    grid = Grid(3, 2, (Slot("plot", 0, 0, 1, 2),))
+    profile = dashboard_profile(signals=signals, uses=[plot])
+    robot = FakeRobot(profile._replace(interfaces={"x": Interface("x", "X", {"wide": grid})}))
+    async with running_dashboard(robot) as address:
+        page = await new_page(size="desktop")
+        await page.set_viewport_size({"width": width, "height": height})
+        await page.goto(f"{address}robots/puppet/")
+        await until(lambda: robot.is_open)
+        for name in names:
+            robot.say(name, -90.25)
+        await page.locator(".plot-value", has_text="-90.25 °").nth(5).wait_for(state="attached")
+        assert await page.evaluate(ENTRIES) == len(names)
