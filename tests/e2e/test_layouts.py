@@ -1,6 +1,7 @@
 """Interfaces in a real browser: by screen, by hand, in tabs, over a picture, and one for faults."""
 
 import asyncio
+import json
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
@@ -289,6 +290,46 @@ async def test_the_background_fills_the_stage_and_controls_lie_above_it(
             )
             assert back == stage, size
             assert await is_on_top(page, "[data-cell='1']"), size
+
+
+async def test_the_cameras_of_the_background_are_chosen_by_mouse_and_touch(
+    new_page: PageMaker,
+) -> None:
+    """No cell lies over their buttons, and the server sends the chosen picture only."""
+    signals = {name: Signal(name, "image", title=name.title()) for name in ("front", "rear")}
+    signals["a"] = Signal("a")
+    uses = [
+        *(WidgetUse(f"v{place}", "value", {"value": "a"}) for place in range(6)),
+        WidgetUse("c", "camera", lists={"images": ("front", "rear")}),
+    ]
+    grid = Grid(3, 2, tuple(Slot(f"v{place}", *divmod(place, 2)) for place in range(6)))
+    profile = dashboard_profile(signals=signals, uses=uses)
+    interface = Interface("x", "X", {"wide": grid}, background="c")
+    robot = FakeRobot(profile._replace(interfaces={"x": interface}))
+    async with running_dashboard(robot) as address:
+        for size in (PHONE, PHONE_LYING, TABLET, DESKTOP):
+            page = await new_page()
+            shown: list[list[str]] = []
+            page.on("websocket", lambda line, shown=shown: line.on("framesent", hear(shown)))
+            await turned(page, size)
+            await page.goto(f"{address}robots/puppet/")
+            for wanted, name in (("rear", "Rear"), ("front", "Front")):
+                choice = page.get_by_role("button", name=name)
+                await choice.click(timeout=5000)
+                await expect(choice).to_have_attribute("aria-pressed", "true")
+                await until(lambda shown=shown, wanted=wanted: shown[-1:] == [[wanted]])  # type: ignore[misc]
+            assert ["front", "rear"] not in shown[1:], size
+
+
+def hear(shown: list[list[str]]) -> Callable[[str | bytes], None]:
+    """Keep the names of the images that a page asks for."""
+
+    def take(said: str | bytes) -> None:
+        message = json.loads(said)
+        if message.get("t") == "show":
+            shown.append(message["signals"])
+
+    return take
 
 
 async def test_every_robot_has_an_interface_for_finding_faults(new_page: PageMaker) -> None:

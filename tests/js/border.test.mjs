@@ -38,6 +38,12 @@ test("only commands that are bound are given, with plain arguments", () => {
   }
 });
 
+test("the images that a widget shows are chosen by their places", () => {
+  assert.deepEqual(say({ t: "look", input: "images", places: [1] }), { t: "look", input: "images", places: [1] });
+  assert.deepEqual(say({ t: "look", input: 5, places: "x" }), { t: "look", input: "", places: [] });
+  assert.deepEqual(say({ t: "look", input: "images", places: [-1, "x", 2] })?.places, [0, 0, 2]);
+});
+
 test("arguments make no prototype", () => {
   const args = JSON.parse('{"__proto__": 1, "constructor": 2}');
   const message = say({ t: "send", id: 1, output: "press", args });

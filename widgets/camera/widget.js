@@ -10,6 +10,7 @@ import { Rate, ageText, fileName, lookOf, place } from "./frame.js";
 import { Newest } from "./newest.js";
 
 const LOOK_AGAIN_MS = 200;
+const FULL_COLOUR_MS = 5000;
 const KEYS = ["ArrowUp", "ArrowDown", "ArrowLeft", "ArrowRight"];
 const KEY_LEVEL = 0.5;
 
@@ -32,6 +33,7 @@ class Camera {
   /** @param {Context} ctx */
   constructor(ctx) {
     const { el, options, t } = ctx;
+    this.ctx = ctx;
     this.t = t;
     this.signal = ctx.signal;
     this.root = part(el, ".camera");
@@ -52,7 +54,11 @@ class Camera {
     this.rate = options["rate"] === true ? new Rate() : null;
     /** @type {Reading[]} */
     this.sources = [];
+    /** How many of them the input `images` has. */
+    this.listed = 0;
     this.chosen = 0;
+    /** @type {HTMLButtonElement[] | undefined} */
+    this.switches = undefined;
     this.fault = "";
     /** What a hand that turns the camera is told. */
     this.hand = "";
@@ -69,6 +75,7 @@ class Camera {
       },
     );
     if (options["snapshot"] !== false) this.addSnapshot();
+    this.addFullColour();
     if (this.face.tabIndex === 0) this.addHold(ctx);
     // The age grows also when nothing comes: that is when it matters.
     this.timer = setInterval(() => this.tellAge(), LOOK_AGAIN_MS);
@@ -88,6 +95,19 @@ class Camera {
   addSnapshot() {
     this.shutter = this.addButton("⤓", this.t("Keep this picture"), () => void this.keep());
     this.shutter.disabled = true;
+  }
+
+  /** At night pictures are dimmed; this shows them as they are, for a moment. */
+  addFullColour() {
+    /** @type {number | undefined} */
+    let ending;
+    const show = () => {
+      clearTimeout(ending);
+      attribute(this.root, "data-full", "yes");
+      ending = window.setTimeout(() => attribute(this.root, "data-full", null), FULL_COLOUR_MS);
+    };
+    this.addButton("☀", this.t("Full colour for 5 s"), show).classList.add("urc-view-full");
+    this.signal.addEventListener("abort", () => clearTimeout(ending));
   }
 
   /** @param {Context} ctx */
@@ -118,8 +138,10 @@ class Camera {
    */
   update(readings, look) {
     const one = readings["image"];
-    this.sources = [...(one ? [one] : []), ...many(readings["images"])];
-    if (this.sources.length > 1 && !this.switches) this.addSwitches();
+    const more = many(readings["images"]);
+    this.listed = more.length;
+    this.sources = [...(one ? [one] : []), ...more];
+    if (this.sources.length > 1) this.showSwitches();
     const reading = this.sources[this.chosen];
     attribute(this.root, "data-state", reading?.state ?? "none");
     attribute(this.root, "data-locked", look?.reason ? "yes" : null);
@@ -129,13 +151,26 @@ class Camera {
     this.tell();
   }
 
-  addSwitches() {
-    this.switches = this.sources.map((source, index) => {
-      const name = source.signal.title || source.signal.name;
-      const button = this.addButton(name, "", () => this.choose(index));
-      attribute(button, "aria-pressed", String(index === this.chosen));
-      return button;
+  /** A button for each camera. Titles come with the signals, which may be later than the first reading. */
+  showSwitches() {
+    const isFirst = !this.switches;
+    this.switches ??= this.sources.map((_, index) => {
+      const made = this.addButton("", "", () => this.choose(index));
+      attribute(made, "aria-pressed", String(index === this.chosen));
+      return made;
     });
+    this.switches.forEach((one, place) => {
+      const signal = this.sources[place]?.signal;
+      write(one, signal?.title || signal?.name || "");
+    });
+    if (isFirst) this.lookAtChosen();
+  }
+
+  /** The server sends the pictures of the chosen camera only. */
+  lookAtChosen() {
+    const singles = this.sources.length - this.listed;
+    this.ctx.look("image", this.chosen < singles ? [0] : []);
+    this.ctx.look("images", this.chosen < singles ? [] : [this.chosen - singles]);
   }
 
   /** @param {number} index */
@@ -143,6 +178,7 @@ class Camera {
     if (index === this.chosen) return;
     this.chosen = index;
     this.pictures.leave();
+    this.lookAtChosen();
     this.fault = "";
     this.switches?.forEach((button, place) => attribute(button, "aria-pressed", String(place === index)));
     this.draw();

@@ -31,6 +31,7 @@
  *   | {t: "steer", output: string, verb: string}
  *   | {t: "drive", wish: import("./types.js").Wish}
  *   | {t: "follow", what: keyof Topics}
+ *   | {t: "look", input: string, places: number[]}
  *   | {t: "memory", text: string}
  *   | {t: "hold", id: number, output: string, keys: string[], keysOn: number[], taps: string[], pad: "" | "left" | "right", stays: boolean}
  *   | {t: "gate", id: number, isHeld: boolean, timeoutMs: number, key: string, pad: "" | "left" | "right"}
@@ -198,6 +199,10 @@ export function heard(message, outputs) {
     case "follow": {
       const what = textOf(message["what"]);
       return TOPICS.has(what) ? { t, what: /** @type {keyof Topics} */ (what) } : null;
+    }
+    case "look": {
+      const places = listOf(message["places"], MOST_MORE).map((each) => within(each, 0, 1e6));
+      return { t, input: textOf(message["input"]), places };
     }
     case "memory": {
       const { text } = message;

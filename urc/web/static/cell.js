@@ -90,6 +90,8 @@ export class Cell {
     this.edition = -1;
     /** Its inputs that are images. @type {{edition: number, names: readonly string[]}} */
     this.images = { edition: -1, names: NONE };
+    /** Places of the images that the widget shows, by input; without an entry, all. @type {Map<string, ReadonlySet<number>>} */
+    this.looks = new Map();
     /** What the context said of units. @type {Map<string, {edition: number, symbol: string, factor: (value: number) => number}>} */
     this.shownIn = new Map();
     /** @type {{width: number, height: number} | null} */
@@ -170,11 +172,26 @@ export class Cell {
     return this.isMounted && this.isVisible && this.budget.allows(nowMs);
   }
 
+  /**
+   * Choose the images of an input that the widget shows; the server sends no others.
+   *
+   * @param {string} input
+   * @param {readonly number[]} places
+   */
+  look(input, places) {
+    this.looks.set(input, new Set(places));
+    this.images.edition = -1;
+    this.doors.wake();
+  }
+
   /** Names of the images that it shows now. @param {Store} store */
   pictures(store) {
     if (!this.isMounted || !this.isVisible) return NONE;
     if (this.images.edition !== store.edition) {
-      const names = this.inputs.flatMap(({ signals }) => signals);
+      const names = this.inputs.flatMap(({ input, signals }) => {
+        const places = this.looks.get(input);
+        return places ? signals.filter((_, place) => places.has(place)) : signals;
+      });
       const found = names.filter((name) => PICTURES.has(store.signals.get(name)?.type ?? ""));
       this.images = { edition: store.edition, names: found };
     }

@@ -60,6 +60,7 @@ export function contextOf(cell) {
     picture: (/** @type {string} */ input, /** @type {(bitmap: ImageBitmap, reading: Reading) => void} */ show) => {
       picture(cell, input, show);
     },
+    look: (/** @type {string} */ input, /** @type {readonly number[]} */ places) => cell.look(input, places),
     t,
     unit: (/** @type {string} */ input) => unit(cell, input),
     style: loadStyle,

@@ -80,6 +80,7 @@ export function contextOf(frame, options) {
     picture: (/** @type {string} */ input, /** @type {(bitmap: ImageBitmap, reading: Reading) => void} */ show) => {
       picture(frame, input, show);
     },
+    look: (/** @type {string} */ input, /** @type {readonly number[]} */ places) => frame.say({ t: "look", input, places }),
     t,
     unit: (/** @type {string} */ input) => unit(frame, input),
     style: loadStyle,

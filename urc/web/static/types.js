@@ -246,6 +246,8 @@
  * @property {(input: string, listener: (bitmap: ImageBitmap, reading: Reading) => void) => void} picture
  *   Decodes the images of an input: the newest wins, what is late is dropped. The bitmap is closed
  *   when the next one comes: draw it at once.
+ * @property {(input: string, places: readonly number[]) => void} look Chooses the images of an input
+ *   that the widget shows, by their places (0 first); the server sends no others. At first, all.
  * @property {(text: string, names?: Record<string, string | number>) => string} t The text in the
  *   reader's language, with "{name}" replaced.
  * @property {(input: string) => {symbol: string, factor: (value: number) => number}} unit In which

@@ -222,6 +222,9 @@ export class Warden extends Cell {
       case "follow":
         this.follow(message.what);
         break;
+      case "look":
+        if (this.inputs.some(({ input }) => input === message.input)) this.look(message.input, message.places);
+        break;
       case "pads":
         this.showPads();
         break;
