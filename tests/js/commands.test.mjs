@@ -15,6 +15,7 @@ const VOLTS = { type: "number", title: "", unit: "V", min: 0, max: 10, choices: 
 test("an option narrows what a command takes, and never widens it", () => {
   assert.deepEqual(boundsOf(VOLTS, {}), { min: 0, max: 10, step: 0.1, digits: 1, unit: "V" });
   assert.deepEqual(boundsOf(VOLTS, { min: -5, max: 4, step: 0.25 }), { min: 0, max: 4, step: 0.25, digits: 2, unit: "V" });
+  assert.equal(boundsOf({ ...VOLTS, unit: "degC" }, {}).unit, "°C");
   const whole = boundsOf({ ...VOLTS, type: "integer", max: 1000 }, {});
   assert.deepEqual([whole.step, whole.digits], [10, 0]);
   assert.deepEqual(boundsOf(undefined, {}), { min: 0, max: 100, step: 1, digits: 0, unit: "" });

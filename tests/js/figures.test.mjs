@@ -48,13 +48,21 @@ test("without a precision a conversion adds no digits, and takes none that came"
   assert.equal(shown(10, { unit: "m/s" }), "22.37 mph");
   assert.equal(shown(1.3, { unit: "m" }), "4.265 ft");
   assert.equal(shown(0, { unit: "m" }), "0 ft");
-  assert.equal(shown(0.8123456, { unit: "rad" }), "46.543974 °");
-  assert.equal(shown(12345.678, { unit: "m" }), "40504.193 ft");
+  assert.equal(shown(0.8123456, { unit: "rad" }), "46.54397 °");
+  assert.equal(shown(12345.678, { unit: "m" }), "40504.19 ft");
   assert.equal(shown(273.15, { unit: "K" }, "everyday"), "0 °C");
   assert.equal(shown(459.67 / 1.8, { unit: "K" }), "0 °F");
   assert.equal(shown([0.3, 0.1 + 0.2], { unit: "m" }), "0.9843, 0.9843 ft");
   assert.equal(shown(0.1 + 0.2, { unit: "m" }, ""), "0.3 m");
   assert.equal(shown(1e-9, { unit: "m" }, ""), "1e-9 m");
+});
+
+test("a float of 32 bits shows the digits that it has", () => {
+  assert.equal(shown(73.0000019073486, { unit: "%" }, ""), "73 %");
+  assert.equal(shown(Math.fround(3.3), { unit: "V" }, ""), "3.3 V");
+  assert.equal(shown(Math.fround(-0.1234567), { unit: "m" }, ""), "-0.1234567 m");
+  assert.equal(shown(123456789.25, { unit: "m" }, ""), "123456789 m");
+  assert.equal(shown(46.52193847, { unit: "deg", precision: 8 }, ""), "46.52193847 °");
 });
 
 test("nothing is a negative zero", () => {

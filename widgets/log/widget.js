@@ -2,7 +2,7 @@
 /** @typedef {import("../../urc/web/static/types.js").Context} Context */
 /** @typedef {import("../../urc/web/static/types.js").Instance} Instance */
 /** @typedef {import("../../urc/web/static/types.js").LogLine} LogLine */
-import { attribute, part, save, write } from "urc/kit";
+import { attribute, clock, part, save, write } from "urc/kit";
 import { chosen, fileOf } from "./lines.js";
 
 const SIGNS = { info: "", warning: "◆", error: "▲" };
@@ -91,7 +91,7 @@ function itemOf(line) {
   item.dataset["level"] = level;
   const when = document.createElement("span");
   when.className = "log-time";
-  when.textContent = new Date(time).toLocaleTimeString([], { hour12: false });
+  when.textContent = clock(new Date(time));
   const sign = document.createElement("span");
   sign.className = "log-sign";
   sign.textContent = SIGNS[level] ?? "";

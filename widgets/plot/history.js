@@ -130,7 +130,7 @@ function nearest(column, row) {
  */
 function settings(place, lines, { colour, grid, epoch, moved }) {
   const axis = { stroke: colour, grid: { stroke: grid, width: 1 }, ticks: { stroke: grid, width: 1 } };
-  const clock = new Intl.DateTimeFormat(undefined, { hour: "2-digit", minute: "2-digit", second: "2-digit", fractionalSecondDigits: 1 });
+  const clock = new Intl.DateTimeFormat([], { hour: "2-digit", minute: "2-digit", second: "2-digit", fractionalSecondDigits: 1, hour12: false });
   const when = (/** @type {number} */ time) => clock.format(epoch + time * 1000);
   return {
     ...sizeOf(place),

@@ -3,7 +3,7 @@
 /** @typedef {import("../../urc/web/static/types.js").Instance} Instance */
 /** @typedef {import("../../urc/web/static/types.js").Reading} Reading */
 /** @typedef {import("./live.js").Trace} Trace */
-import { ALARMS, DASH, attribute, colours, figure, isStill, many, noteOf, number, part, save, style, write } from "urc/kit";
+import { ALARMS, DASH, attribute, clock, colours, figure, isStill, many, noteOf, number, part, save, style, write } from "urc/kit";
 import { spanOf } from "urc/scale";
 import { History } from "./history.js";
 import { Live } from "./live.js";
@@ -335,8 +335,7 @@ class Plot {
   moved(time) {
     const values = time === null ? null : this.history?.values;
     if (time === null || !values) return;
-    const clock = new Date(epoch() + time * 1000).toLocaleTimeString();
-    write(this.note, clock);
+    write(this.note, clock(new Date(epoch() + time * 1000)));
     this.read(values);
   }
 

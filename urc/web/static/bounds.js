@@ -5,6 +5,8 @@
  * @typedef {import("./types.js").Argument} Argument
  */
 
+import { symbolOf } from "./units.js";
+
 /** How far a control goes where nobody has said it. */
 const ROOM = 100;
 
@@ -29,7 +31,7 @@ export function boundsOf(argument, options) {
   const step = typeof options.step === "number" && options.step > 0 ? options.step : usual;
   const digits = typeof options.precision === "number" ? options.precision : digitsOf(step);
   const unit = typeof options.unit === "string" ? options.unit : (argument?.unit ?? "");
-  return { min, max: Math.max(min, max), step, digits: isWhole ? 0 : digits, unit };
+  return { min, max: Math.max(min, max), step, digits: isWhole ? 0 : digits, unit: symbolOf(unit) };
 }
 
 /**

@@ -6,8 +6,8 @@
 
 /** So many digits are written where nobody has said how many mean something. */
 const FIGURES = 4;
-/** So many digits of a number can be trusted: 0.30000000000000004 is 0.3. */
-const TRUSTED = 15;
+/** A number has so many digits that mean something, as a float of 32 bits: 73.0000019073486 is 73. */
+const TRUSTED = 7;
 /** More digits after the point are not written. */
 const MOST = 100;
 
@@ -77,9 +77,10 @@ function asFine(value, shown, factor) {
   return Number.isFinite(digits) ? exact(Number(shown.toFixed(digits))) : exact(shown);
 }
 
-/** @param {number} value */
+/** The same, but for what stands before the point: that is never rounded. @param {number} value */
 function exact(value) {
-  return Number.isInteger(value) ? String(value) : String(Number(value.toPrecision(TRUSTED)));
+  if (Number.isInteger(value)) return String(value);
+  return String(Number(Math.abs(value) < 10 ** TRUSTED ? value.toPrecision(TRUSTED) : value.toFixed(0)));
 }
 
 /** How many digits a number has after its point. @param {number} value */

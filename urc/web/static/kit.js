@@ -62,6 +62,15 @@ export function drawing(root, selector) {
 }
 
 /**
+ * Return the time of day for people, the same on logs and plots: 24 hours, in this device's zone.
+ *
+ * @param {Date} time
+ */
+export function clock(time) {
+  return time.toLocaleTimeString([], { hour12: false });
+}
+
+/**
  * Write a text, on change only.
  *
  * @param {Element} el

@@ -9,6 +9,7 @@
  * @typedef {import("./store.js").Store} Store
  */
 import { part } from "./badge.js";
+import { clock } from "./kit.js";
 import { ageText } from "./store.js";
 import { said, t } from "./words.js";
 
@@ -115,7 +116,7 @@ function lineElement(line) {
   const time = new Date(Date.now() - line.age);
   el.dataset["level"] = line.level;
   el.append(
-    element("span", "urc-log-time", time.toLocaleTimeString([], { hour12: false })),
+    element("span", "urc-log-time", clock(time)),
     element("span", "urc-log-sign", SIGNS[line.level] ?? ""),
     `${line.source}: ${line.text}`,
   );

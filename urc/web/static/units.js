@@ -54,6 +54,15 @@ const SYSTEMS = {
   },
 };
 
+/**
+ * Return the sign of a unit as people write it: "°C" for "degC".
+ *
+ * @param {string} unit as documents spell it
+ */
+export function symbolOf(unit) {
+  return Object.entries(SIGNS).find(([name]) => name === unit)?.[1] ?? unit;
+}
+
 export class Units {
   /** @param {string} system one of the systems; anything else leaves units as they are declared */
   constructor(system = "") {
@@ -90,8 +99,7 @@ export class Units {
   make(symbol) {
     const system = SYSTEMS[this.system] ?? {};
     const found = Object.hasOwn(system, symbol) ? system[symbol] : undefined;
-    const sign = Object.entries(SIGNS).find(([name]) => name === symbol)?.[1];
-    const [factor, shown, offset = 0] = found ?? [1, sign ?? symbol, 0];
+    const [factor, shown, offset = 0] = found ?? [1, symbolOf(symbol), 0];
     return { factor, offset, symbol: shown };
   }
 }
