@@ -35,6 +35,22 @@ BARS = """() => {
 }"""
 
 
+ROWS = """() => {
+  const tops = [...document.querySelectorAll(".urc-bar > *")].map((one) => one.getBoundingClientRect());
+  return new Set(tops.filter(({ height }) => height).map(({ top, height }) => Math.round(top + height / 2))).size;
+}"""
+
+
+async def test_the_bar_of_an_error_is_one_row_on_a_phone(new_page: PageMaker) -> None:
+    """As the menu's is."""
+    async with running_dashboard(FakeRobot(dashboard_profile())) as address:
+        page = await new_page(size="phone")
+        new_page.allow(page, lambda text: "404" in text)
+        for path in ("nothing", ""):
+            await page.goto(f"{address}{path}")
+            assert await page.evaluate(ROWS) == 1, path
+
+
 NARROW_PX = (320, 360, 390, 430, 500, 560, 599, 600, 700, 820)
 LEAST_TITLE_PX = 72
 """Six letters of a robot's name."""

@@ -152,6 +152,12 @@ def test_a_page_shows_each_state_of_the_widgets_that_it_names(client: TestClient
     assert client.get("/widgets/value/widget.yaml").status_code == 404
 
 
+def test_a_widgets_page_is_found_without_its_last_slash(client: TestClient) -> None:
+    """As a robot's page is."""
+    answer = client.get("/widgets/plot", follow_redirects=False)
+    assert (answer.status_code, answer.headers["location"]) == (308, "/widgets/plot/")
+
+
 def test_what_a_widget_is_for_is_told_in_the_readers_language(client: TestClient) -> None:
     """Its examples, too, as far as most widgets have them; the rest is marked as English."""
     german = {"accept-language": "de"}

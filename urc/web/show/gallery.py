@@ -13,7 +13,7 @@ from urllib.parse import quote
 
 from starlette.exceptions import HTTPException
 from starlette.requests import Request
-from starlette.responses import HTMLResponse, PlainTextResponse, Response
+from starlette.responses import HTMLResponse, PlainTextResponse, RedirectResponse, Response
 from starlette.routing import Route
 
 from urc.model.profile import Profile
@@ -150,6 +150,7 @@ class Gallery:
             Route("/widgets", self.index),
             Route("/widgets/", self.index),
             Route("/widgets/{names}/", self.demo),
+            Route("/widgets/{names}", with_slash),
             Route("/widgets/{names}/stamp", self.stamp),
         ]
 
@@ -256,6 +257,11 @@ def _exhibits(shown: Iterable[Shown], border: Border) -> Iterable[Exhibit]:
         cell = widget_cell(index, state.use, state.profile, border)
         label = t(state.name) if state.name in EXAMPLES else state.name
         yield Exhibit(widget.name, state.name, label, widget.title, cell, state.news)
+
+
+async def with_slash(request: Request) -> Response:
+    """Lead to the page of the same path with a slash at its end."""
+    return RedirectResponse(request.url.replace(path=f"{request.url.path}/").path, 308)
 
 
 def _answer(html: str, status: int = 200) -> Response:
