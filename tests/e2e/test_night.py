@@ -15,7 +15,9 @@ pytestmark = pytest.mark.anyio
 
 async def filter_of(page: Page) -> str:
     """Return what the page does with the picture of the camera."""
-    found: str = await page.locator(".camera-picture").evaluate("(el) => getComputedStyle(el).filter")
+    found: str = await page.locator(".camera-picture").evaluate(
+        "(el) => getComputedStyle(el).filter"
+    )
     return found
 
 

@@ -64,9 +64,7 @@ async def test_a_speed_step_never_runs_out_of_its_button(new_page: PageMaker, wi
             assert await page.evaluate(SPEEDS) == [], height
 
 
-@pytest.mark.parametrize(
-    ("width", "height"), [(1440, 900), (1180, 820), (390, 844), (358, 640)]
-)
+@pytest.mark.parametrize(("width", "height"), [(1440, 900), (1180, 820), (390, 844), (358, 640)])
 async def test_the_legend_of_a_plot_shows_every_signal(
     new_page: PageMaker, width: int, height: int
 ) -> None:
