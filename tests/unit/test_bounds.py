@@ -47,9 +47,9 @@ def test_a_table_of_usual_size_is_cut() -> None:
 TOO_LARGE = [
     "(?:a?){1000}" * 10 + "x",
     "(?:(?:a?){30}){30}",
-    "(?P<n>(?:[ab]*a[ab]{600}))c",
-    r"(?:\W?){60}",
-    "|".join(["é{40}"] * 10),
+    "(?P<n>(?:[ab]*a[ab]{600}[ab]{600}))c",
+    r"(?:\W?){150}",
+    "|".join(["é{60}"] * 10),
 ]
 
 
@@ -61,8 +61,13 @@ def test_a_pattern_that_multiplies_is_refused(
     """The same line with and without RE2: the pattern is judged as it is written."""
     if not is_installed:
         monkeypatch.setitem(sys.modules, "re2", None)
-    with pytest.raises(PatternError, match=r"this pattern counts to \d+ parts; 500 are allowed"):
+    with pytest.raises(PatternError, match=r"this pattern counts to \d+ parts; 1000 are allowed"):
         compile_pattern(source)
+
+
+def test_a_sentence_of_a_usual_length_is_found_anywhere() -> None:
+    """NMEA 0183 has up to 82 characters between its dollar sign and its line end."""
+    assert compile_pattern(r"\$[^\r\n]{1,80}\r\n").search("xx$GPGLL,,V\r\n") == {}
 
 
 @pytest.mark.parametrize("source", [r"^[0-9A-F]{1000}$", r"^.{800},(?P<n>\d+)$"])
