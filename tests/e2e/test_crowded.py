@@ -36,8 +36,9 @@ BARS = """() => {
 
 
 ROWS = """() => {
-  const tops = [...document.querySelectorAll(".urc-bar > *")].map((one) => one.getBoundingClientRect());
-  return new Set(tops.filter(({ height }) => height).map(({ top, height }) => Math.round(top + height / 2))).size;
+  const parts = [...document.querySelectorAll(".urc-bar > *")];
+  const boxes = parts.map((one) => one.getBoundingClientRect()).filter(({ height }) => height);
+  return new Set(boxes.map(({ top, height }) => Math.round(top + height / 2))).size;
 }"""
 
 
@@ -59,7 +60,8 @@ BAR = """() => {
   const [title, badge, bar] = [".urc-bar-title", ".urc-badge", ".urc-bar"].map(box);
   return {
     title: title.width, rows: bar.height / title.height,
-    isSecondRow: badge.top >= title.bottom, isWide: document.documentElement.scrollWidth > innerWidth,
+    isSecondRow: badge.top >= title.bottom,
+    isWide: document.documentElement.scrollWidth > innerWidth,
   };
 }"""
 

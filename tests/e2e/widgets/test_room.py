@@ -17,7 +17,7 @@ BATTERY = """() => {
   const box = (part) => cell.querySelector(part).getBoundingClientRect();
   return {
     picture: box(".battery-inner").height / cell.getBoundingClientRect().height,
-    facts: [...cell.querySelectorAll(".battery-facts > li")].filter((one) => one.offsetHeight > 0).length,
+    facts: [...cell.querySelectorAll(".battery-facts > li")].filter((one) => one.offsetHeight).length,
   };
 }"""
 SPEEDS = """() => [...document.querySelectorAll(".joystick .urc-speed, .joystick .urc-speed-next")]
