@@ -6,6 +6,7 @@ from playwright.async_api import expect
 from tests.e2e.browser import running_browser
 from tests.e2e.conftest import PageMaker
 from tests.e2e.dashboards import running_dashboard, until, until_attribute
+from tests.e2e.keys import known_here
 from tests.e2e.motion.driving import CALM_LEASE_S, driven, held, number
 from urc.model.codec import WriteSpec
 from urc.model.driver import Command
@@ -97,7 +98,9 @@ async def test_large_text_leaves_stop_whole_and_room_for_widgets(size_px: int) -
     )
     flag = f"--blink-settings=defaultFontSize={size_px}"
     async with driven(robot=robot) as (_, address), running_browser(flag) as large:
-        page = await large.new_page()
+        context = await large.new_context()
+        await known_here(context)
+        page = await context.new_page()
         await page.goto(address)
         await page.locator("[data-stop-button]").wait_for()
         for width, height in SCREENS:

@@ -17,7 +17,8 @@ BATTERY = """() => {
   const box = (part) => cell.querySelector(part).getBoundingClientRect();
   return {
     picture: box(".battery-inner").height / cell.getBoundingClientRect().height,
-    facts: [...cell.querySelectorAll(".battery-facts > li")].filter((one) => one.offsetHeight).length,
+    facts: [...cell.querySelectorAll(".battery-facts > li")]
+      .filter((one) => one.offsetHeight).length,
   };
 }"""
 SPEEDS = """() => [...document.querySelectorAll(".joystick .urc-speed, .joystick .urc-speed-next")]
