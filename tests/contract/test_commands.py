@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from urc.cli.arguments import parse
+from urc.cli.arguments import parse, profile_path
 from urc.cli.main import VERBS, main
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -52,3 +52,19 @@ def test_help_of_a_verb_shows_its_example(verb: str, capsys: pytest.CaptureFixtu
 def test_verb_is_named_in_the_docs(verb: str) -> None:
     """Who reads the pages meets every verb."""
     assert any(f"urc {verb}" in page.read_text(encoding="utf-8") for page in PAGES)
+
+
+@pytest.mark.parametrize("verb", VERBS)
+def test_an_example_names_nothing_that_only_a_checkout_has(
+    verb: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A robot is named as it can be in any folder; other files are the reader's own."""
+    monkeypatch.chdir(tmp_path)
+    module = import_module(f"urc.cli.{verb}")
+    words = shlex.split(module.EXAMPLE.partition(" > ")[0])
+    assert not [word for word in words if word.startswith(("robots/", "widgets/", "docs/"))]
+    found = parse(verb, VERBS[verb], module, words[2:])
+    profiles = [*getattr(found, "profiles", ()), getattr(found, "profile", None)]
+    for profile in filter(None, profiles):
+        if not profile.endswith(".yaml"):
+            assert Path(profile_path(profile)).is_file()

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from urc.model.profile import Profile
     from urc.model.values import Value
 
-EXAMPLE = "urc discover robots/rover.yaml --for 5s"
+EXAMPLE = "urc discover generic-ros1 --set host=192.168.1.20"
 
 DEFAULT_S = 3.0
 _OPEN_S = 5.0

@@ -5,7 +5,7 @@ import argparse
 from urc.cli.arguments import load
 from urc.problems import printable
 
-EXAMPLE = "urc docs robots/puppet.yaml > puppet.md"
+EXAMPLE = "urc docs puppet > puppet.md"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from urc.model.values import Value
     from urc.runtime.recording.recorder import Recorder
 
-EXAMPLE = "urc record robots/puppet.yaml --for 10s -o puppet.mcap"
+EXAMPLE = "urc record puppet --for 10s -o puppet.mcap"
 
 _SOON_S, _LOOK_S = 0.02, 0.5
 

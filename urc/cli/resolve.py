@@ -5,7 +5,7 @@ import argparse
 from urc.cli.arguments import profile_path
 from urc.problems import ProblemsError
 
-EXAMPLE = "urc resolve robots/puppet.yaml"
+EXAMPLE = "urc resolve puppet"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from urc.model.profile import Profile
     from urc.model.values import Value
 
-EXAMPLE = "urc serve robots/puppet.yaml --set host=192.168.1.20"
+EXAMPLE = "urc serve puppet --set host=192.168.1.20"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from urc.model.values import Value
     from urc.simulator.twin import Twin
 
-EXAMPLE = "urc simulate robots/puppet.yaml --set port=6789"
+EXAMPLE = "urc simulate puppet --set port=6789"
 
 _SOURCE: Final = "urc.simulator.twin"
 """Where an emulated robot tells of frames that it cannot answer."""

@@ -8,8 +8,9 @@ import os
 from contextlib import suppress
 from typing import TYPE_CHECKING
 
+from urc.cli.arguments import profile_path
 from urc.cli.output import complain, json_text
-from urc.problems import Problem, has_errors, to_json, to_text
+from urc.problems import Problem, UrcError, has_errors, to_json, to_text
 
 if TYPE_CHECKING:
     from urc.config.load import Shelf
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
     from urc.model.widget import Widget
     from urc.runtime.coverage import Coverage
 
-EXAMPLE = "urc validate robots/*.yaml"
+EXAMPLE = "urc validate puppet"
 
 FORMATS = ("text", "json", "sarif", "github")
 
@@ -46,7 +47,9 @@ class _Report:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the documents, the format and what is checked."""
-    parser.add_argument("paths", metavar="PATH", nargs="+", help="documents of any kind")
+    parser.add_argument(
+        "paths", metavar="PATH", nargs="+", help="documents of any kind, or names of robots"
+    )
     parser.add_argument(
         "--format", choices=FORMATS, default="text", help="of the report (default: text)"
     )
@@ -147,9 +150,16 @@ def _examine_own_widgets(profile: "Profile", report: _Report) -> None:
 
 
 def _document_in(path: str) -> str:
-    """Return the document that a path means: a widget's folder stands for its manifest."""
+    """Return the document that a path, or the name of a robot, means.
+
+    A widget's folder stands for its manifest. What nothing has is a finding like others.
+    """
     manifest = os.path.join(path, "widget.yaml")
-    return manifest if os.path.isfile(manifest) else path
+    if os.path.isfile(manifest):
+        return manifest
+    with suppress(UrcError):
+        return profile_path(path)
+    return path
 
 
 def _shelf_of_package(path: str) -> "Shelf | None":

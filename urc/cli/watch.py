@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from urc.model.values import Sample, Value
     from urc.runtime.hub import Hub, Note, Tap, Tapped, Traffic
 
-EXAMPLE = "urc watch robots/puppet.yaml battery --for 5s"
+EXAMPLE = "urc watch puppet battery --for 5s"
 
 _LAST_WORDS_S = 5.0
 """How long the reader may take for the last lines, when the time is over."""

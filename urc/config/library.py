@@ -1,19 +1,23 @@
 """The documents of one check, each put together from what it extends and includes.
 
     extends: base.yaml                  # all of the base, changed by what stands here
+    extends: generic-ros1               # the same, of a document that ships with URC
     include: [parts/battery.yaml]       # parts of documents, put under what stands here
 
-Both name documents relative to the one that names them. What a document says itself goes before
+A path is relative to the document that names it. What a document says itself goes before
 what it includes, and that before what it extends.
 """
 
 import os
+import re
 from typing import Any, Final
 
 from urc.config.merge import Tree, children, count_nodes, merge
 from urc.config.part import Findings, Part
 from urc.config.shape import check_source, kind_of
+from urc.config.suggest import did_you_mean
 from urc.problems import Problem, ProblemsError
+from urc.shipped import shipped
 from urc.source import Document, Path, read_document, similar_file
 
 __all__ = ["Library"]
@@ -27,6 +31,9 @@ _HEADER: Final = (*_OWN, "title", "summary", "licence", "author")
 _FILE_CODES: Final = (
     "no-such-file", "is-directory", "not-a-file", "not-readable", "too-large",
 )  # fmt: skip
+_NAME: Final = re.compile("[a-z][a-z0-9-]*")
+_SHIPPED: Final = {"robot": ".", "driver": "drivers", "interface": "interfaces"}
+"""Kind of a document → where such documents ship, below the folder of robots."""
 _ARTICLES: Final = {"interface": "an interface"}
 _INCLUDED: Final = {
     "robot": ("robot", "driver"),
@@ -57,9 +64,19 @@ class Library:
         return read_document(path)
 
     def follow(self, reference: Part, kinds: tuple[str, ...]) -> Document | None:
-        """Return the document that a path names, relative to the one in which the path stands."""
+        """Return the document that a reference names.
+
+        A path is relative to the document in which it stands; a name is of what ships with URC.
+        """
         here = reference.document.source_of(reference.path).file
-        target = os.path.normpath(os.path.join(os.path.dirname(here), reference.data))
+        if _NAME.fullmatch(reference.data):
+            named = _shipped(reference.data, kinds)
+            if named is None:
+                self._report_name(reference, kinds)
+                return None
+            target = named
+        else:
+            target = os.path.normpath(os.path.join(os.path.dirname(here), reference.data))
         real = os.path.realpath(target)
         if real == os.path.realpath(here):
             self.findings.error(reference, "refers-to-itself", "this document refers to itself")
@@ -82,6 +99,18 @@ class Library:
             f"{target} is {_ARTICLES.get(found, f'a {found}')}, {wanted} is expected here",
         )
         return None
+
+    def _report_name(self, reference: Part, kinds: tuple[str, ...]) -> None:
+        known = [name for kind in kinds for name in _names(kind)]
+        hint = did_you_mean(reference.data, known, f"{kinds[0]}s that ship")
+        if not hint.startswith("did"):
+            hint = f"the path of a document ends in .yaml; {hint}"
+        self.findings.error(
+            reference,
+            "no-such-file",
+            f"no {' or '.join(kinds)} named {reference.data!r} ships with URC",
+            hint=hint,
+        )
 
     def _open(self, reference: Part, target: str) -> Document | None:
         try:
@@ -206,6 +235,16 @@ class Library:
                 hint="say it in the document that includes both",
             )
             self.findings.problems.append(found._replace(path=".".join(map(str, path))))
+
+
+def _shipped(name: str, kinds: tuple[str, ...]) -> str | None:
+    """Return the file of the document of that name that ships with URC, or None."""
+    files = (shipped("robots") / _SHIPPED[kind] / f"{name}.yaml" for kind in kinds)
+    return next((os.path.normpath(file) for file in files if file.is_file()), None)
+
+
+def _names(kind: str) -> list[str]:
+    return sorted(file.stem for file in (shipped("robots") / _SHIPPED[kind]).glob("*.yaml"))
 
 
 class _Clashes:

@@ -19,6 +19,10 @@ _EXCLUSIVE: Final = (frozenset(("grid", "grids", "tabs")),)
 """Keys of which a mapping has at most one, beside the forms of frames."""
 
 
+_OF_USED_DRIVER: Final = frozenset(("use", "params", "overrides"))
+"""Keys of a driver in a document of its own."""
+
+
 class Tree(NamedTuple):
     """Data, and where it stands."""
 
@@ -89,6 +93,8 @@ def merge(base: Tree, over: Tree, path: Path = (), clash: _Clash | None = None) 
         path: where both stand in their documents.
         clash: asked about each value that is replaced by another one.
     """
+    if path == ("driver",) and isinstance(over.value, dict):
+        base = _driver_in_full(base, over.value)
     if isinstance(base.value, dict) and isinstance(over.value, dict):
         if path[-1:] == ("framing",) and _has_other_type(base.value, over.value):
             return over  # the keys of another framing mean nothing to this one
@@ -103,6 +109,14 @@ def merge(base: Tree, over: Tree, path: Path = (), clash: _Clash | None = None) 
     if clash is not None and base.value != over.value:
         clash(path, base, over)
     return over
+
+
+def _driver_in_full(base: Tree, over: dict[str, object]) -> Tree:
+    """Return a driver that is only named as one that can be changed, where `over` changes it."""
+    if not isinstance(base.value, str) or not over.keys() <= _OF_USED_DRIVER:
+        return base
+    mark = base.mark.copy({"use": _pinned(base)})
+    return Tree({"use": base.value}, mark, base.home)
 
 
 def _mappings(base: Tree, over: Tree, path: Path, clash: _Clash | None) -> Tree:

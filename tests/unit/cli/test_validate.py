@@ -209,3 +209,12 @@ def test_command_that_is_asked_and_answered_is_a_test(
     Path("asked.yaml").write_text(head + silent + test, "utf-8")
     assert main(["validate", "asked.yaml"]) == 1
     assert "this test cannot fail" in capsys.readouterr().out
+
+
+def test_a_robot_is_checked_by_its_name(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """From any folder, as every other verb takes it."""
+    monkeypatch.chdir(tmp_path)
+    assert main(["validate", "puppet"]) == 0
+    assert capsys.readouterr().err.startswith("1 document: 0 errors, 0 warnings")
