@@ -163,7 +163,7 @@ class Opened(msgspec.Struct, array_like=True, frozen=True, tag=21):
     turn: int
     address: str
     """Where it leads, for people; may be known better now."""
-    stand: dict[str, int]
+    stand: dict[str, int] = {}
     """Counters that stops have used already."""
 
 
