@@ -128,3 +128,30 @@ async def test_unfit_message_breaks_nothing(ends: tuple[End, End]) -> None:
     a.pipe.post("fine")
     await b.until(1)
     assert b.got == ["fine"]
+
+
+async def test_pipe_that_broke_is_told_once_by_whatever_uses_it_next(
+    ends: tuple[End, End],
+) -> None:
+    """Writing to a process that was killed; nothing is raised where nobody expects it."""
+    a, b = ends
+    a.pipe._loop.remove_reader(a.pipe._line)
+    b.pipe.close()
+    assert a.pipe.post("lost") > 0
+    assert not a.is_gone.is_set(), "whoever posts is not called back from there"
+    async with asyncio.timeout(WITHIN_S):
+        await a.is_gone.wait()
+    assert not a.pipe.is_open
+    a.pipe.end()
+    a.pipe.close()
+
+
+async def test_reset_of_the_other_side_is_its_end(ends: tuple[End, End]) -> None:
+    """What was written to it and never read makes the system say so."""
+    a, b = ends
+    b.pipe._loop.remove_reader(b.pipe._line)
+    a.pipe.post("unread")
+    b.pipe.close()
+    async with asyncio.timeout(WITHIN_S):
+        await a.is_gone.wait()
+    assert a.got == []

@@ -8,6 +8,7 @@ from urc.guard import wire
 from urc.guard.line import WINDOW_BYTES
 from urc.guard.proxy import GuardedTransport
 from urc.model.codec import Envelope
+from urc.testing.clock import settle
 from urc.transports.base import ConnectFailed, PeerClosed, Prompt, TransportError
 
 pytestmark = pytest.mark.anyio
@@ -178,3 +179,123 @@ async def test_death_of_the_guard_ends_everything() -> None:
             await waiting
     guard.answers = False
     await guard.line.close()  # of nothing: it waits for nobody
+
+
+async def test_line_is_closed_before_and_after() -> None:
+    """Also in what it says of itself; nothing is kept for the next connection."""
+    guard = Guard()
+    for is_used in (False, True):
+        if is_used:
+            await guard.line.open(1.0)
+            assert guard.line.is_open
+            guard.tell(wire.Received("wire", 1, b"unread"), 3)
+            await guard.line.close()
+        assert not guard.line.is_open
+        assert not guard.line.offer(b"x")
+        for use in (guard.line.send(b"x"), guard.line.receive()):
+            with pytest.raises(PeerClosed, match="the line is closed"):
+                await use
+    assert guard.said == [wire.Open("wire", 1, 1.0), wire.Close("wire", 1)]
+
+
+async def test_refused_opening_is_called_off_once() -> None:
+    """The guard may open it all the same, later."""
+    guard = Guard()
+    guard.answers = False
+    opening = asyncio.ensure_future(guard.line.open(1.0))
+    await settle()
+    guard.tell(wire.Opened("wire", 7, "tcp robot:9"))
+    guard.tell(wire.OpenFailed("wire", 7, "of another turn"))
+    await settle()
+    assert not opening.done()
+    guard.tell(wire.OpenFailed("wire", 1, "nothing listens"))
+    with pytest.raises(ConnectFailed, match="nothing listens"):
+        await opening
+    await guard.line.close()
+    assert guard.said == [wire.Open("wire", 1, 1.0), wire.Close("wire", 1)]
+
+
+async def test_guard_that_dies_while_a_line_is_opened_says_so() -> None:
+    guard = Guard()
+    guard.answers = False
+    opening = asyncio.ensure_future(guard.line.open(1.0))
+    await settle()
+    guard.line.lost("the guard ended")
+    with pytest.raises(ConnectFailed, match="the guard ended"):
+        await opening
+
+
+@pytest.mark.parametrize("is_closed", [False, True])
+async def test_sender_is_told_whether_the_line_is_closed(is_closed: bool) -> None:
+    guard = Guard()
+    await guard.line.open(1.0)
+    sending = asyncio.ensure_future(guard.line.send(b"x"))
+    await settle()
+    guard.tell(wire.Refused("wire", 1, 1, "no", is_closed))
+    with pytest.raises(TransportError, match="no") as refused:
+        await sending
+    assert isinstance(refused.value, PeerClosed) is is_closed
+
+
+async def test_what_nobody_waited_for_ends_the_line_when_it_is_refused() -> None:
+    """All before it went out; whoever reads learns why there is no more."""
+    guard = Guard()
+    await guard.line.open(1.0)
+    assert guard.line.offer(b"a")
+    sending = asyncio.ensure_future(guard.line.send(b"b"))
+    await settle()
+    assert guard.line.offer(b"c")
+    guard.tell(wire.Refused("wire", 1, 3, "no route", True))
+    await sending
+    with pytest.raises(PeerClosed, match="no route"):
+        await guard.line.receive()
+
+
+async def test_senders_who_gave_up_do_not_hide_those_after_them() -> None:
+    guard = Guard()
+    await guard.line.open(1.0)
+    assert guard.line.offer(b"offered")
+    sends = [asyncio.ensure_future(guard.line.send(bytes([one]))) for one in range(3)]
+    await settle()
+    sends[0].cancel()
+    await settle()
+    guard.tell(wire.Sent("wire", 1, 4))
+    await settle()
+    assert [one.done() for one in sends] == [True, True, True]
+    numbers = [(one.number, one.data) for one in guard.said if isinstance(one, wire.Send)]
+    assert numbers == [(1, b"offered"), (2, b"\0"), (3, b"\1"), (4, b"\2")]
+
+
+async def test_bounds_of_what_is_offered_are_exact() -> None:
+    """Before, after a refusal by the encoder, and after everything was lost."""
+    guard = Guard()
+    post = guard.line._post
+
+    def refuse(said: object) -> None:
+        raise OverflowError("integer out of range")
+
+    for turn in (1, 2):
+        await guard.line.open(1.0)
+        guard.line._post = refuse
+        with pytest.raises(TransportError):
+            await guard.line.send(b"x" * 100)
+        guard.line._post = post
+        assert guard.line.offer(b"x" * 4096)
+        assert not guard.line.is_clogged
+        assert guard.line.offer(b"x")
+        assert guard.line.is_clogged
+        assert guard.line.offer(b"x" * (65536 - 4097))
+        assert not guard.line.offer(b"x")
+        guard.tell(wire.Sent("wire", turn, 2))
+        assert guard.line.offer(b"x" * 4096)
+        assert not guard.line.offer(b"x")
+
+
+async def test_what_was_taken_is_told_to_the_byte() -> None:
+    guard = Guard()
+    await guard.line.open(1.0)
+    for _ in range(4):
+        guard.tell(wire.Received("wire", 1, b"a"), WINDOW_BYTES // 4)
+        await guard.line.receive()
+    told = [one for one in guard.said if isinstance(one, wire.Credit)]
+    assert told == [wire.Credit("wire", 1, WINDOW_BYTES // 4)] * 4

@@ -243,3 +243,29 @@ def test_it_must_stop_when_its_lease_is_over() -> None:
     assert held.is_waiting
     assert not held.must_stop(1.2)
     assert held.must_stop(1.25)
+
+
+def test_other_terms_with_the_same_rate_do_not_let_it_go_faster() -> None:
+    """A gesture right after another one is one more write of the same control."""
+    held = mover()
+    for _ in range(2):
+        held.tick(b"go", 1.0)
+        held.due(1.0, is_clear=True)
+    held.renew(Terms(b"HALT", period_s=0.05))
+    held.tick(b"go on", 1.01)
+    assert held.due(1.01, is_clear=True) is None
+    assert held.due(1.06, is_clear=True) == b"go on"
+
+
+def test_other_rate_counts_from_now_on() -> None:
+    held = mover()
+    for _ in range(2):
+        held.tick(b"go", 1.0)
+        held.due(1.0, is_clear=True)
+    held.renew(Terms(STOP, period_s=0.2))
+    written = []
+    for step in range(100):
+        now = 1.0 + step / 100
+        held.tick(b"go on", now)
+        written += [now] if held.due(now, is_clear=True) else []
+    assert 5 <= len(written) <= 6

@@ -23,6 +23,12 @@ def test_whoever_comes_first_drives_and_the_others_are_told_who() -> None:
     assert lease.refusal("b", taken.state.epoch) == "Anna has the controls"
 
 
+def test_a_driver_without_a_name_is_somebody() -> None:
+    lease = Lease()
+    lease.take(Client("a"), 0.0)
+    assert lease.take(BERT, 1.0) == Refused("somebody else has the controls")
+
+
 def test_an_input_of_an_earlier_lease_is_refused() -> None:
     lease = Lease()
     lease.take(ANNA, 0.0)

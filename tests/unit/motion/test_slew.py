@@ -80,3 +80,19 @@ def test_no_course_of_values_grows_faster_than_the_rate_or_leaves_its_bounds() -
         gained = abs(found) - (abs(before) if found * before > 0 else 0.0)
         assert gained <= 2.0 * (passed_s if step else 0.05) + 1e-9
         before = found
+
+
+def test_a_value_within_its_room_is_left_as_it_is() -> None:
+    """To the last bit: what somebody typed is what the robot hears."""
+    slew = Slew({"x": 100.0}, {"x": 0.7}, 1.0)
+    assert slew.limit({"x": 0.1}, 1.0) == {"x": 0.1}
+
+
+def test_other_side_of_a_rest_is_as_far_away_as_it_is() -> None:
+    slew = Slew({"us": 400}, {"us": 90}, 0.05)
+    assert slew.limit({"us": -85}, 1.0) == {"us": 70}
+
+
+def test_elements_without_a_rest_stand_at_zero() -> None:
+    slew = Slew({"wheels": 2.0}, {"wheels": (1.0,)}, 0.5)
+    assert slew.limit({"wheels": (9.0, 9.0, -9.0)}, 1.0) == {"wheels": (2.0, 1.0, -1.0)}

@@ -70,3 +70,51 @@ def test_marks_are_bounded() -> None:
         watch.wrote(1, step * 0.01)
     assert watch.saw(10_000, 100.0)
     assert watch.age_s(100.0) == 100.0
+
+
+def test_bytes_are_counted_whatever_left_before_them() -> None:
+    watch = StallWatch(0.25)
+    watch.wrote(100, 1.0)
+    assert not watch.saw(60, 1.02)
+    watch.wrote(50, 1.1)
+    assert not watch.saw(110, 1.12)
+    assert watch.deadline == 1.25, "of the first, some are still here"
+    assert not watch.saw(50, 1.2)
+    assert watch.deadline == 1.1 + 0.25, "of the first, none are"
+    assert not watch.saw(50, 1.34)
+    assert watch.saw(50, 1.36)
+
+
+def test_a_single_byte_that_stays_is_a_stall() -> None:
+    watch = StallWatch(0.25)
+    assert not watch.saw(1, 1.0)
+    assert watch.saw(1, 1.25)
+
+
+def test_what_is_written_together_is_as_old_as_the_first_of_it() -> None:
+    watch = StallWatch(0.25)
+    watch.wrote(10, 1.0)
+    watch.wrote(10, 1.004)
+    watch.saw(10, 1.01)
+    assert watch.deadline == 1.25
+
+
+def test_a_line_that_takes_nothing_is_remembered_in_bounded_space() -> None:
+    """And its oldest bytes stay the oldest."""
+    watch = StallWatch(60.0)
+    for number in range(1000):
+        watch.wrote(10, 1.0 + number / 100)
+    assert len(watch._marks) <= 256
+    assert watch.deadline == 61.0
+
+
+def test_what_was_given_up_stays_as_old_as_it_was() -> None:
+    """Whatever follows it and leaves."""
+    watch = StallWatch(0.25)
+    watch.wrote(10, 1.0)
+    watch.wrote(10, 1.1)
+    watch.gave_up()
+    assert watch.deadline == 1.25
+    watch.wrote(10, 1.15)
+    watch.saw(5, 1.2)
+    assert watch.age_s(1.2) == 1.2 - 1.0

@@ -56,12 +56,14 @@ class Movers:
 
     def renew(self, command: str, stop: Payload) -> None:
         assert isinstance(stop, bytes)
+        assert command in stop.decode()
         self.told.append(f"stop is {stop.decode()}")
 
     def is_stopping(self, command: str) -> bool:
         return False
 
     def is_open(self, command: str) -> bool:
+        assert command
         return self.is_up
 
     def release(self, command: str) -> None:

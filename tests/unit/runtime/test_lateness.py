@@ -51,3 +51,12 @@ async def test_an_ended_watch_looks_no_more() -> None:
     it.watch.end()
     await it.clock.hold_up(5.0)
     assert it.told == []
+
+
+async def test_the_worst_is_remembered() -> None:
+    it = Scene()
+    assert it.watch.worst_s == 0.0
+    for held_s in (0.35, 0.85, 0.45):
+        await it.clock.advance(0.05)
+        await it.clock.hold_up(held_s)
+    assert it.watch.worst_s == pytest.approx(0.8)
