@@ -31,11 +31,17 @@ class FakeFrames:
 
     def is_lasting(self, command: str) -> bool:
         """Return whether its stop is the same for ever."""
+        self._known(command)
         return not self.number
 
     def is_ready(self, command: str) -> bool:
         """Return whether its line is ready."""
+        self._known(command)
         return self.is_greeted
+
+    def _known(self, command: str) -> None:
+        if command not in self.driver.commands:
+            raise KeyError(command)
 
     def send(self, line: str = "wire") -> int:
         """Use a number up on another frame, and return it."""

@@ -178,7 +178,7 @@ class Bench:
     async def open(self, turn: int = 1) -> None:
         self.tell(wire.Open("wire", turn, 1.0))
         await settle()
-        assert self.heard() == [wire.Opened("wire", turn, "wire")]
+        assert self.heard() == [wire.Opened("wire", turn, "wire", {})]
 
     def heard(self) -> list[wire.FromGuard]:
         """Return what it said since this was last asked."""

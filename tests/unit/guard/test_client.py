@@ -103,7 +103,7 @@ class House:
         opening = asyncio.ensure_future(self.guard.transports["wire"].open(BOUND_S))
         process = self.started[-1]
         await self.until(lambda: any(isinstance(one, wire.Open) for one in process.heard))
-        process.pipe.post(wire.Opened("wire", 1, "robot:1"))
+        process.pipe.post(wire.Opened("wire", 1, "robot:1", {}))
         await opening
 
 
@@ -261,7 +261,7 @@ async def test_guard_that_opened_a_line_was_started_well(house: House) -> None:
         await house.nth(count + 1)
     opening = asyncio.ensure_future(house.guard.transports["wire"].open(BOUND_S))
     await house.started[-1].hears(2)
-    house.started[-1].pipe.post(wire.Opened("wire", 1, "robot:1"))
+    house.started[-1].pipe.post(wire.Opened("wire", 1, "robot:1", {}))
     await opening
     for _ in range(3):
         count = len(house.started)
@@ -374,7 +374,7 @@ async def test_guard_comes_to_its_door(house: House, monkeypatch: pytest.MonkeyP
     assert not opening.done()
     doors[1].coming.set_result(lines[1])
     assert await second.hears(2) == [MAKE, wire.Open("wire", 1, BOUND_S)]
-    second.pipe.post(wire.Opened("wire", 1, "robot:1"))
+    second.pipe.post(wire.Opened("wire", 1, "robot:1", {}))
     await opening
     assert first.heard == []
     lines[0].close()

@@ -204,7 +204,7 @@ async def test_refused_opening_is_called_off_once() -> None:
     guard.answers = False
     opening = asyncio.ensure_future(guard.line.open(1.0))
     await settle()
-    guard.tell(wire.Opened("wire", 7, "tcp robot:9"))
+    guard.tell(wire.Opened("wire", 7, "tcp robot:9", {}))
     guard.tell(wire.OpenFailed("wire", 7, "of another turn"))
     await settle()
     assert not opening.done()

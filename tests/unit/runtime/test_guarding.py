@@ -8,6 +8,7 @@ import pytest
 from tests.unit.runtime.desks import DRIVER, held
 from urc.guard.client import Guard, LineSpec, LocalGuard
 from urc.guard.side import Client
+from urc.model.codec import Count, Numbered, Payload, Series
 from urc.model.driver import Driver, TransportSpec
 from urc.motion.hold import LEASE_S, Reason, Terms
 from urc.motion.stall import STALLED_S, WAITED_S
@@ -16,11 +17,15 @@ from urc.registry import Table
 from urc.runtime import guarding
 from urc.runtime.guarding import GuardedMovers, take_reins
 from urc.testing.clock import FakeClock
+from urc.testing.movers import FakeFrames
 from urc.transports.base import Setup
 
 pytestmark = pytest.mark.anyio
 
 TERMS = Terms(b"stop", period_s=0.05)
+SERIES = Series(
+    (Numbered(b"7 stop", Count({}, {"n": 7})), Numbered(b"8 stop", Count({"n": 7}, {"n": 8})))
+)
 
 
 class FakeClient(Client):
@@ -29,6 +34,7 @@ class FakeClient(Client):
     def __init__(self) -> None:
         super().__init__([])
         self.told: list[tuple[Any, ...]] = []
+        self.moving: set[str] = set()
         self.transports = {"wire": type("Line", (), {"is_open": True})()}
 
     def start(self) -> None:
@@ -42,6 +48,9 @@ class FakeClient(Client):
 
     def renew(self, control: str, stop: object) -> None:
         self.told.append(("renew", control, stop))
+
+    def is_stopping(self, control: str) -> bool:
+        return control in self.moving
 
     def release(self, control: str) -> None:
         self.told.append(("release", control))
@@ -85,7 +94,7 @@ def test_terms_that_stop_nothing_arm_nothing(client: FakeClient, movers: Guarded
     with pytest.raises(UrcError, match=r"^drive: a lease lasts 0\.1 to 1\.0 s, not 5$"):
         movers.arm("drive", TERMS._replace(lease_s=5.0))
     movers.renew("drive", b"later")
-    movers.stop_all()
+    movers.stop_all(FakeFrames(DRIVER))
     assert client.told == []
 
 
@@ -94,21 +103,38 @@ def test_stop_goes_by_the_terms_of_what_is_armed(client: FakeClient, movers: Gua
     terms = TERMS._replace(period_s=0.3, lease_s=0.4)
     movers.arm("drive", terms)
     movers.stop({"drive": b"stop 2"})
-    movers.stop_all()
-    stopped = ("stop", ("wire", "drive", terms._replace(stop=b"stop 2")))
-    assert client.told[1:] == [stopped, stopped]
+    movers.stop({"drive": SERIES})
+    stops = {"stop": b"7 stop", "stops": SERIES.frames}
+    assert client.told[1:] == [
+        ("stop", ("wire", "drive", terms._replace(stop=b"stop 2"))),
+        ("stop", ("wire", "drive", terms._replace(**stops))),
+    ]
 
 
-def test_all_that_is_armed_is_stopped_by_the_newest_frames(
+def test_all_that_may_move_is_stopped_by_the_frames_of_now(
     client: FakeClient, movers: GuardedMovers
 ) -> None:
+    """Or by the newest that there was, where none can be made any more."""
+    frames = FakeFrames(DRIVER)
     movers.arm("drive", TERMS)
     movers.arm("lift", TERMS)
+    client.moving = {"drive"}
+    movers.stop_all(frames)
+    client.moving = {"drive", "lift"}
     movers.renew("drive", b"stop 7")
-    movers.stop_all()
+    movers.renew("lift", SERIES)
+
+    def broken(command: str) -> Payload:
+        raise UrcError("no such setting")
+
+    frames.stop_frame = broken  # type: ignore[method-assign]
+    movers.stop_all(frames)
+    numbered = TERMS._replace(stop=b"7 stop", stops=SERIES.frames)
     assert client.told[2:] == [
+        ("stop", ("wire", "drive", TERMS._replace(stop=b"drive stop"))),
         ("renew", "drive", b"stop 7"),
-        ("stop", ("wire", "drive", TERMS._replace(stop=b"stop 7")), ("air", "lift", TERMS)),
+        ("renew", "lift", SERIES),
+        ("stop", ("wire", "drive", TERMS._replace(stop=b"stop 7")), ("air", "lift", numbered)),
     ]
 
 
