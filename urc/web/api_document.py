@@ -15,6 +15,7 @@ from urc import __version__
 from urc.web.manage.wire import (
     Add,
     Agree,
+    Ask,
     ControlState,
     Failure,
     Gone,
@@ -56,7 +57,14 @@ _CALLS: Final = (
         "What is installed, what repositories have, and the job that is under way.",
         Shelf,
         is_post=False,
-        query=("kinds", "words", "anew"),
+        query=("kinds", "words"),
+    ),
+    _Call(
+        "/api/v1/repositories/ask",
+        "Begin to ask the repositories what they have.",
+        Line,
+        Ask,
+        status=202,
     ),
     _Call("/api/v1/repositories", "Connect to a repository: it must answer.", Line, Url),
     _Call("/api/v1/repositories/remove", "Forget a repository.", Line, Url),

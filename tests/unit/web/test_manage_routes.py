@@ -19,6 +19,7 @@ from urc.testing.entry import HERE, MANAGER, OPEN
 from urc.web.app import build_app
 from urc.web.fleet.garage import Workshop
 from urc.web.fleet.robots import Robot
+from urc.web.manage.catalogue import Catalogue
 from urc.web.manage.given import given_source
 
 ADDRESS = "http://localhost:8080"
@@ -113,6 +114,28 @@ def test_who_has_the_token_of_managers_may(tmp_path: Path) -> None:
         path = client.post("/api/v1/packages/add", json={"path": "/etc/passwd"})
         assert path.status_code == 403
         assert "full path" not in client.get("/interfaces").text
+
+
+def test_only_pages_of_ours_have_repositories_asked(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A picture in a foreign page is a GET, and a GET sends nothing to anybody."""
+    asked: list[bool] = []
+    monkeypatch.setattr(Catalogue, "ask", lambda self, force=False: asked.append(force))
+    with served(tmp_path) as client:
+        for query in ("", "?anew", "?force=true"):
+            assert client.get(f"/api/v1/packages{query}").status_code == 200
+        client.get("/drivers")
+        assert client.get("/api/v1/repositories/ask").status_code == 405
+        foreign = {"origin": "http://evil.example"}
+        url = "/api/v1/repositories/ask"
+        assert client.post(url, json={"force": True}, headers=foreign).status_code == 403
+        assert asked == []
+        assert client.post(url, json={"force": True}).status_code == 202
+        assert asked == [True]
+    with served(tmp_path, client=AWAY) as client:
+        assert client.post(url, json={"force": True}).status_code == 202
+    assert asked == [True, False]
 
 
 def test_the_pages_say_who_may(tmp_path: Path) -> None:

@@ -54,10 +54,10 @@ class Catalogue:
         """Return the list of repositories."""
         return Repositories(self._folder, complain)
 
-    def ask(self, *, anew: bool = False) -> None:
+    def ask(self, *, force: bool = False) -> None:
         """Begin to ask all repositories, unless that was done a moment ago."""
         is_fresh = self._asked_s is not None and self._now() - self._asked_s < FRESH_S
-        if self.is_asking or (is_fresh and not anew):
+        if self.is_asking or (is_fresh and not force):
             return
         self._asking = asyncio.get_running_loop().create_task(self._ask())
 

@@ -185,13 +185,13 @@ class Manager:
         """Remember a repository that answers; raise `PackageError`."""
         known = self.catalogue.repositories(log.info)
         await in_daemon(lambda: known.add(url), "connect")
-        self.catalogue.ask(anew=True)
+        self.catalogue.ask(force=True)
 
     async def disconnect(self, url: str) -> None:
         """Forget a repository; raise `PackageError` when it was never added."""
         known = self.catalogue.repositories(log.info)
         await asyncio.to_thread(known.remove, url)
-        self.catalogue.ask(anew=True)
+        self.catalogue.ask(force=True)
 
     def gone(self, wish: Wish) -> list[str]:
         """Return all that would go with a package, as ``drivers/puppet 1.0.0``; raise."""

@@ -21,7 +21,7 @@ from urc.web.manage.given import given_source
 from urc.web.manage.jobs import Busy, Wanted
 from urc.web.manage.manager import Manager
 from urc.web.manage.pages import manage_page
-from urc.web.manage.wire import Add, Agree, Failure, Gone, JobNews, Line, Package, Url
+from urc.web.manage.wire import Add, Agree, Ask, Failure, Gone, JobNews, Line, Package, Url
 from urc.web.show.menu import Ways
 from urc.web.words import t
 
@@ -110,6 +110,7 @@ class ManageRoutes:
         """Return the pages, and what they ask for."""
         posts = {
             "repositories": self.connect,
+            "repositories/ask": self.ask,
             "repositories/remove": self.disconnect,
             "packages/install": self.install,
             "packages/add": self.add,
@@ -148,10 +149,9 @@ class ManageRoutes:
 
     @_api
     async def shelf(self, request: Request) -> Response:
-        """Tell what there is; ``kinds`` and ``words`` choose, ``anew`` asks the repositories."""
+        """Tell what there is; ``kinds`` and ``words`` choose. No repository is asked."""
         query = request.query_params
         kinds = tuple(one for one in query.get("kinds", "").split(",") if one in _KINDS) or _KINDS
-        self._manager.catalogue.ask(anew="anew" in query)
         shelf = await asyncio.to_thread(
             self._manager.shelf,
             query.get("words", "")[:200],
@@ -159,6 +159,16 @@ class ManageRoutes:
             may_manage=self.may_manage(request),
         )
         return answer(shelf)
+
+    @_api
+    async def ask(self, request: Request) -> Response:
+        """Begin to ask the repositories; ``force`` asks however new their answers are.
+
+        Anybody who looks at a page may ask, but only now and then.
+        """
+        said = await body_of(request, Ask)
+        self._manager.catalogue.ask(force=said.force and self.may_manage(request))
+        return answer(Line(t("asking the repositories")), 202)
 
     @_api
     async def connect(self, request: Request) -> Response:

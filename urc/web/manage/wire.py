@@ -11,6 +11,7 @@ __all__ = [
     "MOST_HITS",
     "Add",
     "Agree",
+    "Ask",
     "Available",
     "Failure",
     "Gone",
@@ -50,6 +51,13 @@ class Url(Message, frozen=True):
     """A repository is connected to, or forgotten."""
 
     url: _Short
+
+
+class Ask(Message, frozen=True):
+    """The repositories are asked what they have."""
+
+    force: bool = False
+    """However new their answers are."""
 
 
 class Package(Message, frozen=True):

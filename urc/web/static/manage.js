@@ -42,13 +42,21 @@ function say(text, kind = "") {
   said.classList.toggle("urc-bad", kind === "bad");
 }
 
-/** @param {boolean} [anew] whether the repositories are asked, however new their answers are */
-async function refresh(anew = false) {
+/** @param {boolean} [force] whether the repositories are asked, however new their answers are */
+async function look(force = false) {
+  try {
+    await ask("/api/v1/repositories/ask", { force });
+  } catch (error) {
+    say(reason(error), "bad");
+  }
+  await refresh();
+}
+
+async function refresh() {
   round += 1;
   const mine = round;
   clearTimeout(again);
   const query = new URLSearchParams({ kinds: root.dataset["kinds"] ?? "", words: words.value });
-  if (anew) query.set("anew", "");
   try {
     /** @type {Shelf} */
     const shelf = await ask(`/api/v1/packages?${query}`);
@@ -108,7 +116,7 @@ async function act(path, body) {
   } catch (error) {
     say(reason(error), "bad");
   }
-  await refresh(path.startsWith("repositories"));
+  await refresh();
   return answer;
 }
 
@@ -159,9 +167,9 @@ words.addEventListener("input", () => {
   clearTimeout(typing);
   typing = window.setTimeout(() => void refresh(), TYPING_MS);
 });
-part(root, "[data-ask]").addEventListener("click", () => void refresh(true));
+part(root, "[data-ask]").addEventListener("click", () => void look(true));
 document.addEventListener("visibilitychange", () => {
-  if (!document.hidden) void refresh();
+  if (!document.hidden) void look();
 });
 ready(root);
-void refresh();
+void look();
