@@ -45,6 +45,7 @@ def sources() -> Iterator[tuple[str, Path]]:
         ("urc/web/static/*.js", "javascript"),
         ("urc/web/**/*.py", "python"),
         ("urc/runtime/permissions.py", "python"),
+        ("urc/runtime/risks.py", "python"),
         ("urc/packages/*.py", "python"),
     ):
         for path in sorted(ROOT.glob(pattern)):

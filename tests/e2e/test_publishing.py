@@ -165,7 +165,7 @@ def _is_withdrawn(lab: Lab, keeper: Person, owner: Person, other: Person) -> Non
     told = other.refuses("install", "puppet@1.1.0", "--yes")
     assert f"drivers/puppet 1.1.0 was withdrawn: {why}; --withdrawn takes it all the same" in told
     assert "installed drivers/puppet 1.0.0" in other.does("install", "puppet", "--yes")
-    told = other.does("install", "puppet@1.1.0", "--yes", "--withdrawn")
+    told = other.does("install", "puppet@1.1.0", "--yes", "--allow-more", "--withdrawn")
     assert f"; WITHDRAWN: {why}" in told
     keeper.does("repo", "restore", *version)
     assert other.does("search", "puppet") == "drivers/puppet 1.1.0  The driver puppet.\n"

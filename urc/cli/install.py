@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from urc.cli.failures import Misuse
 from urc.cli.output import complain
+from urc.cli.packages import add_risks
 from urc.cli.update import difference_lines
 
 if TYPE_CHECKING:
@@ -13,6 +14,7 @@ if TYPE_CHECKING:
     from urc.packages.plan import Plan
     from urc.packages.store import Store
     from urc.packages.update import Difference
+    from urc.runtime.apart import Looks
 
 EXAMPLE = "urc install drivers/puppet@^1.0"
 
@@ -30,6 +32,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="with --yes: also another version that may do more than the one in use",
     )
+    add_risks(parser)
     parser.add_argument(
         "--signed-by",
         metavar="SHA256:…",
@@ -53,6 +56,7 @@ def run(arguments: argparse.Namespace) -> int:
     from urc.cli.packages import is_agreed_to, is_path, keep_in_use, open_store, planned, used_lock
     from urc.packages.disk import put_file
     from urc.packages.install import origin_lines
+    from urc.runtime.apart import Looks
 
     lock_file: Path | None = arguments.lock
     pinned = _pinned(lock_file)
@@ -65,9 +69,12 @@ def run(arguments: argparse.Namespace) -> int:
         if arguments.signed_by is not None:
             _check_signer(plan, arguments.signed_by)
         used = used_lock(store, plan.lock.key)
-        _show(plan, folder, origin_lines(plan, store))
-        difference = _compare(used, plan, store, folder)
-        if not is_agreed_to(difference, arguments, "Install it?"):
+        look = Looks()
+        risks = _show(plan, folder, origin_lines(plan, store), look)
+        difference = _compare(used, plan, store, folder, look)
+        if difference is not None:
+            risks = difference.risks
+        if not is_agreed_to(difference, risks, arguments, "Install it?"):
             print("nothing is installed")
             return 1
         if used is not None and used.version != plan.lock.version:
@@ -101,12 +108,11 @@ def _pinned(file: Path | None) -> "Lock | None":
 
 
 def _compare(
-    used: "Lock | None", plan: "Plan", store: "Store", folder: Path
+    used: "Lock | None", plan: "Plan", store: "Store", folder: Path, look: "Looks"
 ) -> "Difference | None":
     """Print what another version changes, and return it; None where nothing is compared."""
     from urc.packages.update import staged_difference
     from urc.problems import UrcError, printable
-    from urc.runtime.look import look
 
     if used is None or used.key != plan.lock.key or used == plan.lock:
         return None
@@ -122,17 +128,18 @@ def _compare(
     return found
 
 
-def _show(plan: "Plan", folder: Path, origins: list[str]) -> None:
+def _show(plan: "Plan", folder: Path, origins: list[str], look: "Looks") -> list[str]:
+    """Print what a package may do; return what of this machine it uses by itself."""
     from urc.packages.store import kinds_in
     from urc.problems import printable
-    from urc.runtime.permissions import permissions
 
     lock = plan.lock
     document = folder / lock.root / f"{lock.key.kind}.yaml"
     widgets = [key.name for key in kinds_in(lock, "widget")]
-    allowed = permissions(document, folder, widgets)
+    seen = look(document, folder, widgets)
     for line in origins:
         print(printable(line))
     print(f"{lock} may do this:")
-    for line in allowed:
+    for line in seen.permissions:
         print(printable(f"  {line}"))
+    return seen.risks

@@ -1,10 +1,11 @@
 """What the verbs about packages share: the store, the repositories, a question, installed names."""
 
 import argparse
+import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from urc._folders import data_folder
 from urc.cli.failures import Misuse
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
     from urc.packages.update import Difference
 
 __all__ = [
+    "add_risks",
     "installed_document",
     "is_agreed",
     "is_agreed_to",
@@ -111,6 +113,19 @@ def known_entries() -> "list[Entry]":
         return []
 
 
+RISKS_FLAG: Final = "--let-it-use-my-keys-files-and-fixed-hosts"
+
+
+def add_risks(parser: argparse.ArgumentParser) -> None:
+    """Add the flag for packages that name files, keys, programs or hosts by themselves."""
+    parser.add_argument(
+        RISKS_FLAG,
+        dest="takes_risks",
+        action="store_true",
+        help="also where a package names keys, files, programs or hosts that nobody fills in",
+    )
+
+
 def is_agreed(question: str) -> bool:
     """Ask a person; raise `Misuse` where there is none."""
     if not sys.stdin.isatty():
@@ -122,25 +137,43 @@ def is_agreed(question: str) -> bool:
 
 
 def is_agreed_to(
-    difference: "Difference | None", arguments: argparse.Namespace, question: str
+    difference: "Difference | None",
+    risks: Sequence[str],
+    arguments: argparse.Namespace,
+    question: str,
 ) -> bool:
     """Ask a person, or take `--yes`, which is not enough where a version may do more.
 
     Args:
         difference: to what is installed; None where nothing is.
-        arguments: with ``yes`` and ``allow_more``.
+        risks: what the package uses of this machine by itself.
+        arguments: with ``yes``, ``allow_more`` and ``takes_risks``.
         question: as ``Update it?``.
     """
     gains = difference is not None and bool(difference.gained)
-    if not arguments.yes:
-        return is_agreed(f"It may do more than before. {question}" if gains else question)
-    if gains and not arguments.allow_more:
-        complain(
-            "urc: it may do more than before, which --yes alone does not agree to;"
-            " add --allow-more, or leave --yes out and be asked"
-        )
+    if risks:
+        _warn("WARNING: by itself, without your filling it in:")
+        for line in risks:
+            _warn(f"  {line}")
+    if arguments.yes:
+        return _is_yes_enough(gains, bool(risks), arguments)
+    if risks and not arguments.takes_risks and not is_agreed("Let it do that?"):
         return False
-    return True
+    return is_agreed(f"It may do more than before. {question}" if gains else question)
+
+
+def _is_yes_enough(gains: bool, has_risks: bool, arguments: argparse.Namespace) -> bool:
+    lacks = [
+        *(["--allow-more"] if gains and not arguments.allow_more else []),
+        *([RISKS_FLAG] if has_risks and not arguments.takes_risks else []),
+    ]
+    if lacks:
+        what = "it may do more than before" if gains else "it uses what nobody fills in"
+        complain(
+            f"urc: {what}, which --yes alone does not agree to;"
+            f" add {' '.join(lacks)}, or leave --yes out and be asked"
+        )
+    return not lacks
 
 
 def used_lock(store: "Store", key: "Key") -> "Lock | None":
@@ -160,6 +193,15 @@ def keep_in_use(lock: "Lock") -> None:
 
     if lock.key.kind in DRIVEN:
         pin(data_folder() / "robots", lock)
+
+
+def _warn(line: str) -> None:
+    """Print one line to standard error, in red where that is a terminal."""
+    from urc.problems import printable
+
+    is_plain = not sys.stderr.isatty() or bool(os.environ.get("NO_COLOR"))
+    text = printable(line)
+    print(text if is_plain else f"\x1b[1;31m{text}\x1b[0m", file=sys.stderr, flush=True)
 
 
 def signer(file: Path | None = None) -> "Signer | None":

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 
 from urc.cli.failures import Misuse
 from urc.cli.output import complain
+from urc.cli.packages import add_risks
 
 if TYPE_CHECKING:
     from urc.packages.lock import Lock
@@ -26,6 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--allow-more", action="store_true", help="with --yes: also where something may do more"
     )
+    add_risks(parser)
     parser.add_argument(
         "--back", action="store_true", help="put back what the last update of NAME replaced"
     )
@@ -83,14 +85,14 @@ def _update(old: "Lock", plan: "Plan", store: "Store", arguments: argparse.Names
     from urc.packages.install import origin_lines
     from urc.packages.update import staged_difference
     from urc.problems import printable
-    from urc.runtime.look import look
+    from urc.runtime.apart import look_apart
 
     with store.changing() as change:
         staged = change.stage(plan)
-        difference = staged_difference(old, plan, store, staged, look)
+        difference = staged_difference(old, plan, store, staged, look_apart)
         for line in _told(old, plan, difference, origin_lines(plan, store)):
             print(printable(line))
-        if not is_agreed_to(difference, arguments, "Update it?"):
+        if not is_agreed_to(difference, difference.risks, arguments, "Update it?"):
             print(f"{old} stays")
             return False
         change.replace(old, plan)

@@ -51,6 +51,10 @@ class Seen(Protocol):
         """What it may do, one line each."""
 
     @property
+    def risks(self) -> Sequence[str]:
+        """What of this machine it uses by itself, one line each."""
+
+    @property
     def wire(self) -> Mapping[str, str]:
         """Place in the document → what stands there, of all that decides what goes to the robot."""
 
@@ -67,6 +71,8 @@ class Difference(NamedTuple):
     gained: list[str]
     """What it may do that the old one may not."""
     lost: list[str]
+    risks: list[str]
+    """What of this machine the new one uses by itself, that the old one does not."""
     wire: list[str]
     """``- commands.beep.send: "beep"`` and ``+ commands.beep.send: "BEEP"``."""
 
@@ -141,9 +147,9 @@ def staged_difference(old: Lock, plan: Plan, store: Store, staged: Path, look: L
     before = _seen(old, store.make(old), look)
     after = _seen(plan.lock, staged, look)
     gained, lost = differences(before.permissions, after.permissions)
-    return Difference(
-        version_lines(old, plan.lock), gained, lost, _wire_lines(before.wire, after.wire)
-    )
+    risks = [line for line in after.risks if line not in before.risks]
+    wire = _wire_lines(before.wire, after.wire)
+    return Difference(version_lines(old, plan.lock), gained, lost, risks, wire)
 
 
 def differences(before: Iterable[str], after: Iterable[str]) -> tuple[list[str], list[str]]:

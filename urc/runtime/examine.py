@@ -12,6 +12,7 @@ from typing import Final
 
 from urc.config.load import check
 from urc.problems import Problem, printable
+from urc.runtime.apart import bound_this_process
 from urc.runtime.catalog import built_in_catalog
 from urc.runtime.selftest import exercise
 from urc.runtime.shelves import TwoShelves
@@ -84,14 +85,7 @@ def examine_apart(document: Path, total_s: float = _TOTAL_S) -> list[str]:
 
 
 def _main(document: str) -> int:
-    try:
-        import resource
-    except ImportError:  # Windows: the time-out of the caller is all there is
-        pass
-    else:
-        resource.setrlimit(resource.RLIMIT_AS, (_MEMORY_BYTES, _MEMORY_BYTES))
-        resource.setrlimit(resource.RLIMIT_CPU, (_PROCESSOR_S, _PROCESSOR_S))
-        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    bound_this_process(_PROCESSOR_S, _MEMORY_BYTES)
     sys.stdout.write(json.dumps([printable(line) for line in examine(Path(document))]))
     return 0
 

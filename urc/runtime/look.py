@@ -8,6 +8,7 @@ from urc.config.load import check
 from urc.config.resolve import resolve
 from urc.runtime.catalog import built_in_catalog
 from urc.runtime.permissions import permissions
+from urc.runtime.risks import risks_of
 from urc.runtime.shelves import shelf_of
 from urc.source import parse_document
 
@@ -27,6 +28,8 @@ class Look(NamedTuple):
     wire: Mapping[str, str]
     """``commands.beep.send`` → what stands there: all that decides what goes to the robot, and what
     is made of its answers."""
+    risks: list[str]
+    """What of this machine it uses by itself; see `urc.runtime.risks`."""
 
 
 def look(document: Path, folder: Path, widgets: Sequence[str]) -> Look:
@@ -45,12 +48,13 @@ def look(document: Path, folder: Path, widgets: Sequence[str]) -> Look:
     shelf = shelf_of(document)
     checked = check(document, built_in_catalog(), shelf)
     if checked.profile is None:
-        return Look(allowed, {})
+        return Look(allowed, {}, [])
+    risks = risks_of(checked.profile)
     text = resolve(str(document), shelf, checked.profile).text
     data = parse_document(text.encode(), "resolved").data
     assert isinstance(data, dict)  # noqa: S101 (a document that was loaded is a mapping)
     wire = {key: value for key, value in data.items() if key not in _NOT_WIRE}
-    return Look(allowed, dict(_flat(wire, "")))
+    return Look(allowed, dict(_flat(wire, "")), risks)
 
 
 def _flat(value: object, path: str) -> Iterator[tuple[str, str]]:

@@ -67,7 +67,7 @@ def _of_profile(profile: Profile) -> list[str]:
                 phrase("secret: is given what the setting {name} holds", name=setting.name)
             )
     commands = profile.driver.commands
-    moving = sorted(name for name, command in commands.items() if command.hold)
+    moving = sorted(name for name, command in commands.items() if command.hold or command.moves)
     if commands:
         lines.append(phrase("commands: {names}", names=", ".join(sorted(commands))))
     if moving:

@@ -275,6 +275,7 @@ async def test_what_the_driver_asks_is_asked_in_the_place_of_the_widget(
             await confirmed(page, beam, beam.get_by_text("Waiting for a second person").is_visible)
             asked = other.locator(".urc-asked", has_text="The beam goes on")
             await asked.wait_for()
+            await asked.get_by_text("Two screens of one machine count as two people").wait_for()
             assert robot.lines == []
             if answer == "Refuse":
                 await asked.get_by_role("button", name=answer).click()

@@ -28,6 +28,7 @@ BOT_2 = package("driver", "bot", "2.0.0", {"widgets/dial": "^2"})
 class Seen(NamedTuple):
     permissions: list[str]
     wire: dict[str, str]
+    risks: list[str]
 
 
 def look(document: Path, folder: Path, widgets: Sequence[str]) -> Seen:
@@ -36,7 +37,7 @@ def look(document: Path, folder: Path, widgets: Sequence[str]) -> Seen:
     assert widgets == ["dial"]
     assert (folder / "widgets/dial/widget.js").is_file()
     wire = {"send": version, "port": "1"} | ({"more": "x"} if version == "2.0.0" else {})
-    return Seen(["connects", f"is {version}"], wire)
+    return Seen(["connects", f"is {version}"], wire, ["uses a key", f"runs {version}"])
 
 
 @pytest.fixture

@@ -14,7 +14,7 @@ from starlette.testclient import TestClient
 from tests.unit.packages.made import install, package, write_package
 from tests.unit.web.test_manage_routes import fleet_of, served
 from urc.cli.main import main
-from urc.cli.packages import installed_document
+from urc.cli.packages import RISKS_FLAG, installed_document
 from urc.packages.install import plan_file
 from urc.packages.package import Package, pack_folder
 from urc.packages.sources import FileSource
@@ -45,8 +45,8 @@ def asked(client: TestClient, path: str, **how: Any) -> dict[str, Any]:
     raise AssertionError(job)
 
 
-def agree(client: TestClient, job: dict[str, Any]) -> Any:
-    return client.post("/api/v1/job/agree", json={"number": job["number"]})
+def agree(client: TestClient, job: dict[str, Any], **more: bool) -> Any:
+    return client.post("/api/v1/job/agree", json={"number": job["number"], **more})
 
 
 def update(store: Store, newer: Package) -> None:
@@ -188,7 +188,8 @@ def test_urc_install_shows_and_asks_the_same(
     said = capsys.readouterr()
     assert "may from now on: connects by udp (leak)" in said.out
     assert "--allow-more" in said.err
-    assert main(["install", str(folder), "--yes", "--allow-more"]) == 0
+    assert main(["install", str(folder), "--yes", "--allow-more"]) == 1
+    assert main(["install", str(folder), "--yes", "--allow-more", RISKS_FLAG]) == 0
     assert [lock.version for lock in store.installed()] == ["1.0.0", "2.0.0", "3.0.0"]
     assert installed_document("drivers/rover") == store.document(store.installed()[0])
     assert installed_document("drivers/rover@3.0.0") == store.document(store.installed()[2])
@@ -204,3 +205,14 @@ def test_a_newer_interface_is_used_at_once_and_says_what_it_changes(tmp_path: Pa
         job = asked(client, "upload?name=wide.zip", **body)
         assert (job["isUpdate"], job["stays"]) == (True, "")
         assert agree(client, job).json()["state"] == "done"
+
+
+def test_what_a_package_uses_by_itself_is_agreed_to_apart(tmp_path: Path) -> None:
+    attack = ATTACK.parent / "key-user"
+    with served(tmp_path) as client:
+        job = asked(client, "add", json={"path": str(attack)})
+        assert "shell logs in with the keys of your SSH agent" in job["risks"]
+        refused = agree(client, job)
+        assert refused.status_code == 422
+        assert "by itself: agree to that, too" in refused.json()["error"]
+        assert agree(client, job, takesRisks=True).json()["state"] == "done"

@@ -133,7 +133,7 @@ def test_only_pages_of_ours_have_repositories_asked(
         assert asked == []
         assert client.post(url, json={"force": True}).status_code == 202
         assert asked == [True]
-    with served(tmp_path, client=AWAY) as client:
+    with served(tmp_path, cookies={}) as client:
         assert client.post(url, json={"force": True}).status_code == 202
     assert asked == [True, False]
 

@@ -22,9 +22,8 @@ from urc.packages.sources import FileSource, Source
 from urc.packages.store import Store, kinds_in
 from urc.packages.update import Difference, plan_update, staged_difference
 from urc.problems import UrcError, printable
+from urc.runtime.apart import Looks
 from urc.runtime.kept import DRIVEN
-from urc.runtime.look import look
-from urc.runtime.permissions import permissions
 from urc.web.daemon import in_daemon
 from urc.web.manage.given import source_at
 from urc.web.manage.wire import JobNews, JobState
@@ -51,6 +50,8 @@ class _Planned(NamedTuple):
     plan: Plan
     origins: tuple[str, ...]
     may: tuple[str, ...]
+    risks: tuple[str, ...] = ()
+    """What of this machine it uses by itself."""
     old: Lock | None = None
     """What an update takes the place of."""
     stays: Lock | None = None
@@ -87,6 +88,7 @@ class Job:
             is_update=changes is not None,
             packages=_clean(changes.versions if changes is not None else packages),
             may=_clean(planned.may if planned is not None else ()),
+            risks=_clean(planned.risks if planned is not None else ()),
             gained=_clean(changes.gained if changes is not None else ()),
             lost=_clean(changes.lost if changes is not None else ()),
             wire=_clean(changes.wire if changes is not None else ())[:_WIRE_MOST],
@@ -170,12 +172,24 @@ class Jobs:
             return None, None
         return planned.plan.lock.key, None if planned.old else self._used(planned.plan.lock.key)
 
-    async def agree(self, number: int) -> Job:
-        """Install what a job has planned; raise `Busy` when it does not ask."""
+    async def agree(self, number: int, *, takes_risks: bool = False) -> Job:
+        """Install what a job has planned; raise `Busy` when it does not ask.
+
+        Args:
+            number: of the job.
+            takes_risks: whether what the package uses by itself was agreed to as well.
+
+        Raises:
+            PackageError: it was not.
+        """
         job = self._asked(number)
         planned = job.planned
         if job.state != "asks" or planned is None:
             raise Busy("there is nothing to agree to: begin again")
+        if planned.risks and not takes_risks:
+            raise PackageError(
+                f"{planned.plan.lock} uses something of this machine by itself: agree to that, too"
+            )
         job.state, job.line = "working", _INSTALLING
         try:
             await asyncio.to_thread(self._install, planned)
@@ -247,19 +261,22 @@ class Jobs:
             lock = plan.lock
             widgets = [key.name for key in kinds_in(lock, "widget")]
             document = folder / lock.root / f"{lock.key.kind}.yaml"
-            may = permissions(document, folder, widgets)
+            look = Looks()
+            seen = look(document, folder, widgets)
             before, stays = old, None
             used = self._used(lock.key)
             if old is None and used is not None and used != lock:
                 is_chosen = used.key == lock.key and used.key.kind in DRIVEN
                 stays = used if is_chosen and used.version != lock.version else None
                 before = used
-            changes = self._changes(job, before, plan, folder)
+            changes = self._changes(job, before, plan, folder, look)
         origins = origin_lines(plan, self._store)
-        return _Planned(plan, tuple(origins), tuple(may), old, stays, changes)
+        risks = seen.risks if changes is None else changes.risks
+        may = tuple(seen.permissions)
+        return _Planned(plan, tuple(origins), may, tuple(risks), old, stays, changes)
 
     def _changes(
-        self, job: Job, before: Lock | None, plan: Plan, folder: Path
+        self, job: Job, before: Lock | None, plan: Plan, folder: Path, look: Looks
     ) -> Difference | None:
         """Return what is another thing than in the version before, where that can be told."""
         if before is None:

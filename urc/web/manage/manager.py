@@ -243,7 +243,7 @@ class Manager:
         await self.changed()
         return gone
 
-    async def agree(self, number: int) -> Job:
+    async def agree(self, number: int, *, takes_risks: bool = False) -> Job:
         """Install what the job has planned; raise `Busy` while its robot is being driven.
 
         What is in use of the package stays so, but for an update.
@@ -253,7 +253,7 @@ class Manager:
             self._check_idle_of(key)
         if used is not None and used.key.kind in DRIVEN:
             await asyncio.to_thread(pin, self._kept_folder, used)
-        job = await self.jobs.agree(number)
+        job = await self.jobs.agree(number, takes_risks=takes_risks)
         await self.changed()
         return job
 

@@ -252,7 +252,7 @@ class ManageRoutes:
         """Install what the job has planned."""
         self.check(request)
         said = await body_of(request, Agree)
-        job = await self._manager.agree(said.number)
+        job = await self._manager.agree(said.number, takes_risks=said.takes_risks)
         return answer(job.news())
 
     @_api

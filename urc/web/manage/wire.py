@@ -80,6 +80,8 @@ class Agree(Message, frozen=True):
     """What a job may do was read and agreed to; or the job is given up."""
 
     number: int
+    takes_risks: bool = False
+    """Whether what the package uses of this machine by itself was agreed to as well."""
 
 
 JobState = Literal["working", "asks", "done", "failed", "cancelled"]
@@ -101,6 +103,8 @@ class JobNews(Message, frozen=True):
     """Where each package comes from, and who signed it; of an update what becomes of each."""
     may: tuple[str, ...] = ()
     """What the package may do, one line each."""
+    risks: tuple[str, ...] = ()
+    """What of this machine it uses by itself; of an update only what is new."""
     gained: tuple[str, ...] = ()
     """Of an update: what it may do that the version before may not."""
     lost: tuple[str, ...] = ()

@@ -216,7 +216,8 @@ export class Asks {
     const end = new AbortController();
     if (level === "hazardous") slide(yes, { label: t("Slide to agree"), done: agree, signal: end.signal });
     else yes.addEventListener("click", agree);
-    box.append(words, no, yes);
+    const note = element("small", "urc-quiet", t("Two screens of one machine count as two people: agree only if you are another person."));
+    box.append(words, no, yes, note);
     this.heading.append(box);
     this.others.set(n, box);
   }

@@ -132,7 +132,11 @@ export class JobDialog {
       made(
         "div",
         { class: "urc-ways" },
-        isAsking && button(isSwap(job) ? t("Update") : t("Install"), "yes", () => void this.agree(job), { class: "urc-button-main" }),
+        isAsking &&
+          button(isSwap(job) ? t("Update") : t("Install"), "yes", () => void this.agree(job), {
+            class: "urc-button-main",
+            disabled: job.risks.length > 0,
+          }),
         isOver
           ? button(t("Close"), "close", () => this.close(), { class: "urc-button-main" })
           : button(t("Give up"), "no", () => this.leave()),
@@ -146,6 +150,7 @@ export class JobDialog {
     const version = job.stays;
     const stays = t("{version} stays in use until another version is chosen in the settings of the robot.", { version });
     return [
+      ...this.risks(job),
       job.stays !== "" && made("p", { class: "urc-caution" }, `◆ ${stays}`),
       isUpdate && heading(t("What changes")),
       isUpdate && list(job.packages),
@@ -164,10 +169,37 @@ export class JobDialog {
     ];
   }
 
+  /**
+   * What a package uses of this machine by itself: a question of its own.
+   *
+   * @param {Job} job
+   */
+  risks({ risks }) {
+    if (risks.length === 0) return [];
+    const yes = this.box(() => {
+      const install = this.el.querySelector("[data-key='yes']");
+      if (install instanceof HTMLButtonElement) install.disabled = !yes.checked;
+    });
+    yes.dataset["key"] = "risks";
+    return [
+      made("h3", { class: "urc-row-title urc-bad" }, `▲ ${t("By itself, without your filling it in")}`),
+      made("ul", { class: "urc-list urc-bad", "data-risks": true }, ...risks.map((one) => made("li", {}, one))),
+      made("label", { class: "urc-check" }, yes, ` ${t("Let it do that")}`),
+    ];
+  }
+
+  /** @param {() => void} onchange @returns {HTMLInputElement} */
+  box(onchange) {
+    const box = document.createElement("input");
+    box.type = "checkbox";
+    box.addEventListener("change", onchange);
+    return box;
+  }
+
   /** @param {Job} job */
   async agree(job) {
     for (const one of this.el.querySelectorAll("button")) one.disabled = true;
-    const answer = await this.act("job/agree", { number: job.number });
+    const answer = await this.act("job/agree", { number: job.number, takesRisks: job.risks.length > 0 });
     if (!answer) this.close();
   }
 }

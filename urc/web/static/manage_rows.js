@@ -12,6 +12,7 @@
  * @property {boolean} isUpdate
  * @property {string[]} packages
  * @property {string[]} may
+ * @property {string[]} risks
  * @property {string[]} gained
  * @property {string[]} lost
  * @property {string[]} wire

@@ -1,0 +1,131 @@
+"""Looks at a stranger's documents in a process of its own, with little memory and time.
+
+``python -m urc.runtime.apart`` reads what to look at from its standard input, as JSON, and writes
+what it saw. Whatever a document costs, the program that asks for the look goes on meanwhile.
+"""
+
+import json
+import subprocess
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, Final
+
+from urc._phrases import Phrase, joined, phrase
+from urc.problems import Problem, ProblemsError, UrcError
+from urc.runtime.look import Look, look
+
+__all__ = ["Looks", "bound_this_process", "look_apart"]
+
+TOTAL_S: Final = 30.0
+"""Longest time that a look takes; it is much where other programs are busy."""
+PROCESSOR_S: Final = 10
+MEMORY_BYTES: Final = 1 << 30
+COMMAND: Final = ("-P", "-m", "urc.runtime.apart")
+"""What Python is told; -P: nothing is imported from the folder in which it is started."""
+_ANSWER_BYTES: Final = 16 << 20
+
+
+def look_apart(
+    document: Path, folder: Path, widgets: Sequence[str], *, total_s: float = TOTAL_S
+) -> Look:
+    """Return what `urc.runtime.look.look` returns, and raise what it raises.
+
+    Args:
+        document: the package's own.
+        folder: with all that the package needs.
+        widgets: names of the widgets that come along.
+        total_s: after which the look is given up.
+
+    Raises:
+        ProblemsError: the document is broken.
+        UrcError: it refers to a file outside, or costs more than the memory and time there are.
+    """
+    asked = json.dumps([str(document), str(folder), list(widgets)])
+    command = [sys.executable, *COMMAND]
+    try:
+        done = subprocess.run(  # noqa: S603 (our own program)
+            command, input=asked.encode(), capture_output=True, timeout=total_s, check=False
+        )
+    except subprocess.TimeoutExpired:
+        raise UrcError(f"{document.name}: looking at it took longer than {total_s:g} s") from None
+    try:
+        said = json.loads(done.stdout)
+    except ValueError:
+        raise UrcError(
+            f"{document.name}: it cannot be looked at with {PROCESSOR_S} s of processor time and"
+            f" {MEMORY_BYTES >> 20} MiB of memory"
+        ) from None
+    if "problems" in said:
+        raise ProblemsError([Problem(*one) for one in said["problems"]])
+    if "fault" in said:
+        raise UrcError(said["fault"])
+    return Look([_phrase(one) for one in said["may"]], said["wire"], [*map(_phrase, said["risks"])])
+
+
+class Looks:
+    """Looks at each document once."""
+
+    def __init__(self) -> None:
+        self._seen: dict[Path, Look] = {}
+
+    def __call__(self, document: Path, folder: Path, widgets: Sequence[str]) -> Look:
+        """Return what `look_apart` returns; raise what it raises."""
+        if document not in self._seen:
+            self._seen[document] = look_apart(document, folder, widgets)
+        return self._seen[document]
+
+
+def bound_this_process(processor_s: int, memory_bytes: int) -> None:
+    """Let this process have no more than that; on Windows the caller's time-out is all there is."""
+    try:
+        import resource
+    except ImportError:
+        return
+    resource.setrlimit(resource.RLIMIT_AS, (memory_bytes, memory_bytes))
+    resource.setrlimit(resource.RLIMIT_CPU, (processor_s, processor_s))
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+
+
+def _said(line: str) -> Any:
+    """Return a line as JSON that can be said in another language still."""
+    if not isinstance(line, Phrase):
+        return line
+    if line.pieces:
+        return {"between": line.between, "pieces": [_said(one) for one in line.pieces]}
+    return {"text": line.text, "names": {name: _said(one) for name, one in line.names.items()}}
+
+
+def _phrase(said: Any) -> str:
+    if isinstance(said, str):
+        return said
+    if "pieces" in said:
+        return joined(said["between"], [_phrase(one) for one in said["pieces"]])
+    return phrase(said["text"], **{name: _phrase(one) for name, one in said["names"].items()})
+
+
+def _main() -> int:
+    bound_this_process(PROCESSOR_S, MEMORY_BYTES)
+    document, folder, widgets = json.loads(sys.stdin.buffer.read())
+    said: dict[str, Any]
+    try:
+        seen = look(Path(document), Path(folder), widgets)
+    except ProblemsError as error:
+        said = {"problems": error.problems}
+    except UrcError as error:
+        said = {"fault": str(error)}
+    else:
+        said = {
+            "may": [_said(line) for line in seen.permissions],
+            "wire": dict(seen.wire),
+            "risks": [_said(line) for line in seen.risks],
+        }
+    text = json.dumps(said)
+    if len(text) > _ANSWER_BYTES:
+        text = json.dumps({"fault": f"{document}: there is too much to be seen of it"})
+    sys.stdout.write(text)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(_main())
