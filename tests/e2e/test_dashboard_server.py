@@ -14,13 +14,13 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from tests.e2e.dashboards import running_dashboard, until, until_closed
 from tests.e2e.keys import headers_for
 from tests.e2e.processes import UrcProcess
+from urc._addresses import local_addresses
 from urc.model.interface import WidgetUse
 from urc.model.values import Signal
 from urc.problems import UrcError
 from urc.testing.dashboard import FakeRobot, dashboard_profile
 from urc.testing.entry import BEARER
 from urc.web.app import build_app, serve
-from urc.web.serve.addresses import local_addresses
 from urc.web.serve.policy import REFUSAL_HEADERS
 from urc.web.serve.server import reachable_urls
 

@@ -8,6 +8,7 @@ from typing import Final
 
 from urc.config.form_json_text import compiled_tree, placed_templates, templates_in
 from urc.config.forms import FormContext, body_form
+from urc.config.headers import check_headers
 from urc.config.part import Findings, Part
 from urc.expressions import Template
 from urc.model.codec import WriteSpec
@@ -22,6 +23,7 @@ def parse_write(part: Part, findings: Findings, context: FormContext) -> WriteSp
     body = body_form(part)
     spec = body[1].parse_write(body[0], findings, context) if body else None
     before = len(findings.problems)
+    check_headers(part, findings)
     attributes = {
         name: compiled_tree(inner, findings)
         for name, inner in part.entries().items()

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from typing import Final
 
 from urc.config.form_json_text import compiled_tree, placed_templates
+from urc.config.headers import check_headers
 from urc.config.parse_framing import parse_framing
 from urc.config.part import Findings, Part
 from urc.config.suggest import did_you_mean
@@ -30,6 +31,7 @@ def parse_transport(part: Part, findings: Findings, catalog: Catalog) -> Transpo
             f"there is no transport of type {kind.data!r}",
             hint=did_you_mean(kind.data, catalog.transports, "types"),
         )
+    check_headers(part, findings)
     encoding = part.text("encoding", "utf-8")
     options = {
         name: _option(inner, findings)

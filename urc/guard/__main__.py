@@ -1,4 +1,4 @@
-"""The guard's process: ``python -m urc.guard PIPE``, started by `urc.guard.client` alone."""
+"""The guard's process: ``python -m urc.guard PIPE DOOR…``, started by `urc.guard.client` alone."""
 
 import asyncio
 import gc
@@ -18,6 +18,7 @@ from urc.guard.host import FINISH_S, Host
 from urc.guard.pipe import Pipe
 from urc.guard.precedence import Precedence
 from urc.guard.process import DOOR
+from urc.transports.own_doors import OWN_DOORS
 
 __all__ = ["BEAT_S", "main"]
 
@@ -97,6 +98,7 @@ def main() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     logging.basicConfig(format="%(levelname)s: guard: %(message)s", level=logging.WARNING)
     line = _line(sys.argv[1])
+    OWN_DOORS.learn(sys.argv[2:])
     gc.collect()
     gc.freeze()  # what is loaded by now stays: no need to look through it again
     precedence = Precedence()

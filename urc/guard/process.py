@@ -10,6 +10,8 @@ import sys
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
+from urc.transports.own_doors import OWN_DOORS
+
 __all__ = ["CAN_INHERIT", "DOOR", "Door", "launch", "reap", "standing"]
 
 CAN_INHERIT: Final = os.name == "posix"
@@ -115,7 +117,7 @@ def _started(place: str, **more: Any) -> "subprocess.Popen[bytes]":
     else:
         more["process_group"] = 0
     # -P: nothing is imported from the folder we happen to be in.
-    command = [sys.executable, "-P", "-m", "urc.guard", place]
+    command = [sys.executable, "-P", "-m", "urc.guard", place, *OWN_DOORS.words()]
     return subprocess.Popen(command, **more)  # noqa: S603 - our own interpreter and module
 
 

@@ -6,12 +6,14 @@ other forms; JSON stays data, because such transports have an encoding of their 
 
 from collections.abc import Mapping
 from typing import Any, Final, cast
+from urllib.parse import unquote
 
 from urc.expressions import Template, text_of
 from urc.model.codec import Envelope, Payload, WriteSpec
 from urc.protocol.codec import CodecContext, Frame, Writer
 from urc.protocol.forms import build_writer
 from urc.protocol.json_text_form import JsonWriter, filled
+from urc.protocol.place_words import place_writer
 
 __all__ = ["EnvelopeWriter"]
 
@@ -28,13 +30,20 @@ class EnvelopeWriter:
     def __init__(self, spec: WriteSpec, context: CodecContext) -> None:
         self._verb = cast("str", spec.options["verb"])
         self._attributes = cast("Mapping[str, Any]", spec.options["attributes"])
+        places = {name: place_writer(name, tree) for name, tree in self._attributes.items()}
+        self._places = {name: one for name, one in places.items() if one is not None}
+        self._rest = {
+            name: tree for name, tree in self._attributes.items() if name not in self._places
+        }
         body = cast("WriteSpec | None", spec.options["body"])
         self._body: Writer | None = None if body is None else build_writer(body, context)
         self._context = context
 
     def write(self, namespace: Mapping[str, object]) -> Payload:
         """Return the envelope; raise `NotWritable` or `ExpressionError`."""
-        attributes = filled(dict(self._attributes), namespace)
+        attributes = filled(self._rest, namespace)
+        for name, place in self._places.items():
+            attributes[name] = place.write(namespace)
         for name in _TEXTS:
             if name in attributes:
                 values = attributes[name].items()
@@ -50,9 +59,10 @@ class EnvelopeWriter:
             return None
         found: dict[str, object] = {}
         for name in _ADDRESS:
-            if name in self._attributes and not self._is_here(
-                self._attributes[name], envelope.attributes.get(name), found
-            ):
+            value = envelope.attributes.get(name)
+            if name == "path" and name in self._places and isinstance(value, str):
+                value = unquote(value)
+            if name in self._attributes and not self._is_here(self._attributes[name], value, found):
                 return None
         if self._body is None:
             return found

@@ -4,6 +4,7 @@ import errno
 import socket
 
 from urc.problems import printable
+from urc.transports.own_doors import OwnDoor
 
 __all__ = ["CLOSED", "HUNG_UP", "broke", "explain", "late", "one_line", "place_of", "reason"]
 
@@ -41,6 +42,8 @@ def broke(fault: BaseException) -> str:
 
 def explain(host: str, place: str, fault: OSError | UnicodeError) -> str:
     """Return one line about why a line to `place` could not be opened."""
+    if isinstance(fault, OwnDoor):
+        return f"{place}: {fault.strerror}"
     if isinstance(fault, socket.gaierror | UnicodeError):
         return f"no such host {host!r}"
     if isinstance(fault, ConnectionRefusedError):

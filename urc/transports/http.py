@@ -13,6 +13,7 @@ from urllib.parse import urlencode
 import httpx2
 import msgspec
 
+from urc._headers import is_reserved
 from urc.model.codec import Envelope, Payload
 from urc.transports._faults import CLOSED, late
 from urc.transports.base import ConnectFailed, PeerClosed, Setup, Transport, TransportError
@@ -292,6 +293,9 @@ def _request_of(client: Client, data: Envelope) -> httpx2.Request:
     if not isinstance(headers, Mapping):
         raise HttpFault(f"headers must be names and values, not {headers!r}")
     named = {str(name): _plain(value) for name, value in headers.items()}
+    for name in named:
+        if is_reserved(name):
+            raise HttpFault(f"a document may not set the header {name[:40]!r}")
     body = data.body
     if body is not None and not isinstance(body, bytes):
         if not any(name.lower() == "content-type" for name in named):

@@ -10,6 +10,7 @@ import ssl
 from collections.abc import AsyncIterator, Callable, Iterable, Mapping
 from contextlib import asynccontextmanager, suppress
 from typing import Any
+from urllib.parse import unquote
 
 import httpcore2
 import httpx2
@@ -19,7 +20,7 @@ from urc.transports.base import ByteStream, ConnectFailed, PeerClosed, Transport
 from urc.transports.web_dial import Dialer
 from urc.transports.web_place import Credentials, WebPlace
 
-__all__ = ["Client", "HttpFault"]
+__all__ = ["Client", "HttpFault", "leads_up"]
 
 KEPT_S = 3.0
 """An idle connection is used again for this long; small robots close theirs after five seconds."""
@@ -96,6 +97,8 @@ class Client:
             HttpFault: it cannot be said in HTTP, or would lead elsewhere.
         """
         base = self._place.path.partition("?")[0].rstrip("/")
+        if leads_up(path):
+            raise HttpFault(f"{method} {path[:80]!r} would leave {base or '/'}: no '..' in a path")
         try:
             url = httpx2.URL(f"{self._origin}{base}/{path.lstrip('/')}")
             request = self._client.build_request(method, url, headers=dict(headers), content=body)
@@ -174,6 +177,15 @@ class Client:
         return HttpFault(_short(fault), is_unanswered=True)
 
 
+def leads_up(path: str) -> bool:
+    """Return whether a path has a part that means another folder, however it is written."""
+    plain = path.partition("?")[0].partition("#")[0]
+    for _ in range(_UNPACKED):  # some servers unpack what was packed twice
+        plain = unquote(plain)
+    return any(part in (".", "..") for part in plain.replace("\\", "/").split("/"))
+
+
+_UNPACKED = 2
 _FAULTS = (
     httpcore2.TimeoutException,
     httpcore2.NetworkError,

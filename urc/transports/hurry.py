@@ -11,6 +11,7 @@ import socket
 from contextvars import ContextVar
 
 from urc.transports._stream import tune
+from urc.transports.own_doors import OWN_DOORS
 
 __all__ = ["HURRY", "Hurry", "connected"]
 
@@ -70,6 +71,7 @@ async def _once(family: int, address: object) -> socket.socket:
         if line.getsockname() == line.getpeername():
             # A port of this machine that nobody listens on, and the kernel chose it for our end.
             raise ConnectionRefusedError(errno.ECONNREFUSED, "connected to itself")
+        OWN_DOORS.check(line)
     except BaseException:
         line.close()
         raise

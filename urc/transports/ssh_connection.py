@@ -1,14 +1,19 @@
 """One SSH connection, and the sharing of it by everything that goes through it."""
 
 import asyncio
+import ipaddress
+import socket
 from collections.abc import Awaitable, Callable
 from contextlib import suppress
 from typing import Any, NoReturn
 
 import asyncssh
 
-from urc.transports._faults import CLOSED, HUNG_UP, one_line
+from urc._addresses import is_of_this_machine
+from urc.transports._faults import CLOSED, HUNG_UP, explain, one_line
+from urc.transports._lookup import Lookup
 from urc.transports.base import ConnectFailed, PeerClosed
+from urc.transports.own_doors import OWN_DOORS, OwnDoor
 from urc.transports.ssh_channel import MAX_PACKET, WINDOW, Channel
 from urc.transports.ssh_wire import Wire
 from urc.transports.topic_socket import Address
@@ -17,6 +22,7 @@ __all__ = ["Connection", "Shared"]
 
 _GONE_WITHIN_S = 0.5
 """What a closed connection may take to be gone."""
+_LOOK_UP_S = 2.0
 
 
 class Connection:
@@ -61,6 +67,10 @@ class Connection:
     async def forwarded(self, host: str, port: int) -> Channel:
         """Return a connection to `host` and `port` as the server sees them."""
         place = Address(host, port).text
+        try:
+            host = await self._checked(host, port)
+        except OwnDoor as fault:
+            raise ConnectFailed(explain(host, place, fault)) from fault
         return await self._opened(
             lambda channel: self.ssh.create_connection(
                 lambda: channel, host, port, encoding=None, window=WINDOW, max_pktsize=MAX_PACKET
@@ -68,6 +78,36 @@ class Connection:
             Channel(self._wire),
             f"cannot connect to {place} through ssh {self._address.text}",
         )
+
+    async def _checked(self, host: str, port: int) -> str:
+        """Return what to connect to for `host`; raise `OwnDoor` where this program listens there.
+
+        An SSH server on this machine would lead to all that listens on it. There a name is looked
+        up here, once, so that the server does not find another address for it.
+        """
+        is_near = self._is_on_this_machine()
+        addresses = [host]
+        if is_near:
+            try:
+                async with asyncio.timeout(_LOOK_UP_S):
+                    found = await Lookup(host, port, socket.SOCK_STREAM).addresses()
+            except (OSError, UnicodeError) as fault:
+                raise ConnectFailed(explain(host, Address(host, port).text, fault)) from fault
+            addresses = [str(address[0]) for _, address in found]
+        for one in addresses:
+            with suppress(ValueError):  # a name, which the far end looks up
+                address = ipaddress.ip_address(one.partition("%")[0])
+                OWN_DOORS.check_place(address, port, is_near=is_near)
+        return addresses[0]
+
+    def _is_on_this_machine(self) -> bool:
+        """Return whether the server runs here, as far as its address says it."""
+        peer = self.ssh.get_extra_info("peername")
+        place = str(peer[0]) if isinstance(peer, tuple) and peer else self._address.host
+        try:
+            return is_of_this_machine(ipaddress.ip_address(place.partition("%")[0]))
+        except ValueError:
+            return False
 
     async def close(self) -> None:
         """Close at once, with every channel."""

@@ -9,6 +9,7 @@ from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 from urllib.parse import urlsplit
 
+from urc._headers import is_reserved
 from urc.transports._faults import place_of
 from urc.transports._tls import Tls
 from urc.transports.base import TransportError
@@ -138,7 +139,7 @@ class Options:
             # What follows the name may be a secret: it is not shown.
             if not _TOKEN.fullmatch(name) or not text.isprintable() or not text.isascii():
                 raise TransportError(f"{self.kind} cannot send the header {name[:40]!r} as it is")
-            if name.lower() in _OURS:
+            if is_reserved(name) or name.lower() in _OURS:
                 raise TransportError(f"{self.kind} sets the header {name} itself")
             found[name] = text
         if len(found) > MAX_HEADERS:
@@ -194,4 +195,4 @@ _UNITS_S = {"ms": 0.001, "s": 1.0, "m": 60.0, "h": 3600.0}
 _HOST = re.compile(r"[^\s/?#@\\\[\]]{1,253}")
 _PATH = re.compile(r"[!-~]*")
 _TOKEN = re.compile(r"[!#$%&'*+.^_`|~0-9A-Za-z-]{1,100}")
-_OURS = {"host", "content-length", "transfer-encoding", "connection", "upgrade", "authorization"}
+_OURS = {"authorization"}

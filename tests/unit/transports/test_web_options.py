@@ -46,6 +46,21 @@ BESIDE: list[tuple[dict[str, object], str]] = [
     ({"headers": {"X Y": "z"}}, "http cannot send the header 'X Y' as it is"),
     ({"headers": {"X": "a\nHost: b"}}, "http cannot send the header 'X' as it is"),
     ({"headers": {"Host": "b"}}, "http sets the header Host itself"),
+    *(
+        ({"headers": {name: "x"}}, f"http sets the header {name} itself")
+        for name in (
+            "Origin",
+            "cookie",
+            "Forwarded",
+            "X-Forwarded-For",
+            "x-forwarded-host",
+            "X-Real-IP",
+            "SEC-Fetch-Site",
+            "Sec-WebSocket-Key",
+            "Proxy-Authorization",
+            "Referer",
+        )
+    ),
     ({"max_body": 0}, "http needs max_body from 1 to 2.68435e+08, not 0"),
     ({"in_flight": True}, "http needs a number as in_flight, not True"),
     ({"answer_timeout": "soon"}, "http needs answer_timeout from 0.05s to 600s, not 'soon'"),

@@ -18,9 +18,10 @@ from starlette.types import ASGIApp
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 from uvicorn.server import ServerState
 
+from urc._addresses import local_addresses
 from urc.problems import UrcError
+from urc.transports.own_doors import OWN_DOORS
 from urc.web.feed.flow import SocketFlow
-from urc.web.serve.addresses import local_addresses
 from urc.web.serve.connection import CONNECTIONS, REQUEST_S, Connection
 from urc.web.serve.frames import Frames, text_of
 from urc.web.wire.messages import INBOUND_BYTES
@@ -82,7 +83,7 @@ async def serve(
     )
     server = _Server(config)
     try:
-        with _ending(server):
+        with _ending(server), OWN_DOORS.kept(listener):
             running = asyncio.ensure_future(server.serve(sockets=[listener]))
             await _until_ready(server, running)
             if on_ready and server.started:

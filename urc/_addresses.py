@@ -1,6 +1,6 @@
 """The addresses of this machine's network interfaces, asked of the system: no packet is sent.
 
-Floor 5. A name server or a host's own name would not do: many machines know themselves only as
+A name server or a host's own name would not do: many machines know themselves only as
 127.0.1.1. The C library's getifaddrs is there on Linux, macOS and the BSDs. Where it isn't, the
 routing table is asked which address it would send from.
 """
@@ -12,7 +12,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import suppress
 
-__all__ = ["Address", "local_addresses"]
+__all__ = ["Address", "is_of_this_machine", "local_addresses", "unmapped"]
 
 Address = ipaddress.IPv4Address | ipaddress.IPv6Address
 
@@ -37,13 +37,33 @@ def local_addresses() -> tuple[Address, ...]:
 
     Loopback is left out, and so is IPv6's link-local range: no browser opens those.
     """
-    try:
-        found = set(_of_interfaces())
-    except (OSError, AttributeError, TypeError):  # a system without getifaddrs
-        found = set(_of_routes())
+    found = _all()
     usable = [each for each in found if not each.is_loopback and not each.is_unspecified]
     told = [each for each in usable if each.version == 4 or not each.is_link_local]
     return tuple(sorted(told, key=lambda each: (each.version, each.is_link_local, int(each))))
+
+
+def is_of_this_machine(address: Address) -> bool:
+    """Return whether what is sent to `address` stays on this machine, as far as it is known here.
+
+    An address that a router or a container's host leads back to this machine is not.
+    """
+    plain = unmapped(address)
+    return plain.is_loopback or plain.is_unspecified or plain in _all()
+
+
+def unmapped(address: Address) -> Address:
+    """Return the IPv4 address inside an IPv6 one that stands for it; else `address`, bare."""
+    if address.version == 4:
+        return address
+    return address.ipv4_mapped or ipaddress.IPv6Address(int(address))
+
+
+def _all() -> set[Address]:
+    try:
+        return set(_of_interfaces())
+    except (OSError, AttributeError, TypeError):  # a system without getifaddrs
+        return set(_of_routes())
 
 
 def _of_interfaces() -> Iterator[Address]:
