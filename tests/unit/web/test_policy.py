@@ -1,5 +1,6 @@
 """Who may talk to the dashboard: hosts, origins, body sizes and the headers of every answer."""
 
+import socket
 from collections.abc import Iterable
 
 import pytest
@@ -12,12 +13,13 @@ from urc.web.serve.policy import (
     Policy,
     is_host_allowed,
     is_origin_ours,
+    own_names,
     parse_host,
 )
 
 pytestmark = pytest.mark.anyio
 
-NAMES = frozenset({"robot-pi", "lab.example.org"})
+NAMES = frozenset({"robot-pi", "lab.example.org", "lab-pc.local"})
 
 HOSTS = [
     ("127.0.0.1", True),
@@ -31,10 +33,12 @@ HOSTS = [
     ("localhost", True),
     ("LOCALHOST:8080", True),
     ("localhost.:8080", True),
-    ("puppet.local", True),
-    ("Puppet.LOCAL:8080", True),
-    ("puppet.local.:8080", True),
-    ("a.b.local", True),
+    ("lab-pc.local", True),
+    ("Lab-PC.LOCAL:8080", True),
+    ("lab-pc.local.:8080", True),
+    ("puppet.local", False),
+    ("evil.local:8080", False),
+    ("evil.lab-pc.local", False),
     ("robot-pi:8080", True),
     ("ROBOT-PI", True),
     ("lab.example.org", True),
@@ -107,9 +111,70 @@ ORIGINS = [
 
 @pytest.mark.parametrize(("host", "is_allowed"), HOSTS)
 def test_hosts(host: str, is_allowed: bool) -> None:
-    """Addresses, localhost, *.local and configured names pass; nothing else, in no disguise."""
+    """Addresses, localhost and names that are known pass; nothing else, in no disguise."""
     authority = parse_host(host)
     assert (authority is not None and is_host_allowed(authority, NAMES)) is is_allowed
+
+
+@pytest.mark.parametrize(
+    ("host", "is_allowed"),
+    [
+        ("localhost:8080", True),
+        ("127.0.0.1:8080", True),
+        ("127.9.9.9", True),
+        ("[::1]:8080", True),
+        ("[::ffff:127.0.0.1]", True),
+        ("robot-pi", True),
+        ("192.168.4.1:8080", False),
+        ("0.0.0.0:8080", False),
+        ("[fe80::1]", False),
+        ("evil.local", False),
+    ],
+)
+def test_over_loopback_only_loopback_is_answered(host: str, is_allowed: bool) -> None:
+    """A name that was bound to 127.0.0.1 by somebody else is not this machine's."""
+    authority = parse_host(host)
+    assert authority is not None
+    assert is_host_allowed(authority, NAMES, is_loopback=True) is is_allowed
+
+
+@pytest.mark.parametrize(
+    ("name", "names"),
+    [
+        ("Lab-PC", {"lab-pc.local"}),
+        ("lab-pc.local", {"lab-pc.local"}),
+        ("lab-pc.example.org", {"lab-pc.local"}),
+        ("", set()),
+        ("lab pc", set()),
+    ],
+)
+def test_under_local_only_this_machines_own_name_is_answered(
+    name: str, names: set[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Any neighbour may answer for any other."""
+    monkeypatch.setattr(socket, "gethostname", lambda: name)
+    assert own_names() == names
+
+
+@pytest.mark.parametrize(
+    ("client", "host", "status"),
+    [
+        ("127.0.0.1", "localhost", 200),
+        ("127.0.0.1", "lab-pc.local", 421),
+        ("127.0.0.1", "evil.local", 421),
+        ("192.168.4.2", "lab-pc.local", 200),
+        ("192.168.4.2", "192.168.4.1:8080", 200),
+        ("192.168.4.2", "evil.local", 421),
+        ("127.0.0.1", "robot-pi", 200),
+    ],
+)
+async def test_who_comes_how_decides_which_names_are_answered(
+    client: str, host: str, status: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The page of another name, bound to this machine, gets one line and nothing else."""
+    monkeypatch.setattr(socket, "gethostname", lambda: "lab-pc")
+    sent = await ask(("host", host), client=client)
+    assert sent[0]["status"] == status
 
 
 @pytest.mark.parametrize(("origin", "scheme", "host", "is_ours"), ORIGINS)
@@ -135,7 +200,11 @@ async def inner(scope: Scope, receive: Receive, send: Send) -> None:
 
 
 async def ask(
-    *headers: tuple[str, str], kind: str = "http", method: str = "GET", body: Iterable[bytes] = ()
+    *headers: tuple[str, str],
+    kind: str = "http",
+    method: str = "GET",
+    body: Iterable[bytes] = (),
+    client: str = "127.0.0.1",
 ) -> list[Message]:
     """Return what the policy around `inner` answers."""
     scope: Scope = {
@@ -143,6 +212,7 @@ async def ask(
         "scheme": "ws" if kind == "websocket" else "http",
         "method": method,
         "path": "/",
+        "client": (client, 50_000),
         "headers": [(name.encode(), value.encode()) for name, value in headers],
         "extensions": {"websocket.http.response": {}},
     }

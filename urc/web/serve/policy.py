@@ -9,12 +9,14 @@ It knows no route, no robot and no template.
 import ipaddress
 import re
 import secrets
+import socket
 from collections.abc import Iterable
 from typing import NamedTuple
 
 from starlette.exceptions import HTTPException
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from urc._addresses import unmapped
 from urc.web.serve.access import Access
 
 __all__ = [
@@ -25,6 +27,7 @@ __all__ = [
     "frame_policy",
     "is_host_allowed",
     "is_origin_ours",
+    "own_names",
     "parse_host",
 ]
 
@@ -109,26 +112,38 @@ def parse_host(text: str) -> Authority | None:
     return _authority(match) if match else None
 
 
-def is_host_allowed(authority: Authority, names: frozenset[str]) -> bool:
+def is_host_allowed(
+    authority: Authority, names: frozenset[str], *, is_loopback: bool = False
+) -> bool:
     """Return whether we answer to that host.
 
-    An address written out cannot be re-bound by a foreign name server, ``localhost`` and names
-    under ``.local`` aren't served by one; every other name must be in `names` (lower case).
+    An address written out cannot be re-bound by a foreign name server, and ``localhost`` isn't
+    served by one. Every other name must be one of `names`: whatever answers multicast questions on
+    a network may claim any name under ``.local``.
+
+    Args:
+        authority: the host.
+        names: those that were given, and this machine's own; lower case.
+        is_loopback: whether the request comes over loopback: no other address leads there.
     """
     host = authority.host
-    if host.startswith("["):
-        return _is_address(ipaddress.IPv6Address, host[1:-1])
-    if _is_address(ipaddress.IPv4Address, host):
-        return True
     name = host.removesuffix(".")
     if name == "localhost" or name in names:
         return True
-    labels = name.split(".")
-    return (
-        len(labels) > 1
-        and labels[-1] == "local"
-        and all(_LABEL.fullmatch(label) for label in labels)
-    )
+    try:
+        address = ipaddress.ip_address(host[1:-1] if host.startswith("[") else host)
+    except ValueError:
+        return False
+    if (address.version == 6) is not host.startswith("["):
+        return False
+    return unmapped(address).is_loopback if is_loopback else True
+
+
+def own_names() -> frozenset[str]:
+    """Return the names under ``.local`` by which this machine makes itself known."""
+    name = socket.gethostname().lower().removesuffix(".").removesuffix(".local")
+    label = name.partition(".")[0]
+    return frozenset({f"{label}.local"} if _LABEL.fullmatch(label) else ())
 
 
 def is_origin_ours(origin: str, scheme: str, authority: Authority) -> bool:
@@ -180,6 +195,7 @@ class Policy:
         self._app = app
         self._access = access
         self._names = frozenset(name.lower().removesuffix(".") for name in allowed_hosts)
+        self._own = own_names()
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Refuse, or hand on with headers added to every answer."""
@@ -200,8 +216,11 @@ class Policy:
     def _refusal(self, scope: Scope) -> tuple[int, str] | None:
         hosts = _values(scope, b"host")
         authority = parse_host(hosts[0]) if len(hosts) == 1 else None
-        if authority is None or not is_host_allowed(authority, self._names):
-            return 421, "This server does not answer to that host name."
+        is_near = _is_loopback(scope)
+        names = self._names if is_near else self._names | self._own
+        if authority is None or not is_host_allowed(authority, names, is_loopback=is_near):
+            shown = authority.host if authority is not None else "that host name"
+            return 421, f"This server does not answer to {shown}; --allow-host adds a name."
         is_upgrade = scope["type"] == "websocket"
         if is_upgrade or scope["method"] not in _SAFE_METHODS:
             origins = _values(scope, b"origin")
@@ -294,12 +313,13 @@ def _authority(match: re.Match[str]) -> Authority | None:
     return Authority(match["host"].lower(), port)
 
 
-def _is_address(kind: type[ipaddress.IPv4Address] | type[ipaddress.IPv6Address], text: str) -> bool:
+def _is_loopback(scope: Scope) -> bool:
+    """Return whether a request comes over loopback, from a program of this machine."""
+    client = scope.get("client")
     try:
-        kind(text)
+        return client is not None and unmapped(ipaddress.ip_address(client[0])).is_loopback
     except ValueError:
         return False
-    return True
 
 
 def _values(scope: Scope, name: bytes) -> list[str]:
