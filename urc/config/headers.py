@@ -8,7 +8,8 @@ __all__ = ["check_headers"]
 
 def check_headers(part: Part, findings: Findings) -> None:
     """Report each header under ``headers`` of `part` that says who asks, or frames the request."""
-    for name, inner in part.named("headers").items():
+    headers = part.entries().get("headers")  # most kinds of transports have none
+    for name, inner in headers.entries().items() if headers else ():
         if is_reserved(name):
             findings.error(
                 inner,

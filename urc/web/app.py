@@ -83,7 +83,7 @@ def build_app(
     Args:
         robots: by the name in their URL.
         access: the keys; None makes some that nobody has.
-        allowed_hosts: names it answers to, besides addresses, ``localhost`` and its own under ``.local``.
+        allowed_hosts: names it answers to, besides addresses, ``localhost`` and its own.
         linger_s: how long a robot stays connected after its last client has gone, in seconds.
         data: folder in which a stop is kept over a restart, and the audit; None: neither is.
         tiles: folder of map pictures, ``z/x/y.png``; None: there are none.
