@@ -1,10 +1,10 @@
 """`urc discover`: robots that announce themselves, serial ports, and the topics of a rosbridge."""
 
 import argparse
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from urc.cli.arguments import add_settings, duration, load
+from urc.cli.arguments import add_settings, duration, is_loopback, load
 from urc.cli.output import complain, json_text
 from urc.problems import UrcError, printable
 
@@ -39,10 +39,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Look around; 1 when nothing was found."""
     from urc.cli.running import run_loop
-    from urc.cli.settings import complete_settings
+    from urc.cli.settings import complete_settings, settings_given
 
     if arguments.profile is None:
-        return run_loop(_look_around(_known_robots(), arguments))
+        known = _known_robots()
+        given = [values for values, _ in settings_given(known, arguments)]
+        return run_loop(_look_around(known, arguments, nearby=given))
     profile = load(arguments.profile)
     settings = complete_settings(profile, arguments)
     return run_loop(_look_around([profile], arguments, settings))
@@ -65,6 +67,7 @@ async def _look_around(
     profiles: Sequence["Profile"],
     arguments: argparse.Namespace,
     settings: Mapping[str, "Value"] | None = None,
+    nearby: Sequence[Mapping[str, "Value"]] = (),
 ) -> int:
     rows: list[Row] = []
     lines = {spec.type for profile in profiles for spec in profile.driver.transports.values()}
@@ -75,6 +78,10 @@ async def _look_around(
     if settings is not None and "rosbridge" in lines:
         topics, hint = await _topics(profiles[0], settings)
         rows += topics
+    if nearby:
+        typed = {text for _, text in arguments.settings}
+        lines_here, hint = await _nearby(profiles, nearby, typed)
+        rows += lines_here
     if arguments.json:
         for row in rows:
             print(json_text(dict(row)))
@@ -123,6 +130,58 @@ async def _mdns(profiles: Sequence["Profile"], seconds: float) -> list[Row]:
     ]  # fmt: skip
 
 
+async def _nearby(
+    profiles: Sequence["Profile"], settings: Sequence[Mapping[str, "Value"]], typed: set[str]
+) -> tuple[list[Row], str]:
+    """Return what listens where shipped robots are by default on this machine, or at typed hosts.
+
+    A rosbridge among it is asked for its topics.
+    """
+    from urc.transports.discover_local import listening
+
+    robots: dict[tuple[str, int], list[str]] = {}
+    bridges: dict[tuple[str, int], tuple[Profile, Mapping[str, Value]]] = {}
+    for profile, values in zip(profiles, settings, strict=True):
+        for kind, place in _places(profile, values):
+            if is_loopback(place[0]) or place[0] in typed:
+                robots.setdefault(place, []).append(profile.name)
+                if kind == "rosbridge":
+                    bridges.setdefault(place, (profile, values))
+    rows: list[Row] = []
+    hints: list[str] = []
+    for place in await listening(robots):
+        names = ", ".join(dict.fromkeys(robots[place]))
+        rows.append(
+            {"found": "port", "place": f"{place[0]}:{place[1]}", "what": f"where {names} may be",
+             "host": place[0], "port": place[1]}
+        )  # fmt: skip
+        if place in bridges:
+            topics, hint = await _topics(*bridges[place])
+            rows += topics
+            hints.append(hint)
+    return rows, "\n\n".join(filter(None, hints))
+
+
+def _places(
+    profile: "Profile", settings: Mapping[str, "Value"]
+) -> Iterator[tuple[str, tuple[str, int]]]:
+    """Yield kind, host and port of the lines of a robot whose settings say all of it."""
+    from urc.runtime.settings import options_of
+    from urc.transports.rosbridge import DEFAULT_PORT
+
+    for spec in profile.driver.transports.values():
+        if spec.type not in ("tcp", "rosbridge", "mqtt", "telnet", "ssh") or spec.via:
+            continue
+        try:
+            options = options_of(spec, settings)
+        except UrcError:
+            continue  # a setting without a value: nobody knows where that robot is
+        default = DEFAULT_PORT if spec.type == "rosbridge" else None
+        host, port = options.get("host"), options.get("port", default)
+        if isinstance(host, str) and host and isinstance(port, int):
+            yield spec.type, (host, port)
+
+
 async def _topics(profile: "Profile", settings: Mapping[str, "Value"]) -> tuple[list[Row], str]:
     from urc.runtime.catalog import built_in_catalog
     from urc.runtime.discover import RosTopic, ros_topics, snippet
@@ -130,7 +189,9 @@ async def _topics(profile: "Profile", settings: Mapping[str, "Value"]) -> tuple[
 
     rows: list[Row] = []
     parts: list[str] = []
-    made = make_transports(profile.driver, settings, built_in_catalog().transports)
+    # What it subscribes to itself, a bridge of ROS 1 would count among the topics.
+    driver = profile.driver._replace(messages={})
+    made = make_transports(driver, settings, built_in_catalog().transports)
     for name, spec in profile.driver.transports.items():
         if spec.type != "rosbridge":
             continue

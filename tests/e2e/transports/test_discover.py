@@ -12,6 +12,7 @@ import pytest
 from zeroconf import ServiceInfo
 from zeroconf.asyncio import AsyncZeroconf
 
+from tests.e2e.ports import free_port
 from tests.e2e.transports.leaks import nothing_left
 from urc.config.load import load_profile
 from urc.runtime.catalog import built_in_catalog
@@ -113,6 +114,29 @@ async def test_topics_of_a_bridge_come_with_a_document_that_reads_them(tmp_path:
     assert list(read.messages) == ["lamp", "odom"]
 
 
+async def test_a_bridge_of_this_machine_is_found_without_a_profile(tmp_path: Path) -> None:
+    """Where shipped robots have it by default; so are other ports on which something listens."""
+    robot = tmp_path / "robot.yaml"
+    robot.write_text(ROVER + ODOMETRY)
+    profile = load_profile(robot, built_in_catalog())
+    async with nothing_left(), serve(profile, {"port": 0}) as listening:
+        port = listening["ros"].port
+        told = await discover("--json", "--for", "100ms", "--set", f"port={port}")
+        shown = await discover("--for", "100ms", "--set", f"port={port}")
+    rows = [json.loads(line) for line in told.splitlines()]
+    found = {(row["found"], row["place"]): row["what"] for row in rows}
+    assert "generic-ros1" in found["port", f"127.0.0.1:{port}"]
+    assert found["topic", "/odom"] == "nav_msgs/Odometry"
+    assert [row["place"] for row in rows if row["found"] == "topic"] == ["/lamp", "/odom"]
+    assert 'subscribe: { topic: "/odom", type: nav_msgs/Odometry' in shown
+
+
+async def test_what_nothing_listens_on_is_not_told() -> None:
+    """No line about what could have been there."""
+    told = await discover("--json", "--for", "100ms", "--set", f"port={free_port()}", expects=None)
+    assert not [line for line in told.splitlines() if json.loads(line)["found"] == "port"]
+
+
 def test_topic_whose_name_is_none_gets_into_no_document() -> None:
     """A bridge may answer anything; what is printed is put into a profile."""
     names = ['/x", type: a/B }\n  evil: {', "/x\x1b[2J", "/ä", ""]
@@ -127,10 +151,10 @@ async def test_bridge_that_is_not_there_is_told() -> None:
         await ros_topics(transport, 1.0)
 
 
-async def discover(*arguments: str) -> str:
+async def discover(*arguments: str, expects: int | None = 0) -> str:
     process = await asyncio.create_subprocess_exec(
         sys.executable, "-m", "urc.cli.main", "discover", *arguments, stdout=asyncio.subprocess.PIPE
     )
     said, _ = await asyncio.wait_for(process.communicate(), WAIT_S)
-    assert process.returncode == 0
+    assert expects is None or process.returncode == expects
     return said.decode()
