@@ -72,6 +72,12 @@ _REFUSED: dict[Any, str] = {
 }
 
 
+_INSTEAD: dict[Any, str] = dict.fromkeys(_REFUSED, "")
+_INSTEAD[_constants.ASSERT] = "; match the text itself, and let a named group take the part wanted"
+_INSTEAD[_constants.ASSERT_NOT] = "; match what may come instead, or exclude frames by 'when'"
+_INSTEAD[_constants.GROUPREF] = "; name both groups and compare them by 'when: a == b'"
+
+
 class PatternError(UrcError):
     """A pattern that cannot be used; `offset` is the 0-based character of the fault."""
 
@@ -275,7 +281,9 @@ def _first_printable(characters: frozenset[int] | None) -> str:
 def _check_dialect(tree: Any, text: str) -> None:
     for operation, argument in tree:
         if operation in _REFUSED:
-            raise PatternError(f"{_REFUSED[operation]} are not part of the language: {text!r}")
+            raise PatternError(
+                f"{_REFUSED[operation]} are not part of the language: {text!r}{_INSTEAD[operation]}"
+            )
         if operation in (_constants.MAX_REPEAT, _constants.MIN_REPEAT):
             low, high, _ = argument
             if max(low, 0 if high is _constants.MAXREPEAT else high) > MAX_REPEAT:

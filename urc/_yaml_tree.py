@@ -130,10 +130,21 @@ class TreeReader:
         data: dict[str, object] = {}
         height = 0
         event: Any
+        before: Any = None
+        told: Any = None
         while not isinstance(event := self._next(), yaml.MappingEndEvent):
+            ahead = self._next() if type(event) is yaml.ScalarEvent else None
+            if before is not None and self._is_bare(event, ahead):
+                self._spend(2, event)
+                if before is not told:
+                    self._report_comma(event, before)
+                    told = before
+                continue
             key = self._key(event, start, depth)
             self._path.append("" if key is None else key)
-            built = self._node(self._next(), depth + 1)
+            value = self._next() if ahead is None else ahead
+            before = value if start.flow_style and _is_plain(value) else None
+            built = self._node(value, depth + 1)
             self._path.pop()
             height = max(height, built.height)
             if key is None:
@@ -268,6 +279,24 @@ class TreeReader:
         what = "an alias" if isinstance(event, yaml.AliasEvent) else "a mapping or list"
         self._report(event, "key-not-text", f"a key must be text, found {what}")
 
+    def _is_bare(self, key: Any, value: Any) -> bool:
+        """Return whether a key has no colon behind it."""
+        is_text = _is_plain(key) and type(value) is yaml.ScalarEvent
+        if not is_text or value.value or value.style:
+            return False
+        end = key.end_mark
+        return not self._line(end.line)[end.column :].lstrip().startswith(":")
+
+    def _report_comma(self, event: Any, before: Any) -> None:
+        """Report a key without a colon: it is the rest of the text `before`."""
+        self._report(
+            event,
+            "unquoted",
+            "a comma ends a text inside of { }, so this is a key of its own",
+            hint=f'quote the text: "{before.value}, {event.value}"',
+            length=max(1, len(event.value)),
+        )
+
     def _warn_of_cut(self, event: Any) -> None:
         end = event.end_mark
         line = self._line(end.line)
@@ -335,6 +364,10 @@ class TreeReader:
         )
         if len(self.problems) >= _PROBLEMS_MOST:
             raise StoppedError
+
+
+def _is_plain(event: Any) -> bool:
+    return type(event) is yaml.ScalarEvent and bool(event.value) and not event.style
 
 
 def _span(event: Any) -> Span:

@@ -36,6 +36,14 @@ MAX_OUTPUT: Final = 65536
 """Characters that one rendering may give."""
 
 
+_INSTEAD: Final = {
+    "for": "; write {{ items | join(',') }} for a list",
+    "if": "; write {{ 'a' if test else 'b' }}",
+    "set": "; write the expression where its value stands",
+}
+"""Statement of Jinja → what to write instead."""
+
+
 class ExpressionError(UrcError):
     """A template that cannot be compiled, or evaluated with the values given.
 
@@ -167,8 +175,10 @@ def split_template(text: str) -> Iterator[tuple[int, str, str | None]]:
             return
         if text[start : start + 2] != "{{":
             word = "statements" if text[start + 1] == "%" else "comments"
+            instead = _INSTEAD.get(_word_behind(text, start), "")
             raise ExpressionError(
-                f"{text[start : start + 2]!r}: templates have no {word}, only {{{{ values }}}}",
+                f"{text[start : start + 2]!r}: templates have no {word}, only"
+                f" {{{{ values }}}}{instead}",
                 start,
             )
         if start > position:
@@ -176,6 +186,11 @@ def split_template(text: str) -> Iterator[tuple[int, str, str | None]]:
         end = _closing(text, start)
         yield start + 2, "", text[start + 2 : end]
         position = end + 2
+
+
+def _word_behind(text: str, start: int) -> str:
+    """Return the word of the statement at `start`."""
+    return next(iter(text[start + 2 :].lstrip("-+ ").split(maxsplit=1)), "")
 
 
 def _closing(text: str, start: int) -> int:

@@ -31,6 +31,8 @@ class _Report:
         self.tests = 0
         self.failed = 0
         """Tests that failed."""
+        self.is_cut_short = False
+        """Whether errors have kept later checks from being made."""
         self.problems: list[Problem] = []
         """In the order of the command line; each once, though several documents may share it."""
         self.coverage: list[Coverage] = []
@@ -113,6 +115,7 @@ def _examine(paths: list[str], *, with_tests: bool) -> _Report:
         report.files += 1
         checked = check(path, catalog, _shelf_of_package(path) or shelf)
         report.add(list(checked.problems))
+        report.is_cut_short |= checked.is_cut_short
         report.looked_at |= dict.fromkeys(checked.files)
         if checked.kind == "widget":
             _examine_folder(path, checked.widget, report)
@@ -212,7 +215,8 @@ def _summary(report: _Report) -> str:
         passed = report.tests - report.failed
         words.append(f"{passed} of {_count(report.tests, 'test')} passed")
     words += filter(None, [summary(report.coverage)])
-    return f"{_count(report.files, 'document')}: {', '.join(words)}"
+    more = "; more may follow once the errors are mended" if report.is_cut_short else ""
+    return f"{_count(report.files, 'document')}: {', '.join(words)}{more}"
 
 
 def _count(number: int, noun: str) -> str:
@@ -224,6 +228,7 @@ def _as_json(report: _Report) -> dict[str, object]:
         "files": report.files,
         "errors": report.count("error"),
         "warnings": report.count("warning"),
+        "more_may_follow": report.is_cut_short,
         "tests": {"run": report.tests, "failed": report.failed},
         "coverage": [
             {

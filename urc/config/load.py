@@ -47,6 +47,8 @@ class Checked(NamedTuple):
     """URLs of other people's pages that its widgets show, as they are written."""
     widget: Widget | None = None
     """Of a widget's manifest without errors."""
+    is_cut_short: bool = False
+    """Whether a pass with errors has kept later ones from being run: more may follow."""
 
 
 def load_profile(
@@ -89,7 +91,8 @@ def check(path: str | PathLike[str], catalog: Catalog, shelf: Shelf | None = Non
     path = fspath(path)
     sources, problems, kind, files = gather(path)
     if sources is None:
-        return Checked(None, tuple(_told_once(problems)), kind, files)
+        is_short = any(one.severity == "error" and one.code != "no-such-file" for one in problems)
+        return Checked(None, tuple(_told_once(problems)), kind, files, is_cut_short=is_short)
     shelf = shelf or Shelf(shipped("widgets"))
     findings = Findings()
     profile: Profile | None = None
@@ -110,10 +113,11 @@ def check(path: str | PathLike[str], catalog: Catalog, shelf: Shelf | None = Non
     problems += sorted(findings, key=lambda one: (one.file != path, one.file, one.line, one.column))
     problems += shelf.problems
     problems = _told_once(problems)
-    if has_errors(problems):
+    is_short = has_errors(problems)
+    if is_short:
         profile, widget = None, None
     every = (*files, *shelf.files)
-    return Checked(profile, tuple(problems), sources.kind, every, _pages(uses), widget)
+    return Checked(profile, tuple(problems), sources.kind, every, _pages(uses), widget, is_short)
 
 
 def _pages(uses: Iterable[WidgetUse]) -> tuple[str, ...]:

@@ -13,8 +13,14 @@ from jsonschema.validators import extend
 from referencing import Registry, Resource
 from referencing.jsonschema import DRAFT202012
 
-from urc.config.shape_hints import example_of, key_hint, mapping_hint, type_hint
-from urc.config.suggest import did_you_mean, listed
+from urc.config.shape_hints import (
+    example_of,
+    key_hint,
+    mapping_hint,
+    type_hint,
+    word_hint,
+)
+from urc.config.suggest import listed
 from urc.problems import Problem
 from urc.source import Document, Path
 
@@ -113,7 +119,7 @@ def _unknown_keys(document: Document, path: Path, error: _Error) -> list[Problem
             (*path, key),
             "unknown-key",
             f"{_cut(key)} is not a key of {_noun(error.schema)}",
-            hint=key_hint(key, known),
+            hint=key_hint(key, known, error.value[key]),
             key=True,
         )
         for key in islice((key for key in error.value if key not in known), _PROBLEMS_MOST)
@@ -124,7 +130,11 @@ def _missing_keys(document: Document, path: Path, error: _Error) -> list[Problem
     known = error.schema.get("properties", {})
     # Where any key may stand, none of them is told as unknown.
     is_closed = bool(known) and error.schema.get("additionalProperties") is False
-    misspelt = [key_hint(key, known) for key in error.value if is_closed and key not in known]
+    misspelt = [
+        key_hint(key, known, error.value[key])
+        for key in error.value
+        if is_closed and key not in known
+    ]
     missing = [
         f"'{name}'"
         for name in error.limit
@@ -173,16 +183,15 @@ def _wrong_type(document: Document, path: Path, error: _Error) -> list[Problem]:
         wanted = " or ".join(_EXPECTED[name] for name in types)
     message = f"expected {wanted}, found {_found(error.value)}"
     hint = type_hint(document, path, error.value, types, is_duration=title == "duration")
-    if isinstance(error.value, str) and "object" in types:
+    if isinstance(error.value, (str, bool)) and "object" in types:
         hint = mapping_hint(document, path, error.value, error.schema) or hint
     return [document.problem(path, "wrong-type", message, hint=hint)]
 
 
 def _wrong_word(document: Document, path: Path, error: _Error) -> list[Problem]:
     words = [str(word) for word in error.limit]
-    message = f"expected one of {listed(words)}; found {_found(error.value)}"
-    near = did_you_mean(str(error.value), words)
-    hint = near if near.startswith("did you") else ""
+    message = f"expected one of {listed(words, None)}; found {_found(error.value)}"
+    hint = word_hint(str(error.value), words)
     return [document.problem(path, "unknown-word", message, hint=hint)]
 
 

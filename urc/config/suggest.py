@@ -1,8 +1,13 @@
 """Which known word a person may have meant."""
 
 from collections.abc import Iterable
+from typing import Final
 
 __all__ = ["did_you_mean", "listed"]
+
+_MOST: Final = 16
+_SPARE: Final = 8
+"""So few more names are listed, too."""
 
 
 def did_you_mean(word: str, known: Iterable[str], noun: str = "") -> str:
@@ -21,11 +26,12 @@ def did_you_mean(word: str, known: Iterable[str], noun: str = "") -> str:
         return f"did you mean '{near[0]}'?"
     if not names:
         return f"there are no {noun} here" if noun else ""
-    return f"{noun or 'known'}: {listed(names)}"
+    return f"{noun or 'known'}: {listed(names, None if noun == 'keys' else _MOST)}"
 
 
-def listed(names: Iterable[str], most: int = 16) -> str:
-    """Return names with commas, cut after `most` of them."""
+def listed(names: Iterable[str], most: int | None = _MOST) -> str:
+    """Return names with commas, cut after `most` of them where many are left out."""
     every = list(names)
-    more = f" and {len(every) - most} more" if len(every) > most else ""
-    return ", ".join(every[:most]) + more
+    if most is None or len(every) <= most + _SPARE:
+        return ", ".join(every)
+    return f"{', '.join(every[:most])} and {len(every) - most} more"

@@ -125,7 +125,9 @@ def check_range(part: Part, kind: str, findings: Findings) -> tuple[float | None
                     hint="only integer and number have a range",
                 )
     elif low is not None and high is not None and low >= high:
-        findings.error(part, "wrong-order", f"min {low:g} is not below max {high:g}", at="min")
+        hint = "exchange them" if low > high else "leave one out, or make the range wider"
+        text = f"min {low:g} is not below max {high:g}"
+        findings.error(part, "wrong-order", text, at="min", hint=hint)
     return low, high
 
 

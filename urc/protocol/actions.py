@@ -27,7 +27,7 @@ from urc.protocol.asking import Builder
 from urc.protocol.codec import Frame, NotWritable
 from urc.protocol.encode import BadArgument
 from urc.protocol.events import Samples
-from urc.protocol.exchange import UNTOLD, Ask, Exchange, LineEvent, expires_at
+from urc.protocol.exchange import Ask, Exchange, LineEvent, expires_at, untold
 from urc.protocol.reins import Reins
 from urc.protocol.steps import Action, Program, Runner
 
@@ -170,7 +170,7 @@ def _sending(ask: Ask, step: SendStep) -> Action:
         try:
             data = ask.made(namespace)
         except BadArgument as error:
-            why = UNTOLD if step.is_secret else str(error)
+            why = untold(error) if step.is_secret else str(error)
             runner.stop("bad-argument", f"{ask.label}: {why}")
             return []
         exchange = Exchange(

@@ -154,7 +154,10 @@ class Answering(Connection):
             return []
         exchange, reply_s = flight.exchange, flight.ear.answer.timeout_s
         text = f"no answer to {exchange.ask.label} {flight.waited(now)}"
-        text += self.inbox.came_since(exchange.sent_at)
+        came = self.inbox.came_since(exchange.sent_at, f"no answer to {exchange.ask.label}")
+        text += came
+        if came and exchange.ask.match is None and len(self._flights) > 1:
+            text += "; answers that come in another order than their requests need 'match'"
         events: list[LineEvent] = [Fault(self.spec.name, "reply-timeout", text)]
         flight.is_late = True
         flight.due = now + reply_s

@@ -4,6 +4,7 @@ Floor 3, pure. An `Ask` is what can be asked, compiled once; an `Exchange` is on
 the queue to its end. What it waits for is an `urc.protocol.answer.Answer`.
 """
 
+import re
 from collections.abc import Callable, Mapping
 from typing import Final, NamedTuple, Protocol
 
@@ -19,7 +20,6 @@ from urc.protocol.gate import REALTIME, Bucket, Counters
 
 __all__ = [
     "DONE",
-    "UNTOLD",
     "Ask",
     "Asked",
     "Ended",
@@ -29,6 +29,7 @@ __all__ = [
     "Outcome",
     "Owner",
     "expires_at",
+    "untold",
 ]
 
 
@@ -42,10 +43,17 @@ class Outcome(NamedTuple):
 
 
 DONE: Final = Outcome()
-UNTOLD: Final = "it cannot be written with what is known"
-"""Why something secret is not sent: the reason itself would show it."""
+_MISSING: Final = re.compile(r"'[A-Za-z_][A-Za-z0-9_]*' has no value here")
 new = tuple.__new__
 """Makes a named tuple without the detour through its class, where each command needs one."""
+
+
+def untold(error: Exception) -> str:
+    """Return why something secret is not sent, without what would show it."""
+    text = str(error)
+    if _MISSING.fullmatch(text):
+        return text  # the name of what is missing, and nothing else
+    return "it cannot be written; the reason is not shown, because it is secret"
 
 
 class Ask(NamedTuple):

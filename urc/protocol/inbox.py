@@ -89,13 +89,18 @@ class Inbox:
             return [fault]
         return [*(heard or ()), *(told or ())]
 
-    def came_since(self, since: float) -> str:
-        """Return what to add to "it did not come": what came in its place; "" for nothing."""
+    def came_since(self, since: float, instead: str) -> str:
+        """Return what to add to "it did not come": what came in its place; "" for nothing.
+
+        Args:
+            since: when the waiting began.
+            instead: what the frame is not: "no answer to home".
+        """
         time_s, text = self._stray
         if time_s < since:
             return ""
         shown = text.removeprefix(_NO_MATCH)
-        return f"; {shown} came, which is no answer" if shown != text else f"; {text}"
+        return f"; {shown} came, which is {instead}" if shown != text else f"; {text}"
 
     def listen(self, ear: Ear) -> None:
         """Let `ear` have the frames that answer no request."""

@@ -27,7 +27,7 @@ from urc.protocol.answering import Answering
 from urc.protocol.codec import Frame
 from urc.protocol.encode import BadArgument
 from urc.protocol.events import Fault, Open, Send
-from urc.protocol.exchange import DONE, UNTOLD, Asked, Ended, Exchange, LineEvent, Outcome
+from urc.protocol.exchange import DONE, Asked, Ended, Exchange, LineEvent, Outcome, untold
 from urc.protocol.flights import Flight
 from urc.protocol.framings.base import FrameFault
 from urc.protocol.outbox import written
@@ -159,7 +159,7 @@ class Line(Answering):
             try:
                 count = written(exchange, self.counters, self.learnt).takes
             except BadArgument as error:
-                why = UNTOLD if exchange.is_secret else str(error)
+                why = untold(error) if exchange.is_secret else str(error)
                 return [Ended(exchange, Outcome("bad-argument", why))]
         data = self._as_sent(exchange, number)
         if exchange.on_sent is not None and not exchange.is_secret:

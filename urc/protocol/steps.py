@@ -188,7 +188,8 @@ class Runner:
         if self._listening is None and self._awaited is None:
             self._resume()
             return
-        came = self._listening[0].inbox.came_since(self._began_at) if self._listening else ""
+        inbox = self._listening[0].inbox if self._listening else None
+        came = "" if inbox is None else inbox.came_since(self._began_at, "not what it expects")
         self._stop_listening()
         if self._otherwise is None:
             self.stop("timed-out", self._late_text + came)

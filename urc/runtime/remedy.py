@@ -64,7 +64,8 @@ class Remedy:
         if not fed:
             return ""
         line = self._trial.engine.lines[transport]
-        asked = self._answered_by(transport, fed, signal)
+        asked = self._asked_in_vain(transport, fed, signal)
+        asked = asked or self._answered_by(transport, fed, signal)
         if not line.is_open and not line.is_per_request:
             return f"{transport} is not connected (write connects: {transport})"
         if asked:
@@ -99,6 +100,34 @@ class Remedy:
                     text = _shown(cut, spec.encoding)
                     return f"{text} answers a request that nobody made (write {asked.how})"
         return ""
+
+    def _asked_in_vain(self, transport: str, fed: bytes, signal: str) -> str:
+        """Return which form of a request that was made no frame has, when all have another."""
+        spec = self._driver.transports[transport]
+        for label, reply in self._were_asked(transport):
+            reads = [reply.read, *(stage.read for stage in reply.stages)]
+            if all(signal not in read.fields for read in reads):
+                continue
+            decoder = build_framing(reply.framing or spec.framing).decoder()
+            cuts = [cut for cut in decoder.feed(fed) if isinstance(cut, bytes)]
+            if cuts and not any(self._fits(cut, transport, one) for cut in cuts for one in reads):
+                form = next(one.form for one in reads if signal in one.fields)
+                text = _shown(cuts[-1], spec.encoding)
+                return f"{text} does not fit the {form!r} of {label}, which was asked"
+        return ""
+
+    def _were_asked(self, transport: str) -> Iterator[tuple[str, Reply]]:
+        """Yield the requests of the test that want an answer of this line."""
+        for poll in self._trial.polls:
+            is_ours = poll.transport == transport and ("poll", poll.name) in self._trial.used
+            if is_ours and poll.reply is not None:
+                # One without a name is called by its place, as polls.0.
+                yield poll.name if "." in poll.name else f"poll {poll.name}", poll.reply
+        for command in self._driver.commands.values():
+            name = command.name
+            is_ours = command.transport == transport and ("command", name) in self._trial.used
+            if is_ours and command.reply is not None:
+                yield f"command {name}", command.reply
 
     def _fits(self, payload: bytes, transport: str, read: ReadSpec) -> bool:
         encoding = self._driver.transports[transport].encoding

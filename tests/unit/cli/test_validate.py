@@ -86,7 +86,7 @@ def _documents(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
                 "folder:1:1: error is-directory: ",
                 "broken.yaml:15:14: error wrong-type polls.0.every: ",
             ],
-            "3 documents: 3 errors, 0 warnings",
+            "3 documents: 3 errors, 0 warnings; more may follow once the errors are mended",
         ),
     ],
 )
@@ -116,7 +116,7 @@ def test_json_report_has_the_same_keys_whatever_is_found(capsys: Output) -> None
         report = json.loads(output)
         assert errors == ""
         assert list(report) == [
-            "files", "errors", "warnings", "tests", "coverage", "problems",
+            "files", "errors", "warnings", "more_may_follow", "tests", "coverage", "problems",
         ]  # fmt: skip
         assert report["tests"] == tests
         assert report["errors"] + report["warnings"] == len(report["problems"])

@@ -352,7 +352,9 @@ sequences: { dock: [{ expect: '^DOCKED$' }] }
     talk.at(0.1).run("home")
     talk.says("OK")
     talk.at(0.6)
-    assert talk.messages[-1] == "no answer to home within 0.5 s; 'OK' came, which is no answer"
+    assert talk.messages[-1] == (
+        "no answer to home within 0.5 s; 'OK' came, which is no answer to home"
+    )
     talk.at(2.0).run("wait")
     talk.at(2.5)
     assert talk.messages[-1] == "no answer to wait within 0.5 s"
@@ -360,5 +362,44 @@ sequences: { dock: [{ expect: '^DOCKED$' }] }
     talk.says("DOCKING")
     talk.at(4.5)
     assert talk.messages[-1] == (
-        "dock.0: what it expects did not come within 0.5 s; 'DOCKING' came, which is no answer"
+        "dock.0: what it expects did not come within 0.5 s; 'DOCKING' came, which is not what it"
+        " expects"
     )
+
+
+def test_answers_in_another_order_ask_for_match() -> None:
+    """Without it, the first request waits for an answer that the second one had."""
+    talk = Dialogue(
+        """
+wire: queue: { in_flight: 2 }
+commands:
+  volts: { send: V, reply: { regex: '^V[0-9]$' } }
+  amps: { send: A, reply: { regex: '^A[0-9]$' } }
+"""
+    ).connect()
+    talk.run("volts")
+    talk.run("amps")
+    talk.says("A1")
+    talk.at(0.5)
+    assert any(
+        one == "no answer to volts within 0.5 s; 'A1' came, which is no answer to volts; answers"
+        " that come in another order than their requests need 'match'"
+        for one in talk.messages
+    ), talk.messages
+
+
+def test_a_secret_that_cannot_be_written_names_what_is_missing() -> None:
+    """A name shows nothing; its value would."""
+    talk = Dialogue(
+        """
+wire: on_connect: [
+wire:   { expect: '^HELLO( (?P<_salt>[a-z]+))?$' },
+wire:   { send: "IN {{ (settings.key ~ _salt) | md5 }}" } ]
+settings: { key: { type: string, secret: true } }
+""",
+        {"key": "geheim"},
+    ).connect()
+    talk.says("HELLO")
+    told = " ".join([*talk.messages, *talk.links])
+    assert "'_salt' has no value here" in told
+    assert "geheim" not in told

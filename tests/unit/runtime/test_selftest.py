@@ -162,13 +162,15 @@ def test_message_that_nobody_asked_for_is_read() -> None:
         (
             trial(feed={"wire": "full\n"}, reply_to=0, expect={"battery": 100}),
             "no-match: nothing declared matches 'full';"
-            " battery: expected 100, but nothing set it",
+            " battery: expected 100, but nothing set it:"
+            " 'full' does not fit the 'regex' of polls.0, which was asked",
         ),
         (
             trial(feed={"wire": "a\n" * 5}, reply_to=0, expect={"battery": 1}),
             "no-match: nothing declared matches 'a'; no-match: nothing declared matches 'a';"
             " no-match: nothing declared matches 'a'; and 2 more;"
-            " battery: expected 1, but nothing set it",
+            " battery: expected 1, but nothing set it:"
+            " 'a' does not fit the 'regex' of polls.0, which was asked",
         ),
         (
             trial(feed={"wire": "ok\n"}, run="stop", fails="refused"),
