@@ -120,7 +120,8 @@ def write_form(part: Part) -> tuple[Part, WriteForm]:
         for key in part.data:
             if key in WRITE_FORMS:
                 return part.must(key), cast("WriteForm", import_module(WRITE_FORMS[key]))
-    return part, cast("WriteForm", import_module(WRITE_FORMS["text"]))
+    module = "urc.config.form_frames" if isinstance(part.data, list) else WRITE_FORMS["text"]
+    return part, cast("WriteForm", import_module(module))
 
 
 def body_form(part: Part) -> tuple[Part, WriteForm] | None:

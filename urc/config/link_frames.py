@@ -9,7 +9,7 @@ from typing import cast
 from urc.config.forms import write_form
 from urc.config.part import Findings, Part
 from urc.expressions import ExpressionError, Template
-from urc.model.codec import WriteSpec
+from urc.model.codec import WriteSpec, each_of
 from urc.model.driver import Driver, FramingSpec, TransportSpec
 from urc.model.framing import FrameLayout
 
@@ -30,7 +30,13 @@ def _check(part: Part, send: WriteSpec, spec: TransportSpec | None, findings: Fi
     written = part.get("send")
     if spec is None or written is None:
         return
-    inner, form = write_form(written)
+    places = written.items() if send.form == "frames" else [written]
+    for place, one in zip(places, each_of(send), strict=True):
+        _check_one(place, one, spec, findings)
+
+
+def _check_one(part: Part, send: WriteSpec, spec: TransportSpec, findings: Findings) -> None:
+    inner, form = write_form(part)
     if send.form == "text":
         _check_end(inner, findings)
         data = _text(form.templates(inner, send), spec.encoding)

@@ -158,6 +158,10 @@ def _of_command(linker: Linker, part: Part, rule: SimulatorRule) -> set[str]:
         text = f"{rule.request!r} is a sequence, which sends several frames"
         hint = "write a rule for what each of its steps sends, with 'match'"
         linker.findings.error(inner, "wrong-command", text, hint=hint)
+    elif command.send.form == "frames":
+        text = f"{rule.request!r} sends several frames, and a rule takes one"
+        hint = "write a rule with match: for each of its frames"
+        linker.findings.error(inner, "wrong-command", text, hint=hint)
     elif command.transport != rule.transport:
         _elsewhere(linker, inner, rule, command.transport)
     return set(command.arguments)

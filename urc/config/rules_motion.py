@@ -12,7 +12,7 @@ from typing import Final, cast
 from urc.config.part import Findings, Part, shown_duration
 from urc.expressions import Template, split_template
 from urc.model.binary import Item, least_size
-from urc.model.codec import WriteSpec
+from urc.model.codec import WriteSpec, each_of
 from urc.model.driver import Command, Driver, TransportSpec
 from urc.model.flow import Hold
 from urc.model.framing import FrameLayout
@@ -191,7 +191,8 @@ def least_frame_bytes(send: WriteSpec, spec: TransportSpec) -> int:
 
     What is known only with the values counts one byte, and what a framing stuffs counts nothing.
     """
-    return max(1, sum(_payload_bytes(send))) + _around(spec)
+    frames = each_of(send)
+    return sum(max(1, sum(_payload_bytes(one))) for one in frames) + len(frames) * _around(spec)
 
 
 def _payload_bytes(send: WriteSpec) -> Iterator[int]:

@@ -160,9 +160,15 @@ class WriteSpec(NamedTuple):
     """How arguments become a frame."""
 
     form: str
-    """Row of the writers' table: ``text`` …"""
+    """Row of the writers' table: ``text`` …; ``frames`` are several, each with its own."""
     options: Mapping[str, object] = NOTHING
     names: frozenset[str] = frozenset()
     """Root names that its templates use."""
     settings: frozenset[str] = frozenset()
     """Names used as ``settings.NAME``."""
+
+
+def each_of(send: WriteSpec) -> tuple[WriteSpec, ...]:
+    """Return the frames of `send`: itself, or all that go out together."""
+    frames = send.options.get("frames")
+    return frames if send.form == "frames" and isinstance(frames, tuple) else (send,)

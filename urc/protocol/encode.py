@@ -4,11 +4,11 @@ Floor 3, pure. Checks stand here, on the server side of everything: a browser, a
 go through the same door.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 
 from urc.expressions import ExpressionError, Template
-from urc.model.codec import Payload, WriteSpec
+from urc.model.codec import Payload, WriteSpec, each_of
 from urc.model.driver import MOST_ELEMENTS, Argument, Command
 from urc.model.values import NOTHING, Reading, Value
 from urc.problems import UrcError, printable
@@ -36,7 +36,12 @@ def build_encode(
     context: CodecContext,
     arguments: Mapping[str, Argument] = NOTHING,
 ) -> Encode:
-    """Return the function that writes `send` and frames it; constants are made once."""
+    """Return the function that writes `send` and frames it; constants are made once.
+
+    Several frames are one piece of the stream: none goes out without the others.
+    """
+    if send.form == "frames":
+        return _together([build_encode(one, framing, context, arguments) for one in each_of(send)])
     writer = build_writer(send, context)
 
     def encode(namespace: Mapping[str, object]) -> Payload:
@@ -58,6 +63,14 @@ def build_encode(
             return build_fast_encode(template, arguments, framing, context.encoding, encode)
 
         return after_a_while(encode, make)
+    return encode
+
+
+def _together(encodes: Sequence[Encode]) -> Encode:
+    def encode(namespace: Mapping[str, object]) -> Payload:
+        pieces = [one(namespace) for one in encodes]
+        return b"".join(one for one in pieces if isinstance(one, bytes))
+
     return encode
 
 

@@ -11,7 +11,7 @@ from typing import Final
 from urc.config.part import shown_duration
 from urc.config.values import shown
 from urc.expressions import Template
-from urc.model.codec import traffic_of
+from urc.model.codec import each_of, traffic_of
 from urc.model.driver import Argument, Command, Driver, TransportSpec
 from urc.model.interface import WidgetUse
 from urc.model.profile import Profile, Setting
@@ -164,9 +164,10 @@ def _what_goes_out(command: Command, spec: TransportSpec | None) -> Iterator[str
     if data is not None:
         yield f"- sends {_code(_text_of(data))}, in hex {_code(_hex_of(data))}"
     else:
-        template = command.send.options.get("template")
-        if isinstance(template, Template):
-            yield f"- sends {_code(template.source)}"
+        for one in each_of(command.send):
+            template = one.options.get("template")
+            if isinstance(template, Template):
+                yield f"- sends {_code(template.source)}"
     if command.reply is None:
         yield "- done when it is sent"
 

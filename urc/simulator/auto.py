@@ -10,7 +10,7 @@ from functools import partial
 from typing import Final, NamedTuple
 
 from urc.expressions import COUNTERS, ExpressionError, Template
-from urc.model.codec import Envelope, Payload, ReadSpec, WriteSpec
+from urc.model.codec import Envelope, Payload, ReadSpec, WriteSpec, each_of
 from urc.model.driver import Argument, Command, Driver, FramingSpec, Poll, TransportSpec
 from urc.model.flow import ExpectStep, IfStep, PromptStep, RepeatStep, SendStep, Step
 from urc.model.values import NOTHING, Value
@@ -307,7 +307,9 @@ class AutoLine:
             if command.steps:
                 requests += self._script(command.name, command.steps)[1]
             elif command.transport == name:
-                requests.append(self._request(command.name, command, command.arguments))
+                for one in each_of(command.send):
+                    asked = command._replace(send=one)
+                    requests.append(self._request(command.name, asked, command.arguments))
         for poll in driver.polls:
             if poll.transport == name and not poll.run:
                 requests.append(self._request(poll.name, poll, NOTHING))
