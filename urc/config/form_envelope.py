@@ -31,6 +31,12 @@ def parse_write(part: Part, findings: Findings, context: FormContext) -> WriteSp
     }
     if (body and spec is None) or len(findings.problems) > before:
         return None
+    if part.name == "request" and ("url" in part.data) == ("path" in part.data):
+        both = "url" in part.data
+        text = "'path' and 'url' both say where" if both else "'path' is missing"
+        hint = "write 'path', or 'url' for what the robot itself has named"
+        findings.error(part, "two-forms" if both else "missing-key", text, key=True, hint=hint)
+        return None
     if part.name == "request":
         attributes.setdefault("method", "GET" if spec is None else "POST")
     found = list(templates_in(attributes))

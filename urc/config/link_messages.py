@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping
 
 from urc.config.forms import WRITE_FORMS
-from urc.config.messaging import CARRIERS, MESSAGING
+from urc.config.messaging import BYTE_LINES, CARRIERS, MESSAGING
 from urc.config.part import Findings, Part
 from urc.config.suggest import did_you_mean
 from urc.model.driver import Driver, TransportSpec
@@ -31,8 +31,13 @@ def check_messages(part: Part, driver: Driver, findings: Findings) -> None:
         if keepalive is not None:
             _check_send(keepalive.get("send"), spec, findings)
         for key in ("on_connect", "on_close"):
+            is_asked = False  # the step before makes a request, whose answer may be expected
             for step in inner.listed(key):
-                _check_step(step, spec, findings)
+                _check_step(step, spec, findings, wants_topic=not is_asked)
+                send = step.get("send")
+                if send is not None:
+                    data = send.data
+                    is_asked = isinstance(data, dict) and not data.keys().isdisjoint(_ANSWERED)
 
 
 def _check_answer(part: Part | None, spec: TransportSpec | None, findings: Findings) -> None:
@@ -63,11 +68,13 @@ def _target(place: tuple[str, int | str], driver: Driver) -> str:
     return driver.commands[str(key)].transport
 
 
-def _check_step(part: Part, spec: TransportSpec | None, findings: Findings) -> None:
+def _check_step(
+    part: Part, spec: TransportSpec | None, findings: Findings, *, wants_topic: bool
+) -> None:
     _check_send(part.get("send"), spec, findings)
     expect = part.get("expect")
     if expect is not None and isinstance(expect.data, dict):
-        _check_read(expect, spec, findings, wants_topic=True)
+        _check_read(expect, spec, findings, wants_topic=wants_topic)
 
 
 def _check_send(part: Part | None, spec: TransportSpec | None, findings: Findings) -> str:
@@ -127,6 +134,8 @@ def _check_read(
     if spec is None:
         return
     subscribe, kind = part.get("subscribe"), MESSAGING.get(spec.type)
+    for inner in (part, *part.listed("stages"), *_refusals(part)):
+        _check_head(inner, spec, findings)
     if kind is None:
         if subscribe is not None:
             findings.error(
@@ -158,6 +167,24 @@ def _check_read(
                 key=True,
                 hint=f"here 'subscribe' takes: {known}",
             )
+
+
+def _refusals(part: Part) -> list[Part]:
+    parts = [inner for one in (part, *part.listed("stages")) for inner in one.listed("errors")]
+    return [inner for inner in parts if isinstance(inner.data, dict)]
+
+
+def _check_head(part: Part, spec: TransportSpec, findings: Findings) -> None:
+    """Report headers where no answer has any."""
+    if "head" in part.data and spec.type != "http" and spec.type in (*MESSAGING, *BYTE_LINES):
+        findings.error(
+            part,
+            "misplaced-key",
+            f"what comes over {spec.type} has no headers and no status",
+            at="head",
+            key=True,
+            hint="take 'head' away: it is for the answers of http",
+        )
 
 
 def check_via(

@@ -81,6 +81,8 @@ class _Linker:
         for field in read.fields:
             if field in read.sets:
                 self.field(part.must("set").must(field), field, {"key": True})
+            elif field in read.head:
+                self.field(part.must("head").must(field), field, {"key": True})
             elif field in read.collects:
                 self.field(part.must("collect").must(field), field, {"key": True})
             elif field in self.driver.signals or not field.startswith("_"):

@@ -43,6 +43,7 @@ _BESIDE: Final = {
 }
 """Verb → the keys that may stand beside it."""
 VERBS: Final = tuple(_BESIDE)
+_OF_REQUESTS: Final = ("match", "stages", "resend", "extend")
 _NEVER: Final = compile_template("")
 _NO_PATTERN: Final = "^$"
 
@@ -135,7 +136,7 @@ def _expect(part: Part, inner: Part, context: StepContext, findings: Findings) -
     transport = part.text("from", context.transport)
     framing = None
     if isinstance(inner.data, dict):
-        refuse(inner, ("match", "stages"), "means nothing for a step", findings)
+        refuse(inner, _OF_REQUESTS, "means nothing for a step", findings)
         refuse(inner, ("timeout",), "stands beside 'expect', not in it", findings)
         framing, forms = parse_own_framing(inner, findings, context.forms)
         stage = parse_stage(inner, findings, forms)

@@ -18,8 +18,8 @@ _VERBS: Final = (
 )  # fmt: skip
 """Kinds of messages."""
 _ADDRESS: Final = (
-    "topic", "type", "service", "action", "method", "path", "query", "headers", "qos", "retain",
-    "ok", "status", "reason",
+    "topic", "type", "service", "action", "method", "path", "url", "query", "headers", "qos",
+    "retain", "ok", "status", "reason",
 )  # fmt: skip
 """Keys of a message that are not its body."""
 _BODIES: Final = ("json", "text", "hex")

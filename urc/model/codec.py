@@ -152,6 +152,8 @@ class ReadSpec(NamedTuple):
     """Over settings: where it comes from, on a transport that carries messages. None: anywhere."""
     collects: Mapping[str, Collect] = NOTHING
     """Signal → how it is put together; these names are the last of `fields`."""
+    head: Mapping[str, str] = NOTHING
+    """Field → header of an http answer in small letters, or ``status``."""
     listen: Mapping[str, Value] = NOTHING
     """How `topic` is listened to: type, throttle in seconds, quality of service …"""
 

@@ -12,6 +12,7 @@ from urc.protocol.connection import Connection
 from urc.protocol.events import Fault
 from urc.protocol.exchange import Ended, Exchange, LineEvent, Outcome, expires_at
 from urc.protocol.flights import Flight
+from urc.protocol.head import is_redirect
 from urc.protocol.held_replies import Refusal
 from urc.protocol.topics import frame_of
 
@@ -26,21 +27,30 @@ class Answering(Connection):
 
     def _envelope(self, envelope: Envelope, now: float) -> list[LineEvent]:
         frame = frame_of(envelope, self.spec.encoding)
-        attributes = envelope.attributes
         if envelope.verb == "response":
-            flight = self._flights.numbered(attributes.get("id"))
-            if flight is None:
-                is_motion = attributes.get("id") is None and self.held.is_listening(now)
-                return self._motion_response(frame, attributes, now) if is_motion else []
-            if attributes.get("ok", True):
-                return self._answer(flight, flight.answer(frame), frame, now)
-            reason = str(attributes.get("reason") or "the robot refused")
-            return self._answer(flight, flight.refused(frame, reason), frame, now)
+            return self._response(envelope, frame, now)
         answered = self._flights.offer(frame) if self._flights else None
         if answered:
             return self._answer(*answered, frame, now)
         told = self._of_motion(frame, now) if self.held.is_listening(now) else None
         return self.inbox.tell(frame, now) if told is None else told
+
+    def _response(self, envelope: Envelope, frame: Frame, now: float) -> list[LineEvent]:
+        attributes = envelope.attributes
+        number, reason = attributes.get("id"), ""
+        if not attributes.get("ok", True):
+            reason = str(attributes.get("reason") or "the robot refused")
+        flight = self._flights.numbered(number)
+        if flight is None:
+            if number is None and self.held.is_listening(now):
+                return self._motion_response(frame, attributes, now)
+            # Of a step, or nobody's: it was told already that it is late.
+            asker = self._askers.pop(number, None)
+            return [] if asker is None else self.inbox.answered(asker, frame, reason, now)
+        if reason and flight.ear.answer.takes_redirects and is_redirect(frame):
+            reason = ""
+        offer = flight.refused(frame, reason) if reason else flight.answer(frame)
+        return self._answer(flight, offer, frame, now)
 
     def _motion_response(
         self, frame: Frame, attributes: Mapping[str, object], now: float

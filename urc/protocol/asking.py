@@ -21,6 +21,7 @@ from urc.protocol.fast_value import Taken
 from urc.protocol.forms import build_reader
 from urc.protocol.framing import build_framing
 from urc.protocol.gate import RANKS, Bucket
+from urc.protocol.head import LOCATION
 from urc.protocol.known import Known
 from urc.protocol.line import Line
 from urc.protocol.messages import Messages
@@ -197,6 +198,7 @@ class Builder:
                 (kind, self._matcher(read, context)) for kind, read in asides if read is not None
             ),
             extend_s=stage.asides.extend_s,
+            takes_redirects=LOCATION in stage.read.head.values(),
         )
 
     def _message(self, read: ReadSpec, context: CodecContext) -> Matcher:

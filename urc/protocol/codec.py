@@ -29,7 +29,7 @@ class NotWritable(UrcError):
 class Frame:
     """One frame as it came in; its text is decoded once, and only when somebody wants it."""
 
-    __slots__ = ("_text", "encoding", "fault", "payload", "topic", "was_text_wanted")
+    __slots__ = ("_text", "attributes", "encoding", "fault", "payload", "topic", "was_text_wanted")
 
     fault: str
     """Why a reader that knew it could not take it; unset when there was none."""
@@ -42,6 +42,8 @@ class Frame:
         self._text: str | None = None
         self.topic: str | None = None
         """Where it comes from, on a transport that carries messages."""
+        self.attributes: Mapping[str, object] = NOTHING
+        """Of the envelope that brought it: status, headers."""
         # The fault is set when there is one: a line makes thousands of frames a second.
 
     @property

@@ -47,6 +47,8 @@ class Connection:
         """Of the commands that move the robot for as long as they are held."""
         self.is_behind = False
         """Whether something that came in waits for `go_on`."""
+        self._askers: dict[object, object] = {}
+        """Numbers of requests that steps have made → who expects the answer, if anybody."""
         self._is_leaving = False
         self._misses = 0
         """Answers in a row that did not come."""
@@ -149,6 +151,7 @@ class Connection:
         self._silent_at = None
         self.is_behind = False
         self.learnt = {}
+        self._askers.clear()
         if state == "open":
             self.counters.begin()
 

@@ -18,7 +18,7 @@ from urc.protocol.place_words import place_writer
 __all__ = ["EnvelopeWriter"]
 
 
-_ADDRESS: Final = ("topic", "service", "action", "method", "path", "query")
+_ADDRESS: Final = ("topic", "service", "action", "method", "path", "url", "query")
 """What tells an envelope from another one; the rest says how it goes there."""
 _TEXTS: Final = ("query", "headers")
 """Mappings whose values are text on the wire."""
@@ -59,7 +59,8 @@ class EnvelopeWriter:
             return None
         found: dict[str, object] = {}
         for name in _ADDRESS:
-            value = envelope.attributes.get(name)
+            # A robot that was sent a URL sees its path.
+            value = envelope.attributes.get("path" if name == "url" else name)
             if name == "path" and name in self._places and isinstance(value, str):
                 value = unquote(value)
             if name in self._attributes and not self._is_here(self._attributes[name], value, found):

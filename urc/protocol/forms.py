@@ -18,6 +18,10 @@ def build_reader(spec: ReadSpec, context: CodecContext) -> Reader:
         from urc.protocol.topics import TopicReader
 
         reader = TopicReader(reader, spec, context)
+    if spec.head:
+        from urc.protocol.head import HeadReader
+
+        reader = HeadReader(reader, spec)
     if not (spec.conversions or spec.sets or spec.when):
         return reader
     from urc.protocol.shaped import ShapedReader

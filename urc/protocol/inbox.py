@@ -9,12 +9,13 @@ from urc.model.codec import Counted
 from urc.model.driver import TransportSpec
 from urc.model.values import Sample
 from urc.patterns import Pattern
-from urc.protocol.answer import Ear, Fields, Heard, Matcher, Offer, Quick
+from urc.protocol.answer import Ear, Fields, Heard, Matcher, Offer, Quick, shown
 from urc.protocol.codec import BadText, Frame
 from urc.protocol.events import Fault, Samples, Send
 from urc.protocol.exchange import LineEvent
 from urc.protocol.flights import Flight
 from urc.protocol.framings.base import Decoder, Framing, StreamDecoder
+from urc.protocol.head import is_redirect
 from urc.protocol.messages import Messages
 from urc.protocol.reacting import Collector, Replies
 from urc.protocol.secrets import Secrets
@@ -198,18 +199,41 @@ class Inbox:
     def _listeners(self, frame: Frame, now: float) -> list[LineEvent] | None:
         for ear in self._ears:
             offer = ear.offer(frame)
-            if offer is None:
-                continue
-            events: list[LineEvent] = self.dropped(offer)
-            if offer.fields is not None:
-                events += self.samples(ear.answer.matcher, offer.fields, now)[0]
-            elif offer.told is not None:
-                events += self.samples(*offer.told, now)[0]
-            if offer.fields is not None or offer.refusal:
-                self.unlisten(ear)
-                events.append(Heard(ear, offer))
-            return events
+            if offer is not None:
+                return self._said(ear, offer, now)
         return None
+
+    def _said(self, ear: Ear, offer: Offer, now: float) -> list[LineEvent]:
+        """Return what to tell of a frame that an ear takes."""
+        events: list[LineEvent] = self.dropped(offer)
+        if offer.fields is not None:
+            events += self.samples(ear.answer.matcher, offer.fields, now)[0]
+        elif offer.told is not None:
+            events += self.samples(*offer.told, now)[0]
+        if offer.fields is not None or offer.refusal:
+            self.unlisten(ear)
+            events.append(Heard(ear, offer))
+        return events
+
+    def answered(self, asker: object, frame: Frame, refusal: str, now: float) -> list[LineEvent]:
+        """Return what the answer to a request of `asker` says to the step that expects it.
+
+        Args:
+            asker: the sequence that made the request; nobody else hears the answer.
+            frame: the answer.
+            refusal: why the robot refused; "" where it did not.
+            now: the time.
+        """
+        ear = next((one for one in self._ears if one.owner is asker), None)
+        if ear is None:
+            return []
+        offer = ear.offer(frame)
+        is_redirected = ear.answer.takes_redirects and is_redirect(frame)
+        if refusal and not is_redirected and (offer is None or not offer.refusal):
+            offer = Offer(refusal=refusal)
+        if offer is None:
+            offer = Offer(refusal=f"its answer is not as declared: {shown(frame)}")
+        return self._said(ear, offer, now)
 
     def dropped(self, offer: Offer) -> list[LineEvent]:
         """Return what to say of lines that turned out to be no answer."""

@@ -172,6 +172,10 @@ class Line(Answering):
             shared = Counted(Numbered(data, count), again)
         sent: list[LineEvent] = [Send(self.spec.name, data, exchange.is_secret, shared)]
         if not ask.answers:
+            if number is not None:
+                if len(self._askers) >= MOST_IN_FLIGHT:
+                    self._askers.pop(next(iter(self._askers)))
+                self._askers[number] = exchange.owner
             sent.append(Ended(exchange, DONE))
             return sent
         if ask.framing is not None:

@@ -9,6 +9,7 @@ from urc.expressions import ExpressionError
 from urc.model.codec import Payload, ReadSpec
 from urc.protocol.codec import CodecContext, Frame, NotWritable, Reader
 from urc.protocol.convert import BadValue, Unusable, build_conversion, build_inverse
+from urc.protocol.topics import frame_of
 
 __all__ = ["ShapedReader"]
 
@@ -76,7 +77,7 @@ class ShapedReader:
             except BadValue as error:
                 raise NotWritable(f"{name}: {error}") from None
         payload = self._inner.write(raw)
-        if self._when is not None and self.read(Frame(payload, self._encoding)) is None:
+        if self._when is not None and self.read(frame_of(payload, self._encoding)) is None:
             raise NotWritable(f"{self._when.source!r} is not true of these values")
         return payload
 

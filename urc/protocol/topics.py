@@ -85,6 +85,7 @@ def frame_of(payload: Payload, encoding: str) -> Frame:
         topic = f"{attributes.get('action')}{FEEDBACK}"
     frame = Frame(body if isinstance(body, bytes) else payload, encoding)
     frame.topic = None if topic is None else str(topic)
+    frame.attributes = attributes
     return frame
 
 

@@ -387,7 +387,11 @@ def _main_way(steps: Iterable[Step]) -> Iterator[Step]:
 def numbered(data: Payload, request: Frame) -> Payload:
     """Return what answers a request: with its number, where the request has one."""
     asked = request.payload
-    if not isinstance(data, bytes) or not isinstance(asked, Envelope):
+    if not isinstance(asked, Envelope):
         return data
     number = asked.attributes.get("id")
+    if isinstance(data, Envelope) and data.verb == "response":
+        return data._replace(attributes={"id": number, **data.attributes})
+    if not isinstance(data, bytes):
+        return data
     return Envelope("response", {"id": number, "ok": True, "status": 200}, data)

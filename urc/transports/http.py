@@ -17,7 +17,7 @@ from urc._headers import is_reserved
 from urc.model.codec import Envelope, Payload
 from urc.transports._faults import CLOSED, late
 from urc.transports.base import ConnectFailed, PeerClosed, Setup, Transport, TransportError
-from urc.transports.http_body import complaint, read_body
+from urc.transports.http_body import body_of, complaint
 from urc.transports.http_client import Client, HttpFault
 from urc.transports.http_inbox import Inbox
 from urc.transports.http_streams import Pulse, Stream, streams_of
@@ -168,7 +168,7 @@ class _Talk:
     async def probe(self, path: str) -> None:
         try:
             async with self._client.answer(self._client.request("GET", path, {}, None)) as response:
-                reason = await complaint(response)
+                reason = complaint(response, await body_of(response, self._max_bytes))
         except HttpFault as fault:
             raise ConnectFailed(str(fault)) from fault
         if reason:
@@ -256,8 +256,8 @@ class _Talk:
         request.stream = _Handed(body, handed)
         async with self._client.answer(request) as response:
             self.pulse.beat()
-            reason = await complaint(response)
-            found = b"" if reason else await read_body(response, self._max_bytes)
+            found = await body_of(response, self._max_bytes)
+            reason = complaint(response, found)
             attributes: dict[str, object] = {
                 "ok": not reason,
                 "status": response.status_code,
@@ -304,7 +304,10 @@ def _request_of(client: Client, data: Envelope) -> httpx2.Request:
             body = msgspec.json.encode(body)
         except (msgspec.MsgspecError, TypeError) as fault:
             raise HttpFault(f"the body cannot be written as JSON ({fault})") from fault
-    return client.request(str(attributes.get("method", "GET")), path, named, body)
+    method = str(attributes.get("method", "GET"))
+    if "url" in attributes:
+        return client.follow(method, str(attributes["url"]), named, body)
+    return client.request(method, path, named, body)
 
 
 def _plain(value: object) -> str:

@@ -96,11 +96,45 @@ class Client:
         Raises:
             HttpFault: it cannot be said in HTTP, or would lead elsewhere.
         """
-        base = self._place.path.partition("?")[0].rstrip("/")
         if leads_up(path):
+            base = self._base.removeprefix(self._origin)
             raise HttpFault(f"{method} {path[:80]!r} would leave {base or '/'}: no '..' in a path")
+        return self._built(method, f"{self._base}/{path.lstrip('/')}", headers, body)
+
+    def follow(
+        self, method: str, reference: str, headers: Mapping[str, str], body: bytes | None
+    ) -> httpx2.Request:
+        """Return a request for a URL that the robot has named: whole, or from its root.
+
+        Raises:
+            HttpFault: it cannot be said in HTTP, or leads to another host, port or protocol.
+        """
         try:
-            url = httpx2.URL(f"{self._origin}{base}/{path.lstrip('/')}")
+            base = httpx2.URL(f"{self._base}/")
+            url = base.join(reference)
+        except (httpx2.InvalidURL, UnicodeError, TypeError, ValueError) as fault:
+            raise HttpFault(f"{reference[:80]!r} is no URL ({fault})") from fault
+        if (url.scheme, url.host, url.port, url.userinfo) != (
+            base.scheme,
+            base.host,
+            base.port,
+            b"",
+        ):
+            where = f"{self._place.authority}"
+            raise HttpFault(f"{one_line(reference)!r} is not on {where}: nobody else is asked")
+        return self._built(method, str(url.copy_with(fragment=None)), headers, body)
+
+    @property
+    def _base(self) -> str:
+        """The document's URL, without the slash at its end."""
+        return self._origin + self._place.path.partition("?")[0].rstrip("/")
+
+    def _built(
+        self, method: str, target: str, headers: Mapping[str, str], body: bytes | None
+    ) -> httpx2.Request:
+        path = target.removeprefix(self._origin)
+        try:
+            url = httpx2.URL(target)
             request = self._client.build_request(method, url, headers=dict(headers), content=body)
         except (httpx2.InvalidURL, UnicodeError, TypeError, ValueError) as fault:
             raise HttpFault(f"{method} {path[:80]!r} is no request ({fault})") from fault

@@ -16,7 +16,7 @@ from typing import Final, NamedTuple
 import httpx2
 
 from urc.transports.base import Subscription, TransportError
-from urc.transports.http_body import complaint, read_body
+from urc.transports.http_body import fault_of, read_body
 from urc.transports.http_client import Client, HttpFault
 from urc.transports.http_events import Event, EventCutter, LineCutter
 from urc.transports.http_inbox import Inbox
@@ -210,7 +210,7 @@ class Stream:
         async with head, self._client.answer(request, silence_s) as response:
             head.lift()
             self._pulse.beat()
-            if reason := await complaint(response):
+            if reason := await fault_of(response):
                 raise HttpFault(reason)
             yield response
 

@@ -114,6 +114,60 @@ async def test_bad_answer_is_one_line(web: Server, path: str, reason: str) -> No
 
 
 @WEB
+async def test_bad_answer_brings_its_status_and_its_body(web: Server) -> None:
+    """What the driver has forms for is in there; one line for people stands beside it."""
+    async with line(web.port) as transport:
+        answer = await asked(transport, "/busy.cgi")
+        assert answer.attributes["status"] == 503
+        assert isinstance(answer.body, bytes)
+        assert b"the arm is moving" in answer.body
+        moved = await asked(transport, "/moved")
+        headers = moved.attributes["headers"]
+        assert isinstance(headers, dict)
+        assert headers["location"] == "http://127.0.0.1:1/elsewhere"
+
+
+@WEB
+async def test_a_url_that_the_robot_named_is_asked_for(web: Server) -> None:
+    """Whole, or from its root: what is below the document's URL is not put before it."""
+    async with line(web.port, url=f"http://127.0.0.1:{web.port}/basic") as transport:
+        for url in (f"http://127.0.0.1:{web.port}/state.json", "/state.json#end"):
+            await transport.send(Envelope("request", {"id": 1, "url": url}, None))
+            answer = await received(transport)
+            assert answer.body == b'{"battery": 87}'
+
+
+@WEB
+@pytest.mark.parametrize(
+    "url",
+    [
+        "http://127.0.0.1:1/state.json",
+        "http://localhost/state.json",
+        "//127.0.0.1/state.json",
+        "https://127.0.0.1/state.json",
+        "http://me@127.0.0.1:{port}/state.json",
+        "http://127.0.0.1:{port}@evil/state.json",
+        "file:///etc/passwd",
+        "\\\\evil\\x",
+        "http://[",
+    ],
+)
+async def test_a_url_that_leads_elsewhere_is_not_asked_for(web: Server, url: str) -> None:
+    """Nothing that a robot says makes URC talk to another host, port or protocol."""
+    async with line(web.port) as transport:
+        named = url.replace("{port}", str(web.port))
+        await transport.send(Envelope("request", {"id": 1, "url": named}, None))
+        answer = await received(transport)
+        if named.startswith("\\"):
+            assert answer.attributes["status"] == 404  # a path of the robot's own
+            return
+        assert answer.attributes["ok"] is False
+        assert "status" not in answer.attributes
+        reason = str(answer.attributes["reason"])
+        assert "nobody else is asked" in reason or "is no URL" in reason
+
+
+@WEB
 @pytest.mark.parametrize("kind", ["basic", "digest"])
 async def test_robot_that_asks_who_we_are(web: Server, kind: str) -> None:
     """The right password opens; a wrong one is told by the robot, again and again."""
