@@ -26,7 +26,8 @@ def beside_form(part: Part, spec: ReadSpec, findings: Findings) -> ReadSpec:
             text = f"the frame gives {name!r} already"
             hint = f"call the field _{name}, and write it so in the expression"
             findings.error(inner, "duplicate-name", text, key=True, hint=hint)
-    for name, inner in part.named("head").items():
+    heads = part.named("head") if "head" in part.data else {}
+    for name, inner in heads.items():
         if name in spec.fields:
             text = f"the frame gives {name!r} already"
             findings.error(inner, "duplicate-name", text, key=True, hint="call one of them _other")
@@ -34,7 +35,7 @@ def beside_form(part: Part, spec: ReadSpec, findings: Findings) -> ReadSpec:
     topic = findings.template(subscribe.must("topic")) if subscribe else None
     if topic is not None and ("+" in topic.source or "#" in topic.source):
         spec = spec._replace(fields=(*spec.fields, "_topic"))
-    head = {name: str(inner.data).lower() for name, inner in part.named("head").items()}
+    head = {name: str(inner.data).lower() for name, inner in heads.items()}
     spec = spec._replace(head=head, fields=(*spec.fields, *head))
     return spec._replace(
         topic=topic,

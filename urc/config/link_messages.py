@@ -134,7 +134,7 @@ def _check_read(
     if spec is None:
         return
     subscribe, kind = part.get("subscribe"), MESSAGING.get(spec.type)
-    for inner in (part, *part.listed("stages"), *_refusals(part)):
+    for inner in _answers(part):
         _check_head(inner, spec, findings)
     if kind is None:
         if subscribe is not None:
@@ -169,9 +169,12 @@ def _check_read(
             )
 
 
-def _refusals(part: Part) -> list[Part]:
-    parts = [inner for one in (part, *part.listed("stages")) for inner in one.listed("errors")]
-    return [inner for inner in parts if isinstance(inner.data, dict)]
+def _answers(part: Part) -> list[Part]:
+    """Return a frame that is read, its stages, and the refusals of each."""
+    stages = part.listed("stages") if "stages" in part.data else []
+    given = [one for one in (part, *stages) if "errors" in one.data]
+    refusals = [inner for one in given for inner in one.listed("errors")]
+    return [part, *stages, *(inner for inner in refusals if isinstance(inner.data, dict))]
 
 
 def _check_head(part: Part, spec: TransportSpec, findings: Findings) -> None:
