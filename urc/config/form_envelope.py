@@ -37,6 +37,12 @@ def parse_write(part: Part, findings: Findings, context: FormContext) -> WriteSp
         hint = "write 'path', or 'url' for what the robot itself has named"
         findings.error(part, "two-forms" if both else "missing-key", text, key=True, hint=hint)
         return None
+    url = attributes.get("url")
+    if isinstance(url, Template) and any(not name.startswith("_") for name in url.names):
+        text = "'url' is what the robot has named, a field such as _next, and nothing else"
+        hint = "put arguments and settings into 'path' or 'query', which keep to this server's part"
+        findings.error(part.must("url"), "wrong-form", text, hint=hint)
+        return None
     if part.name == "request":
         attributes.setdefault("method", "GET" if spec is None else "POST")
     found = list(templates_in(attributes))
