@@ -9,7 +9,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 NOT_OURS = {
     ".git", ".venv", "node_modules", "dist", "build", "__pycache__",
-    ".hypothesis", ".mypy_cache", ".pytest_cache", ".ruff_cache",
+    ".hypothesis", ".mutate", ".mypy_cache", ".pytest_cache", ".ruff_cache",
 }  # fmt: skip
 MAX_LINES = 600
 MAX_BYTES = 1_000_000

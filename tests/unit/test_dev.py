@@ -93,6 +93,7 @@ def test_node_is_asked_for_only_where_npm_is_missing(
     assert (dev.groups_for("demo"), dev.groups_for("test")) == ([], ["dev", "node"])
     monkeypatch.setattr(dev.shutil, "which", lambda name: f"bin/{name}")
     assert dev.groups_for("test") == ["dev"]
+    assert dev.groups_for("mutate") == ["dev", "mutate"]
 
 
 def test_a_python_that_is_too_old_is_told_in_one_line(

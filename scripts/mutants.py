@@ -1,0 +1,163 @@
+"""Mutants and what became of them, as mutmut keeps it; and those that are explained."""
+
+import json
+import re
+import tomllib
+from collections.abc import Iterator
+from difflib import unified_diff
+from functools import cached_property
+from pathlib import Path
+from typing import NamedTuple
+
+from scripts.mutation_copy import PLAIN, Settings
+
+__all__ = ["DEAD", "Explained", "Kind", "Mutant", "explained_in", "mutants_in", "table"]
+
+_STATUS = {
+    None: "waiting",
+    0: "survived",
+    1: "killed",
+    3: "killed",  # pytest itself broke down
+    5: "no tests",
+    33: "no tests",
+    24: "timeout",
+    -24: "timeout",
+    36: "timeout",
+    152: "timeout",
+    255: "timeout",
+}
+"""By exit codes of mutmut; all others are odd."""
+STATUSES = ("killed", "timeout", "survived", "no tests", "odd", "waiting")
+DEAD = ("killed", "timeout")
+"""Of those a test noticed: it failed, or did not end any more."""
+Change = tuple[str, str]
+"""What a mutant takes out, and what it puts in its place."""
+
+
+class Mutant:
+    """One small change of one function."""
+
+    def __init__(self, folder: Path, module: str, name: str, status: str) -> None:
+        """Name it as mutmut does: ``urc.guard.reins.xǁReinsǁtick__mutmut_3``."""
+        self._folder = folder
+        self.module = module
+        self.name = name
+        self.status = status
+
+    @property
+    def function(self) -> str:
+        """Where it is: ``urc.guard.reins.Reins.tick``."""
+        inner = self.name.removeprefix(f"{self.module}.").partition("__mutmut_")[0]
+        plain = inner.replace("ǁ", ".").removeprefix("x.").removeprefix("x_")
+        return f"{self.module}.{plain.removesuffix(PLAIN)}"
+
+    @cached_property
+    def change(self) -> Change:
+        """What it changes, without indents."""
+        before, after = [], []
+        for line in self._diff():
+            if line.startswith("-"):
+                before.append(line[1:].strip())
+            elif line.startswith("+"):
+                after.append(line[1:].strip())
+        return "\n".join(before), "\n".join(after)
+
+    @property
+    def shown(self) -> str:
+        """Its change with the lines around it."""
+        return f"  {self.function}\n" + "\n".join(f"  {line}" for line in self._diff())
+
+    def _diff(self) -> list[str]:
+        path = self._folder / (self.module.replace(".", "/") + ".py")
+        spans = json.loads(Path(f"{path}.spans").read_text("utf-8"))["spans"]
+        lines = path.read_text("utf-8").splitlines()
+        name = self.name.removeprefix(f"{self.module}.")
+        base = name.partition("__mutmut_")[0]
+
+        def text(one: str) -> list[str]:
+            start, end = spans[one]
+            return [line.replace(one, base) for line in lines[start - 1 : end]]
+
+        before, after = text(f"{base}__mutmut_orig"), text(name)
+        return list(unified_diff(before, after, lineterm="", n=2))[2:]
+
+
+class Kind(NamedTuple):
+    """Mutants that are all harmless for one reason."""
+
+    before: re.Pattern[str]
+    """Matches the whole of what they take out."""
+    after: str
+    """What they put in its place, with references to the groups of `before`."""
+
+    def fits(self, change: Change) -> bool:
+        """Return whether a change is of this kind."""
+        found = self.before.fullmatch(change[0])
+        return found is not None and found.expand(self.after) == change[1]
+
+
+class Explained(NamedTuple):
+    """The mutants that live, and why no test is to kill them."""
+
+    reasons: dict[tuple[str, Change], str]
+    """Function and change → why."""
+    kinds: tuple[Kind, ...] = ()
+
+    def covers(self, mutant: Mutant) -> bool:
+        """Return whether a mutant is explained."""
+        known = (mutant.function, mutant.change) in self.reasons
+        return known or any(kind.fits(mutant.change) for kind in self.kinds)
+
+    def unused(self, mutants: list[Mutant]) -> Iterator[str]:
+        """Yield the reasons to which no mutant belongs that lives or waits."""
+        lives = {(one.function, one.change) for one in mutants if one.status not in DEAD}
+        for function, (before, after) in sorted(self.reasons.keys() - lives):
+            yield f"{function}: {before} -> {after}"
+
+
+def explained_in(path: Path) -> Explained:
+    """Read the file of explanations.
+
+    Raises:
+        KeyError, TypeError, ValueError: an entry is not as it should be.
+    """
+    told = tomllib.loads(path.read_text("utf-8"))
+    reasons = {
+        (entry["function"], (before, after)): entry["why"]
+        for entry in told.get("mutant", [])
+        for before, after in entry["changes"]
+    }
+    kinds = (Kind(re.compile(one["before"]), one["after"]) for one in told.get("kind", []))
+    return Explained(reasons, tuple(kinds))
+
+
+def mutants_in(copy: Path, settings: Settings) -> list[Mutant]:
+    """Return all mutants that were made."""
+    folder = copy / "mutants"
+    found = []
+    for path in sorted(folder.rglob("*.py.meta")):
+        source = path.relative_to(folder).as_posix().removesuffix(".meta")
+        if settings.is_mutated(source):
+            module = source.removesuffix(".py").replace("/", ".").removesuffix(".__init__")
+            codes = json.loads(path.read_text("utf-8"))["exit_code_by_key"]
+            found += [
+                Mutant(folder, module, name, _STATUS.get(code, "odd"))
+                for name, code in codes.items()
+            ]
+    return found
+
+
+def table(mutants: list[Mutant], explained: Explained) -> Iterator[str]:
+    """Yield a line for each module, and one for all."""
+    heads = [*STATUSES[:3], "explained", *STATUSES[3:]]
+    yield f"{'':<28}" + "".join(f"{head:>10}" for head in [*heads, "all", "killed %"])
+    modules = sorted({one.module for one in mutants})
+    for module in [*modules, ""]:
+        those = [one for one in mutants if module in ("", one.module)]
+        counts = {status: sum(one.status == status for one in those) for status in STATUSES}
+        lives = [one for one in those if one.status not in (*DEAD, "waiting")]
+        counts["explained"] = sum(map(explained.covers, lives))
+        killed = sum(counts[status] for status in DEAD)
+        share = f"{100 * killed / len(those):.1f}" if those else "-"
+        cells = [*(counts[head] for head in heads), len(those), share]
+        yield f"{module or 'all':<28}" + "".join(f"{cell:>10}" for cell in cells)

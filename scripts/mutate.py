@@ -1,0 +1,95 @@
+"""What `./dev mutate` does: break the code in thousands of small ways, and see that a test notices.
+
+mutmut makes the mutants and runs the tests, as `[tool.mutmut]` in pyproject.toml says, in a copy of
+the tree under `.mutate`. Results stay there: a run that is stopped goes on where it was, and only
+what a change concerns is tried again. `tests/mutants.toml` explains the mutants that no test can
+kill. Exit code 0: all of them are killed or explained, and 90 % are killed; 1: not so; 3: there is
+more to do. Why mutmut, and what it leaves out: docs/decisions/0023-mutants-by-mutmut.md.
+"""
+
+import argparse
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+from scripts.mutants import DEAD, Explained, Mutant, explained_in, mutants_in, table
+from scripts.mutation_copy import Settings, bring_up_to_date, forget_open_questions
+
+ROOT = Path(__file__).resolve().parents[1]
+COPY = ROOT / ".mutate"
+EXPLAINED = ROOT / "tests" / "mutants.toml"
+WANTED = 0.9
+"""Share of the mutants that the tests must kill."""
+UNFINISHED = 3
+_END_S = 30
+
+
+def main() -> int:
+    """Run what is left to run; print the summary; return the exit code."""
+    options = _options()
+    if os.name == "nt":
+        print("mutate: mutmut needs fork, which Windows has not; use WSL", file=sys.stderr)
+        return 2
+    settings = Settings.of(ROOT)
+    if not options.report:
+        if bring_up_to_date(ROOT, COPY, settings):
+            forget_open_questions(COPY)
+        if not _run(options.names, options.workers, options.minutes):
+            return 1
+    mutants = mutants_in(COPY, settings)
+    return summarise(mutants, explained_in(EXPLAINED), is_part=bool(options.names))
+
+
+def _options() -> argparse.Namespace:
+    said = (__doc__ or "").partition("\n")[0]
+    parser = argparse.ArgumentParser(prog="./dev mutate", description=said)
+    add = parser.add_argument
+    add("names", nargs="*", metavar="NAME", help="try these again, such as 'urc.guard.reins.*'")
+    add("--minutes", type=float, metavar="N", help="stop then; the next run goes on from there")
+    add("--workers", type=int, default=2, metavar="N", help="so many at a time; 2 unless told")
+    add("--report", action="store_true", help="try nothing; show what is known")
+    return parser.parse_args()
+
+
+def _run(names: list[str], workers: int, minutes: float | None) -> bool:
+    """Run mutmut until it is done or its time is up; return False when it could not work."""
+    mutmut = Path(sys.executable).with_name("mutmut")
+    command = [str(mutmut), "run", "--max-children", str(workers), *names]
+    # The copy stands before the checkout, also for programs that a test starts.
+    environment = {**os.environ, "PYTHONPATH": str(COPY / "mutants")}
+    process = subprocess.Popen(command, cwd=COPY, env=environment)
+    try:
+        return process.wait(minutes * 60 if minutes is not None else None) == 0
+    except (subprocess.TimeoutExpired, KeyboardInterrupt):
+        print("\nstopped; the next run goes on from here", flush=True)
+        process.send_signal(signal.SIGINT)
+        try:
+            process.wait(_END_S)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait()
+        return True
+
+
+def summarise(mutants: list[Mutant], explained: Explained, *, is_part: bool) -> int:
+    """Print a line for each module, then each mutant that is to be looked at."""
+    print("\n".join(table(mutants, explained)))
+    lives = [one for one in mutants if one.status not in (*DEAD, "waiting")]
+    new = [one for one in lives if not explained.covers(one)]
+    for one in new:
+        print(f"\n{one.status}: {one.name}\n{one.shown}")
+    for entry in explained.unused(mutants):
+        print(f"\n{EXPLAINED.name}: no mutant that lives is so any more: {entry}")
+    killed = sum(one.status in DEAD for one in mutants)
+    waiting = sum(one.status == "waiting" for one in mutants)
+    print(f"\n{len(new)} survivors are neither killed nor explained")
+    if waiting:
+        print(f"{waiting} mutants wait: run ./dev mutate again")
+        return UNFINISHED
+    return 0 if not new and (is_part or killed >= WANTED * len(mutants)) else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())
