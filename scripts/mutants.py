@@ -18,6 +18,8 @@ _STATUS = {
     0: "survived",
     1: "killed",
     3: "killed",  # pytest itself broke down
+    -1: "killed",  # a signal of a test, which the mutant did not take
+    -15: "killed",
     5: "no tests",
     33: "no tests",
     24: "timeout",

@@ -22,10 +22,10 @@ __all__ = [
     "with_plain_properties",
 ]
 
-PLAIN = "_plain"
+PLAIN = "_as_method"
 """Ends the name of a method that was a property."""
 STAMP = "urc-mutate.json"
-SETTLED = (1, 3, 24, -24, 36, 152, 255)
+SETTLED = (1, 3, -1, -15, 24, -24, 36, 152, 255)
 """Exit codes of mutmut's runs that say that it was killed, or did not end."""
 
 
@@ -34,6 +34,8 @@ class Settings(NamedTuple):
 
     mutated: tuple[str, ...]
     """Patterns of files."""
+    spared: tuple[str, ...]
+    """Those of them that are not."""
     copied: tuple[str, ...]
     """Files and folders that the tests need."""
 
@@ -42,11 +44,12 @@ class Settings(NamedTuple):
         """Read them."""
         told = tomllib.loads((root / "pyproject.toml").read_text("utf-8"))["tool"]["mutmut"]
         named = [*told["source_paths"], *told["also_copy"], "tests", "pyproject.toml"]
-        return cls(tuple(told["only_mutate"]), tuple(named))
+        return cls(tuple(told["only_mutate"]), tuple(told["do_not_mutate"]), tuple(named))
 
     def is_mutated(self, name: str) -> bool:
         """Return whether mutants are made of a file."""
-        return any(fnmatch(name, pattern) for pattern in self.mutated)
+        is_named = any(fnmatch(name, pattern) for pattern in self.mutated)
+        return is_named and not any(fnmatch(name, pattern) for pattern in self.spared)
 
 
 def bring_up_to_date(root: Path, copy: Path, settings: Settings) -> bool:
@@ -66,6 +69,8 @@ def bring_up_to_date(root: Path, copy: Path, settings: Settings) -> bool:
         if not target.is_file() or target.read_bytes() != data:
             target.parent.mkdir(parents=True, exist_ok=True)
             target.write_bytes(data)
+    # Python remembers of a folder on its path that there was none.
+    (copy / "mutants").mkdir(exist_ok=True)
     for folder in (copy, copy / "mutants"):
         for name in _files(folder, settings.copied):
             if name.removesuffix(".meta").removesuffix(".spans") not in names:

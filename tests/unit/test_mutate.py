@@ -17,7 +17,7 @@ from scripts.mutation_copy import (
 )
 
 ROOT = Path(__file__).resolve().parents[2]
-SETTINGS = Settings(("urc/guard/*",), ("urc", "tests"))
+SETTINGS = Settings(("urc/guard/*",), ("urc/guard/double.py",), ("urc", "tests"))
 SOURCE = '''\
 class Reins:
     @property
@@ -81,7 +81,7 @@ def test_a_property_is_a_method_that_can_be_mutated() -> None:
     reins = names["Reins"]()
     reins.debts = ["drive"]
     assert reins.owes is True
-    assert reins.owes_plain() is True
+    assert reins.owes_as_method() is True
     assert reins.other() == 1
     assert plain.count("@") == 1
 
@@ -102,7 +102,7 @@ def test_the_copy_follows_the_tree(tree: Path, tmp_path: Path) -> None:
     """What did not change keeps its time, so that its mutants stand; what is gone goes."""
     copy = tmp_path / "copy"
     assert bring_up_to_date(tree, copy, SETTINGS)
-    assert "owes_plain" in (copy / "urc" / "guard" / "reins.py").read_text("utf-8")
+    assert "owes_as_method" in (copy / "urc" / "guard" / "reins.py").read_text("utf-8")
     assert (copy / "urc" / "other.py").read_text("utf-8") == SOURCE
     os.utime(copy / "urc" / "other.py", (1, 1))
     assert not bring_up_to_date(tree, copy, SETTINGS)
@@ -125,7 +125,14 @@ def test_after_a_change_all_that_lives_is_tried_again(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("code", "status"),
-    [(3, "killed"), (-24, "timeout"), (36, "timeout"), (33, "no tests"), (-11, "odd")],
+    [
+        (3, "killed"),
+        (-15, "killed"),
+        (-24, "timeout"),
+        (36, "timeout"),
+        (33, "no tests"),
+        (-11, "odd"),
+    ],
 )
 def test_how_a_run_ended(tmp_path: Path, code: int, status: str) -> None:
     ran(tmp_path, _1=code)
@@ -137,7 +144,7 @@ def test_a_mutant_says_where_it_is_and_what_it_changes(tmp_path: Path) -> None:
     first, _ = mutants_in(tmp_path, SETTINGS)
     assert first.function == "urc.guard.reins.Reins.tick"
     assert first.change == ("self.moves = True", "self.moves = False")
-    plain = "urc.guard.reins.xǁReinsǁowes_plain__mutmut_1"
+    plain = "urc.guard.reins.xǁReinsǁowes_as_method__mutmut_1"
     assert Mutant(tmp_path, "urc.guard.reins", plain, "").function == "urc.guard.reins.Reins.owes"
     alone = "urc.guard.reins.x_look__mutmut_7"
     assert Mutant(tmp_path, "urc.guard.reins", alone, "").function == "urc.guard.reins.look"
