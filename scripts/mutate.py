@@ -24,6 +24,8 @@ WANTED = 0.9
 """Share of the mutants that the tests must kill."""
 UNFINISHED = 3
 _END_S = 30
+_TEST_S = 10
+"""A test that a mutant makes hang is ended then; the longest takes one."""
 
 
 def main() -> int:
@@ -58,7 +60,11 @@ def _run(names: list[str], workers: int, minutes: float | None) -> bool:
     mutmut = Path(sys.executable).with_name("mutmut")
     command = [str(mutmut), "run", "--max-children", str(workers), *names]
     # The copy stands before the checkout, also for programs that a test starts.
-    environment = {**os.environ, "PYTHONPATH": str(COPY / "mutants")}
+    environment = {
+        **os.environ,
+        "PYTHONPATH": str(COPY / "mutants"),
+        "URC_TEST_TIMEOUT_S": str(_TEST_S),
+    }
     process = subprocess.Popen(command, cwd=COPY, env=environment)
     try:
         return process.wait(minutes * 60 if minutes is not None else None) == 0
