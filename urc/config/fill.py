@@ -28,7 +28,11 @@ class Listener(Protocol):
         """Take note of ``max: {i}``: without quotes that is a mapping to YAML."""
 
 
-_NAME: Final = re.compile(r"(?<!\{)\{([a-z][a-z0-9_]*)(?:\.([a-z0-9_]+))?\}(?!\})")
+_NAME: Final = re.compile(
+    # Double braces are a template's; but {{n}:number} is a field whose name is filled in.
+    r"(?:(?<!\{)|(?<=\{)(?=\{[a-z0-9_.]+\}:[a-z]))"
+    r"\{([a-z][a-z0-9_]*)(?:\.([a-z0-9_]+))?\}(?!\})"
+)
 _CHARACTERS_MOST: Final = 4 << 20
 
 

@@ -15,6 +15,7 @@ from urc.model.values import Limits, Signal
 __all__ = ["parse_signal", "with_ages"]
 
 _NUMBERS: Final = ("integer", "number")
+_ROTATIONS: Final = ("roll", "pitch", "yaw")
 _BYTES: Final = ("image", "blob")
 
 
@@ -107,9 +108,25 @@ def _check_vector(part: Part, kind: str, findings: Findings) -> None:
             )
 
 
+def _check_rotation(part: Part, kind: str, findings: Findings) -> None:
+    """Warn of a rotation that does not say which way it turns; a computed one is as its inputs."""
+    is_named = not {*part.name.split("_")}.isdisjoint(_ROTATIONS)
+    is_angle = kind in _NUMBERS and part.text("unit") in ANGLE_UNITS
+    if is_named and is_angle and "value" not in part.data:
+        findings.warn(
+            part,
+            "no-axes",
+            f"nothing says which way {part.name!r} turns",
+            key=True,
+            hint="write axes: FLU (x forward, y left, z up) or axes: FRD (z down), as the robot's"
+            " document has it",
+        )
+
+
 def _axes(part: Part, kind: str, findings: Findings) -> str:
     inner = part.get("axes")
     if inner is None:
+        _check_rotation(part, kind, findings)
         return ""
     axes = str(inner.data)
     size = part.integer("size")

@@ -13,6 +13,7 @@ from urc.config.struct_numbers import check_fits, unknown_type, written_constant
 from urc.config.struct_scope import Scope
 from urc.config.struct_text import parse_content
 from urc.model.binary import (
+    FRAME_NAMES,
     Extent,
     Item,
     Switch,
@@ -301,6 +302,13 @@ class ItemParser:
 
     def _check_sent(self, part: Part, item: Item) -> None:
         """Report what would be sent and has no value."""
+        if self.purpose == "send" and asks_for_the_end(item):
+            self.findings.error(
+                part,
+                "nothing-to-send",
+                "what is sent has no end yet: '_left' and '_size' cannot say how it goes on",
+                hint="write 'rest' for all that is left, or let an item before say the size",
+            )
         if self.purpose != "send" or item.kind not in (
             "number",
             "coded",
@@ -340,6 +348,15 @@ def _inner(item: Item) -> list[Items]:
     if item.switch is None:
         return [item.items]
     return [*(case for _, case in item.switch.cases), item.switch.default or ()]
+
+
+def asks_for_the_end(item: Item) -> bool:
+    """Return whether the size of the whole frame says how large an item is, or which it is."""
+    by = None if item.switch is None else item.switch.by
+    extents = [extent.expression for extent in (item.size, item.times) if extent is not None]
+    if any(one is not None and one.names & FRAME_NAMES for one in (by, *extents)):
+        return True
+    return any(asks_for_the_end(one) for items in _inner(item) for one in items)
 
 
 def weight_of(item: Item | None) -> int:

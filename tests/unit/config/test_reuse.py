@@ -219,6 +219,25 @@ def test_each_writes_out_keys_texts_and_values(folder: Folder) -> None:
     assert signals["right_2"].title == "right 2 of {{i}}"
 
 
+def test_a_field_of_a_pattern_may_be_a_name_of_each(folder: Folder) -> None:
+    """Two braces are a template's, but for the field whose whole name is filled in."""
+    folder.write(
+        base=head("driver", "base")
+        + WIRE
+        + """
+signals: { "{n}": { each: { n: [tilt, pan] } } }
+messages:
+  "m_{n}":
+    each: { n: [tilt, pan] }
+    pattern: "{n} {{n}:number} {{ {_{n}:word}"
+""",
+    )
+    profile = folder.check("base").profile
+    assert profile is not None
+    fields = [message.read.fields for message in profile.driver.messages.values()]
+    assert fields == [("tilt", "_tilt"), ("pan", "_pan")]
+
+
 def test_one_of_many_is_changed_or_taken_away_by_name(folder: Folder) -> None:
     """In the document itself, or in one that extends it, before or behind the `each`."""
     folder.write(
