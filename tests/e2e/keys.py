@@ -31,14 +31,14 @@ def learn(line: str) -> str:
 
 def headers_for(address: str) -> dict[str, str]:
     """Return what a program sends to the dashboard of a process; nothing where no key is known."""
-    key = _keys.get(_origin(address))
+    key = _key_of(address)
     return {"Authorization": f"Bearer {key}"} if key else {}
 
 
 async def enter(context: BrowserContext, address: str) -> None:
     """Hand in the key of the dashboard at `address`, if it is one of a process."""
-    key = _keys.get(_origin(address))
-    if key is not None:
+    key = _key_of(address)
+    if key:
         await context.request.get(f"{_origin(address)}/?key={key}")
 
 
@@ -47,7 +47,7 @@ def entering(page: Page) -> None:
     goto, entered = page.goto, set[str]()
 
     async def opened(url: str, **how: Any) -> Any:
-        key = _keys.get(_origin(url), "")
+        key = _key_of(url)
         if key not in entered:
             entered.add(key)
             await enter(page.context, url)
@@ -69,6 +69,14 @@ async def known_here(context: BrowserContext) -> None:
             for host in hosts
         ]
     )  # fmt: skip
+
+
+def _key_of(address: str) -> str:
+    # A server that listens everywhere prints one of its addresses.
+    port = urlsplit(address).port
+    return next(
+        (key for origin, key in reversed(_keys.items()) if urlsplit(origin).port == port), ""
+    )
 
 
 def _origin(address: str) -> str:

@@ -14,6 +14,7 @@ from starlette.responses import HTMLResponse, JSONResponse
 from starlette.types import ASGIApp, Receive, Scope, Send
 
 from urc.web.serve.access import PARAMETER, Access, Visitor
+from urc.web.serve.crowd import is_stop
 from urc.web.show.pages import Head, render
 from urc.web.wire.messages import CLOSE_NOT_LET_IN, encode_error
 
@@ -25,7 +26,6 @@ _OPEN = re.compile(
     r"/healthz|/favicon\.ico|/app\.webmanifest|/sw\.js|/(?:static|vendor|words|widgets)/.+\.\w+"
 )
 """What says nothing of a robot. Frames of widgets have no cookies, so their files are open."""
-_STOP = re.compile(r"/api/v1/robots/[^/]+/stop")
 _HEADERS = {"cache-control": "no-store"}
 _REFUSED = {**_HEADERS, "www-authenticate": 'Bearer realm="URC"'}
 
@@ -97,8 +97,9 @@ class Door:
         if scope["type"] == "websocket":
             return False
         path = scope["path"]
-        is_asked = scope["method"] in ("GET", "HEAD") and _OPEN.fullmatch(path)
-        return bool(is_asked or (scope["method"] == "POST" and _STOP.fullmatch(path)))
+        if is_stop(scope["method"], path):
+            return True
+        return scope["method"] in ("GET", "HEAD") and _OPEN.fullmatch(path) is not None
 
     def _answer_to(self, word: str, query: list[tuple[str, str]], scope: Scope) -> HTMLResponse:
         """Return the answer to a browser that hands in a key."""

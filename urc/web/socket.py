@@ -107,8 +107,10 @@ class Client:
             await self._refuse(wire.CLOSE_NOT_READY, f"not set yet: {names}")
         elif self._station.is_full:
             await self._refuse(wire.CLOSE_FULL, "too many clients watch this robot")
+        elif not self._station.has_seat_for(self._guest):
+            await self._refuse(wire.CLOSE_FULL, "too many screens of yours watch this robot")
         else:
-            with self._station.visit():
+            with self._station.visit(self._guest.who):
                 await self._visit()
 
     async def _visit(self) -> None:

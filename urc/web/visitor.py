@@ -24,9 +24,12 @@ def guest_of(connection: HTTPConnection) -> Guest:
     host = connection.client.host if connection.client else ""
     has_key = is_here(connection)
     place = "" if has_key and _is_loopback(host) else host
+    visitor = visitor_of(connection)
+    is_known = visitor.standing != "stranger"
+    who = f"{visitor.standing} {visitor.name}" if is_known else f"at {host}"
     if "watch" in connection.query_params:
-        return Guest(place, "viewer")
-    return Guest(place, "engineer" if has_key else "driver")
+        return Guest(place, "viewer", who, is_known)
+    return Guest(place, "engineer" if has_key else "driver", who, is_known)
 
 
 def is_here(connection: HTTPConnection) -> bool:

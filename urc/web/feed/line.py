@@ -86,3 +86,7 @@ class Guest(NamedTuple):
     place: str = ""
     """Address, for the others; "" for this machine."""
     role: Role = "driver"
+    who: str = ""
+    """Whose seats are counted together: one browser, program or address; "": nobody's."""
+    is_known: bool = False
+    """Whether it has a key; else `who` is an address."""

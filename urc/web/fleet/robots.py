@@ -7,6 +7,7 @@ gone, so that a reload of the page does not cut the robot off and Back does.
 import asyncio
 import logging
 import secrets
+from collections import Counter
 from collections.abc import AsyncIterator, Callable, Iterator, Mapping
 from contextlib import AbstractAsyncContextManager, asynccontextmanager, contextmanager
 from dataclasses import dataclass
@@ -26,6 +27,7 @@ from urc.runtime.trail import Trail
 from urc.web.drive.consent import Consent
 from urc.web.drive.controls import Controls
 from urc.web.feed.fanout import Fanout
+from urc.web.feed.line import Guest
 from urc.web.fleet.tape import Tape
 
 __all__ = [
@@ -43,6 +45,8 @@ LINGER_S = 2.0
 OPEN_TIMEOUT_S = 10.0
 RETRY_S = 1.0
 CLIENTS = 256
+SEATS, KNOWN_SEATS = 8, 64
+"""Clients of one robot that may come from one stranger's address, and from one that has a key."""
 CLOSE_TIMEOUT_S = 8.0
 """How long a session that is to end is waited for."""
 STOP_WITHIN_S = 1.0
@@ -172,6 +176,7 @@ class Station:
         self.controls.once.on_stopped = self.consent.stop
         self._linger_s = linger_s
         self._visitors = 0
+        self._seats: Counter[str] = Counter()
         self._stirred = asyncio.Event()
         self._next: asyncio.Future[Live] | None = None
         self._is_open = False
@@ -184,15 +189,23 @@ class Station:
         """Whether one more client would be one too many."""
         return self._visitors >= CLIENTS
 
+    def has_seat_for(self, guest: Guest) -> bool:
+        """Return whether one more client of `guest` leaves room for those of others."""
+        most = KNOWN_SEATS if guest.is_known else SEATS
+        return not guest.who or self._seats[guest.who] < most
+
     @contextmanager
-    def visit(self) -> Iterator[None]:
-        """Count as a client for as long as the context lasts."""
+    def visit(self, who: str = "") -> Iterator[None]:
+        """Count as a client for as long as the context lasts; `who` is that of its `Guest`."""
         self._visitors += 1
+        self._seats[who] += 1
         self._stirred.set()
         try:
             yield
         finally:
             self._visitors -= 1
+            self._seats[who] -= 1
+            self._seats += Counter()  # without those that are gone
             self._stirred.set()
 
     async def live(self) -> Live:

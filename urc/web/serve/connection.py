@@ -14,12 +14,16 @@ import uvicorn
 from uvicorn.protocols.http.h11_impl import H11Protocol
 from uvicorn.server import ServerState
 
+from urc.web.serve.crowd import is_stop
 from urc.web.serve.policy import REFUSAL_HEADERS
 
-__all__ = ["CONNECTIONS", "REQUEST_S", "Connection", "refusal"]
+__all__ = ["CONNECTIONS", "REQUEST_S", "RESERVE", "Connection", "refusal"]
 
 CONNECTIONS = 1024
-"""How many may be open at once, WebSockets included."""
+"""How many may be open at once, WebSockets included. One more closes one that only waits: of the
+address that has most of these, the oldest."""
+RESERVE = 64
+"""How many more may be made while none of them only waits, to say STOP and nothing else."""
 REQUEST_S = 5.0
 """In which a connection must bring a whole request, its body too: the first one from the moment it
 is made, each later one from its first byte."""
@@ -37,6 +41,12 @@ def refusal(status: HTTPStatus, text: str) -> bytes:
     ]
     lines = b"".join(name + b": " + value + b"\r\n" for name, value in headers)
     return f"HTTP/1.1 {status.value} {status.phrase}\r\n".encode() + lines + b"\r\n" + body
+
+
+def _stops(data: bytes) -> bool:
+    """Return whether a request that begins so is a STOP."""
+    method, _, rest = data.partition(b"\r\n")[0].partition(b" ")
+    return is_stop(method.decode("latin-1"), rest.partition(b" ")[0].decode("latin-1"))
 
 
 class Connection(H11Protocol):
@@ -63,17 +73,24 @@ class Connection(H11Protocol):
         self._alarm: asyncio.TimerHandle | None = None
         self._is_one_too_many = False
         self._has_spoken = False
+        self.made_s = 0.0
+        """When it was made, by the clock of the loop."""
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
         """Take the transport, and expect a request."""
         super().connection_made(transport)
-        self._is_one_too_many = len(self.connections) > self._most
+        self.made_s = self.loop.time()
+        if len(self.connections) > self._most and not self._make_room():
+            self._is_one_too_many = True
+            if len(self.connections) > self._most + RESERVE:
+                transport.abort()
+                return
         self._watch()
 
     def data_received(self, data: bytes) -> None:
         """Take what came, and see whether the request is whole now."""
         self._has_spoken = True
-        if self._is_one_too_many:
+        if self._is_one_too_many and not _stops(data):
             # Not earlier: an answer to nothing is lost when the request then meets a closed door.
             self._refuse(HTTPStatus.SERVICE_UNAVAILABLE, "Too many connections are open.")
             return
@@ -88,6 +105,25 @@ class Connection(H11Protocol):
     def send_400_response(self, msg: str) -> None:
         """Say that this is no HTTP; called by the base class."""
         self._refuse(HTTPStatus.BAD_REQUEST, msg)
+
+    def _make_room(self) -> bool:
+        """Close one that only waits, if there is one; return whether there was."""
+        waiting: dict[str, list[Connection]] = {}
+        for one in self.connections:
+            if isinstance(one, Connection) and one is not self and one.only_waits:
+                peer = one.transport.get_extra_info("peername") or ("",)
+                waiting.setdefault(str(peer[0]), []).append(one)
+        if not waiting:
+            return False
+        most = max(waiting.values(), key=len)
+        min(most, key=lambda one: one.made_s).transport.abort()
+        return True
+
+    @property
+    def only_waits(self) -> bool:
+        """Whether no whole request is under way on it."""
+        is_ours = self.transport.get_protocol() is self and not self.transport.is_closing()
+        return is_ours and self.conn.their_state in (h11.IDLE, h11.SEND_BODY)
 
     def _watch(self) -> None:
         """Let the clock run while a request is not whole, and only then."""

@@ -18,6 +18,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from urc._addresses import unmapped
 from urc.web.serve.access import Access
+from urc.web.serve.crowd import Places, is_stop
 
 __all__ = [
     "BODY_BYTES",
@@ -196,6 +197,7 @@ class Policy:
         self._access = access
         self._names = frozenset(name.lower().removesuffix(".") for name in allowed_hosts)
         self._own = own_names()
+        self._places = Places()
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Refuse, or hand on with headers added to every answer."""
@@ -208,10 +210,17 @@ class Policy:
         state["visitor"] = self._access.visitor(scope["headers"])
         answer = _Answer(scope, send, nonce)
         refusal = self._refusal(scope)
-        if refusal is None:
+        if refusal is not None:
+            await answer.refuse(*refusal)
+        elif is_stop(scope.get("method", ""), scope["path"]):
             await self._app(scope, _limited(scope, receive), answer.send)
         else:
-            await answer.refuse(*refusal)
+            client = scope.get("client") or ("",)
+            with self._places.taken(state["visitor"], client[0]) as has_place:
+                if has_place:
+                    await self._app(scope, _limited(scope, receive), answer.send)
+                else:
+                    await answer.refuse(503, "Too much is under way from this address.")
 
     def _refusal(self, scope: Scope) -> tuple[int, str] | None:
         hosts = _values(scope, b"host")

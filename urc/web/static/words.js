@@ -47,6 +47,7 @@ const SENTENCES = [
   mark("nobody waited for the answer"),
   mark("the robot's session ended"),
   mark("too many clients watch this robot"),
+  mark("too many screens of yours watch this robot"),
   mark("the server was held up"),
   mark("the layout was changed"),
   mark("{name}, before a restart"),

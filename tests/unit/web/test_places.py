@@ -1,0 +1,74 @@
+"""One visitor takes no place of others: what is under way, and seats at one robot."""
+
+from contextlib import ExitStack
+
+import pytest
+
+from urc.testing.clock import FakeClock
+from urc.testing.dashboard import FakeRobot, dashboard_profile
+from urc.web.feed.line import Guest
+from urc.web.fleet.robots import KNOWN_SEATS, SEATS, Robot, Station
+from urc.web.serve.access import STRANGER, Visitor
+from urc.web.serve.crowd import KNOWN_PLACES, PLACES, Places, is_stop
+
+HOLDER = Visitor("here", "browser 1")
+
+
+@pytest.mark.parametrize(("visitor", "most"), [(STRANGER, PLACES), (HOLDER, KNOWN_PLACES)])
+def test_one_visitor_has_a_bounded_number_of_places(visitor: Visitor, most: int) -> None:
+    """Those of others are not touched, and what ends makes room."""
+    places = Places()
+    with ExitStack() as open_ones:
+        for _ in range(most):
+            assert open_ones.enter_context(places.taken(visitor, "192.0.2.7"))
+        with places.taken(visitor, "192.0.2.7") as has_place:
+            assert not has_place
+        for other in (STRANGER, HOLDER._replace(name="browser 2")):
+            with places.taken(other, "192.0.2.8") as has_place:
+                assert has_place
+    with places.taken(visitor, "192.0.2.7") as has_place:
+        assert has_place
+
+
+def test_who_has_a_key_is_counted_by_it_and_not_by_the_address() -> None:
+    """Behind one address there may be a whole lab."""
+    places = Places()
+    with ExitStack() as open_ones:
+        for _ in range(PLACES):
+            open_ones.enter_context(places.taken(STRANGER, "192.0.2.7"))
+        with places.taken(HOLDER, "192.0.2.7") as has_place:
+            assert has_place
+
+
+@pytest.mark.parametrize(
+    ("guest", "seats"),
+    [
+        (Guest("192.0.2.7", "driver", "at 192.0.2.7"), SEATS),
+        (Guest("", "engineer", "here browser 1", True), KNOWN_SEATS),
+    ],
+)
+def test_one_visitor_has_a_bounded_number_of_seats_at_a_robot(guest: Guest, seats: int) -> None:
+    profile = dashboard_profile()
+    station = Station(Robot(profile, {}, FakeRobot(profile).open), clock=FakeClock())
+    with ExitStack() as open_ones:
+        for _ in range(seats):
+            assert station.has_seat_for(guest)
+            open_ones.enter_context(station.visit(guest.who))
+        assert not station.has_seat_for(guest)
+        assert station.has_seat_for(guest._replace(who="at 192.0.2.8", is_known=False))
+    assert station.has_seat_for(guest)
+
+
+@pytest.mark.parametrize(
+    ("method", "path", "stops"),
+    [
+        ("POST", "/api/v1/robots/puppet/stop", True),
+        ("POST", "/api/v1/robots/my%20robot/stop", True),
+        ("GET", "/api/v1/robots/puppet/stop", False),
+        ("POST", "/api/v1/robots/puppet/stop/more", False),
+        ("POST", "/api/v1/robots/puppet/settings", False),
+        ("POST", "/stop", False),
+    ],
+)
+def test_only_stop_is_not_counted(method: str, path: str, stops: bool) -> None:
+    assert is_stop(method, path) is stops
