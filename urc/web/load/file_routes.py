@@ -79,7 +79,9 @@ class FileRoutes:
         file = request.path_params["file"]
         tables = self._widgets()
         table = next((one for one in tables if file in one.files), tables[-1])
-        return table.respond(file, request)
+        answer = table.respond(file, request)
+        request.state.is_file = True
+        return answer
 
     async def _tile(self, request: Request) -> Response:
         """Serve a square of a map, where a folder with tiles was given."""

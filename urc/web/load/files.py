@@ -123,6 +123,7 @@ def _served(place: Path, media_type: str, request: Request) -> Response:
         found = place.stat()
     except OSError as error:
         raise HTTPException(404) from error
+    request.state.is_file = True
     tag = f'"{found.st_mtime_ns:x}-{found.st_size:x}"'
     headers = {"etag": tag, "cache-control": "no-cache"}
     if tag in request.headers.get("if-none-match", ""):

@@ -246,8 +246,9 @@ class Policy:
 class _Answer:
     """Adds the headers of the page policy to whatever answer goes out first.
 
-    A route may leave two words in the request's state: ``frame_policy``, the policy of a frame
-    instead of a page's; and ``is_code``, for what frames may load too.
+    A route may leave words in the request's state: ``frame_policy``, the policy of a frame instead
+    of a page's; ``is_code``, for what frames may load too; and ``is_file``, for what others have
+    written: opened by itself, such a file is no page of ours.
     """
 
     def __init__(self, scope: Scope, send: Send, nonce: str) -> None:
@@ -263,7 +264,10 @@ class _Answer:
         fixed = _CODE_HEADERS if self._state.get("is_code") else _FIXED_HEADERS
         if framed is not None:
             fixed = _FRAME_HEADERS
-        return [(b"content-security-policy", (framed or self._policy).encode()), *fixed]
+        policy = framed or self._policy
+        if self._state.get("is_file"):
+            policy = f"sandbox; {policy}"
+        return [(b"content-security-policy", policy.encode()), *fixed]
 
     async def send(self, message: Message) -> None:
         kind = message["type"]
