@@ -14,7 +14,7 @@ from typing import Any, Final
 
 from urc import _filters
 from urc._grammar import COUNTERS, Refused, translate
-from urc._spelling import spelt
+from urc._spelling import quoted, spelt
 from urc.problems import UrcError
 
 __all__ = [
@@ -25,6 +25,7 @@ __all__ = [
     "compile_template",
     "is_byte_filter",
     "last_filter",
+    "quoted",
     "spelt",
     "split_template",
     "text_of",

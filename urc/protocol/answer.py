@@ -8,7 +8,7 @@ it each frame that comes in.
 from collections.abc import Callable, Mapping
 from typing import Final, Literal, NamedTuple, Protocol
 
-from urc.expressions import ExpressionError, Template, text_of
+from urc.expressions import ExpressionError, Template, quoted, text_of
 from urc.model.codec import traffic_of
 from urc.patterns import Pattern
 from urc.protocol.codec import BadItem, BadText, Frame, Reader
@@ -234,7 +234,7 @@ def _told(text: Template | None, fields: Fields, frame: Frame) -> str:
 def shown(frame: Frame) -> str:
     """Return a frame in messages for people: its text, or its first bytes."""
     try:
-        return repr(frame.text[:80])
+        return quoted(frame.text, most=80)
     except BadText:
         payload = frame.payload
         if isinstance(payload, bytes):

@@ -7,6 +7,7 @@ emulated robot comes from the same declaration; `urc.protocol.forms` has the tab
 from collections.abc import Mapping
 from typing import NamedTuple, Protocol
 
+from urc.expressions import quoted
 from urc.model.codec import Payload
 from urc.model.values import NOTHING
 from urc.problems import UrcError
@@ -62,7 +63,7 @@ class Frame:
         except UnicodeDecodeError as error:
             wrong = self.payload[error.start : error.end]
             self.was_text_wanted = True
-            raise BadText(f"{wrong!r} is not {self.encoding} text") from None
+            raise BadText(f"{quoted(wrong)} is not {self.encoding} text") from None
 
 
 class CodecContext(NamedTuple):

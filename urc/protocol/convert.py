@@ -11,6 +11,7 @@ from collections.abc import Callable
 from itertools import pairwise
 from typing import Final
 
+from urc.expressions import quoted
 from urc.model.values import Conversion, Value
 
 __all__ = [
@@ -20,7 +21,6 @@ __all__ = [
     "build_inverse",
     "divisor_of",
     "number_of",
-    "short",
     "spelt",
     "whole_of",
 ]
@@ -106,7 +106,7 @@ def whole_of(raw: object) -> int:
             return int(raw)
         except ValueError:
             pass
-    raise BadValue(f"{short(raw)} is not a whole number")
+    raise BadValue(f"{quoted(raw)} is not a whole number")
 
 
 def number_of(raw: object) -> float:
@@ -120,7 +120,7 @@ def number_of(raw: object) -> float:
             return float(raw)
         except ValueError:
             pass
-    raise BadValue(f"{short(raw)} is not a number")
+    raise BadValue(f"{quoted(raw)} is not a number")
 
 
 def spelt(raw: object) -> str:
@@ -130,14 +130,6 @@ def spelt(raw: object) -> str:
     if isinstance(raw, float) and raw.is_integer():
         return str(int(raw))
     return str(raw)
-
-
-def short(raw: object) -> str:
-    """Return a raw value for a message, cut when it is long."""
-    if isinstance(raw, (str, bytes)) and len(raw) > 60:
-        raw = raw[:60]
-    text = repr(raw)
-    return text if len(text) <= 40 else text[:37] + "..."
 
 
 def _is_plain(text: str) -> bool:
@@ -171,7 +163,7 @@ def _from_base(base: int) -> Step:
                 return int(raw, base)
             except ValueError:
                 pass
-        raise BadValue(f"{short(raw)} is not a whole number of base {base}")
+        raise BadValue(f"{quoted(raw)} is not a whole number of base {base}")
 
     return convert
 
@@ -276,7 +268,7 @@ def _line_back(coefficients: tuple[float, ...]) -> Step:
         number = number_of(value) - offset
         raw = number * divisor if divisor else number / scale
         if not math.isfinite(raw):
-            raise BadValue(f"{short(value)} has no raw number")
+            raise BadValue(f"{quoted(value)} has no raw number")
         return _tidy(raw)
 
     return convert
@@ -323,7 +315,7 @@ def _words(states: tuple[tuple[str, str], ...]) -> Step:
     def convert(raw: object) -> object:
         word = words.get(spelt(raw))
         if word is None:
-            raise BadValue(f"{short(raw)} is none of the states {known}")
+            raise BadValue(f"{quoted(raw)} is none of the states {known}")
         return word
 
     return convert
@@ -335,7 +327,7 @@ def _words_back(states: tuple[tuple[str, str], ...]) -> Step:
     def convert(value: object) -> object:
         raw = raws.get(value) if isinstance(value, str) else None
         if raw is None:
-            raise BadValue(f"{short(value)} is none of the states {', '.join(raws)}")
+            raise BadValue(f"{quoted(value)} is none of the states {', '.join(raws)}")
         # A binary frame wants the number, and in text it reads the same.
         return int(raw) if raw.isdecimal() and str(int(raw)) == raw else raw
 

@@ -8,6 +8,7 @@ is worse than an old one.
 import math
 from collections.abc import Callable, Mapping
 
+from urc.expressions import quoted
 from urc.model.values import ElementType, Reading, Signal, Value
 from urc.protocol.convert import (
     BadValue,
@@ -15,7 +16,6 @@ from urc.protocol.convert import (
     build_conversion,
     build_inverse,
     number_of,
-    short,
     spelt,
     whole_of,
 )
@@ -103,7 +103,7 @@ def _states_converter(states: Mapping[str, str], *, is_number: bool) -> Callable
         if word is None and is_number and isinstance(raw, str):
             word = states.get(_as_number(raw))
         if word is None:
-            raise BadValue(f"{short(raw)} is none of the states {known}")
+            raise BadValue(f"{quoted(raw)} is none of the states {known}")
         return word
 
     return convert
@@ -122,7 +122,7 @@ def _to_string(raw: object) -> Value:
         return raw
     if isinstance(raw, (bool, int, float)):
         return spelt(raw)
-    raise BadValue(f"{short(raw)} is no text")
+    raise BadValue(f"{quoted(raw)} is no text")
 
 
 def _to_boolean(raw: object) -> Value:
@@ -133,7 +133,7 @@ def _to_boolean(raw: object) -> Value:
         return True
     if word in _FALSE:
         return False
-    raise BadValue(f"{short(raw)} is neither true nor false")
+    raise BadValue(f"{quoted(raw)} is neither true nor false")
 
 
 def _number_converter(
@@ -152,7 +152,7 @@ def _number_converter(
             value = round(value)
         if least <= value <= most and abs(value) != math.inf:
             return value
-        raise BadValue(f"{short(raw)} is {_outside(signal, value)}")
+        raise BadValue(f"{quoted(raw)} is {_outside(signal, value)}")
 
     return convert
 

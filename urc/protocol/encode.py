@@ -7,7 +7,7 @@ go through the same door.
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 
-from urc.expressions import ExpressionError, Template
+from urc.expressions import ExpressionError, Template, quoted
 from urc.model.codec import Payload, WriteSpec, each_of
 from urc.model.driver import MOST_ELEMENTS, Argument, Command
 from urc.model.values import NOTHING, Reading, Value
@@ -111,7 +111,7 @@ def _elements(argument: Argument, value: object) -> tuple[Value, ...]:
     """Return the elements of an array, each checked as a value of its own."""
     name, wanted = argument.name, argument.size
     if not isinstance(value, (list, tuple)):
-        raise BadArgument(f"{name}: a list is expected, found {_short(value)}")
+        raise BadArgument(f"{name}: a list is expected, found {quoted(value)}")
     if wanted is not None and len(value) != wanted:
         raise BadArgument(f"{name}: {wanted} elements are expected, found {len(value)}")
     if len(value) > MOST_ELEMENTS:
@@ -126,7 +126,7 @@ def _one(argument: Argument, value: object) -> Value:
     checked = _typed(argument, value)
     if argument.choices and checked not in argument.choices:
         choices = ", ".join(map(repr, argument.choices))
-        raise BadArgument(f"{argument.name}: {_short(value)} is none of {choices}")
+        raise BadArgument(f"{argument.name}: {quoted(value)} is none of {choices}")
     if isinstance(checked, (int, float)) and not isinstance(checked, bool):
         if argument.min is not None and checked < argument.min:
             raise BadArgument(f"{argument.name}: {checked} is below its minimum {argument.min}")
@@ -148,13 +148,8 @@ def _typed(argument: Argument, value: object) -> Value:
         case "string", str():
             if not argument.allows_control and value != printable(value):
                 raise BadArgument(
-                    f"{argument.name}: {_short(value)} has control characters, which could end"
+                    f"{argument.name}: {quoted(value)} has control characters, which could end"
                     " the frame and start another"
                 )
             return value
-    raise BadArgument(f"{argument.name}: {argument.type} expected, found {_short(value)}")
-
-
-def _short(value: object) -> str:
-    text = repr(value)
-    return text if len(text) <= 40 else text[:37] + "..."
+    raise BadArgument(f"{argument.name}: {argument.type} expected, found {quoted(value)}")

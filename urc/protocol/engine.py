@@ -274,7 +274,7 @@ class Engine:
         if program is None:
             return self._send(found, values, sink, now, privileged_on, unless)
         if any(runner.program is program for runner in self._runners):
-            return sink(Outcome("busy", f"{command} is at work already"), now)
+            return sink(Outcome("at-work", f"{command} is at work already"), now)
         runner = Runner(self, program, sink, privileged_on, confirmed_by)
         runner.wait_for_logins(now)
         self._begin(runner)

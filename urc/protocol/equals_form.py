@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from typing import cast
 
+from urc.expressions import quoted
 from urc.model.codec import Payload, ReadSpec
 from urc.model.values import NOTHING
 from urc.protocol.codec import CodecContext, Frame, NotWritable
@@ -56,5 +57,5 @@ class RawReader:
         """Return the bytes of the field; raise `NotWritable` when it holds none."""
         value = fields.get(self._field)
         if not isinstance(value, bytes):
-            raise NotWritable(f"{self._field}: bytes expected, found {value!r}")
+            raise NotWritable(f"{self._field}: bytes expected, found {quoted(value)}")
         return value

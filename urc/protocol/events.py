@@ -85,9 +85,9 @@ class Failed(NamedTuple):
     id: int
     command: str
     code: str
-    """``timed-out``, ``refused``, ``disconnected``, ``bad-argument``, ``queue-full``,
+    """``timed-out``, ``refused``, ``disconnected``, ``bad-argument``, ``queue-full``, ``at-work``,
     ``unknown-command``, ``superseded``, ``not-allowed``, ``not-confirmed``,
-    ``not-verified``, ``busy``, ``failed``."""
+    ``not-verified``, ``failed``."""
     message: str
 
 

@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping
 from typing import Any, cast
 
 from urc._number_bytes import reader_of
-from urc.expressions import Template
+from urc.expressions import Template, quoted
 from urc.model.binary import number_of
 from urc.model.codec import Payload, WriteSpec
 from urc.protocol.codec import CodecContext, Frame, NotWritable
@@ -43,7 +43,9 @@ class BytesWriter:
                 return value.encode(self._encoding)
             except UnicodeEncodeError as error:
                 wrong = error.object[error.start]
-                raise NotWritable(f"{wrong!r} cannot be written in {self._encoding}") from None
+                raise NotWritable(
+                    f"{quoted(wrong)} cannot be written in {self._encoding}"
+                ) from None
         raise NotWritable(f"{template.source.strip()}: {str(value)[:40]} is neither byte nor text")
 
     def read(self, frame: Frame) -> Mapping[str, object] | None:

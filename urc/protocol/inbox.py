@@ -5,6 +5,7 @@ Floor 3, pure. See `urc.protocol.line` for the theory of operation.
 
 from collections.abc import Sequence
 
+from urc.expressions import quoted
 from urc.model.codec import Counted
 from urc.model.driver import TransportSpec
 from urc.model.values import Sample
@@ -254,8 +255,7 @@ class Inbox:
             if was_text_wanted:
                 return Fault(self._spec.name, "bad-text", str(error))
             return Fault(self._spec.name, "no-match", f"{_NO_MATCH}{self._in_hex(frame)}")
-        shown = text if len(text) <= 60 else text[:57] + "..."
-        return Fault(self._spec.name, "no-match", f"{_NO_MATCH}{shown!r}")
+        return Fault(self._spec.name, "no-match", f"{_NO_MATCH}{quoted(text, most=60)}")
 
     def samples(
         self, matcher: Matcher, found: Fields, now: float

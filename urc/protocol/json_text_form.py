@@ -4,7 +4,7 @@ import json
 from collections.abc import Mapping
 from typing import Any
 
-from urc.expressions import Template
+from urc.expressions import Template, quoted
 from urc.model.codec import Envelope, Payload, WriteSpec
 from urc.protocol.codec import BadText, CodecContext, Frame, NotWritable
 from urc.protocol.texts import counter_in
@@ -30,7 +30,7 @@ class JsonWriter:
             return self._text(filled(self._tree, namespace)).encode(self._encoding)
         except UnicodeEncodeError as error:
             wrong = error.object[error.start]
-            raise NotWritable(f"{wrong!r} cannot be written in {self._encoding}") from None
+            raise NotWritable(f"{quoted(wrong)} cannot be written in {self._encoding}") from None
 
     def _text(self, value: object) -> str:
         try:

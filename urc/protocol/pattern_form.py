@@ -8,6 +8,7 @@ import re
 from collections.abc import Callable, Mapping
 from typing import Final, cast
 
+from urc.expressions import quoted
 from urc.model.codec import Payload, ReadSpec
 from urc.model.text import FieldKind, Hole
 from urc.protocol.codec import CodecContext, Frame, NotWritable
@@ -95,7 +96,7 @@ class PatternReader:
         found = self._read(text)
         for name, value in fields.items():
             if found is None or (name in found and not _is_same(found[name], value)):
-                raise NotWritable(f"{name}: {value!r} does not fit {text!r}")
+                raise NotWritable(f"{name}: {quoted(value)} does not fit {quoted(text)}")
         return encoded(text, self._encoding)
 
 

@@ -9,7 +9,7 @@ from functools import partial
 from typing import Final, NamedTuple
 from urllib.parse import quote
 
-from urc.expressions import Template, compile_template, split_template, text_of
+from urc.expressions import Template, compile_template, quoted, split_template, text_of
 from urc.protocol.codec import NotWritable
 
 __all__ = ["Place", "place_writer"]
@@ -66,7 +66,7 @@ def _path(text: str, is_whole: bool) -> str:
     """Return a value as a part of a path."""
     parts = text.split("/") if is_whole else [text]
     if any(part in _UP for part in parts):
-        raise NotWritable(f"{text!r} would lead to another path")
+        raise NotWritable(f"{quoted(text)} would lead to another path")
     return quote(text, safe="/" if is_whole else "")
 
 
@@ -74,7 +74,9 @@ def _name(text: str, is_whole: bool, *, what: str) -> str:
     """Return a value as a part of the name of a topic, a service or an action."""
     for sign in (*_WILD, *(() if is_whole else ("/",))):
         if sign in text:
-            raise NotWritable(f"{text!r} would lead to another {what}: {sign!r} may not be in it")
+            raise NotWritable(
+                f"{quoted(text)} would lead to another {what}: {sign!r} may not be in it"
+            )
     return text
 
 

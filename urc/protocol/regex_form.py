@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from typing import cast
 
+from urc.expressions import quoted
 from urc.model.codec import Payload, ReadSpec
 from urc.patterns import Pattern, example
 from urc.protocol.codec import CodecContext, Frame, NotWritable
@@ -31,5 +32,5 @@ class RegexReader:
         text = example(self._pattern, texts)
         found = self._pattern.search(text)
         if found is None or any(found[name] != texts[name] for name in texts if name in found):
-            raise NotWritable(f"no text with {texts!r} fits {self._pattern.source!r}")
+            raise NotWritable(f"no text with {quoted(texts)} fits {self._pattern.source!r}")
         return encoded(text, self._encoding)

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from typing import cast
 
+from urc.expressions import quoted
 from urc.model.codec import Payload, ReadSpec
 from urc.protocol.codec import CodecContext, Frame, NotWritable
 from urc.protocol.texts import encoded, field_text, written_differently
@@ -63,7 +64,9 @@ class SplitReader:
         text = (self._by or " ").join(parts)
         wrong = written_differently(fields, self._read(text))
         if wrong:
-            raise NotWritable(f"{wrong}: {fields[wrong]!r} cannot be a part of {text!r}")
+            raise NotWritable(
+                f"{wrong}: {quoted(fields[wrong])} cannot be a part of {quoted(text)}"
+            )
         return encoded(text, self._encoding)
 
 
@@ -120,5 +123,5 @@ class KeyvalueReader:
         text = self._pairs.join(pairs)
         wrong = written_differently(fields, self._read(text))
         if wrong or not pairs:
-            raise NotWritable(f"{wrong or 'nothing'} cannot be a pair of {text!r}")
+            raise NotWritable(f"{wrong or 'nothing'} cannot be a pair of {quoted(text)}")
         return encoded(text, self._encoding)

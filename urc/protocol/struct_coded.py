@@ -10,6 +10,7 @@ from collections.abc import Callable, Mapping
 from typing import Any, Final
 
 from urc._number_bytes import reader_of, words_turned, writer_of
+from urc.expressions import quoted
 from urc.model.binary import Extent, Item, Number, packed_size
 from urc.protocol.codec import BadItem, NotWritable
 from urc.protocol.struct_value import checked_raw, meaning_of, number_writer
@@ -117,7 +118,7 @@ def packed_writer(item: Item, count: Extent) -> Callable[[Mapping[str, Any], boo
                 raise NotWritable(f"{name!r} has no value here")
             values = [zero] * count.number
         if not isinstance(values, (list, tuple)):
-            raise NotWritable(f"{name}: a list is expected, found {values!r}"[:200])
+            raise NotWritable(f"{name}: a list is expected, found {quoted(values)}")
         if len(values) != count.number:
             text = f"{name}: expected {count.number} items, found {len(values)}"
             raise NotWritable(text)

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import cast
 
-from urc.expressions import COUNTERS, ExpressionError
+from urc.expressions import COUNTERS, ExpressionError, quoted
 from urc.model.binary import Item, joined_name, names_of
 from urc.model.codec import Payload, ReadSpec, WriteSpec
 from urc.protocol.codec import BadText, CodecContext, Frame, NotWritable
@@ -37,7 +37,7 @@ class StructReader:
         except BadText as error:
             raise NotWritable(str(error)) from None
         if found is None:
-            raise NotWritable(f"no frame has the fields {known!r}"[:200])
+            raise NotWritable(f"no frame has the fields {quoted(known)}")
         return data
 
 

@@ -13,7 +13,7 @@ from struct import unpack_from
 from typing import Any
 
 from urc._number_bytes import format_of, order_of, plain_reader
-from urc.expressions import ExpressionError, Template
+from urc.expressions import ExpressionError, Template, quoted
 from urc.model.binary import FRAME_NAMES, Extent, Item, Switch, joined_name, least_size
 from urc.protocol.codec import BadItem
 from urc.protocol.struct_coded import (
@@ -228,7 +228,7 @@ def build_amount(extent: Extent | None, name: str) -> Amount:
         if isinstance(found, float) and found.is_integer():
             found = int(found)
         if not isinstance(found, int) or found < 0:
-            raise BadItem(f"{name}: {found!r} is no size")
+            raise BadItem(f"{name}: {quoted(found)} is no size")
         return found, at
 
     return amount

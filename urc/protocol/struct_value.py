@@ -9,6 +9,7 @@ from collections.abc import Callable
 from typing import Any
 
 from urc._number_bytes import plain_writer
+from urc.expressions import quoted
 from urc.model.binary import Item, Number
 from urc.protocol.codec import BadItem, NotWritable
 
@@ -56,7 +57,7 @@ def meaning_of(item: Item) -> Callable[[Any], Any]:
 
 def not_valid(name: str, value: object, valid: tuple[float, float]) -> BadItem:
     """Return the fault of a value outside of its ``valid``."""
-    return BadItem(f"{name}: expected {valid[0]:g} to {valid[1]:g}, found {value!r}")
+    return BadItem(f"{name}: expected {valid[0]:g} to {valid[1]:g}, found {quoted(value)}")
 
 
 def raw_of(item: Item) -> Callable[[Any], Any]:
@@ -72,14 +73,16 @@ def raw_of(item: Item) -> Callable[[Any], Any]:
     def raw(value: Any) -> Any:
         if isinstance(value, str):
             if value not in numbers:
-                raise NotWritable(f"{name}: {_wanted(item)} expected, found {_short(value)}")
+                raise NotWritable(f"{name}: {_wanted(item)} expected, found {quoted(value)}")
             value = numbers[value]
         elif not isinstance(value, (int, float)):
-            raise NotWritable(f"{name}: {_wanted(item)} expected, found {_short(value)}")
+            raise NotWritable(f"{name}: {_wanted(item)} expected, found {quoted(value)}")
         elif isinstance(value, int) and value.bit_length() > 1000:
-            raise NotWritable(f"{name}: {_short(value)} is too large")
+            raise NotWritable(f"{name}: {quoted(value)} is too large")
         if valid is not None and not valid[0] <= value <= valid[1]:
-            raise NotWritable(f"{name}: expected {valid[0]:g} to {valid[1]:g}, found {value!r}")
+            raise NotWritable(
+                f"{name}: expected {valid[0]:g} to {valid[1]:g}, found {quoted(value)}"
+            )
         if offset:
             value = value - offset
         if divisor:
@@ -97,14 +100,14 @@ def fitting(number: Number, value: int | float, name: str) -> int | float | bool
         try:
             return float(value)
         except OverflowError:
-            raise NotWritable(f"{name}: {_short(value)} is too large") from None
+            raise NotWritable(f"{name}: {quoted(value)} is too large") from None
     if number.kind == "boolean":
         if value in (0, 1):
             return bool(value)
-        raise NotWritable(f"{name}: true or false expected, found {_short(value)}")
+        raise NotWritable(f"{name}: true or false expected, found {quoted(value)}")
     if isinstance(value, float):
         if not abs(value) < 1e30:  # not-a-number fails every comparison
-            raise NotWritable(f"{name}: a whole number is expected, found {_short(value)}")
+            raise NotWritable(f"{name}: a whole number is expected, found {quoted(value)}")
         value = round(value)
     if not number.least <= value <= number.most:
         sign = "signed " if number.is_signed else ""
@@ -120,11 +123,6 @@ def _wanted(item: Item) -> str:
         return "a number"
     words = [word for _, word in item.enum]
     return "one of " + ", ".join(words[:8]) + (" …" if len(words) > 8 else "")
-
-
-def _short(value: object) -> str:
-    text = repr(value)
-    return text if len(text) <= 40 else text[:37] + "..."
 
 
 def checked_raw(item: Item) -> Callable[[Any], tuple[Any, Any]]:
@@ -149,7 +147,7 @@ def number_writer(number: Number, name: str) -> Callable[[Any], bytes]:
         try:
             return pack(raw)
         except (OverflowError, struct.error):  # a float too large for its 16 or 32 bits
-            text = f"{name or 'a number'}: {_short(raw)} does not fit into f{number.bits}"
+            text = f"{name or 'a number'}: {quoted(raw)} does not fit into f{number.bits}"
             raise NotWritable(text) from None
 
     return write if number.kind == "float" else pack
@@ -171,7 +169,7 @@ def text_of_bytes(item: Item, encoding: str) -> Callable[[bytes], object]:
             return raw.decode(codec)
         except UnicodeDecodeError as error:
             wrong = raw[error.start : error.end]
-            raise BadItem(f"{name}: {wrong!r} is not {codec} text") from None
+            raise BadItem(f"{name}: {quoted(wrong)} is not {codec} text") from None
 
     return text
 
@@ -184,7 +182,7 @@ def bytes_of_text(item: Item, encoding: str) -> Callable[[object], bytes]:
         if isinstance(value, bytes):
             raw = value
         elif not isinstance(value, str):
-            raise NotWritable(f"{name}: text is expected, found {_short(value)}")
+            raise NotWritable(f"{name}: text is expected, found {quoted(value)}")
         elif item.kind == "bytes":
             raw = hex_bytes(value, name)
         else:
@@ -192,9 +190,9 @@ def bytes_of_text(item: Item, encoding: str) -> Callable[[object], bytes]:
                 raw = value.encode(codec)
             except UnicodeEncodeError as error:
                 wrong = error.object[error.start]
-                raise NotWritable(f"{name}: {wrong!r} does not exist in {codec}") from None
+                raise NotWritable(f"{name}: {quoted(wrong)} does not exist in {codec}") from None
         if item.until and item.until in raw:
-            raise NotWritable(f"{name}: {raw!r} contains what ends it, {item.until!r}")
+            raise NotWritable(f"{name}: {quoted(raw)} contains what ends it, {quoted(item.until)}")
         return raw
 
     return encode
@@ -210,7 +208,7 @@ def fixed_bytes(item: Item) -> Callable[[bytes], bytes]:
         if len(raw) > size:
             raise NotWritable(f"{name}: {len(raw)} bytes do not fit into {size}")
         if ends_at_nul and pad in raw:
-            raise NotWritable(f"{name}: {raw!r} contains a NUL, which would end it")
+            raise NotWritable(f"{name}: {quoted(raw)} contains a NUL, which would end it")
         return raw.ljust(size, pad)
 
     return padded
@@ -221,4 +219,4 @@ def hex_bytes(text: str, name: str) -> bytes:
     try:
         return bytes.fromhex(text)
     except ValueError:
-        raise NotWritable(f"{name}: hex digits are expected, found {_short(text)}") from None
+        raise NotWritable(f"{name}: hex digits are expected, found {quoted(text)}") from None

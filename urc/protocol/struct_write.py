@@ -9,7 +9,7 @@ expressions over the size of the whole frame (`Pen.late`).
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
-from urc.expressions import Template
+from urc.expressions import Template, quoted
 from urc.model.binary import (
     FRAME_NAMES,
     OUTER_NAMES,
@@ -254,7 +254,7 @@ def _padding_step(item: Item, rules: Rules) -> WriteStep:
     def pad(pen: Pen, scope: Scope) -> None:
         number = 0 if expression is None else evaluate(expression, scope)
         if not isinstance(number, int) or not 0 <= number <= LARGEST_FRAME:
-            raise NotWritable(f"padding: {number!r} is no size")
+            raise NotWritable(f"padding: {quoted(number)} is no size")
         pen.put(bytes((item.pad,)) * number)
 
     return pad
@@ -278,11 +278,11 @@ def _array_step(item: Item, count: Extent, rules: Rules) -> WriteStep:
         zeros = missing * (count.number if count.kind == "fixed" else 0)
         values = _given(item, scope, rules, zeros)
         if not isinstance(values, (list, tuple)):
-            raise NotWritable(f"{name}: a list is expected, found {values!r}"[:200])
+            raise NotWritable(f"{name}: a list is expected, found {quoted(values)}")
         _put_size(pen, scope, count, len(values), name, rules)
         for value in values:
             if is_struct and not isinstance(value, Mapping):
-                raise NotWritable(f"{name}: a mapping is expected, found {value!r}"[:200])
+                raise NotWritable(f"{name}: a mapping is expected, found {quoted(value)}")
             inner: Scope = {**value, **_outer(scope)} if is_struct else {item.id: value}
             for step in steps:
                 step(pen, inner)
@@ -383,7 +383,7 @@ def _switch_step(item: Item, rules: Rules) -> WriteStep:
         key = evaluate(switch.by, scope)
         steps = cases.get(key, otherwise) if isinstance(key, (int, float, str)) else otherwise
         if steps is None:
-            raise NotWritable(f"no case for {switch.by.source.strip()} = {key!r}")
+            raise NotWritable(f"no case for {switch.by.source.strip()} = {quoted(key)}")
         for one in steps:
             one(pen, scope)
 

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from functools import cached_property
 from typing import NamedTuple, cast
 
-from urc.expressions import Template, split_template, text_of
+from urc.expressions import Template, quoted, split_template, text_of
 from urc.model.codec import Payload, WriteSpec
 from urc.protocol.codec import BadText, CodecContext, Frame, NotWritable
 from urc.protocol.texts import counter_in
@@ -33,7 +33,7 @@ class TextWriter:
             return text.encode(self._encoding)
         except UnicodeEncodeError as error:
             wrong = error.object[error.start]
-            raise NotWritable(f"{wrong!r} cannot be written in {self._encoding}") from None
+            raise NotWritable(f"{quoted(wrong)} cannot be written in {self._encoding}") from None
 
     def read(self, frame: Frame) -> Mapping[str, object] | None:
         """Return what stands in the places of the plain names, as text.

@@ -3,6 +3,7 @@
 import re
 from collections.abc import Mapping
 
+from urc.expressions import quoted
 from urc.protocol.codec import NotWritable
 from urc.protocol.convert import spelt
 
@@ -31,7 +32,7 @@ def encoded(text: str, encoding: str) -> bytes:
     try:
         return text.encode(encoding)
     except UnicodeEncodeError as error:
-        raise NotWritable(f"{error.object!r} does not exist in {encoding}") from None
+        raise NotWritable(f"{quoted(error.object)} does not exist in {encoding}") from None
 
 
 def written_differently(fields: Mapping[str, object], found: Mapping[str, object] | None) -> str:

@@ -10,8 +10,9 @@ from binascii import Error as Base64Error
 from binascii import a2b_base64, b2a_base64
 from collections.abc import Callable, Mapping
 
+from urc.expressions import quoted
 from urc.model.values import Reading, Signal, Value
-from urc.protocol.convert import BadValue, short
+from urc.protocol.convert import BadValue
 
 __all__ = ["MAX_BYTES", "MAX_ELEMENTS", "array_converter", "bytes_converter", "bytes_text"]
 __all__ += ["elements_of", "object_converter"]
@@ -58,14 +59,14 @@ def elements_of(raw: object) -> list[object] | tuple[object, ...]:
     if isinstance(raw, str):
         inner = raw.strip(_AROUND)
         return list(_BETWEEN.split(inner)) if inner else []
-    raise BadValue(f"{short(raw)} is no list")
+    raise BadValue(f"{quoted(raw)} is no list")
 
 
 def object_converter(raw: object) -> Reading:
     """Return a mapping as it is."""
     if raw is None or isinstance(raw, Mapping):
         return raw
-    raise BadValue(f"{short(raw)} has no named parts")
+    raise BadValue(f"{quoted(raw)} has no named parts")
 
 
 def bytes_converter(signal: Signal) -> Callable[[object], Reading]:
@@ -82,7 +83,7 @@ def bytes_converter(signal: Signal) -> Callable[[object], Reading]:
         elif isinstance(raw, (list, tuple)):
             data = _from_numbers(raw)
         else:
-            raise BadValue(f"{short(raw)} is neither bytes nor their base64")
+            raise BadValue(f"{quoted(raw)} is neither bytes nor their base64")
         if len(data) > most:
             raise BadValue(f"{len(data)} bytes, {most} are the most")
         return data
@@ -99,11 +100,11 @@ def _from_base64(text: str) -> bytes:
     try:
         return a2b_base64(text, strict_mode=True)
     except (Base64Error, ValueError):
-        raise BadValue(f"{short(text)} is no base64") from None
+        raise BadValue(f"{quoted(text)} is no base64") from None
 
 
 def _from_numbers(numbers: list[object] | tuple[object, ...]) -> bytes:
     try:
         return bytes(numbers)  # type: ignore[arg-type]  # checked by what it raises
     except (TypeError, ValueError):
-        raise BadValue(f"{short(numbers)} is no list of bytes") from None
+        raise BadValue(f"{quoted(numbers)} is no list of bytes") from None

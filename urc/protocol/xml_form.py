@@ -8,6 +8,7 @@ from collections.abc import Iterator, Mapping
 from typing import cast
 from xml.etree import ElementTree
 
+from urc.expressions import quoted
 from urc.model.codec import Payload, ReadSpec
 from urc.model.text import XmlPath, XmlStep
 from urc.protocol.codec import CodecContext, Frame, NotWritable
@@ -56,7 +57,7 @@ class XmlReader:
         text = ElementTree.tostring(root, encoding="unicode")
         wrong = written_differently(fields, self._read(text))
         if wrong:
-            raise NotWritable(f"{wrong}: {fields[wrong]!r} cannot stand in a document")
+            raise NotWritable(f"{wrong}: {quoted(fields[wrong])} cannot stand in a document")
         return encoded(text, self._encoding)
 
 

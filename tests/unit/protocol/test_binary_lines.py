@@ -27,7 +27,7 @@ def test_what_is_sent_may_be_framed_otherwise_than_what_comes() -> None:
     ("read", "fault"),
     [
         (struct_read("struct: [u8 4]"), ("no-match", "nothing declared matches ff 01")),
-        (regex("^hello$"), ("bad-text", r"b'\xff' is not utf-8 text")),
+        (regex("^hello$"), ("bad-text", r"hex ff is not utf-8 text")),
     ],
     ids=["struct", "regex"],
 )

@@ -132,7 +132,7 @@ def test_an_answer_is_picked_out_of_unsolicited_frames() -> None:
         ("go", {"speed": 10}, "bad-argument", "above its maximum 9"),
         ("go", {"speed": -1}, "bad-argument", "below its minimum 0"),
         ("go", {"speed": "3"}, "bad-argument", "integer expected, found '3'"),
-        ("go", {"speed": True}, "bad-argument", "integer expected, found True"),
+        ("go", {"speed": True}, "bad-argument", "integer expected, found true"),
         ("go", {"speed": 1.5}, "bad-argument", "integer expected, found 1.5"),
         ("go", {"speed": float("nan")}, "bad-argument", "integer expected, found nan"),
         ("go", {"speed": 1, "x": 2}, "bad-argument", "has no argument 'x'"),

@@ -275,7 +275,8 @@ def test_a_sequence_is_not_run_twice_at_a_time() -> None:
     talk = Dialogue(ARM).connect()
     talk.run("arm")
     talk.run("arm")
-    assert talk.outcomes == {2: "busy"}
+    assert talk.outcomes == {2: "at-work"}
+    assert talk.messages == ["arm is at work already"]
 
 
 def test_a_sequence_does_not_go_on_upon_a_new_connection() -> None:

@@ -103,7 +103,7 @@ def test_a_formula_that_fails_is_told() -> None:
     samples, refused = made.put({"volts": 0}, 0.0)
     assert values(samples) == {"volts": 0}
     assert refused == ["inverse: in '1 / volts': division by zero"]
-    assert made.put({"volts": 0.1}, 1.0)[1] == ["inverse: 10.0 is above its maximum 5"]
+    assert made.put({"volts": 0.1}, 1.0)[1] == ["inverse: 10 is above its maximum 5"]
 
 
 def test_a_computed_signal_is_as_old_as_the_first_of_its_inputs_to_grow_old() -> None:
