@@ -1,0 +1,114 @@
+"""Packages that are made to do harm, as a person at the dashboard meets them."""
+
+import http.client
+import json
+import time
+from contextlib import AsyncExitStack, closing
+from pathlib import Path
+from statistics import median
+from typing import Any
+from urllib.parse import urlsplit
+
+import pytest
+from anyio import to_thread
+from playwright.async_api import expect
+
+from tests.e2e.conftest import PageMaker
+from tests.e2e.managing import running_managed
+from tests.unit.packages.made import DOCUMENTS, write_package
+from urc.packages.store import Store
+from urc.testing.entry import HERE_COOKIE
+
+pytestmark = pytest.mark.anyio
+ATTACKS = Path(__file__).parents[1] / "attacks"
+SAMPLES = 100
+
+
+async def test_what_a_package_uses_by_itself_needs_a_tick(
+    new_page: PageMaker, tmp_path: Path
+) -> None:
+    """It stands first; without the tick there is no way to install it."""
+    async with running_managed(tmp_path) as address:
+        page = await new_page(size="tablet")
+        await page.goto(f"{address}interfaces")
+        await page.get_by_label("Add by its path").fill(str(ATTACKS / "drivers" / "key-user"))
+        await page.get_by_role("button", name="Add", exact=True).click()
+        dialog = page.get_by_role("dialog")
+        risks = dialog.locator("[data-risks] li")
+        await expect(risks.nth(0)).to_contain_text("uses a key file of this machine")
+        install = dialog.get_by_role("button", name="Install")
+        await expect(install).to_be_disabled()
+        await dialog.get_by_label("Let it do that").check()
+        await install.click()
+        await expect(dialog).to_contain_text("✓ installed")
+        (lock,) = Store(tmp_path / "packages").installed()
+        assert str(lock) == "drivers/key-user 1.0.0"
+
+
+class Asker:
+    """A program that asks a dashboard, one request after the other on one connection."""
+
+    def __init__(self, address: str) -> None:
+        self._origin = address.rstrip("/")
+        self._line = http.client.HTTPConnection(urlsplit(address).netloc, timeout=60)
+
+    def ask(self, path: str, body: object = None) -> Any:
+        """Return what is answered."""
+        headers = {"origin": self._origin, "cookie": HERE_COOKIE}
+        if body is None:
+            self._line.request("GET", path, headers=headers)
+        else:
+            headers["content-type"] = "application/json"
+            self._line.request("POST", path, json.dumps(body), headers)
+        return json.loads(self._line.getresponse().read())
+
+    def close(self) -> None:
+        """Hang up."""
+        self._line.close()
+
+    def waited(self) -> float:
+        """Return how long the server takes to say that it is well, in seconds."""
+        began_s = time.perf_counter()
+        assert self.ask("/healthz")["status"] == "ok"
+        return time.perf_counter() - began_s
+
+    def examined(self, folder: Path) -> list[float]:
+        """Have a package looked at; return how long answers took meanwhile, in seconds."""
+        waits = []
+        said = self.ask("/api/v1/packages/add", {"path": str(folder)})
+        assert "number" in said, said
+        while True:
+            waits.append(self.waited())
+            job = self.ask("/api/v1/packages?kinds=interface")["job"]
+            if job["state"] != "working":
+                self.ask("/api/v1/job/cancel", {"number": job["number"]})
+                return waits
+
+
+@pytest.mark.alone
+async def test_the_dashboard_answers_while_packages_are_examined(tmp_path: Path) -> None:
+    """Answers come as they do at rest: whatever a package costs, another process pays.
+
+    At rest and meanwhile are measured in the same run, so a busy machine changes both.
+    """
+    many = "".join(
+        f"  m{place}: {{ regex: '(?:a?){{160}}x{place}(?P<battery>\\d+)$' }}\n"
+        for place in range(490)
+    )
+    costly = write_package(tmp_path / "shop", "driver", "costly", text=DOCUMENTS["driver"] + many)
+    folders = [*sorted((ATTACKS / "drivers").iterdir()), costly]
+    async with running_managed(tmp_path / "data") as address, AsyncExitStack() as stack:
+        asker = stack.enter_context(closing(Asker(address)))
+        rest = await to_thread.run_sync(lambda: [asker.waited() for _ in range(SAMPLES)])
+        meanwhile: list[float] = []
+        for folder in folders:
+            meanwhile += await to_thread.run_sync(asker.examined, folder)
+    late = [wait for wait in meanwhile if wait > max(rest) + 0.05]
+    figures = f"at rest {_told(rest)}, meanwhile {_told(meanwhile)}, late {len(late)}"
+    assert len(meanwhile) > SAMPLES
+    assert len(late) <= len(meanwhile) // 50, figures
+    assert max(meanwhile) < 2, figures
+
+
+def _told(waits: list[float]) -> str:
+    return f"{1000 * median(waits):.1f} ms, at most {1000 * max(waits):.0f} ms of {len(waits)}"
