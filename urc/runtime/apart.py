@@ -5,6 +5,7 @@ what it saw. Whatever a document costs, the program that asks for the look goes 
 """
 
 import json
+import os
 import subprocess
 import sys
 from collections.abc import Sequence
@@ -17,9 +18,9 @@ from urc.runtime.look import Look, look
 
 __all__ = ["Looks", "bound_this_process", "look_apart"]
 
-TOTAL_S: Final = 30.0
-"""Longest time that a look takes; it is much where other programs are busy."""
-PROCESSOR_S: Final = 10
+TOTAL_S: Final = 60.0
+"""Longest time that a look takes; it is much, for small machines that are busy."""
+PROCESSOR_S: Final = 30
 MEMORY_BYTES: Final = 1 << 30
 COMMAND: Final = ("-P", "-m", "urc.runtime.apart")
 """What Python is told; -P: nothing is imported from the folder in which it is started."""
@@ -77,7 +78,10 @@ class Looks:
 
 
 def bound_this_process(processor_s: int, memory_bytes: int) -> None:
-    """Let this process have no more than that; on Windows the caller's time-out is all there is."""
+    """Let this process have no more than that, and let what drives robots go before it.
+
+    On Windows the caller's time-out is all there is.
+    """
     try:
         import resource
     except ImportError:
@@ -85,6 +89,7 @@ def bound_this_process(processor_s: int, memory_bytes: int) -> None:
     resource.setrlimit(resource.RLIMIT_AS, (memory_bytes, memory_bytes))
     resource.setrlimit(resource.RLIMIT_CPU, (processor_s, processor_s))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    os.nice(10)
 
 
 def _said(line: str) -> Any:

@@ -288,7 +288,9 @@ class _Routes:
         if interface is None:
             raise HTTPException(404, words.t("This robot has no interface of that name."))
         is_dev = self.dev is not None and is_here(request)
-        html = robot_page(
+        # Foreign widgets are rendered by another process, which is waited for.
+        html = await asyncio.to_thread(
+            robot_page,
             request.state.nonce,
             name,
             robot.profile,

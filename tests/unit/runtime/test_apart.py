@@ -48,7 +48,7 @@ def test_a_look_that_ends_without_words_is_told(
     """As where the system ends it, since it wanted too much."""
     monkeypatch.setattr(apart, "COMMAND", ("-c", "import os; os.abort()"))
     document = write_package(tmp_path, "driver", "puppet") / "driver.yaml"
-    with pytest.raises(UrcError, match=r"cannot be looked at with 10 s of processor time"):
+    with pytest.raises(UrcError, match=r"cannot be looked at with 30 s of processor time"):
         look_apart(document, tmp_path, [])
 
 

@@ -6,14 +6,9 @@ own cell.
 
 import json
 import logging
-import traceback
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from functools import lru_cache
-from typing import Final
 
-from jinja2 import Environment, StrictUndefined, Template, TemplateSyntaxError
-from jinja2.sandbox import ImmutableSandboxedEnvironment
 from markupsafe import Markup
 
 from urc.model.driver import Driver
@@ -21,27 +16,21 @@ from urc.model.interface import WidgetUse
 from urc.model.profile import Profile
 from urc.model.values import Signal
 from urc.model.widget import Widget
-from urc.web import words
 from urc.web.load.files import linked_options
 from urc.web.load.foreign import Border, frame_url
-from urc.web.show.markdown import markdown
+from urc.web.show.markup_apart import markup_of
 from urc.web.show.outputs import inputs_config, output_config
+from urc.web.show.sandbox import TEMPLATE, fault_line, widget_template
 
 __all__ = [
-    "TEMPLATE",
     "Cell",
     "WidgetContext",
-    "fault_line",
+    "render_foreign",
     "render_widget",
     "spoken",
     "widget_cell",
     "widget_context",
-    "widget_environment",
 ]
-
-TEMPLATE: Final = "template.html.j2"
-_CODE: Final = "<template>"
-"""What Jinja calls the file of a template that it was given as text."""
 
 log = logging.getLogger(__name__)
 
@@ -89,9 +78,35 @@ class WidgetContext:
 
 def render_widget(widget: Widget, context: WidgetContext) -> Markup:
     """Return the widget's markup. Whatever its template raises comes through."""
-    source = (widget.folder / "template.html.j2").read_text(encoding="utf-8")
-    variables = {name: getattr(context, name) for name in WidgetContext.__slots__}
-    return Markup(_widget_template(source).render(variables))  # noqa: S704  # autoescaped
+    source, variables = _source(widget), _variables(context)
+    return Markup(widget_template(source).render(variables))  # noqa: S704  # autoescaped
+
+
+def render_foreign(uses: Iterable[tuple[WidgetUse, Profile]], border: Border) -> None:
+    """Render the markup of all foreign widgets of a page at once, which one by one takes longer.
+
+    Args:
+        uses: the cells in their order, each with what its robot is.
+        border: which widgets are foreign.
+    """
+    wanted = []
+    for index, (use, profile) in enumerate(uses):
+        widget = profile.widgets[use.widget]
+        if border.is_foreign(widget):
+            try:
+                context = widget_context(use, widget, profile, uid=f"cell-{index}")
+                wanted.append((_source(widget), _variables(context)))
+            except OSError:
+                continue  # its cell says so
+    markup_of(wanted)
+
+
+def _source(widget: Widget) -> str:
+    return (widget.folder / TEMPLATE).read_text(encoding="utf-8")
+
+
+def _variables(context: WidgetContext) -> dict[str, object]:
+    return {name: getattr(context, name) for name in WidgetContext.__slots__}
 
 
 def widget_context(use: WidgetUse, widget: Widget, profile: Profile, uid: str) -> WidgetContext:
@@ -135,15 +150,25 @@ def widget_cell(
     *,
     is_background: bool = False,
 ) -> Cell:
-    """Return one slot with its widget; whatever the widget's template raises costs this one."""
+    """Return one slot with its widget; whatever the widget's template raises costs this one.
+
+    The template of a foreign widget is rendered by another process, which is waited for unless
+    `render_foreign` did it.
+    """
     widget = profile.widgets[use.widget]
     context = widget_context(use, widget, profile, uid=f"cell-{index}")
     html, error = Markup(), ""
+    is_foreign = border.is_foreign(widget)
     try:
-        html = render_widget(widget, context)
+        if is_foreign:
+            html, fault, line = markup_of([(_source(widget), _variables(context))])[0]
+            error = fault and f"{TEMPLATE}:{line}: {fault}"
+        else:
+            html = render_widget(widget, context)
     except Exception as problem:  # a supervisor: a widget costs its own cell
         place = f"{TEMPLATE}:{fault_line(problem)}"
         error = f"{place}: {type(problem).__name__}: {problem}"
+    if error:
         log.warning("widget %s: %s", widget.name, error)
     config = {
         "slot": use.slot,
@@ -154,36 +179,11 @@ def widget_cell(
         "options": dict(context.options),
         "gate": widget.is_gate,
     }
-    frame = frame_url(widget) if border.is_foreign(widget) else ""
+    frame = frame_url(widget) if is_foreign else ""
     return Cell(index, json.dumps(config), html, error, is_background, frame)
-
-
-def fault_line(fault: Exception) -> int:
-    """Return the line of a widget's template in which it failed, from 1."""
-    if isinstance(fault, TemplateSyntaxError):
-        return fault.lineno
-    frames = traceback.extract_tb(fault.__traceback__)
-    lines = [frame.lineno or 1 for frame in frames if frame.filename == _CODE]
-    return lines[-1] if lines else 1
 
 
 def spoken(name: str) -> str:
     """Return an identifier as a person would write it: ``left_motor`` → ``Left motor``."""
     words = name.replace("_", " ").replace("-", " ").strip()
     return words[:1].upper() + words[1:]
-
-
-@lru_cache(maxsize=1)
-def widget_environment() -> Environment:
-    """Return what the templates of widgets are compiled in."""
-    widgets = ImmutableSandboxedEnvironment(
-        autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
-    )
-    widgets.globals["t"] = words.t
-    widgets.filters["markdown"] = markdown
-    return widgets
-
-
-@lru_cache(maxsize=256)
-def _widget_template(source: str) -> Template:
-    return widget_environment().from_string(source)

@@ -22,7 +22,7 @@ from urc.problems import Problem, ProblemsError
 from urc.runtime.changes import Watched
 from urc.web.load.assets import Assets, widget_assets
 from urc.web.load.foreign import Border
-from urc.web.show.cells import Cell, widget_cell
+from urc.web.show.cells import Cell, render_foreign, widget_cell
 from urc.web.show.demos import DemoState, demo_states
 from urc.web.show.lookup import Lookup
 from urc.web.show.menu import Nav, Ways
@@ -172,7 +172,7 @@ class Gallery:
         problems = [problem for one in shown for problem in one.problems]
         for problem in problems if self._is_dev else ():
             log.warning("%s", problem.headline)
-        page = self._page(request, shown, problems, stamp)
+        page = await asyncio.to_thread(self._page, request, shown, problems, stamp)
         return _answer(render("widget.html.j2", page), 409 if problems else 200)
 
     def _page(
@@ -252,7 +252,8 @@ class Gallery:
 
 
 def _exhibits(shown: Iterable[Shown], border: Border) -> Iterable[Exhibit]:
-    every = ((one.widget, state) for one in shown if one.widget for state in one.states)
+    every = [(one.widget, state) for one in shown if one.widget for state in one.states]
+    render_foreign(((state.use, state.profile) for _, state in every), border)
     for index, (widget, state) in enumerate(every):
         cell = widget_cell(index, state.use, state.profile, border)
         label = t(state.name) if state.name in EXAMPLES else state.name

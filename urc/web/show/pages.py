@@ -20,7 +20,7 @@ from urc.shipped import shipped
 from urc.web import words
 from urc.web.drive.once import can_move
 from urc.web.load.foreign import Border
-from urc.web.show.cells import Cell, widget_cell
+from urc.web.show.cells import Cell, render_foreign, widget_cell
 from urc.web.show.interfaces import (
     DEBUG_STYLES,
     DEBUGGING,
@@ -131,6 +131,7 @@ def robot_page(
     """
     uses = _uses(profile, interface)
     slots = tuple(uses)
+    render_foreign(((use, profile) for use in uses.values()), border)
     used = dict.fromkeys(use.widget for use in uses.values())
     head = Head(
         nonce=nonce,

@@ -12,7 +12,8 @@ from jinja2.meta import find_undeclared_variables
 from urc.config.suggest import did_you_mean
 from urc.model.widget import Widget
 from urc.problems import Problem
-from urc.web.show.cells import TEMPLATE, WidgetContext, fault_line, widget_environment
+from urc.web.show.cells import WidgetContext
+from urc.web.show.sandbox import TEMPLATE, fault_line, widget_environment
 
 __all__ = ["TemplateCheck"]
 

@@ -12,8 +12,9 @@ from urc.model.widget import Widget
 from urc.problems import Problem, ProblemsError, has_errors
 from urc.runtime.shelves import hidden_widget
 from urc.web.load.foreign import OURS, Border
-from urc.web.show.cells import TEMPLATE, render_widget, widget_context
+from urc.web.show.cells import render_widget, widget_context
 from urc.web.show.demos import DemoState, demo_states
+from urc.web.show.sandbox import TEMPLATE
 from urc.web.show.template_check import TemplateCheck
 
 __all__ = ["FILES", "check_widget"]
