@@ -112,6 +112,8 @@ def _checked(
     choices: list[Value],
     findings: Findings,
 ) -> Value:
+    if any(type(part.data) is type(one) and part.data == one for one in choices):
+        return part.data  # type: ignore[no-any-return] # choices may be of several types
     try:
         value = fit(part.data, kind)
     except ValueError as error:

@@ -31,7 +31,7 @@ from urc.runtime.dispatcher import Dispatcher
 from urc.runtime.hub import Hub, LinkState
 from urc.runtime.outgoing import STUCK_S, Outgoing
 from urc.runtime.report import LinkReport
-from urc.transports.base import Prompt, Settling, Transport, TransportError
+from urc.transports.base import NOTICE, Prompt, Settling, Transport, TransportError
 
 __all__ = ["Link"]
 
@@ -405,6 +405,9 @@ class Link:
             self._pass_on(data)
 
     def _pass_on(self, data: Payload) -> None:
+        if isinstance(data, Envelope) and data.verb == NOTICE:
+            self._report.note("warning", "notice", str(data.body))
+            return
         now = self._heard_s = self._clock.now()
         if self._hub.traffic_watchers:
             self._report.saw("received", data)

@@ -7,13 +7,14 @@ is translated at the transport's edge into one of the errors below; nothing fore
 """
 
 from collections.abc import Callable, Mapping
-from typing import NamedTuple, Protocol, runtime_checkable
+from typing import Final, NamedTuple, Protocol, runtime_checkable
 
 from urc.model.codec import Payload
 from urc.model.values import NOTHING, Value
 from urc.problems import UrcError
 
 __all__ = [
+    "NOTICE",
     "ByteStream",
     "Carrier",
     "ConnectFailed",
@@ -26,6 +27,11 @@ __all__ = [
     "TransportError",
     "bytes_of",
 ]
+
+
+NOTICE: Final = "notice"
+"""Verb of an envelope that a transport itself gives: its body is one line for people, about a fault
+that the robot does not tell. It goes to the robot's log and is no sign of life."""
 
 
 class TransportError(UrcError):

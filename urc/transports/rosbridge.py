@@ -11,18 +11,22 @@ when its client leaves before that. `settle` is for who leaves: it asks rosapi, 
 says that the bridge has worked off all before it, and stays for the time of such a connection.
 
 The bridge tells no errors: a topic that nobody publishes, a wrong type, a white-list, all are
-silence. So it is asked once, through rosapi, which topics there are.
+silence. So rosapi is asked at the start which topics there are, and at the first message on a topic
+who subscribes to it; `urc.transports.ros_graph` tells what is wrong. With ``ros: auto`` the answer
+comes before the subscriptions, because it says how types are spelled.
 """
 
 import asyncio
 import logging
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
+from contextlib import suppress
 from importlib.util import find_spec
-from typing import Any
+from typing import Any, Final, Literal
 
 from urc.model.codec import Envelope, Payload
 from urc.model.values import NOTHING, Value
-from urc.transports.base import ConnectFailed, PeerClosed, Setup, Transport, TransportError
+from urc.transports.base import NOTICE, ConnectFailed, PeerClosed, Setup, Transport, TransportError
+from urc.transports.ros_graph import TopicGraph, version_of
 from urc.transports.rosbridge_client import KNOWN_TOPICS, Listening, RosClient
 from urc.transports.rosbridge_frames import MAX_BYTES, BadFrame, FrameReader
 from urc.transports.topics import Inbox
@@ -31,6 +35,7 @@ from urc.transports.websocket import WebSocketTransport
 __all__ = ["RosbridgeTransport", "from_setup"]
 
 DEFAULT_PORT = 9090
+AUTO: Final = "auto"
 _WEBSOCKET = ("auth", "headers")
 """Options that are the WebSocket's own."""
 
@@ -54,7 +59,7 @@ class RosbridgeTransport:
         wire: WebSocketTransport,
         where: str,
         subscriptions: tuple[Listening, ...] = (),
-        ros: int | None = None,
+        ros: int | Literal["auto"] | None = None,
     ) -> None:
         """Prepare a line; nothing is opened yet.
 
@@ -62,15 +67,15 @@ class RosbridgeTransport:
             wire: leads to the bridge; ours from now on.
             where: for people: ``192.168.1.5:9090``.
             subscriptions: sent whenever the line is opened, one a topic.
-            ros: 1 or 2: how the names of types are spelled; None: as they are written.
+            ros: 1 or 2: how the names of types are spelled; "auto": as the bridge's own are; None:
+                as they are written.
         """
         self._wire = wire
         self._where = where
         self._subscriptions = subscriptions
         self._ros = ros
         self._session: _Session | None = None
-        self._missed: set[str] = set()
-        """Topics that were told to be missing."""
+        self._graph = TopicGraph(self._tell, None if ros == AUTO else ros)
 
     @property
     def address(self) -> str:
@@ -81,11 +86,12 @@ class RosbridgeTransport:
         """Connect and subscribe, or raise `ConnectFailed` within `timeout_s` seconds."""
         await self.close()
         await self._wire.open(timeout_s)
-        session = _Session(self._wire, self._ros, self._tell)
+        session = self._session = _Session(self._wire, self._ros, self._graph)
         try:
             async with asyncio.timeout(timeout_s):
                 await session.begin(self._subscriptions)
         except BaseException as fault:
+            self._session = None
             await session.end()
             await self._wire.close()
             if isinstance(fault, PeerClosed | TimeoutError):
@@ -93,7 +99,6 @@ class RosbridgeTransport:
                 message = f"{self._where} took no subscription ({told})"
                 raise ConnectFailed(message) from fault
             raise
-        self._session = session
 
     async def receive(self) -> Envelope:
         """Return the next message, response or feedback; `PeerClosed` when no more will come."""
@@ -144,11 +149,9 @@ class RosbridgeTransport:
         finally:
             await self._wire.abort()
 
-    def _tell(self, topics: set[str]) -> None:
-        """Log the topics that nobody publishes; each once for as long as this object lives."""
-        for topic in sorted(topics - self._missed):
-            log.warning("%s: nobody publishes %s", self.address, topic)
-        self._missed |= topics
+    def _tell(self, fault: str) -> None:
+        if self._session is not None:
+            self._session.inbox.answer(Envelope(NOTICE, {}, fault))
 
 
 def from_setup(setup: Setup) -> Transport:
@@ -167,8 +170,8 @@ def from_setup(setup: Setup) -> Transport:
     if not isinstance(path, str) or not path.startswith("/"):
         raise TransportError(f"rosbridge needs a path that starts with /, not {path!r}")
     ros = options.get("ros")
-    if ros is not None and (isinstance(ros, bool) or ros not in (1, 2)):
-        raise TransportError(f"rosbridge needs 1 or 2 as ros, not {ros!r}")
+    if ros is not None and (isinstance(ros, bool) or ros not in (1, 2, AUTO)):
+        raise TransportError(f"rosbridge needs 1, 2 or auto as ros, not {ros!r}")
     host = host.strip()
     where = f"[{host}]:{port}" if ":" in host else f"{host}:{port}"
     url = f"{'ws' if tls is None else 'wss'}://{where}{path}"
@@ -177,7 +180,7 @@ def from_setup(setup: Setup) -> Transport:
         setup._replace(options={"url": url, "tls": tls, "max_message": MAX_BYTES, **given})
     )
     wanted = [_listening(one.topic, one.attributes) for one in setup.subscriptions]
-    return RosbridgeTransport(wire, where, _merged(wanted), int(ros) if ros else None)
+    return RosbridgeTransport(wire, where, _merged(wanted), ros)
 
 
 def _listening(topic: str, attributes: Mapping[str, Value]) -> Listening:
@@ -220,35 +223,58 @@ class _Session:
     """What belongs to one open connection, and goes with it."""
 
     def __init__(
-        self, wire: WebSocketTransport, ros: int | None, missing: Callable[[set[str]], None]
+        self, wire: WebSocketTransport, ros: int | Literal["auto"] | None, graph: TopicGraph
     ) -> None:
         self.inbox = Inbox()
         self._wire = wire
-        self._client = RosClient(self.inbox, ros)
+        self._client = RosClient(self.inbox, None if ros == AUTO else ros)
+        self._is_auto = ros == AUTO
         self._frames = FrameReader()
-        self._missing = missing
+        self._graph = graph
+        self._learnt = asyncio.Event()
+        """Set once rosapi has said which topics there are, or that it cannot."""
         self._bad = 0
         self._reader: asyncio.Task[None] | None = None
         self._fresh: dict[str, None] = {}
         """Topics on which something was published that may not have arrived yet, in order."""
 
     async def begin(self, subscriptions: tuple[Listening, ...]) -> None:
-        """Subscribe, ask which topics there are, and read from now on."""
-        frames: list[bytes] = []
-        if subscriptions:  # asked first: later, ROS 1 would count our own subscriptions
-            wanted = {one.topic for one in subscriptions}
-            frames += self._client.ask("/rosapi/topics", lambda said: self._compare(wanted, said))
-        for one in subscriptions:
-            frames += self._client.listen(one)
+        """Ask which topics there are, subscribe, and read from now on."""
         self._reader = asyncio.create_task(self._read())
-        await self._write(frames)
+        # Asked first: later, ROS 1 would count our own subscriptions.
+        asked = self._client.ask(
+            "/rosapi/topics", lambda said: self._learn(subscriptions, said), errback=self._unknown
+        )
+        await self._write(asked)
+        if self._is_auto:
+            with suppress(TimeoutError):  # rosapi is missing: types go out as they are written
+                async with asyncio.timeout(_ANSWER_S):
+                    await self._learnt.wait()
+        for one in subscriptions:
+            await self._write(self._client.listen(one))
 
     async def perform(self, envelope: Envelope) -> None:
         """Send what an envelope asks for."""
         frames = self._client.perform(envelope)
-        if envelope.verb == "publish" and len(self._fresh) < KNOWN_TOPICS:
-            self._fresh[str(envelope.attributes.get("topic"))] = None
+        if envelope.verb == "publish":
+            topic = str(envelope.attributes.get("topic"))
+            if len(self._fresh) < KNOWN_TOPICS:
+                self._fresh[topic] = None
+            if self._learnt.is_set():
+                frames += self._look_at(topic, str(envelope.attributes.get("type") or ""))
         await self._write(frames)
+
+    def _look_at(self, topic: str, kind: str) -> list[bytes]:
+        """Return what asks who subscribes to a topic, at its first message."""
+        if not self._graph.publishes(topic, kind):
+            return []
+
+        def told(said: Mapping[str, Any]) -> None:
+            nodes = said.get("subscribers")
+            if isinstance(nodes, list):
+                self._graph.subscribers(topic, nodes)
+
+        return self._client.ask("/rosapi/subscribers", told, {"topic": topic})
 
     async def settle(self) -> str:
         """Stay until what was published has arrived; return what did not."""
@@ -326,10 +352,17 @@ class _Session:
             if self._bad & (self._bad - 1) == 0:  # the 1st, 2nd, 4th, 8th …
                 log.warning("rosbridge: %s (%d such frames)", problem, self._bad)
 
-    def _compare(self, wanted: set[str], said: Mapping[str, Any]) -> None:
-        """Tell which topics are not among those that rosapi names."""
-        names = said.get("topics")
+    def _learn(self, subscriptions: tuple[Listening, ...], said: Mapping[str, Any]) -> None:
+        """Take the topics that rosapi names, with their types."""
+        names, types = said.get("topics"), said.get("types")
         if isinstance(names, list):
-            # In ROS 2 the feedback of an action is no topic of its own.
-            missing = {one for one in wanted.difference(names) if not one.endswith("/feedback")}
-            self._missing(missing)
+            kinds = types if isinstance(types, list) and len(types) == len(names) else []
+            found = dict(zip(names, kinds or [""] * len(names), strict=True))
+            self._graph.learn({str(name): str(kind) for name, kind in found.items()})
+            self._graph.subscribed({one.topic: one.type for one in subscriptions})
+            if self._is_auto:
+                self._client.spell(version_of(map(str, kinds)))
+        self._learnt.set()
+
+    def _unknown(self, problem: object) -> None:
+        self._learnt.set()

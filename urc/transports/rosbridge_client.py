@@ -64,6 +64,10 @@ class RosClient:
         """Calls and goals whose answers are outstanding."""
         return self._protocol.unanswered
 
+    def spell(self, ros: int | None) -> None:
+        """Spell types as that version of ROS from now on; None: as they are written."""
+        self._ros_version = ros
+
     # -- what is sent; each returns the frames to write
 
     def listen(self, wanted: Listening) -> list[bytes]:

@@ -2,7 +2,6 @@
 
 import asyncio
 import json
-import logging
 import os
 import sys
 from collections.abc import AsyncIterator
@@ -23,7 +22,7 @@ from urc.model.profile import Profile
 from urc.runtime.catalog import built_in_catalog
 from urc.runtime.session import Session
 from urc.simulator.server import serve as serve_robot
-from urc.transports.base import PeerClosed, Setup, Subscription, Transport, TransportError
+from urc.transports.base import NOTICE, PeerClosed, Setup, Subscription, Transport, TransportError
 from urc.transports.rosbridge import from_setup
 
 pytestmark = pytest.mark.anyio
@@ -102,6 +101,9 @@ class Bridge:
     async def say(self, operation: dict[str, Any]) -> None:
         await self.clients[-1].send(json.dumps(operation))
 
+    async def answer(self, asked: dict[str, Any], values: dict[str, Any]) -> None:
+        await self.say({"op": "service_response", "id": asked["id"], "values": values})
+
     async def hears(self, count: int) -> list[dict[str, Any]]:
         async with asyncio.timeout(WAIT_S):
             while len(self.said) < count:
@@ -146,7 +148,8 @@ async def test_topic_is_advertised_once_a_connection_and_nothing_is_said_late() 
         await transport.open(20.0)
         for _ in range(2):
             await transport.send(twist)
-        assert [one["op"] for one in await robot.hears(3)] == ["advertise", "publish", "publish"]
+        said = (await robot.hears(4))[1:]  # after the question which topics there are
+        assert [one["op"] for one in said] == ["advertise", "publish", "publish"]
         robot.clients[-1].transport.abort()
         with pytest.raises(PeerClosed):
             await heard(transport)
@@ -156,7 +159,7 @@ async def test_topic_is_advertised_once_a_connection_and_nothing_is_said_late() 
         robot.said.clear()
         await transport.open(20.0)
         await transport.send(Envelope("call", {"service": "/last", "id": 1}))
-        assert [one["op"] for one in await robot.hears(1)] == ["call_service"]
+        assert (await robot.hears(2))[1]["service"] == "/last"
         await transport.close()
 
 
@@ -167,7 +170,7 @@ async def test_answers_find_their_questions(caplog: pytest.LogCaptureFixture) ->
         await transport.open(20.0)
         await transport.send(Envelope("call", {"service": "/a", "id": 5}, {"x": float("nan")}))
         await transport.send(Envelope("call", {"service": "/b", "id": 6}, {}))
-        first, second = await robot.hears(2)
+        first, second = (await robot.hears(3))[1:]
         assert first["args"] == {"x": None}
         await robot.say(
             {"op": "service_response", "id": second["id"], "values": "no", "result": False}
@@ -181,7 +184,7 @@ async def test_answers_find_their_questions(caplog: pytest.LogCaptureFixture) ->
         goal = {"action": "/dock", "type": "a/action/Dock", "id": 7, "feedback": True}
         await transport.send(Envelope("goal", goal, {}))
         await transport.send(Envelope("cancel", {"action": "/dock"}))
-        started, cancelled = (await robot.hears(4))[2:]
+        started, cancelled = (await robot.hears(5))[3:]
         assert cancelled == {"op": "cancel_action_goal", "id": started["id"], "action": "/dock"}
         about = {"id": started["id"], "action": "/dock"}
         await robot.say({"op": "action_feedback", **about, "values": {"left": 1}})
@@ -200,23 +203,71 @@ async def test_answers_find_their_questions(caplog: pytest.LogCaptureFixture) ->
     assert "2 such frames" in caplog.text
 
 
-async def test_topics_that_nobody_publishes_are_told_once(
-    caplog: pytest.LogCaptureFixture,
-) -> None:
+async def test_topics_that_nobody_publishes_are_told_once() -> None:
     """The bridge itself says nothing about them, and would not for ever."""
-    caplog.set_level(logging.WARNING)
+    told = []
     async with nothing_left(), bridge() as robot:
         transport = line(robot.port, Subscription("/odom"), Subscription("/lidar"))
         for count in (3, 6):
             await transport.open(20.0)
             asked = (await robot.hears(count))[-3]
-            values = {"topics": ["/odom"], "types": ["nav_msgs/Odometry"]}
-            await robot.say({"op": "service_response", "id": asked["id"], "values": values})
+            await robot.answer(asked, {"topics": ["/odom"], "types": ["nav_msgs/Odometry"]})
             await robot.say({"op": "publish", "topic": "/odom", "msg": {}})
-            await heard(transport)
+            told += await notices(transport)
             await transport.close()
-    told = [record.message for record in caplog.records if "publishes" in record.message]
-    assert told == [f"rosbridge 127.0.0.1:{robot.port}: nobody publishes /lidar"]
+    assert told == ["nobody publishes /lidar"]
+
+
+async def notices(transport: Transport) -> list[str]:
+    """Return the notices before the next message."""
+    told = []
+    while (said := await heard(transport)).verb == NOTICE:
+        told.append(str(said.body))
+    return told
+
+
+async def test_driving_where_nothing_listens_is_told() -> None:
+    """The bridge takes every message; only rosapi knows that it moves nothing."""
+    twist = Envelope("publish", {"topic": "/cmd_vel", "type": "geometry_msgs/Twist"}, {})
+    stray = Envelope("publish", {"topic": "/nobody", "type": "geometry_msgs/Twist"}, {})
+    async with nothing_left(), bridge() as robot:
+        transport = line(robot.port, Subscription("/odom"), ros=2)
+        await transport.open(20.0)
+        asked, _ = await robot.hears(2)
+        types = {"/cmd_vel": "geometry_msgs/msg/TwistStamped", "/odom": "nav_msgs/msg/Odometry"}
+        await robot.answer(asked, {"topics": list(types), "types": list(types.values())})
+        await robot.say({"op": "publish", "topic": "/odom", "msg": {}})
+        assert await notices(transport) == []
+        for message in (twist, stray, twist, stray):
+            await transport.send(message)
+        operations = (await robot.hears(10))[2:]
+        questions = [one for one in operations if one["op"] == "call_service"]
+        assert [one["args"]["topic"] for one in questions] == ["/cmd_vel", "/nobody"]
+        for question, nodes in zip(questions, (["/base"], []), strict=True):
+            await robot.answer(question, {"subscribers": nodes})
+        await robot.say({"op": "publish", "topic": "/odom", "msg": {}})
+        assert await notices(transport) == [
+            "/cmd_vel takes geometry_msgs/TwistStamped, not geometry_msgs/Twist",
+            "nothing subscribes to /nobody: what is sent there moves nothing",
+        ]
+        await transport.close()
+
+
+@pytest.mark.parametrize(
+    ("types", "spelled"),
+    [(["nav_msgs/Odometry"], "nav_msgs/Odometry"), (["x/msg/Y"], "nav_msgs/msg/Odometry")],
+)
+async def test_a_line_spells_types_as_the_bridge_does(types: list[str], spelled: str) -> None:
+    """``ros: auto`` serves both versions: the answer comes before the subscriptions."""
+    async with nothing_left(), bridge() as robot:
+        odometry = Subscription("/odom", {"type": "nav_msgs/Odometry"})
+        transport = line(robot.port, odometry, ros="auto")
+        opening = asyncio.create_task(transport.open(20.0))
+        (asked,) = await robot.hears(1)
+        await robot.answer(asked, {"topics": ["/odom"], "types": types})
+        await opening
+        assert (await robot.hears(2))[1]["type"] == spelled
+        await transport.close()
 
 
 async def test_slow_taker_gets_the_newest() -> None:
@@ -252,6 +303,19 @@ async def test_profile_drives_the_emulated_robot(rover: Profile) -> None:
             for name, values in (("drive", {"speed": 0.5}), ("reset", {}), ("dock", {})):
                 async with asyncio.timeout(WAIT_S):
                     await session.command(name, values)
+
+
+async def test_a_fault_of_a_topic_is_in_the_robots_log(rover: Profile) -> None:
+    """Who drives reads it on the page; the server's own log is elsewhere."""
+    async with nothing_left(), bridge() as robot:
+        settings = {"host": "127.0.0.1", "port": robot.port}
+        async with Session(rover, settings, built_in_catalog().transports) as session:
+            (asked, *_) = await robot.hears(2)
+            await robot.answer(asked, {"topics": [], "types": []})
+            async with asyncio.timeout(WAIT_S):
+                while "nobody publishes /odom" not in [note.text for note in session.hub.notes]:
+                    await asyncio.sleep(0.01)
+            assert session.hub.links["ros"].state != "live", "it is no sign of life"
 
 
 async def test_roslibpy_takes_the_emulated_robot_for_a_bridge(rover: Profile) -> None:

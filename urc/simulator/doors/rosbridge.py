@@ -20,6 +20,7 @@ from urc.simulator.doors.base import (
     shown_place,
 )
 from urc.simulator.doors.rosbridge_desk import Desk, Seat
+from urc.transports.rosbridge_types import spelled
 
 __all__ = ["RosbridgeDoor"]
 
@@ -37,7 +38,10 @@ class RosbridgeDoor:
         """Prepare the door; `open` listens."""
         self._place = place
         self._crowd = Crowd(place)
-        self._desk = Desk({name: str(how.get("type") or "") for name, how in place.topics.items()})
+        # A bridge spells types as its ROS does; where the document leaves that open, it is ROS 2.
+        ros = {1: 1, 2: 2, "auto": 2}.get(place.options.get("ros"))
+        types = {name: str(how.get("type") or "") for name, how in place.topics.items()}
+        self._desk = Desk({name: spelled(kind, "msg", ros) for name, kind in types.items()})
         self._server: Server | None = None
 
     async def open(self) -> Listening:
