@@ -1,6 +1,7 @@
 """The forms of what goes over a transport that carries messages: publish, call, goal, request.
 
 An envelope has an address, whose values may be templates, and a body in one of the other forms.
+``stamped`` makes a message of ROS into its stamped kind here, so the engine knows nothing of it.
 """
 
 from collections.abc import Iterable
@@ -16,6 +17,21 @@ from urc.model.codec import WriteSpec
 __all__ = ["parse_write", "templates"]
 
 _BODY: Final = "body"
+_STAMPED: Final = {
+    "Accel": "accel",
+    "AccelWithCovariance": "accel",
+    "Inertia": "inertia",
+    "Point": "point",
+    "Polygon": "polygon",
+    "Pose": "pose",
+    "PoseWithCovariance": "pose",
+    "Quaternion": "quaternion",
+    "Twist": "twist",
+    "TwistWithCovariance": "twist",
+    "Vector3": "vector",
+    "Wrench": "wrench",
+}
+"""Type of geometry_msgs → field that has it in its stamped kind (common_interfaces)."""
 
 
 def parse_write(part: Part, findings: Findings, context: FormContext) -> WriteSpec | None:
@@ -43,6 +59,11 @@ def parse_write(part: Part, findings: Findings, context: FormContext) -> WriteSp
         hint = "put arguments and settings into 'path' or 'query', which keep to this server's part"
         findings.error(part.must("url"), "wrong-form", text, hint=hint)
         return None
+    if attributes.pop("stamped", False):
+        kind = _stamped_type(part, attributes.get("type"), findings)
+        if kind is None or spec is None:
+            return None
+        attributes["type"], spec = f"{kind}Stamped", _stamped(kind, spec)
     if part.name == "request":
         attributes.setdefault("method", "GET" if spec is None else "POST")
     found = list(templates_in(attributes))
@@ -56,6 +77,36 @@ def parse_write(part: Part, findings: Findings, context: FormContext) -> WriteSp
     )
 
 
+def _stamped_type(part: Part, kind: object, findings: Findings) -> str | None:
+    """Return the type at `part` if it has a stamped kind; else report it."""
+    package, _, name = str(kind).replace("/msg/", "/").partition("/")
+    if package == "geometry_msgs" and name in _STAMPED and "json" in part.data:
+        return str(kind)
+    findings.error(
+        part,
+        "bad-value",
+        f"{kind!r} has no stamped kind that is known, or no json",
+        at="stamped",
+        hint=f"types of geometry_msgs with json: {', '.join(_STAMPED)}; others are written out",
+    )
+    return None
+
+
+def _stamped(kind: str, spec: WriteSpec) -> WriteSpec:
+    """Return the body in its stamped kind; rosbridge writes its own time in place of ``now``."""
+    header = {"stamp": "now", "frame_id": ""}
+    tree = {"header": header, _STAMPED[kind.rpartition("/")[2]]: spec.options["tree"]}
+    return spec._replace(options={"tree": tree})
+
+
+def _unstamped(part: Part, spec: WriteSpec) -> WriteSpec:
+    """Return the body as it is written in the document."""
+    tree = spec.options.get("tree")
+    if not part.data.get("stamped") or not isinstance(tree, dict):
+        return spec
+    return spec._replace(options={"tree": next(reversed(tree.values()))})
+
+
 def templates(part: Part, spec: WriteSpec) -> Iterable[tuple[Part, Template]]:
     """Return every template in it, with its place."""
     attributes = spec.options.get("attributes")
@@ -65,4 +116,4 @@ def templates(part: Part, spec: WriteSpec) -> Iterable[tuple[Part, Template]]:
                 yield from placed_templates(part.must(name), tree)
     body, written = body_form(part), spec.options.get(_BODY)
     if body and isinstance(written, WriteSpec):
-        yield from body[1].templates(body[0], written)
+        yield from body[1].templates(body[0], _unstamped(part, written))

@@ -38,7 +38,7 @@ class Envelope(NamedTuple):
 
     verb: str
     """What the transport is asked to do (``publish``, ``call``, ``goal``, ``cancel``, ``request``),
-    or what it brings (``message``, ``response``, ``feedback``, and the transport's own ``notice``)."""
+    or what it brings (``message``, ``response``, ``feedback``; the transport's own ``notice``)."""
     attributes: Mapping[str, object] = NOTHING
     """What addresses it: topic, type, method, path, headers, quality of service … What is answered
     has an ``id``, and its answer the same; that one says ``ok``, and why not as ``reason``."""
