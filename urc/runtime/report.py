@@ -100,6 +100,8 @@ class LinkReport:
         if self.state == "connecting" and self._detail:
             # Connected, and nothing good has come yet: why is what people want to know.
             self._detail = f"connected; {fault.message}"
+        if fault.code == "silent" and self.state != "silent":
+            return  # the change of state that follows says the same
         self.note("warning", f"fault {fault.code}", f"{fault.code}: {fault.message}")
 
     def note(self, level: Literal["info", "warning", "error"], kind: str, text: str) -> None:

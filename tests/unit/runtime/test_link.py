@@ -171,6 +171,8 @@ async def test_robot_that_is_asked_nothing_and_says_nothing_any_more_is_silent()
         assert state_of(session) == ("live", "")
         await clock.advance(0.2)
         assert state_of(session) == ("silent", "nothing received for 2 s")
+        texts = [note.text for note in session.hub.notes if "nothing received" in note.text]
+        assert texts == ["silent: nothing received for 2 s"], "told once"
         line.feed(b"note I am back\n")
         await settle()
         assert state_of(session) == ("live", "")
