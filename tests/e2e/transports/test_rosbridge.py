@@ -312,9 +312,11 @@ async def test_a_fault_of_a_topic_is_in_the_robots_log(rover: Profile) -> None:
         async with Session(rover, settings, built_in_catalog().transports) as session:
             (asked, *_) = await robot.hears(2)
             await robot.answer(asked, {"topics": [], "types": []})
-            async with asyncio.timeout(WAIT_S):
-                while "nobody publishes /odom" not in [note.text for note in session.hub.notes]:
-                    await asyncio.sleep(0.01)
+            with session.hub.subscribe() as news:
+                async with asyncio.timeout(WAIT_S):
+                    while "nobody publishes /odom" not in [note.text for note in session.hub.notes]:
+                        await news.changed()
+                        news.take()
             assert session.hub.links["ros"].state != "live", "it is no sign of life"
 
 

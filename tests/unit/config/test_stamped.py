@@ -1,4 +1,4 @@
-"""`stamped`: a message of ROS in its stamped kind, and params whose choices are of several types."""
+"""`stamped`: a ROS message in its stamped kind; params with choices of several types."""
 
 from pathlib import Path
 
