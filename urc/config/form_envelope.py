@@ -59,7 +59,8 @@ def parse_write(part: Part, findings: Findings, context: FormContext) -> WriteSp
         hint = "put arguments and settings into 'path' or 'query', which keep to this server's part"
         findings.error(part.must("url"), "wrong-form", text, hint=hint)
         return None
-    if attributes.pop("stamped", False):
+    stamped = part.get("stamped")
+    if stamped is not None and attributes.pop("stamped"):
         kind = _stamped_type(part, attributes.get("type"), findings)
         if kind is None or spec is None:
             return None
