@@ -59,7 +59,7 @@ def parse_write(part: Part, findings: Findings, context: FormContext) -> WriteSp
         hint = "put arguments and settings into 'path' or 'query', which keep to this server's part"
         findings.error(part.must("url"), "wrong-form", text, hint=hint)
         return None
-    stamped = part.get("stamped")
+    stamped = part.get("stamped") if part.name == "publish" else None
     if stamped is not None and attributes.pop("stamped"):
         kind = _stamped_type(part, attributes.get("type"), findings)
         if kind is None or spec is None:
