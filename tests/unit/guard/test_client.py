@@ -11,7 +11,7 @@ from tests.unit.guard.lines import TERMS, CountedWire
 from urc.guard import client, wire
 from urc.guard.client import Guard, LineSpec
 from urc.guard.pipe import Pipe
-from urc.guard.process import Door
+from urc.guard.process import Door, Standing
 from urc.testing.clock import settle
 from urc.transports.base import ConnectFailed, PeerClosed
 
@@ -263,6 +263,8 @@ async def test_guard_that_opened_a_line_was_started_well(house: House) -> None:
     await house.started[-1].hears(2)
     house.started[-1].pipe.post(wire.Opened("wire", 1, "robot:1", {}))
     await opening
+    house.started[-1].pipe.post(wire.Received("wire", 1, b"hello"))
+    assert await house.guard.transports["wire"].receive() == b"hello"
     for _ in range(3):
         count = len(house.started)
         house.started[-1].die()
@@ -390,3 +392,15 @@ async def test_end_does_not_wait_for_a_guard_at_its_door(
     await house.guard.finish()
     assert (process.is_killed, door.closed) == (True, 1)
     line.close()
+
+
+async def test_guard_that_falls_silent_is_replaced(
+    house: House, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It is looked at again and again, as long as it lives."""
+    monkeypatch.setattr(client, "_LOOK_S", 0.02)
+    monkeypatch.setattr(client, "standing", lambda pid: Standing())
+    first = house.begin()
+    first.pipe.post(wire.Beat(0.0))
+    await house.nth(2)
+    assert first.is_killed

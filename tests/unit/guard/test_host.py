@@ -254,3 +254,17 @@ def test_process_is_prepared_before_it_guards(monkeypatch: pytest.MonkeyPatch) -
     assert done == [
         (signal.SIGINT, signal.SIG_IGN), logging.WARNING, "freeze", "ask", Precedence,
     ]  # fmt: skip
+
+
+def test_alarm_that_is_late_rings_at_once() -> None:
+    """By the loop's own alarms, which count from now."""
+    rings: list[float] = []
+
+    class Loop:
+        def call_later(self, delay_s: float, action: object) -> None:
+            rings.append(delay_s)
+
+    clock = program._Clock(Loop())  # type: ignore[arg-type]
+    clock.call_at(clock.now() - 5.0, rings.clear)
+    clock.call_at(clock.now() + 5.0, rings.clear)
+    assert rings == [0.0, pytest.approx(5.0, abs=0.5)]

@@ -333,3 +333,13 @@ async def test_opening_that_took_long_once_does_not_make_the_next_attempts_slow(
         rig.tick(b"go on")
         await settle()
     assert patience == [0.07, 0.07, 0.07]
+
+
+async def test_engine_may_take_as_much_as_it_likes_where_there_is_no_process(rig: Rig) -> None:
+    """What it took is counted there too, so the robot is read on."""
+    await rig.transport.open(1.0)
+    for number in range(40):
+        rig.robot.arriving.put_nowait(bytes([number]) * 4096)
+    async with asyncio.timeout(5.0):
+        for number in range(40):
+            assert await rig.transport.receive() == bytes([number]) * 4096

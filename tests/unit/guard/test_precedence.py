@@ -22,6 +22,7 @@ class System:
         self.asked: list[str] = []
         self.bounds: tuple[int, int] | None = None
         self.now = 100.0
+        self.handlers: dict[int, object] = {}
 
     def set(self, process: int, policy: int, parameter: os.sched_param) -> None:
         """Stand in for `os.sched_setscheduler`."""
@@ -33,6 +34,10 @@ class System:
         else:
             assert (policy, parameter.sched_priority) == (os.SCHED_RR | os.SCHED_RESET_ON_FORK, 1)
             self.asked.append(RR)
+
+    def watch(self, number: int, handler: object) -> None:
+        """Stand in for `signal.signal`."""
+        self.handlers[number] = handler
 
     def bound(self, kind: int, bounds: tuple[int, int]) -> None:
         """Stand in for `resource.setrlimit`."""
@@ -47,7 +52,7 @@ def system(monkeypatch: pytest.MonkeyPatch) -> System:
     monkeypatch.setattr(os, "sched_setscheduler", made.set)
     monkeypatch.setattr(precedence.resource, "setrlimit", made.bound)
     monkeypatch.setattr(precedence.time, "monotonic", lambda: made.now)
-    monkeypatch.setattr(precedence.signal, "signal", lambda number, handler: None)
+    monkeypatch.setattr(precedence.signal, "signal", made.watch)
     return made
 
 
@@ -56,6 +61,7 @@ def test_it_is_asked_for_with_the_lowest_priority_and_bounds(system: System) -> 
     assert Precedence().ask() == ""
     assert system.asked == [RR]
     assert system.bounds == (100_000, 2_000_000)
+    assert callable(system.handlers[signal.SIGXCPU])
 
 
 def test_where_it_is_refused_nothing_else_happens(system: System) -> None:

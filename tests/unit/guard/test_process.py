@@ -93,14 +93,23 @@ async def test_door_lets_the_guard_in_and_nobody_after_it() -> None:
     with socket.create_connection(("127.0.0.1", door.port)) as guard:
         guard.sendall(door.token[:7])
         await asyncio.sleep(0)
-        guard.sendall(door.token[7:])
+        guard.sendall(door.token[7:] + b"hello")
         async with asyncio.timeout(BOUND_S):
             line = await admitted
+            assert await asyncio.get_running_loop().sock_recv(line, 10) == b"hello"
         assert line.getpeername() == guard.getsockname()
         assert line.getsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY)
         line.close()
     assert door._listener.fileno() == -1
     door.close()
+
+
+def test_doors_of_two_robots_are_apart() -> None:
+    first, second = Door(), Door()
+    assert first.port != second.port
+    assert first.token != second.token
+    for door in (first, second):
+        door.close()
 
 
 @pytest.mark.parametrize("word", [b"", b"guess", b"0" * TOKEN_BYTES, b"0" * (TOKEN_BYTES + 9)])

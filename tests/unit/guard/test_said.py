@@ -184,6 +184,26 @@ async def test_robot_is_not_read_while_the_engine_takes_nothing(bench: Bench) ->
     assert bench.heard() == [wire.Received("wire", 1, b"z")]
 
 
+async def test_what_the_engine_may_be_behind_is_bounded_to_the_byte(bench: Bench) -> None:
+    """However it arrives; what was too much is made up for before anything else comes."""
+    robot = bench.robot
+    assert isinstance(robot, Prompter)
+    assert robot.sink is not None
+    assert robot.sink(b"x" * (WINDOW_BYTES - 1))
+    assert robot.sink(b"y" * 10)
+    assert not robot.sink(b"z")
+    robot.arriving.put_nowait(b"in turn")
+    robot.arriving.put_nowait(b"later")
+    await settle()
+    assert len(bench.heard()) == 3, "it was waited for already"
+    bench.tell(wire.Credit("wire", 1, 10), wire.Credit("wire", 1, 6))
+    await settle()
+    assert bench.heard() == []
+    bench.tell(wire.Credit("wire", 1, 1))
+    await settle()
+    assert bench.heard() == [wire.Received("wire", 1, b"later")]
+
+
 async def test_end_of_a_line_is_told_in_the_robots_words(bench: Bench) -> None:
     bench.robot.cut("cable pulled")
     await settle()

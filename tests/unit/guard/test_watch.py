@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from urc.guard import client
+from urc.guard import client, wire
 from urc.guard.client import Guard
 from urc.guard.process import Standing, standing
 
@@ -17,6 +17,7 @@ class FakePipe:
     """A pipe on which nothing comes."""
 
     is_closed = False
+    taken_bytes = 0
 
     def close(self) -> None:
         """Close."""
@@ -50,7 +51,7 @@ class Watched(Guard):
 def stands(monkeypatch: pytest.MonkeyPatch) -> list[Standing]:
     """How the process stands: what was put here last."""
     said = [Standing()]
-    monkeypatch.setattr(client, "standing", lambda pid: said[-1])
+    monkeypatch.setattr(client, "standing", lambda pid: said[-1] if pid == 0 else Standing())
     return said
 
 
@@ -76,9 +77,29 @@ async def test_one_that_is_let_run_by_nobody_is_waited_for(stands: list[Standing
     """Another one would get no more of the machine; but not for ever, and not after it spoke."""
     stands.append(Standing(wants_to_run=True, ran_s=3.0))
     guard = Watched()
-    guard.looks(15)
+    guard.looks(20)
     assert guard.deaths == 0
-    guard.looks(10)
+    guard.looks(1)
+    assert guard.deaths == 1
+
+
+@pytest.mark.anyio
+async def test_one_that_speaks_now_and_then_is_alive(stands: list[Standing]) -> None:
+    guard = Watched()
+    for _ in range(4):
+        guard.looks(5)
+        guard._hear(wire.Beat(0.0))
+    assert guard.deaths == 0
+
+
+@pytest.mark.anyio
+async def test_one_that_starts_has_ten_seconds(stands: list[Standing]) -> None:
+    """A busy machine may take long until Python runs."""
+    guard = Watched()
+    guard._was_heard = False
+    guard.looks(100)
+    assert guard.deaths == 0
+    guard.looks(1)
     assert guard.deaths == 1
 
 
@@ -100,3 +121,5 @@ def test_a_process_tells_whether_it_would_run(tmp_path: Path) -> None:
     (tmp_path / "5" / "stat").write_text("5 (a) S (b) R 1 2 3")
     (tmp_path / "5" / "schedstat").write_text("1500000000 2 3")
     assert standing(5, tmp_path) == Standing(wants_to_run=True, ran_s=1.5)
+    (tmp_path / "5" / "stat").write_text("5 (gone) X 1 2 3")
+    assert not standing(5, tmp_path).wants_to_run

@@ -64,6 +64,11 @@ async def test_of_many_states_the_newest_is_kept(tmp_path: Path) -> None:
     assert file.load().state.epoch == 199
 
 
+def test_a_robot_that_was_never_driven_is_not_stopped(tmp_path: Path) -> None:
+    (tmp_path / "puppet.latch.json").write_text('{"epoch": 0, "latched_by": ""}')
+    assert LatchFile(tmp_path, "puppet").load().state == LeaseState(0)
+
+
 @pytest.mark.parametrize(
     "text",
     [

@@ -352,6 +352,9 @@ def test_speed_grows_as_fast_as_the_driver_lets_it_and_falls_at_once() -> None:
     for _ in range(3):
         it.tick(speed=1.0)
     assert [round(one["speed"], 3) for one in moved] == [0.1, 0.2, 0.3], "the audit has the same"
+    it.now += 0.15
+    it.tick(speed=1.0)
+    assert moved[-1]["speed"] == pytest.approx(0.7), "as long as the pause was"
     it.tick(speed=0.05)
     assert it.heard()[-1] == "drive speed=0.05"
     it.tick(speed=1.0)
@@ -421,5 +424,6 @@ def test_a_refusal_of_what_does_not_move_changes_nothing() -> None:
     it.heard()
     it.frames.on_refused("drive", "too late")
     it.frames.on_refused("lift", "it never moved")
+    it.frames.on_refused("beep", "it is not held")
     assert it.heard() == []
     assert it.tick(speed=0.5) == ""
