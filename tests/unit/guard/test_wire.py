@@ -76,3 +76,8 @@ def test_what_no_message_can_carry_is_refused(body: object) -> None:
 
     with pytest.raises(UNFIT):
         wire.encoder().encode(wire.Send("wire", 1, 1, Envelope("publish", {}, body)))
+
+
+def test_body_that_cannot_be_passed_on_is_named() -> None:
+    with pytest.raises(NotImplementedError, match="^object cannot be passed on$"):
+        wire.encoder().encode(wire.Received("wire", 1, Envelope("publish", {}, object())))
