@@ -310,7 +310,8 @@ def is_shared_reader(asked: tuple[str, tuple[str | int, ...], str]) -> bool:
     `parse_interface` reads the header of documents and the layouts inside a robot alike. Forms are
     read alike in replies and in steps, which may not `set` anything. Kinds of transport
     are read alike, though messages have no framing, not everything goes through something else, and
-    a web server always answers; one of another package has options that no schema of ours knows.
+    a web server always answers, and brokers carry many at once; one of another package has options
+    that no schema of ours knows.
     """
     name, path, key = asked
     if path[-2:-1] == ("transports",):
@@ -318,6 +319,7 @@ def is_shared_reader(asked: tuple[str, tuple[str | int, ...], str]) -> bool:
         return kind not in TRANSPORTS or key in (
             "answers",
             "connection",
+            "duplex",
             "encoding",
             "framing",
             "send_framing",

@@ -56,6 +56,8 @@ def line_with_flow(
         refuse(part, ("keepalive",), "means nothing where each request connects anew", findings)
         if queue is not None:
             refuse(queue, ("in_flight",), "is 1 where each request connects anew", findings)
+    if spec.is_half_duplex and queue is not None:
+        refuse(queue, ("in_flight",), "is 1 where one side talks at a time", findings)
     timeouts = part.get("timeouts")
     if timeouts is not None and "on_connect" not in part.data:
         refuse(timeouts, ("on_connect",), "limits nothing: there are no steps", findings)

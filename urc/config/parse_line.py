@@ -17,7 +17,7 @@ __all__ = ["option_templates", "parse_transport"]
 _COMMON: Final = (
     "type", "connection", "framing", "send_framing", "encoding", "timeouts", "reconnect", "min_gap",
     "queue", "keepalive", "on_connect", "on_close", "stale_after", "via",
-    "answers", "errors",
+    "answers", "duplex", "errors",
 )  # fmt: skip
 
 
@@ -50,6 +50,7 @@ def parse_transport(part: Part, findings: Findings, catalog: Catalog) -> Transpo
         backoff=_backoff(part.get("reconnect"), findings),
         min_gap_s=findings.duration(part, "min_gap", 0.0, least=0.0, most=3600),
         via=part.text("via"),
+        is_half_duplex=part.text("duplex") == "half",
         never_answers=part.text("answers") == "never",
     )
 

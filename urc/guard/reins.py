@@ -108,7 +108,7 @@ class Reins:
     def tick(
         self, control: str, number: int, data: Payload, at_s: float, count: Count | None = None
     ) -> None:
-        """Take sampled input of the time `at_s`."""
+        """Take sampled input of the time `at_s`; no bytes renew the lease and write nothing."""
         mover = self._movers.get(control)
         if mover is None:
             return
@@ -118,7 +118,7 @@ class Reins:
         if now - at_s >= mover.terms.lease_s:
             return  # it waited so long that it renews nothing
         is_stale = not self._tally.fits(count)
-        if mover.tick(None if is_stale else data, min(at_s, now)) and is_stale:
+        if mover.tick(None if is_stale else data or None, min(at_s, now)) and is_stale:
             self._stale.append((control, number))
 
     def moving(self, control: str) -> Terms | None:

@@ -92,6 +92,8 @@ class TransportSpec(NamedTuple):
     """Silence after which the line is told to be silent; None = never."""
     via: str = ""
     """Transport that it goes through; "": none."""
+    is_half_duplex: bool = False
+    """One side talks at a time: nothing but a stop may overtake an answer that the robot owes."""
     never_answers: bool = False
     """The robot says nothing on this line, by design: its silence means nothing."""
     errors: tuple[Pattern, ...] = ()

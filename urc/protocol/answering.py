@@ -63,6 +63,16 @@ class Answering(Connection):
 
     def _of_motion(self, frame: Frame, now: float) -> list[LineEvent] | None:
         """Return what follows from an answer to a frame of motion; None: it is no such answer."""
+        owed_until_s = self.held.owed_until_s
+        told = self._told_of_motion(frame, now)
+        if self.held.owed_until_s < owed_until_s:
+            self._motion_answered()
+        return told
+
+    def _motion_answered(self) -> None:
+        """Take note that the robot owes no answer to motion any more."""
+
+    def _told_of_motion(self, frame: Frame, now: float) -> list[LineEvent] | None:
         refused = self.held.refusals(frame, now)
         if refused:
             return self._motion_refused(refused, frame, now)

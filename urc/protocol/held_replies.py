@@ -5,19 +5,25 @@ for them, and nobody waits. But a robot that answers each of them does so here: 
 is taken and is no stray frame, and a refusal ends the motion. A refusal counts also where the robot
 says it by itself, as a controller does whose guard was opened.
 
+Where one side talks at a time, frames of motion wait for an answer that the robot owes, and what
+waits in the queue of the line waits for theirs. Both waits are short: an answer that was lost must
+not keep a robot from being driven. A stop does not come by here, and waits for nothing.
+
 A command listens from its first frame on, for as long as an answer may take after the newest one.
 """
 
 from collections.abc import Mapping
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 from urc.expressions import ExpressionError, Template
 from urc.protocol.answer import Answer, Ear, Fields, Offer
 from urc.protocol.codec import Frame
 from urc.protocol.word import Word
 
-__all__ = ["HeldReplies", "Refusal"]
+__all__ = ["LONGEST_WAIT_S", "HeldReplies", "Refusal"]
 
+LONGEST_WAIT_S: Final = 0.1
+"""For an answer that is owed, on a line where one side talks at a time."""
 _NOTHING: Mapping[str, object] = {}
 
 
@@ -58,6 +64,9 @@ class HeldReplies:
     def __init__(self) -> None:
         self._all: dict[str, _Listening] = {}
         self._until_s = float("-inf")
+        self.owed_until_s = float("-inf")
+        """Until when the robot may owe an answer to a frame of motion."""
+        self._waits_since_s: float | None = None
 
     def add(self, command: str, answer: Answer, match: Template | None) -> None:
         """Listen for the answers to a command, once it has been given."""
@@ -67,15 +76,34 @@ class HeldReplies:
         """Take note that a frame of a command goes out, made of `names`."""
         one = self._all.get(command)
         if one is not None:
+            self.owed_until_s = now + min(one.ear.answer.timeout_s, LONGEST_WAIT_S)
             one.names = names
             one.until_s = now + one.ear.answer.timeout_s
             self._until_s = max(self._until_s, one.until_s)
 
     def forget(self) -> None:
         """Forget a connection: what comes on the next one answers nothing of this one."""
-        self._until_s = float("-inf")
+        self._until_s = self.owed_until_s = float("-inf")
+        self._waits_since_s = None
         for one in self._all.values():
             one.until_s = float("-inf")
+
+    def must_wait(self, now: float, *, is_owed: bool) -> bool:
+        """Return whether a frame of motion has to wait, on a line where one side talks at a time.
+
+        Args:
+            now: the time.
+            is_owed: whether the robot owes an answer to anything else.
+        """
+        if not is_owed and now >= self.owed_until_s:
+            self._waits_since_s = None
+            return False
+        if self._waits_since_s is None:
+            self._waits_since_s = now
+        if now - self._waits_since_s < LONGEST_WAIT_S:
+            return True
+        self._waits_since_s = None
+        return False
 
     def is_listening(self, now: float) -> bool:
         """Return whether an answer to a frame of motion may come."""
@@ -83,11 +111,14 @@ class HeldReplies:
 
     def refusals(self, frame: Frame, now: float) -> list[Refusal]:
         """Return the commands that a frame refuses: all that it may be about."""
-        return [
+        found = [
             Refusal(name, offer)
             for name, one in self._listening(now)
             if (offer := one.ear.beside(frame, one.is_mine)) is not None and offer.refusal
         ]
+        if found:
+            self.owed_until_s = float("-inf")
+        return found
 
     def refuse(self, frame: Frame, reason: str, now: float) -> list[Refusal]:
         """Return what an answer refuses that is known as a refusal: in words of the driver."""
@@ -99,6 +130,7 @@ class HeldReplies:
         for _, one in self._listening(now):
             offer = one.ear.offer(frame, one.is_mine)
             if offer is not None:
+                self.owed_until_s = float("-inf")
                 return one.ear.answer, offer
         return None
 

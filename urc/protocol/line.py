@@ -16,6 +16,7 @@ answer of the next request, and meanwhile nothing is sent that it could be mista
 misses `urc.protocol.answering.MISSES_UNTIL_CLOSED` answers in a row is given up and opened afresh.
 """
 
+from collections.abc import Mapping
 from functools import partial
 
 from urc.expressions import COUNTERS
@@ -47,6 +48,8 @@ class Line(Answering):
         self._gap_s = spec.min_gap_s
         self.is_scripted = False
         """Whether a sequence is at work, which may wait for the next frame."""
+        self._free_at = float("-inf")
+        """When something may be sent again, once the answer to motion has come."""
         self._may_recut = False
         """Whether an answer brings its own framing, or did before the last bytes came."""
         self._number = 0
@@ -72,6 +75,26 @@ class Line(Answering):
         if not (self._flights or self._outbox):
             return False
         return self._flights.has(label) or self._outbox.has(label)
+
+    # -- motion, which does not come by here
+
+    def motion_must_wait(self, now: float) -> bool:
+        """Return whether a frame of motion has to wait for an answer that the robot owes."""
+        if not self.spec.is_half_duplex:
+            return False
+        is_owed = any(not one.is_late for one in self._flights)
+        return self.held.must_wait(now, is_owed=is_owed)
+
+    def gave_motion(self, command: str, names: Mapping[str, object], now: float) -> None:
+        """Take note that a frame of motion goes out, made of `names`."""
+        self.held.gave(command, names, now)
+        if self.spec.is_half_duplex and now < self.held.owed_until_s:
+            self._free_at = now + self._gap_s
+            self._outbox.next_send = max(self._outbox.next_send, self.held.owed_until_s)
+
+    def _motion_answered(self) -> None:
+        if self.spec.is_half_duplex:
+            self._outbox.next_send = self._free_at
 
     # -- sending
 

@@ -124,10 +124,11 @@ class Motions:
     def is_lasting(self, command: str) -> bool:
         """Return whether its stop is the same bytes for ever; else it is to be made anew.
 
-        It is not where it carries a number, or what the robot or a setting says.
+        It is not where it carries a number, or what the robot or a setting says. Nor does it count
+        as such where one side of the line talks at a time, and each frame made may owe an answer.
         """
-        ask = self._asks[command]
-        return ask.is_local and not ask.has_counters
+        ask, line = self._asks[command], self._lines[self._found(command).transport]
+        return ask.is_local and not (ask.has_counters or line.spec.is_half_duplex)
 
     def is_ready(self, command: str) -> bool:
         """Return whether its line is connected, and the steps of the connection are done."""
@@ -168,6 +169,9 @@ class Motions:
     ) -> Payload | Counted:
         """Return the frame of `command` with these arguments, as it is to be written now.
 
+        On a line where one side talks at a time, it may be no bytes: the robot owes an answer, and
+        the next value goes out instead.
+
         On a line that is shared, a number in it is only proposed: it counts once the frame has
         left, which `told` says.
 
@@ -186,11 +190,13 @@ class Motions:
         if way is None:
             raise BadArgument(f"{command!r} is no command with a release")
         line, ask = way.line, way.ask
+        if line.motion_must_wait(now):
+            return b""
         if way.write is not None and line.state == "open" and line.is_ready:
             is_heard = line.spec.stale_after_s is None or not line.is_silent
             data = way.write(arguments) if is_heard else None
             if data is not None:
-                line.held.gave(command, arguments, now)
+                line.gave_motion(command, arguments, now)
                 return data
         values = way.check(arguments)
         if not (line.is_open and line.is_ready):
@@ -202,7 +208,7 @@ class Motions:
             if refused is not None:
                 raise NotNow(refused.message)
         way.warm_up()
-        line.held.gave(command, values, now)
+        line.gave_motion(command, values, now)
         names = values if ask.is_local else {**self._known.names, **line.learnt, **values}
         if not ask.has_counters:
             return ask.encode(names)

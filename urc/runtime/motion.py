@@ -258,12 +258,14 @@ class MotionDesk:
         finally:
             self._is_making = False
         if not counts:
-            if not isinstance(data, Counted):
+            if not isinstance(data, Counted) and data:
                 movers.rehearse(command, data)
             return ""
         self.lease.touch(now)
         control.course = "moving"
         movers.tick(command, data)
+        if data == b"":
+            return ""  # it waits for an answer that the robot owes
         shown = data.numbered.data if isinstance(data, Counted) else data
         self.on_moved(screen.client, epoch, command, arguments, shown, now)
         return ""

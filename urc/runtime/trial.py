@@ -158,6 +158,10 @@ class Trial:
             self._failed(Failed(number, name, code, str(error)))
             return
         data = made.numbered.data if isinstance(made, Counted) else made
+        if data == b"":
+            text = "it waits for an answer that the robot owes"
+            self._failed(Failed(number, name, "not-allowed", text))
+            return
         self.perform([Send(command.transport, data), Replied(number, name, {})])
 
     def _refused(self, command: str, why: str) -> None:

@@ -103,7 +103,7 @@ class FakeMovers:
     def tick(self, command: str, data: Payload | Counted) -> None:
         """Renew the lease."""
         assert not isinstance(data, Counted)  # noqa: S101 - nobody shares its counters
-        if self._movers[command].tick(data, self._clock.now()):
+        if self._movers[command].tick(data or None, self._clock.now()):
             self.ticked_s = self._clock.now()
         self.step()
 

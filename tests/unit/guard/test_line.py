@@ -343,3 +343,14 @@ async def test_engine_may_take_as_much_as_it_likes_where_there_is_no_process(rig
     async with asyncio.timeout(5.0):
         for number in range(40):
             assert await rig.transport.receive() == bytes([number]) * 4096
+
+
+async def test_a_tick_without_bytes_renews_the_lease_and_writes_nothing(rig: Rig) -> None:
+    """Motion waits for an answer that the robot owes: it goes on, and is stopped as ever."""
+    await rig.drive()
+    for _ in range(4):
+        await rig.clock.advance(0.1)
+        rig.tick(b"")
+    assert rig.robot.written == [b"go 1"]
+    await rig.clock.advance(0.3)
+    assert rig.robot.written == [b"go 1", STOP]

@@ -427,3 +427,19 @@ def test_a_refusal_of_what_does_not_move_changes_nothing() -> None:
     it.frames.on_refused("beep", "it is not held")
     assert it.heard() == []
     assert it.tick(speed=0.5) == ""
+
+
+def test_motion_that_waits_for_an_answer_holds_its_lease() -> None:
+    """Nothing is written, nothing is noted as moved, and nothing ends."""
+    it = Scene()
+    it.drive("ann", "take")
+    told: list[object] = []
+    it.desk.on_moved = lambda *what: told.append(what)
+    assert it.tick(speed=0.5) == ""
+    frame, it.frames.motion_frame = it.frames.motion_frame, lambda *_: b""  # type: ignore[method-assign,misc,assignment]
+    it.heard()
+    assert it.tick(speed=0.6) == ""
+    assert it.heard() == [""]
+    it.frames.motion_frame = frame  # type: ignore[method-assign]
+    assert it.tick(speed=0.7) == ""
+    assert len(told) == 2
