@@ -40,6 +40,8 @@ NAMES = (
     "motion_engine",
     "motion_guard",
     "motion_cuts",
+    "motion_freeze",
+    "motion_counters",
     "motion_flood",
     "motion_idle",
     "motion_input",

@@ -19,6 +19,8 @@ from urc.model.framing import FrameLayout
 
 __all__ = ["check_motion", "least_frame_bytes"]
 
+_ASKED: Final = frozenset(("websocket", "rosbridge"))
+"""Kinds of line whose other end is asked for signs of life while something is held."""
 LONG_LEASE_S: Final = 0.5
 _BITS_OF_A_BYTE: Final = 10
 """On a serial line: start and stop bit included."""
@@ -56,6 +58,28 @@ def check_motion(part: Part, driver: Driver, findings: Findings) -> None:
             hint="write stale_after: beside its transport, or poll something that it answers, or"
             " write answers: never where it says nothing by design",
         )
+    elif held:
+        for name, spec in driver.transports.items():
+            streamed = [one for one in held if one[1].transport == name and not one[2].step_s]
+            if streamed:
+                _check_freeze(streamed[0], spec, findings)
+
+
+def _check_freeze(one: tuple[Part, Command, Hold], spec: TransportSpec, findings: Findings) -> None:
+    """Warn of motion on a line that has no way to know that its other end stands still."""
+    part, command, _ = one
+    is_asked = spec.type in _ASKED or spec.never_answers
+    if is_asked or spec.stale_after_s is not None or spec.connection == "per_request":
+        return
+    findings.warn(
+        part,
+        "unnoticed-freeze",
+        f"while {command.name!r} is held, nothing tells that the robot's program stands still:"
+        f" {spec.name!r} cannot ask it",
+        key=True,
+        hint=f"write stale_after: beside {spec.name!r}, as short as what the robot says allows, or"
+        " answers: never where it says nothing by design",
+    )
 
 
 def _check_line(part: Part, spec: TransportSpec | None, findings: Findings) -> None:

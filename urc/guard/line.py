@@ -16,6 +16,7 @@ from typing import Any, Final
 
 from urc.guard import wire
 from urc.guard.double import Double
+from urc.guard.hearing import HearingWatch
 from urc.guard.lane import Clock, Lane, Ring, why_broken
 from urc.guard.pipe import UNFIT
 from urc.guard.reins import Reins
@@ -78,6 +79,13 @@ class Line:
             failed=self._stall,
             tally=self._tally,
             counted=self._tell_counted,
+        )
+        self._hearing = HearingWatch(
+            transport,
+            clock,
+            silent_s=make.silent_s,
+            is_moving=lambda: self.reins.is_moving,
+            failed=self._stall,
         )
         self._double = Double(transport, clock)
         self._offer: Callable[[bytes], bool] | None = getattr(transport, "offer", None)
@@ -186,6 +194,7 @@ class Line:
             number, self._acked = self._acked, 0
             self._emit(wire.Sent(self.name, self._turn, number))
         self.reins.tell_counted()
+        self._hearing.start()
 
     def rehearse(self, said: wire.Rehearsal) -> None:
         """Go the way of a tick, and write nothing."""
@@ -210,6 +219,7 @@ class Line:
             task.cancel()
             await asyncio.wait({task}, timeout=_CLOSE_S)
         self._is_open = False
+        self._hearing.end()
         self.reins.cut()
         self._lane.end()
         await self._close_transport()
@@ -270,6 +280,7 @@ class Line:
     def _begin(self) -> None:
         self._is_open = True
         self._handed.clear()
+        self._hearing.begin()
         self.reins.begin()
 
     def _hand_over(self) -> None:
@@ -300,6 +311,7 @@ class Line:
             while self._credit <= 0:
                 self._credited.clear()
                 await self._credited.wait()
+                self._hearing.heard()  # it is the engine that was slow
             self._is_reading = True
             try:
                 data = await self.transport.receive()
@@ -316,6 +328,7 @@ class Line:
         return True
 
     def _pass_on(self, data: Payload) -> None:
+        self._hearing.heard()
         try:
             self._credit -= self._emit(wire.Received(self.name, self._turn, data))
         except UNFIT as fault:
@@ -331,6 +344,7 @@ class Line:
 
     def _cut(self, reason: str) -> None:
         self._is_open = False
+        self._hearing.end()
         self.reins.cut()
         self._lane.end()
         if self._is_handed:
@@ -365,6 +379,7 @@ class Line:
         """Reset the line: what waits in the kernel must not arrive later."""
         if self._is_open:
             self._is_open = False
+            self._hearing.end()
             self._switch(self._recover(reason, is_abort=True))
 
     async def _rescue(self) -> None:

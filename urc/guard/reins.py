@@ -90,6 +90,11 @@ class Reins:
         return any(mover.owes_stop for mover in self._movers.values())
 
     @property
+    def is_moving(self) -> bool:
+        """Whether a control is held."""
+        return any(mover.state == "moving" for mover in self._movers.values())
+
+    @property
     def is_settled(self) -> bool:
         """Whether nothing moves, and every stop was handed over, as often as it is to be."""
         return self.lane.is_idle and all(one.state == "idle" for one in self._movers.values())

@@ -59,6 +59,9 @@ class Make(msgspec.Struct, array_like=True, frozen=True, tag=1):
     """Unsent motion of this age means that the line is stalled: it is reset and opened afresh."""
     is_strict: bool
     """Opening it is dear: nothing is written while anything is unsent, however young."""
+    silent_s: float | None = None
+    """While something moves, a robot that says nothing for so long stands still: the line is reset
+    and opened afresh. None: nothing is expected of it."""
 
 
 class Open(msgspec.Struct, array_like=True, frozen=True, tag=2):

@@ -23,6 +23,8 @@ __all__ = ["GuardedMovers", "take_reins"]
 _DEAR: Final = frozenset(("ssh", "serial", "mqtt", "rosbridge"))
 """Kinds of line that are not reset lightly: opening them afresh takes long, or cannot be done."""
 
+_SOONER: Final = 0.9
+
 log = logging.getLogger(__name__)
 
 
@@ -163,6 +165,17 @@ def _is_dear(spec: TransportSpec, driver: Driver) -> bool:
     return "wait" in said or spec.type in _DEAR or bool(spec.via)
 
 
+def _silent_s(spec: TransportSpec) -> float | None:
+    """Return after which silence a line is reset while something moves; None: never.
+
+    A little before the engine gives up its motion: what it writes then would wait where the motion
+    waits. A line without a connection keeps nothing that a reset could throw away.
+    """
+    if spec.stale_after_s is None or spec.type in ("udp", "serial"):
+        return None
+    return spec.stale_after_s * _SOONER
+
+
 def _line(made: Made, driver: Driver) -> LineSpec:
     setup, spec = made.setup, made.spec
     is_dear = _is_dear(spec, driver)
@@ -174,5 +187,6 @@ def _line(made: Made, driver: Driver) -> LineSpec:
         via=spec.via,
         stalled_s=WAITED_S if is_dear else STALLED_S,
         is_strict=is_dear,
+        silent_s=_silent_s(spec),
     )
     return LineSpec(make, made.transport)

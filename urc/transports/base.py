@@ -137,6 +137,18 @@ class Settling(Protocol):
 
 
 @runtime_checkable
+class Probed(Protocol):
+    """What a transport may offer beside, where the program at the other end can be asked."""
+
+    async def probe(self) -> None:
+        """Return when anything has come from that program since the call.
+
+        Raises:
+            TransportError: the line broke.
+        """
+
+
+@runtime_checkable
 class Prompt(Protocol):
     """What a transport of bytes may offer beside: it saves a task's turn for each message.
 

@@ -136,6 +136,10 @@ class RosbridgeTransport:
         """
         return "" if self._session is None else await self._session.settle()
 
+    async def probe(self) -> None:
+        """Ask the bridge for a sign of life, and return when anything has come since."""
+        await self._wire.probe()
+
     def unsent(self) -> int:
         """Return the bytes handed over that have not left this machine for good."""
         return self._wire.unsent()

@@ -125,6 +125,18 @@ class WebSocketTransport:
         finally:
             await self._dialer.close()
 
+    async def probe(self) -> None:
+        """Ask for a sign of life, and return when anything has come since."""
+        connection = self._socket
+        if not isinstance(connection, _Connection):
+            raise PeerClosed(CLOSED)
+        sign = connection.next_sign()
+        try:
+            await connection.ping()
+            await sign
+        except ConnectionClosed as ended:
+            raise PeerClosed(_end(ended)) from ended
+
     def unsent(self) -> int:
         """Return the bytes handed over that have not left this machine for good."""
         if self._socket is None:
@@ -179,9 +191,26 @@ class _Connection(ClientConnection):
     """
 
     _untaken = 0
+    _sign: asyncio.Future[None] | None = None
+
+    def next_sign(self) -> asyncio.Future[None]:
+        """Return what is done when anything has come, also a part of a message, or the end."""
+        if self._sign is None or self._sign.done():
+            self._sign = asyncio.get_running_loop().create_future()
+        return self._sign
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        """Let nobody wait for a sign that cannot come."""
+        self._give_sign()
+        super().connection_lost(exc)
+
+    def _give_sign(self) -> None:
+        if self._sign is not None and not self._sign.done():
+            self._sign.set_result(None)
 
     def data_received(self, data: bytes) -> None:
         """Take what came, and end the line when it makes us answer without end."""
+        self._give_sign()
         before = self.transport.get_write_buffer_size()
         super().data_received(data)
         after = self.transport.get_write_buffer_size()

@@ -157,7 +157,11 @@ class Bench:
     """The guard's side of one line, told message by message; keeps what it says."""
 
     def __init__(
-        self, robot: Wire, *, stalled_s: float = STALLED_S, is_strict: bool = False
+        self,
+        robot: Wire,
+        *,
+        stalled_s: float = STALLED_S,
+        is_strict: bool = False,
     ) -> None:
         self.robot = robot
         self.clock = FakeClock()
@@ -199,11 +203,16 @@ class Rig:
     """A guard of one line, and the engine's side of it."""
 
     def __init__(
-        self, robot: Wire, *, stalled_s: float = STALLED_S, is_strict: bool = False
+        self,
+        robot: Wire,
+        *,
+        stalled_s: float = STALLED_S,
+        is_strict: bool = False,
+        silent_s: float | None = None,
     ) -> None:
         self.robot = robot
         self.clock = FakeClock()
-        make = wire.Make("wire", "", {}, [], "", stalled_s, is_strict)
+        make = wire.Make("wire", "", {}, [], "", stalled_s, is_strict, silent_s)
         line: Transport = robot
         self.guard = LocalGuard([LineSpec(make, line)], self.clock)
         self.guard.start()

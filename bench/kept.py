@@ -1,0 +1,47 @@
+"""What a long run has counted so far, so that one that was broken off goes on where it was.
+
+One file a benchmark, in the user's cache; a run that is whole takes it away, so the next one begins
+with nothing. What was counted by other code does not count.
+"""
+
+import hashlib
+import json
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Final
+
+__all__ = ["Kept"]
+
+_ROOT: Final = Path(__file__).resolve().parents[1]
+
+
+class Kept:
+    """The rows of one benchmark."""
+
+    def __init__(self, name: str) -> None:
+        """Take up what an earlier run of the same code has left."""
+        cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache", "urc-bench")
+        cache.mkdir(parents=True, exist_ok=True)
+        self._file = cache / f"{name}-{_code()}.jsonl"
+        lines = self._file.read_text("utf-8").splitlines() if self._file.exists() else []
+        self.rows: list[Mapping[str, object]] = [json.loads(line) for line in lines]
+
+    def add(self, row: Mapping[str, object]) -> None:
+        """Keep a row."""
+        self.rows.append(row)
+        with self._file.open("a", encoding="utf-8") as file:
+            file.write(json.dumps(row) + "\n")
+
+    def end(self) -> Sequence[Mapping[str, object]]:
+        """Return the rows of a run that is whole; the next one begins anew."""
+        self._file.unlink(missing_ok=True)
+        return self.rows
+
+
+def _code() -> str:
+    """Return a name for the code that is measured."""
+    total = hashlib.sha256()
+    for file in sorted((_ROOT / "urc").rglob("*.py")):
+        total.update(file.read_bytes())
+    return total.hexdigest()[:12]

@@ -1,0 +1,81 @@
+"""What arrives when the counterpart of a robot stood still for 5 s while the robot was driven.
+
+A stand-in for rosbridge is stopped and let go on by signals; its kernel goes on taking what is
+written. Several robots side by side, each with its own program, session and guard. A run that is
+broken off goes on where it was.
+"""
+
+import asyncio
+import json
+from collections.abc import Mapping, Sequence
+from math import inf
+
+from bench.figures import distribution, tell
+from bench.harness import Result
+from bench.kept import Kept
+from urc.testing.rig_freeze import HEARD_MS, STOP_MS, Freeze, freeze
+
+__all__ = ["run"]
+
+TRIALS, TRIALS_IF_FULL = 4, 100
+LANES, LANES_IF_FULL = 2, 5
+BIN_MS = 10
+
+
+def run(*, full: bool) -> Sequence[Result]:
+    """Freeze until as many trials have counted as are wanted."""
+    wanted, lanes = (TRIALS_IF_FULL, LANES_IF_FULL) if full else (TRIALS, LANES)
+    kept = Kept(f"motion_freeze-{wanted}")
+    while (left := wanted - len(_counted(kept.rows))) > 0:
+        if len(kept.rows) >= 2 * wanted:
+            break  # the machine is too busy to show anything
+        at_once = min(lanes, left)
+        rounds = -(-left // at_once)
+        asyncio.run(
+            freeze(
+                rounds,
+                lanes=at_once,
+                seed=len(kept.rows),
+                told=lambda one: kept.add({**one._asdict(), "excused": one.is_excused}),
+            )
+        )
+    return _told(kept.end(), wanted)
+
+
+def _counted(rows: Sequence[Mapping[str, object]]) -> list[Freeze]:
+    return [
+        Freeze(**{name: row[name] for name in Freeze._fields})  # type: ignore[arg-type]
+        for row in rows
+        if not row["excused"]
+    ]
+
+
+def _told(rows: Sequence[Mapping[str, object]], wanted: int) -> Sequence[Result]:
+    said = _counted(rows)
+    bad = [one for one in said if not one.is_good]
+    newest = max((one.newest_ms for one in said), default=inf)
+    stop = max((one.stop_ms for one in said), default=inf)
+    tell(
+        {
+            "figure": "motion_freeze",
+            "trials": len(said),
+            "broken": len(bad),
+            "excused": len(rows) - len(said),
+            "newest_motion_ms": round(newest),
+            **distribution([one.stop_ms for one in said], BIN_MS),
+        }
+    )
+    for one in bad:
+        print(json.dumps({"broken": "motion_freeze", **one._asdict()}), flush=True)
+    worst = max(newest / HEARD_MS, stop / STOP_MS) if len(said) >= wanted and not bad else inf
+    return [
+        Result(
+            name=f"motion after {len(said)} freezes of the counterpart: worst / what is allowed",
+            ratio=round(worst, 3),
+            goal=1.0,
+            baseline_ms=STOP_MS,
+            subject_ms=round(stop, 1),
+            spread=1.0,
+            rounds=len(said),
+        )
+    ]

@@ -1,0 +1,129 @@
+"""A counterpart that stands still while its system goes on taking what is written."""
+
+import asyncio
+
+import pytest
+
+from tests.unit.guard.lines import STOP, TERMS, CountedWire, Rig
+from urc.motion.hearing import SILENCE_S
+from urc.transports.base import PeerClosed
+
+pytestmark = pytest.mark.anyio
+
+
+class ProbedWire(CountedWire):
+    """One whose program at the other end can be asked for a sign of life."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.lives = asyncio.Event()
+        self.lives.set()
+        self.probes = 0
+        self.is_broken = False
+
+    async def open(self, timeout_s: float) -> None:
+        if not self.lives.is_set():
+            self.opens += 1
+            await self.lives.wait()
+        await super().open(timeout_s)
+
+    async def probe(self) -> None:
+        self.probes += 1
+        if self.is_broken:
+            raise PeerClosed("the line broke")
+        await self.lives.wait()
+
+
+async def held(rig: Rig, seconds: float) -> None:
+    """Go on ticking, as a hand does that notices nothing."""
+    for at in range(round(seconds / 0.05)):
+        await rig.clock.advance(0.05)
+        rig.tick(b"go on %d" % at)
+
+
+@pytest.fixture
+def robot() -> ProbedWire:
+    return ProbedWire()
+
+
+@pytest.fixture
+def rig(robot: ProbedWire, rigs: list[Rig]) -> Rig:
+    rigs.append(Rig(robot, stalled_s=1.0, is_strict=True))
+    return rigs[-1]
+
+
+async def test_counterpart_that_stands_still_ends_the_motion_and_hears_the_stop_first(
+    robot: ProbedWire, rig: Rig
+) -> None:
+    await rig.drive()
+    await held(rig, 2.0)
+    assert robot.aborts == 0
+    robot.lives.clear()
+    before = len(robot.written)
+    frozen_s = rig.clock.now()
+    while not robot.aborts:
+        await rig.clock.advance(0.01)
+        rig.tick(b"go old")
+    assert rig.clock.now() - frozen_s <= SILENCE_S
+    written = len(robot.written)
+    await held(rig, 4.0)
+    assert robot.written[written:] == [], "nothing is written to what does not listen"
+    robot.lives.set()
+    await rig.clock.advance(0.2)
+    assert robot.written[written:] == [STOP]
+    await held(rig, 1.0)
+    assert robot.written[written:] == [STOP], "a hand that holds on moves nothing"
+    assert written - before <= 60
+
+
+async def test_nobody_is_asked_at_rest(robot: ProbedWire, rig: Rig) -> None:
+    await rig.transport.open(1.0)
+    await rig.clock.advance(5.0)
+    assert robot.probes == 0
+    rig.guard.arm("wire", "drive", TERMS)
+    rig.tick(b"go")
+    await rig.clock.advance(0.1)
+    assert robot.probes
+    rig.guard.release("drive")
+    await rig.clock.advance(0.2)
+    probes = robot.probes
+    robot.lives.clear()
+    await rig.clock.advance(60.0)
+    assert robot.probes == probes
+    assert robot.aborts == 0
+    robot.lives.set()
+
+
+async def test_whatever_arrives_is_a_sign_of_life(robot: ProbedWire, rig: Rig) -> None:
+    """An answer to the question may be late behind a big picture."""
+    await rig.drive()
+    await held(rig, 0.2)
+    robot.lives.clear()
+    for _ in range(40):
+        robot.arriving.put_nowait(b"odometry")
+        await held(rig, 0.05)
+        await rig.transport.receive()
+    assert robot.aborts == 0
+    robot.lives.set()
+
+
+async def test_question_that_cannot_be_asked_is_no_answer(robot: ProbedWire, rig: Rig) -> None:
+    await rig.drive()
+    robot.is_broken = True
+    await held(rig, 0.6)
+    assert robot.aborts == 1
+
+
+async def test_line_that_cannot_be_asked_is_reset_when_its_robot_is_silent_for_too_long(
+    rigs: list[Rig],
+) -> None:
+    robot = CountedWire()
+    rigs.append(rig := Rig(robot, silent_s=2.0))
+    await rig.drive()
+    await held(rig, 1.5)
+    robot.arriving.put_nowait(b"odometry")
+    await held(rig, 1.9)
+    assert robot.aborts == 0
+    await held(rig, 0.2)
+    assert robot.aborts == 1
+    assert robot.written[-1] == STOP

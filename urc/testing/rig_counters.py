@@ -1,0 +1,169 @@
+"""Robots that are driven over UDP beside polls, in frames that all carry one counter.
+
+Each robot is a socket of its own, which keeps what it receives in order and answers polls. The
+driver is a session with its guard; each gesture is one connection, held for seconds, with two
+controls at times, and let go or left to its lease.
+"""
+
+import asyncio
+import random
+import tempfile
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import Final, NamedTuple, cast
+
+from urc.config.load import load_profile
+from urc.model.profile import Profile
+from urc.motion.fresh import Input
+from urc.motion.lease import Client
+from urc.problems import UrcError
+from urc.runtime.catalog import built_in_catalog
+from urc.runtime.motion import MotionDesk
+from urc.runtime.session import Session
+
+__all__ = ["NUMBERS", "Gesture", "gestures"]
+
+NUMBERS: Final = 65536
+_TICK_S: Final = 0.05
+_SETTLED_S: Final = 1.0
+_READY_S: Final = 10.0
+_DOCUMENT: Final = """\
+urc: 1
+kind: robot
+name: counted
+signals: { volts: { type: integer } }
+transports:
+  wire:
+    type: udp
+    host: 127.0.0.1
+    port: PORT
+    framing: { type: datagram }
+    stale_after: 5s
+    keepalive: { send: "{{ seq('n', 0, 65535) }} ALIVE", every: 330ms }
+commands:
+  drive:
+    send: "{{ seq('n', 0, 65535) }} DRIVE {{ v }}"
+    args: { v: { type: integer, min: -99, max: 99, default: 0 } }
+    hold: { repeat: 20ms, release: {}, watchdog: none }
+  lift:
+    send: "{{ seq('n', 0, 65535) }} LIFT {{ v }}"
+    args: { v: { type: integer, min: -99, max: 99, default: 0 } }
+    hold: { repeat: 50ms, release: {}, watchdog: none }
+polls:
+  - send: "{{ seq('n', 0, 65535) }} VOLTS"
+    every: 35ms
+    reply: { regex: '^(?P<_n>\\d+) V (?P<volts>\\d+)$', match: _n == seq.n }
+"""
+
+
+class Gesture(NamedTuple):
+    """What the robot received in one."""
+
+    lasted_s: float
+    frames: int
+    motions: int
+    fault: str
+    """The first that was wrong; "" when nothing was."""
+
+
+class _Robot(asyncio.DatagramProtocol):
+    def __init__(self) -> None:
+        self.heard: list[tuple[int, str]] = []
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        self._transport = cast("asyncio.DatagramTransport", transport)
+
+    def datagram_received(self, data: bytes, addr: tuple[str, int]) -> None:
+        number, _, words = data.decode().partition(" ")
+        self.heard.append((int(number), words))
+        if words == "VOLTS":
+            self._transport.sendto(f"{number} V 12".encode(), addr)
+
+
+async def gestures(
+    lasts_s: Sequence[float],
+    *,
+    lanes: int,
+    seed: int = 1,
+    told: Callable[[Gesture], None] | None = None,
+) -> Sequence[Gesture]:
+    """Hold for each of these times, `lanes` robots side by side."""
+    dice = random.Random(seed)  # noqa: S311 - the same gestures in every run
+    left, done = list(lasts_s), list[Gesture]()
+
+    async def work() -> None:
+        while left:
+            gesture = await _one(left.pop(), dice)
+            done.append(gesture)
+            if told is not None:
+                told(gesture)
+
+    async with asyncio.TaskGroup() as group:
+        for _ in range(lanes):
+            group.create_task(work())
+    return done
+
+
+async def _one(lasts_s: float, dice: random.Random) -> Gesture:
+    loop = asyncio.get_running_loop()
+    transport, robot = await loop.create_datagram_endpoint(_Robot, local_addr=("127.0.0.1", 0))
+    try:
+        profile = _profile(transport.get_extra_info("sockname")[1])
+        transports = built_in_catalog().transports
+        async with Session(profile, {}, transports, motion="guarded") as session:
+            fault = await _drive(session, lasts_s, dice)
+            await asyncio.sleep(_SETTLED_S)
+            heard = list(robot.heard)
+    finally:
+        transport.close()
+    return _judged(lasts_s, heard, fault)
+
+
+def _profile(port: int) -> Profile:
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder, "counted.yaml")
+        file.write_text(_DOCUMENT.replace("PORT", str(port)), "utf-8")
+        return load_profile(file, built_in_catalog())
+
+
+async def _drive(session: Session, lasts_s: float, dice: random.Random) -> str:
+    """Hold one control all the time and another now and then; let go, or say nothing more."""
+    desk, loop = MotionDesk(session.profile.driver), asyncio.get_running_loop()
+    desk.join(Client("hand", "hand", "driver"))
+    desk.attach(session.frames, session.movers)
+    ready_s = loop.time() + _READY_S
+    while not session.frames.is_ready("drive"):
+        if loop.time() > ready_s:
+            return "the line was never ready"
+        await asyncio.sleep(0.02)
+    desk.drive("hand", "take", loop.time())
+    ends_s, ticks, refused = loop.time() + lasts_s, 0, ""
+    while loop.time() < ends_s and not refused:
+        for command in ("drive", "lift") if ticks % 60 > 30 else ("drive",):
+            ticks, now = ticks + 1, loop.time()
+            given = Input(desk.lease.state.epoch, ticks, desk.beat("hand", now))
+            with suppress(UrcError):
+                value = {"v": dice.randrange(1, 99)}
+                refused = refused or desk.tick("hand", command, value, given, now)
+        if ticks % 60 == 0:
+            desk.release("hand", "lift")
+        await asyncio.sleep(_TICK_S * dice.uniform(0.5, 1.2))
+    if dice.random() < 0.5:
+        desk.release("hand", "drive")
+        desk.release("hand", "lift")
+    await asyncio.sleep(_SETTLED_S)
+    desk.detach()
+    return refused
+
+
+def _judged(lasts_s: float, heard: Sequence[tuple[int, str]], fault: str) -> Gesture:
+    """Find the first gap, and motion that no stop comes after."""
+    motions = [words for _, words in heard if words.startswith(("DRIVE", "LIFT"))]
+    for place, (number, words) in enumerate(heard):
+        if number != place % NUMBERS and not fault:
+            fault = f"{number} {words} in the place of {place % NUMBERS}"
+    last = {words.split()[0]: words for words in motions}
+    moving = [words for words in last.values() if not words.endswith(" 0")]
+    fault = fault or (f"nothing stops {moving[0]}" if moving else "")
+    return Gesture(lasts_s, len(heard), len(motions), fault)

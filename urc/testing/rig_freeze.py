@@ -1,0 +1,168 @@
+"""Robots behind a counterpart that stands still for seconds, while they are driven.
+
+The counterpart is a program of its own (`urc.testing.rig_robot`), which is stopped and let go on by
+signals; its kernel goes on taking what is written. The driver is a session with its guard. Each
+frame of motion says when it was sent, and the counterpart stamps what it hears.
+"""
+
+import asyncio
+import os
+import random
+import signal
+import tempfile
+import time
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from math import inf
+from pathlib import Path
+from typing import Final, NamedTuple
+
+from urc.config.load import load_profile
+from urc.model.profile import Profile
+from urc.motion.hold import Terms
+from urc.problems import UrcError
+from urc.runtime.catalog import built_in_catalog
+from urc.runtime.held import is_lossy
+from urc.runtime.session import Session
+from urc.testing.rig import Robots
+
+__all__ = ["HEARD_MS", "STOP_MS", "Freeze", "freeze"]
+
+HEARD_MS: Final = 500.0
+"""Nothing arrives that was sent later than this after the counterpart has come to a stand."""
+STOP_MS: Final = 200.0
+"""The stop arrives within this time of the counterpart's going on."""
+_TICK_S: Final = 0.05
+_AFTERWARDS_S: Final = 1.2
+_READY_S: Final = 10.0
+_DOCUMENT: Final = """\
+urc: 1
+kind: robot
+name: frozen
+transports:
+  wire: { type: rosbridge, host: 127.0.0.1, port: PORT, ros: 2, reconnect: { initial: 100ms } }
+commands:
+  go:
+    send: { publish: { topic: /go, type: std_msgs/Int64, json: { data: "{{ t }}" } } }
+    args: { t: { type: integer, min: 0, default: 0 } }
+    hold: { repeat: 50ms, release: { t: 0 }, watchdog: none }
+"""
+
+
+class Freeze(NamedTuple):
+    """What came of one."""
+
+    lasted_s: float
+    newest_ms: float
+    """How long after the counterpart had come to a stand the newest motion was sent that arrived;
+    below 0: none that was sent since."""
+    stop_ms: float
+    """From the counterpart's going on to the stop; `inf`: it did not come."""
+    is_last: bool
+    """Whether nothing came after the stop."""
+    late_ms: float
+    """By how much the machine itself was late."""
+
+    @property
+    def is_good(self) -> bool:
+        """Whether all bounds were kept."""
+        return self.newest_ms <= HEARD_MS and self.stop_ms <= STOP_MS and self.is_last
+
+    @property
+    def is_excused(self) -> bool:
+        """Whether the machine was so late that nothing is shown."""
+        return not self.is_good and self.is_last and self.late_ms > STOP_MS / 2
+
+
+async def freeze(
+    rounds: int,
+    *,
+    lanes: int = 1,
+    lasts_s: float = 5.0,
+    seed: int = 1,
+    told: Callable[[Freeze], None] | None = None,
+) -> Sequence[Freeze]:
+    """Let each of `lanes` robots stand still for `lasts_s`, `rounds` times."""
+    dice = random.Random(seed)  # noqa: S311 - the same moments in every run
+    moments = [[0.4 + dice.random() for _ in range(rounds)] for _ in range(lanes)]
+    done: list[Freeze] = []
+
+    def take(one: Freeze) -> None:
+        done.append(one)
+        if told is not None:
+            told(one)
+
+    async with asyncio.TaskGroup() as group:
+        for each in moments:
+            group.create_task(_lane(each, lasts_s, take))
+    return done
+
+
+async def _lane(moments: Sequence[float], lasts_s: float, told: Callable[[Freeze], None]) -> None:
+    robots = await asyncio.to_thread(Robots, ["bridge:127.0.0.1:0"])
+    try:
+        profile = _profile(robots.ports[0])
+        transports = built_in_catalog().transports
+        async with Session(profile, {}, transports, motion="guarded") as session:
+            for moment_s in moments:
+                told(await _one(session, robots, moment_s, lasts_s))
+    finally:
+        os.kill(robots.pid, signal.SIGCONT)
+        await asyncio.to_thread(robots.close)
+
+
+def _profile(port: int) -> Profile:
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder, "frozen.yaml")
+        file.write_text(_DOCUMENT.replace("PORT", str(port)), "utf-8")
+        return load_profile(file, built_in_catalog())
+
+
+async def _one(session: Session, robots: Robots, moment_s: float, lasts_s: float) -> Freeze:
+    """Drive, let the counterpart stand still and go on, and look at what it heard."""
+    movers = session.movers
+    assert movers is not None  # noqa: S101 - there is a held command
+    ends_s = time.monotonic() + _READY_S
+    while not (movers.is_open("go") and session.frames.is_ready("go")):
+        if time.monotonic() > ends_s:
+            return Freeze(0.0, inf, inf, is_last=False, late_ms=0.0)
+        await asyncio.sleep(0.02)
+    await asyncio.sleep(_AFTERWARDS_S)
+    stop, lossy = session.frames.stop_frame("go"), is_lossy(session.profile.driver, "wire")
+    movers.arm("go", Terms(b"", period_s=_TICK_S, is_lossy=lossy).stopped_by(stop))
+    holding = asyncio.create_task(_hold(session))
+    try:
+        await asyncio.sleep(moment_s)
+        robots.signal(signal.SIGSTOP)
+        frozen_ns = time.monotonic_ns()
+        await asyncio.sleep(lasts_s)
+        thawed_ns = time.monotonic_ns()
+        robots.signal(signal.SIGCONT)
+        await asyncio.sleep(_AFTERWARDS_S)
+    finally:
+        holding.cancel()
+    return _judged(robots, frozen_ns, thawed_ns)
+
+
+async def _hold(session: Session) -> None:
+    """Tick as a hand does that notices nothing, for ever."""
+    assert session.movers is not None  # noqa: S101 - as above
+    while True:
+        now_ns = time.monotonic_ns()
+        with suppress(UrcError):  # the line is not open: a hand goes on all the same
+            session.movers.tick("go", session.frames.motion_frame("go", {"t": now_ns // 1000}, 0.0))
+        await asyncio.sleep(_TICK_S)
+
+
+def _judged(robots: Robots, frozen_ns: int, thawed_ns: int) -> Freeze:
+    heard = [(one.time_ns, int(one.text.split()[1])) for one in robots.since(0, frozen_ns)]
+    sent_ns = [sent_us * 1000 for _, sent_us in heard if sent_us]
+    stops = [at_ns for at_ns, sent_us in heard if not sent_us and at_ns >= thawed_ns]
+    late = [ms for at_ns, ms in robots.late if at_ns > thawed_ns + 50_000_000]
+    return Freeze(
+        lasted_s=(thawed_ns - frozen_ns) / 1e9,
+        newest_ms=(max(sent_ns, default=frozen_ns) - frozen_ns) / 1e6,
+        stop_ms=(stops[0] - thawed_ns) / 1e6 if stops else inf,
+        is_last=bool(heard) and not heard[-1][1],
+        late_ms=max(late, default=0.0),
+    )
