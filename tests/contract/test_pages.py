@@ -106,9 +106,7 @@ def test_every_answer_carries_the_page_policy(
     check_policy(dict(answer.headers), is_code=is_code and "." in path, is_file=is_file)
 
 
-def check_policy(
-    headers: dict[str, str], *, is_code: bool = False, is_file: bool = False
-) -> None:
+def check_policy(headers: dict[str, str], *, is_code: bool = False, is_file: bool = False) -> None:
     """Check the headers of one answer. Code is for frames too, which have no origin."""
     policy = headers["content-security-policy"]
     nonce = re.search(r"'nonce-([\w-]{20,})'", policy)

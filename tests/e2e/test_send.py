@@ -2,11 +2,14 @@
 
 import asyncio
 import json
+import os
+import socket
 import subprocess
 import time
 from collections.abc import AsyncIterator, Callable
 from pathlib import Path
 from urllib.parse import urlsplit
+from urllib.request import Request, urlopen
 
 import pytest
 from websockets.asyncio.client import connect
@@ -258,6 +261,39 @@ async def test_a_server_that_was_killed_hinders_nothing(
     assert (done.returncode, done.stderr) == (0, "")
     assert cart.heard == ["go"]
     assert not note.exists()
+
+
+async def test_a_server_that_hangs_lets_nothing_move_but_every_stop(
+    profile: str, cart: Cart, data: Path
+) -> None:
+    """Nobody knows who drives; a stop does not ask."""
+    with socket.create_server(("127.0.0.1", 0)) as hanging:
+        address = f"http://127.0.0.1:{hanging.getsockname()[1]}/"
+        note = data / "servers" / "hanging.json"
+        note.parent.mkdir(parents=True)
+        note.write_text(json.dumps({"address": address, "key": "k" * 40, "pid": os.getpid()}))
+        done = await send(profile, "go", "--data-dir", str(data))
+        assert (done.returncode, done.stdout) == (1, "")
+        assert f"the server at {address} does not say who drives the robot" in done.stderr
+        assert (await send(profile, "halt", "--data-dir", str(data))).returncode == 0
+    assert cart.heard == ["halt"]
+
+
+async def test_a_stop_of_a_running_server_is_told_with_its_address(
+    profile: str, cart: Cart, data: Path, urc_process: Start
+) -> None:
+    """That is where it is reset."""
+    place = ("--data-dir", str(data))
+    server = urc_process("serve", profile, "--port", "0", *place)
+    url = (await server.wait_for_async(r"dashboard (http://\S+)"))[1]
+    place_of_stop = f"{url}api/v1/robots/cart/stop"
+    stop = Request(place_of_stop, method="POST", headers=headers_for(url))  # noqa: S310
+    await asyncio.to_thread(lambda: urlopen(stop, timeout=30).close())  # noqa: S310
+    done = await send(profile, "go", *place)
+    assert (done.returncode, done.stdout) == (1, "")
+    assert "STOP is latched, pressed by " in done.stderr
+    assert f"reset it first on {url}" in done.stderr
+    assert "go" not in cart.heard
 
 
 async def test_a_held_command_is_held_for_as_long_as_is_said(

@@ -63,7 +63,7 @@ class Hindrance:
         if self._clock() >= self._ask_s:
             self._driven = self._asked()
             self._ask_s = self._clock() + _ASK_S
-        self.why = self._latched or self._driven
+        self.why = self._driven or self._latched
         return self.why
 
     def _read_latch(self) -> None:
@@ -105,7 +105,7 @@ class Hindrance:
             with suppress(OSError):
                 file.unlink()  # of a server that was killed
             return ""
-        except (OSError, HTTPException, ValueError, KeyError, TypeError):
+        except (OSError, HTTPException, ValueError, KeyError, TypeError, RecursionError):
             return f"the server at {url} does not say who drives the robot"
         finally:
             line.close()
