@@ -12,9 +12,10 @@ from typing import Any, Final
 from urc._number_bytes import writer_of
 from urc._numbers import NUMBER_NAMES, number_of
 
-__all__ = ["BYTE_FILTERS", "TEXT_FILTERS", "written_number"]
+__all__ = ["BYTE_FILTERS", "TEXT_FILTERS", "together", "written_number"]
 
 MAX_BYTES: Final = 65536
+_YEAR_10000: Final = 253402300800
 
 
 def written_number(name: str, value: object) -> bytes:
@@ -54,6 +55,21 @@ def _data(value: object) -> bytes:
     if len(data) > MAX_BYTES:
         raise ValueError(f"the text has more than {MAX_BYTES} bytes")
     return data
+
+
+def together(left: object, right: object) -> bytes:
+    """Return bytes one after the other; a text among them is UTF-8."""
+    return _data(_data(left) + _data(right))
+
+
+def _iso(value: object) -> str:
+    """Return a time in seconds since 1970 as ``2026-01-31T12:00:00.000Z``."""
+    from datetime import UTC, datetime
+
+    if not isinstance(value, (int, float)) or not 0 <= value < _YEAR_10000:
+        raise ValueError(f"a time in seconds since 1970 is expected, found {_short(value)}")
+    text = datetime.fromtimestamp(value, UTC).isoformat(timespec="milliseconds")
+    return text.replace("+00:00", "Z")
 
 
 def _hexbytes(value: object) -> bytes:
@@ -101,6 +117,7 @@ BYTE_FILTERS: Final[dict[str, Callable[..., Any]]] = {
 TEXT_FILTERS: Final[dict[str, tuple[Callable[..., Any], int]]] = {
     "b64encode": (_b64encode, 0),
     "hmac_sha256": (_hmac_sha256, 1),
+    "iso": (_iso, 0),
     "md5": (_hash("md5"), 0),
     "sha1": (_hash("sha1"), 0),
     "sha256": (_hash("sha256"), 0),

@@ -41,6 +41,8 @@ def _bounded(value: Any) -> Any:
 def _add(left: Any, right: Any) -> Any:
     if isinstance(left, str) and isinstance(right, str):
         return _joined([left, right])
+    if isinstance(left, bytes) or isinstance(right, bytes):
+        return _bytes.together(left, right)
     return _bounded(_number(left) + _number(right))
 
 

@@ -19,7 +19,7 @@ from urc._lists import compiled
 from urc._tokens import Refused, Token, float_of, integer_of, string_of, tokens_of
 from urc.problems import UrcError
 
-__all__ = ["COUNTERS", "MAX_DEPTH", "Refused", "translate"]
+__all__ = ["COUNTERS", "MAX_DEPTH", "NONCE", "Refused", "translate"]
 
 MAX_DEPTH: Final = 40
 """Levels of brackets, and operators of one kind in a row."""
@@ -43,6 +43,10 @@ _TESTS = (
 _PATTERNS = ("match", "search")
 COUNTERS: Final = "seq()"
 """The root name under which a namespace keeps its counters; no name of a document can be so."""
+NONCE: Final = "nonce()"
+"""The root name under which a namespace keeps its fresh bytes."""
+_MOST_NONCE: Final = 64
+_NONCE_ALONE = re.compile(r"\(\d+\)")
 _COUNTER = re.compile(r"[a-z][a-z0-9_]{0,63}")
 
 
@@ -70,6 +74,9 @@ def translate(
     parser.allows_bytes = allows_bytes
     python = parser.expression()
     parser.expect_end()
+    if not allows_bytes and _NONCE_ALONE.fullmatch(python.removeprefix(resolve(NONCE))):
+        text = "nonce() gives bytes: write nonce() | b64encode, or send it by 'hex:' or 'bytes:'"
+        raise Refused(text, 0)
     return python
 
 
@@ -221,7 +228,7 @@ class _Parser:
             elif self._take("["):
                 value = self._subscript(value, is_settings)
             elif self._next.text == "(" and self._next.kind == "operator":
-                text = "calls are not part of the language, only filters and seq()"
+                text = "calls are not part of the language, only filters, seq() and nonce()"
                 raise Refused(text, self._next.offset)
             else:
                 return value
@@ -265,6 +272,8 @@ class _Parser:
                 return _CONSTANTS[token.text]
             if token.text == "seq" and self._take("("):
                 return self._counter(token)
+            if token.text == "nonce" and self._take("("):
+                return self._nonce(token)
             self._names.add(token.text)
             return self._resolve(token.text)
         if token.text == "(" and token.kind == "operator":
@@ -292,6 +301,16 @@ class _Parser:
             raise Refused(f"a counter cannot run from {low} to {high}", token.offset)
         self._names.add(COUNTERS)
         return f"{self._resolve(COUNTERS)}({string_of(name)!r}, {low}, {high})"
+
+    def _nonce(self, token: Token) -> str:
+        """``nonce()`` or ``nonce(8)``: so many fresh bytes, 16 where nothing is said."""
+        size = 16 if self._next.text == ")" else self._whole()
+        if size is None or not self._take(")"):
+            raise Refused("write nonce(), or nonce(8) with a number of bytes", token.offset)
+        if not 1 <= size <= _MOST_NONCE:
+            raise Refused(f"a nonce has 1 to {_MOST_NONCE} bytes, not {size}", token.offset)
+        self._names.add(NONCE)
+        return f"{self._resolve(NONCE)}({size})"
 
     def _whole(self) -> int | None:
         token = self._next

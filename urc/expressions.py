@@ -9,21 +9,27 @@ quietly (``'abc' | int`` is 0), URC raises: a reading must not become a zero by 
 A template that is exactly one ``{{ expression }}`` keeps the expression's type.
 """
 
+import ast
+import re
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any, Final
 
 from urc import _filters
-from urc._grammar import COUNTERS, Refused, translate
+from urc._grammar import COUNTERS, NONCE, Refused, translate
 from urc._spelling import quoted, spelt
 from urc.problems import UrcError
 
 __all__ = [
     "COUNTERS",
+    "NONCE",
+    "NOW",
     "ExpressionError",
     "Template",
     "compile_expression",
     "compile_template",
+    "digested_settings",
     "is_byte_filter",
+    "is_nonce",
     "last_filter",
     "quoted",
     "spelt",
@@ -31,6 +37,10 @@ __all__ = [
     "text_of",
 ]
 
+NOW: Final = "now"
+"""The root name of the time of day, in seconds since 1970."""
+_HASHES: Final = frozenset(f"_filter_{name}" for name in ("md5", "sha1", "sha256", "hmac_sha256"))
+_NONCE: Final = re.compile(rf"ns\['{re.escape(NONCE)}'\]\(\d+\)")
 MAX_SOURCE: Final = 4096
 """Characters of one template."""
 MAX_OUTPUT: Final = 65536
@@ -233,6 +243,36 @@ def last_filter(template: Template) -> str:
     """Return the filter that makes the value of an expression, or ""."""
     name = template.python.partition("(")[0]
     return name.removeprefix("_filter_") if name.startswith("_filter_") else ""
+
+
+def digested_settings(template: Template) -> frozenset[str]:
+    """Return the settings that show nowhere but in hashes with something new in them.
+
+    Such a hash tells nothing about the setting, and is worth nothing a second time.
+    """
+    if not template.settings:
+        return frozenset()
+    shown, digested = set[str](), set[str]()
+    _sort(ast.parse(template.python, mode="eval"), shown, digested, is_digested=False)
+    return frozenset(digested - shown)
+
+
+def _sort(node: ast.AST, shown: set[str], digested: set[str], *, is_digested: bool) -> None:
+    """Sort the settings under `node` into those that show and those that are in a hash."""
+    if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
+        if node.func.id in _HASHES:
+            roots = {one.value for one in ast.walk(node) if isinstance(one, ast.Constant)}
+            is_new = {NONCE, NOW} & roots or any(str(one).startswith("_") for one in roots)
+            is_digested = is_digested or bool(is_new)
+        elif node.func.id == "_item" and ast.unparse(node.args[0]) == "ns['settings']":
+            (digested if is_digested else shown).add(ast.literal_eval(node.args[1]))
+    for inner in ast.iter_child_nodes(node):
+        _sort(inner, shown, digested, is_digested=is_digested)
+
+
+def is_nonce(template: Template) -> bool:
+    """Return whether the value of an expression is nothing but ``nonce()``."""
+    return _NONCE.fullmatch(template.python) is not None
 
 
 def is_byte_filter(name: str) -> bool:

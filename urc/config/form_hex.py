@@ -11,6 +11,7 @@ from urc.expressions import (
     Template,
     compile_expression,
     is_byte_filter,
+    is_nonce,
     last_filter,
     split_template,
 )
@@ -68,7 +69,7 @@ def _expression(part: Part, text: str, offset: int, findings: Findings) -> Templ
     except ExpressionError as error:
         findings.error(part, "bad-template", str(error), offset=offset + error.offset)
         return None
-    if not is_byte_filter(last_filter(template)):
+    if not (is_byte_filter(last_filter(template)) or is_nonce(template)):
         shown = text.strip()
         value = shown.rpartition("|")[0].strip() or shown
         plain = f"({value})" if re.search(r"\W", value) else value

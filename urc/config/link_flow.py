@@ -7,7 +7,7 @@ from urc.config.moving import link_moves, refuse_moving, runs_what_moves
 from urc.config.part import Findings, Part
 from urc.config.suggest import did_you_mean
 from urc.config.values import check_within, fit_argument, fit_hint, known_argument
-from urc.expressions import COUNTERS, Template
+from urc.expressions import COUNTERS, NONCE, NOW, Template
 from urc.model.codec import ReadSpec, WriteSpec
 from urc.model.driver import Argument, Command, Driver, Poll, Reply
 from urc.model.flow import Asides, ErrorReply
@@ -188,7 +188,7 @@ def link_refusals(linker: Linker, part: Part, faults: tuple[ErrorReply, ...]) ->
 def said_on(driver: Driver, transport: str) -> Iterable[str]:
     """Return what all that is said on a line knows: its counters, and what its login learnt."""
     learnt = driver.learnt(transport) if transport in driver.transports else frozenset()
-    return (COUNTERS, *learnt)
+    return (COUNTERS, NONCE, NOW, *learnt)
 
 
 def link_keepalives(linker: Linker, part: Part) -> None:

@@ -10,7 +10,7 @@ from urc.config.link_flow import (
 )
 from urc.config.moving import refuse_moving
 from urc.config.part import Part
-from urc.expressions import COUNTERS, Template
+from urc.expressions import COUNTERS, NONCE, NOW, Template
 from urc.model.driver import Driver
 from urc.model.flow import (
     ExpectStep,
@@ -87,7 +87,7 @@ class _Walk:
         match step:
             case SendStep():
                 self._transport(part, "to", step.transport)
-                known = {*self._known, COUNTERS, *self._learnt(step.transport)}
+                known = {*self._known, COUNTERS, NONCE, NOW, *self._learnt(step.transport)}
                 self._linker.templates(part.must("send"), step.send, known)
             case ExpectStep():
                 self._expect(part, step)

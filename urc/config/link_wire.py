@@ -22,7 +22,7 @@ from urc.config.parse_reply import refuse
 from urc.config.parse_simulator import Simulated
 from urc.config.part import Findings, Part
 from urc.config.suggest import did_you_mean
-from urc.expressions import COUNTERS, Template
+from urc.expressions import COUNTERS, NONCE, Template
 from urc.model.codec import ReadSpec, WriteSpec
 from urc.model.driver import Driver
 from urc.model.profile import Setting
@@ -140,7 +140,7 @@ class _Linker:
         """Check the names that a template uses."""
         allowed = {*known, "settings"}
         for used in sorted(template.names - allowed):
-            name, hint = self._meant(used, allowed - {COUNTERS})
+            name, hint = self._meant(used, allowed - {COUNTERS, NONCE})
             self._unknown(
                 part,
                 template,
@@ -183,6 +183,8 @@ class _Linker:
 
     def _meant(self, name: str, allowed: Iterable[str]) -> tuple[str, str]:
         """Return an unknown name as it is written, and what to do about it."""
+        if name == NONCE:
+            return "nonce", "fresh bytes belong into what is sent: 'send'"
         if name == COUNTERS:
             return "seq", "a counter counts what is sent: it belongs into 'send'"
         if name in self.settings:

@@ -5,6 +5,7 @@ A rule speaks only where somebody has decided something: never about a default.
 
 from collections.abc import Iterator
 
+from urc.config.forms import write_form
 from urc.config.link_steps import steps_of
 from urc.config.part import Findings, Part, shown_duration
 from urc.config.rules_answers import check_answers
@@ -12,7 +13,8 @@ from urc.config.rules_frames import check_frames_apart
 from urc.config.rules_motion import check_motion
 from urc.config.rules_traffic import check_traffic
 from urc.config.rules_unmarked import check_unguarded, check_unmarked
-from urc.expressions import split_template
+from urc.expressions import digested_settings, split_template
+from urc.model.codec import WriteSpec
 from urc.model.driver import Driver, Poll, Reply, TransportSpec
 from urc.model.flow import SendStep, Step, UntilStep, WaitStep, all_steps
 
@@ -156,6 +158,14 @@ def _check_poll(part: Part, poll: Poll, findings: Findings) -> None:
         )
 
 
+def _digested(part: Part, send: WriteSpec) -> set[str]:
+    """Return the settings that show in no frame, but as part of a hash that is new each time."""
+    inner, form = write_form(part)
+    found = [template for _, template in form.templates(inner, send)]
+    digested = {name for one in found for name in digested_settings(one)}
+    return digested - {name for one in found for name in one.settings - digested_settings(one)}
+
+
 def _check_secrets(part: Part, driver: Driver, secrets: frozenset[str], findings: Findings) -> None:
     """Warn of whatever sends a secret and does not keep it out of messages."""
     asked = [
@@ -168,7 +178,7 @@ def _check_secrets(part: Part, driver: Driver, secrets: frozenset[str], findings
         if "send" in inner.data
     ]
     for place, send in asked:
-        used = sorted(send.settings & secrets)
+        used = sorted((send.settings & secrets) - _digested(place, send))
         if used:
             findings.warn(
                 place,
@@ -177,7 +187,7 @@ def _check_secrets(part: Part, driver: Driver, secrets: frozenset[str], findings
                 hint="send it once, in a step of 'on_connect' or of a sequence, with redact: true",
             )
     for inner, step in _sends(part, driver):
-        used = sorted(step.send.settings & secrets)
+        used = sorted((step.send.settings & secrets) - _digested(inner.must("send"), step.send))
         if used and not step.is_secret:
             findings.warn(
                 inner.must("send"),

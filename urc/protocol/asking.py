@@ -6,7 +6,7 @@ Floor 3, pure.
 from collections.abc import Mapping
 from functools import partial
 
-from urc.expressions import COUNTERS
+from urc.expressions import COUNTERS, NONCE, NOW
 from urc.model.codec import NUMBERED, Payload, ReadSpec, WriteSpec
 from urc.model.driver import Argument, Command, Driver, Message, Poll, Reply, TransportSpec
 from urc.model.flow import RESENDS, Asides, ExpectStep, SendStep, Stage
@@ -20,6 +20,7 @@ from urc.protocol.fast_read import build_fast_read, prefix_of
 from urc.protocol.fast_value import Taken
 from urc.protocol.forms import build_reader
 from urc.protocol.framing import build_framing
+from urc.protocol.fresh import FIXED, Fresh
 from urc.protocol.gate import RANKS, Bucket
 from urc.protocol.head import LOCATION
 from urc.protocol.known import Known
@@ -41,14 +42,17 @@ class Builder:
             be encoded.
     """
 
-    def __init__(self, driver: Driver, readings: Readings, known: Known) -> None:
+    def __init__(
+        self, driver: Driver, readings: Readings, known: Known, fresh: Fresh = FIXED
+    ) -> None:
         self._driver = driver
+        self._fresh = fresh
         self._readings = readings
         self._known = known
         self.lines: dict[str, Line] = {}
         for name, spec in driver.transports.items():
             messages = [one for one in driver.messages.values() if one.transport == name]
-            context = CodecContext(spec.encoding, self._readings.settings)
+            context = CodecContext(spec.encoding, self._readings.settings, fresh)
             matchers = [self._message(one.read, context) for one in messages]
             if any(one.answer or one.read.collects for one in messages):
                 self._react(spec, messages, matchers, context)
@@ -132,9 +136,10 @@ class Builder:
         arguments: Mapping[str, Argument] = NOTHING,
     ) -> Ask:
         line = self.lines[transport]
-        context = CodecContext(line.spec.encoding, self._readings.settings)
+        context = CodecContext(line.spec.encoding, self._readings.settings, self._fresh)
         encode = build_encode(send, line.framing, context, arguments)
         has_counters = COUNTERS in send.names
+        is_fresh = bool((send.names & {NOW, NONCE}) - arguments.keys())
         learnt = (send.names & self._driver.learnt(transport)) - arguments.keys()
         is_numbered = send.options.get("verb") in NUMBERED
         is_local = send.names <= arguments.keys()
@@ -146,6 +151,7 @@ class Builder:
                 is_numbered=is_numbered,
                 is_local=is_local,
                 learnt=learnt,
+                is_fresh=is_fresh,
                 queue_s=queue_limit_s(line.spec, None),
             )
         reply = reply.with_errors(line.spec.errors, line.spec.faults)
@@ -165,6 +171,7 @@ class Builder:
             is_numbered=is_numbered,
             is_local=is_local and reply.match is None,
             learnt=learnt,
+            is_fresh=is_fresh,
             queue_s=queue_limit_s(line.spec, answers[0].timeout_s),
             quick=None if is_numbered else self._quick(reply, context),
             starts=_starts(reply.read, context.encoding),

@@ -11,6 +11,7 @@ from urc.expressions import quoted
 from urc.model.codec import Payload
 from urc.model.values import NOTHING
 from urc.problems import UrcError
+from urc.protocol.fresh import FIXED, Fresh
 
 __all__ = ["BadItem", "BadText", "CodecContext", "Frame", "NotWritable", "Reader", "Writer"]
 
@@ -72,6 +73,8 @@ class CodecContext(NamedTuple):
     encoding: str = "utf-8"
     settings: Mapping[str, object] = NOTHING
     """Values of the profile's settings, for ``when`` and ``set``."""
+    fresh: Fresh = FIXED
+    """What is new in each frame that is written."""
 
 
 class Reader(Protocol):

@@ -7,7 +7,7 @@ go through the same door.
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 
-from urc.expressions import ExpressionError, Template, quoted
+from urc.expressions import NONCE, NOW, ExpressionError, Template, quoted
 from urc.model.codec import Payload, WriteSpec, each_of
 from urc.model.driver import MOST_ELEMENTS, Argument, Command
 from urc.model.values import NOTHING, Reading, Value
@@ -51,6 +51,8 @@ def build_encode(
         except (ExpressionError, FramingError, NotWritable) as error:
             raise BadArgument(str(error)) from None
 
+    if (send.names & {NOW, NONCE}) - arguments.keys():
+        return lambda namespace: encode({**context.fresh.names(), **namespace})
     if not send.names:
         constant = encode({})
         return lambda _: constant

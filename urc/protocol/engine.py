@@ -56,6 +56,7 @@ from urc.protocol.exchange import (
     LineEvent,
     Outcome,
 )
+from urc.protocol.fresh import FIXED, Fresh
 from urc.protocol.known import Known
 from urc.protocol.line import Line
 from urc.protocol.motions import Motions
@@ -76,6 +77,7 @@ class Engine:
     Args:
         driver: as loaded; its patterns and templates are compiled already.
         settings: value of every setting of the profile.
+        fresh: the time of day, and randomness, for what is sent; fixed ones for tests.
         is_brief: take the short way where there is one; the long way does the same, in more steps.
 
     Raises:
@@ -83,12 +85,17 @@ class Engine:
     """
 
     def __init__(
-        self, driver: Driver, settings: Mapping[str, Value], *, is_brief: bool = True
+        self,
+        driver: Driver,
+        settings: Mapping[str, Value],
+        *,
+        is_brief: bool = True,
+        fresh: Fresh = FIXED,
     ) -> None:
         names: dict[str, object] = {"settings": dict(settings)}
         self.readings = Readings(driver.signals, names)
         self.known = Known(driver.signals, names)
-        builder = Builder(driver, self.readings, self.known)
+        builder = Builder(driver, self.readings, self.known, fresh)
         self.lines: Mapping[str, Line] = builder.lines
         self._all_lines = tuple(self.lines.values())
         self._commands = driver.commands

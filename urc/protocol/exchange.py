@@ -81,6 +81,8 @@ class Ask(NamedTuple):
     """It moves the robot: it must not wait until the line is usable and take effect then."""
     learnt: frozenset[str] = frozenset()
     """Names in it that the login of the line has read."""
+    is_fresh: bool = False
+    """It has the time in it, or bytes that are never sent twice."""
     is_local: bool = False
     """Its templates use nothing but its arguments."""
     queue_s: float = 0.0
@@ -103,7 +105,7 @@ class Ask(NamedTuple):
     @property
     def is_made_late(self) -> bool:
         """Whether it is made when it is sent: what is in it is not known before."""
-        return self.has_counters or bool(self.learnt)
+        return self.has_counters or self.is_fresh or bool(self.learnt)
 
     def made(self, names: Mapping[str, object]) -> Payload | None:
         """Return what is sent, as far as it is known now; None where it is made when it is sent.
@@ -113,7 +115,7 @@ class Ask(NamedTuple):
         """
         if self.learnt:
             return None
-        if not self.has_counters:
+        if not (self.has_counters or self.is_fresh):
             return self.encode(names)
         self.encode({**names, COUNTERS: Counters().draw()})
         return None

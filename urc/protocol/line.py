@@ -17,6 +17,7 @@ misses `urc.protocol.answering.MISSES_UNTIL_CLOSED` answers in a row is given up
 """
 
 from collections.abc import Mapping
+from contextlib import suppress
 from functools import partial
 
 from urc.expressions import COUNTERS
@@ -184,6 +185,8 @@ class Line(Answering):
             except BadArgument as error:
                 why = untold(error) if exchange.is_secret else str(error)
                 return [Ended(exchange, Outcome("bad-argument", why))]
+        elif ask.is_fresh:
+            self._freshen(exchange)
         data = self._as_sent(exchange, number)
         if exchange.on_sent is not None and not exchange.is_secret:
             exchange.on_sent(data)
@@ -207,6 +210,14 @@ class Line(Answering):
         flight.number, flight.size = number, size_of(data)
         self._flights.append(flight)
         return sent
+
+    def _freshen(self, exchange: Exchange) -> None:
+        """Make what is sent again anew, but for its numbers: nothing fresh is sent twice."""
+        draw = self.counters.draw()
+        draw.values.update(exchange.numbers)
+        names = {**self.learnt, **exchange.namespace, COUNTERS: draw}
+        with suppress(BadArgument):  # it could be written before; what it has is better than none
+            exchange.data = exchange.ask.encode(names)
 
     def _size_of(self, exchange: Exchange) -> int:
         if exchange.data is not None:

@@ -1,6 +1,8 @@
 """An opened profile: the engine, its links, and the hub, from `async with` to the end of it."""
 
 import asyncio
+import secrets
+import time
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from functools import partial
@@ -17,6 +19,7 @@ from urc.problems import UrcError
 from urc.protocol.bounds import GOOD_BYE_S, lines_of, longest_s
 from urc.protocol.engine import Engine
 from urc.protocol.events import Failed, Replied, Request
+from urc.protocol.fresh import Fresh
 from urc.protocol.reins import PAUSE_S, Pull
 from urc.registry import Table
 from urc.runtime.blanking import Blanker
@@ -100,7 +103,7 @@ class Session:
         )
         self.hub = Hub(driver.signals, self._blanker, streams)
         self._clock: Clock = clock or LoopClock()
-        engine = Engine(driver, self.settings)
+        engine = Engine(driver, self.settings, fresh=Fresh(time.time, secrets.token_bytes))
         self.frames: Frames = engine.motions
         """Makes the frames of held commands."""
         self.movers: GuardedMovers | None = None

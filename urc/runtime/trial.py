@@ -28,6 +28,7 @@ from urc.protocol.events import (
     Send,
 )
 from urc.protocol.exchange import LineEvent
+from urc.protocol.fresh import FIXED_UNIX_S, Fresh, fixed_bytes
 from urc.protocol.messages import Messages
 from urc.protocol.readings import Decode
 
@@ -47,8 +48,8 @@ _MOST_TICKS: Final = 20_000
 class _Watched(Engine):
     """An engine that remembers which commands it ran, and which messages frames were."""
 
-    def __init__(self, driver: Driver, settings: Mapping[str, Value]) -> None:
-        super().__init__(driver, settings, is_brief=False)
+    def __init__(self, driver: Driver, settings: Mapping[str, Value], fresh: Fresh) -> None:
+        super().__init__(driver, settings, is_brief=False, fresh=fresh)
         self.used: set[Exercised] = set()
         for name, line in self.lines.items():
             names = [one.name for one in driver.messages.values() if one.transport == name]
@@ -91,7 +92,9 @@ class Trial:
         self.driver = driver
         self.settings = settings
         self.polls = polls
-        self.engine = _Watched(driver, settings)
+        self.engine = _Watched(
+            driver, settings, Fresh(lambda: FIXED_UNIX_S + self.now, fixed_bytes)
+        )
         self.now = 0.0
         """Seconds on the test's own clock."""
         self.samples: dict[str, Sample] = {}
