@@ -132,7 +132,10 @@ def run(arguments: argparse.Namespace) -> int:
 
     def given(profile: "Profile") -> Mapping[str, "Value"]:
         bare = profile._replace(
-            settings={name: one._replace(default=None) for name, one in profile.settings.items()}
+            settings={
+                name: one._replace(default=None, is_required=True)
+                for name, one in profile.settings.items()
+            }
         )
         named = [one.name for one in profiles]
         if profile.name not in named:

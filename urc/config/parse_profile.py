@@ -36,6 +36,16 @@ def parse_setting(part: Part, findings: Findings) -> Setting:
             key=True,
             hint="leave 'default' out: the operator fills it in",
         )
+    is_required = part.flag("required", default=True)
+    if not is_required and default_part is not None:
+        findings.error(
+            part,
+            "misplaced-key",
+            "'required' means nothing beside 'default': the setting is never empty",
+            at="required",
+            key=True,
+            hint="leave one of them out",
+        )
     setting = Setting(
         name=part.name,
         type=kind,  # type: ignore[arg-type]  # the schema's enum is this Literal
@@ -44,6 +54,7 @@ def parse_setting(part: Part, findings: Findings) -> Setting:
         min=low,
         max=high,
         is_secret=is_secret,
+        is_required=is_required,
         description=part.text("description"),
         default=(
             None if default_part is None else setting_value(default_part, kind, choices, findings)

@@ -39,6 +39,20 @@ class Setting(NamedTuple):
     max: float | None = None
     is_secret: bool = False
     description: str = ""
+    is_required: bool = True
+    """Whether it must be filled in before Connect, where it has no default."""
+
+    @property
+    def empty(self) -> Value:
+        """What it is in templates where it stays empty: no text, or nothing."""
+        return None if self.type in ("port", "integer", "number", "boolean") else ""
+
+    def is_missing(self, value: Value) -> bool:
+        """Return whether `value` keeps the robot from being connected.
+
+        What a document gives counts as filled in, an empty text, too.
+        """
+        return self.is_required and (value is None or (value == "" and self.default != ""))
 
 
 Fed = str | bytes | Envelope

@@ -41,7 +41,8 @@ def destination_of(profile: Profile, package: str, values: Mapping[str, Value]) 
         package: ``drivers/puppet``; "" for a document that was named at the start.
         values: of the settings.
     """
-    lines = [_line(spec, values) for spec in profile.driver.transports.values()]
+    empty = {name: one.empty for name, one in profile.settings.items() if not one.is_required}
+    lines = [_line(spec, empty | dict(values)) for spec in profile.driver.transports.values()]
     # Robots behind a gateway are named in what is sent, not in an option.
     named = [
         [name, values.get(name)]

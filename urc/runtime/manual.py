@@ -63,7 +63,8 @@ def _settings(settings: Mapping[str, Setting]) -> Iterator[str]:
         return
     rows = []
     for setting in settings.values():
-        default = "to be filled in" if setting.default is None else _code(_value(setting.default))
+        empty = "to be filled in" if setting.is_required else "may stay empty"
+        default = empty if setting.default is None else _code(_value(setting.default))
         if setting.is_secret:
             default = "secret, to be filled in"
         allowed = ", ".join(_code(choice) for choice in setting.choices)

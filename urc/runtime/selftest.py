@@ -59,11 +59,16 @@ def exercise(profile: Profile) -> Outcome:
 
 
 def sample_settings(settings: Mapping[str, Setting]) -> dict[str, Value]:
-    """Return a value for every setting: its default, or something of its type."""
+    """Return a value for every setting: its default, or something of its type.
+
+    What may stay empty does.
+    """
     values: dict[str, Value] = {}
     for name, setting in settings.items():
         if setting.default is not None:
             values[name] = setting.default
+        elif not setting.is_required:
+            values[name] = setting.empty
         elif setting.choices:
             values[name] = setting.choices[0]
         elif setting.type == "boolean":

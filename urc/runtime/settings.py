@@ -10,8 +10,9 @@ from difflib import get_close_matches
 from ipaddress import ip_address
 from pathlib import Path
 from types import MappingProxyType
+from typing import Final
 
-from urc.expressions import ExpressionError
+from urc.expressions import ExpressionError, Template
 from urc.model.driver import TransportSpec
 from urc.model.profile import Profile, Setting
 from urc.model.values import Value
@@ -24,6 +25,8 @@ _INTEGER = re.compile(r"[+-]?[0-9]{1,18}")
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]{1,3})?")
 _HOST_LABEL = re.compile(r"(?!-)[A-Za-z0-9_-]{1,63}(?<!-)")
 _TRUE, _FALSE = ("true", "yes", "on", "1"), ("false", "no", "off", "0")
+_ONE_SETTING = re.compile(r"\{\{\s*settings\.[a-z]\w*\s*\}\}")
+_LEFT_OUT: Final = object()
 _LONGEST = 4096
 """Characters of one setting."""
 _NO_ENVIRONMENT: Mapping[str, str] = MappingProxyType({})
@@ -69,8 +72,12 @@ def resolve_settings(
                 values[name] = parse_setting(setting, text, allows_any_port=allows_any_port)
             except UrcError as problem:
                 raise UrcError(f"{source}: {problem}") from problem
-    missing = tuple(name for name, value in values.items() if value is None)
-    return {name: value for name, value in values.items() if value is not None}, missing
+    for name, setting in profile.settings.items():
+        if values[name] is None and not setting.is_required:
+            values[name] = setting.empty
+    specs = profile.settings
+    missing = tuple(name for name in values if values[name] is None and specs[name].is_required)
+    return {name: value for name, value in values.items() if name not in missing}, missing
 
 
 def parse_setting(setting: Setting, text: str, *, allows_any_port: bool = False) -> Value:
@@ -86,6 +93,8 @@ def parse_setting(setting: Setting, text: str, *, allows_any_port: bool = False)
     """
     if len(text) > _LONGEST:
         raise UrcError(f"is {len(text)} characters long; {_LONGEST} are allowed")
+    if not setting.is_required and not text.strip():
+        return setting.empty
     found = "that" if setting.is_secret else repr(text)
     match setting.type:
         case "string":
@@ -110,16 +119,29 @@ def parse_setting(setting: Setting, text: str, *, allows_any_port: bool = False)
 def options_of(spec: TransportSpec, settings: Mapping[str, Value]) -> dict[str, object]:
     """Return the options of a transport, its templates evaluated with ``settings``.
 
+    What is nothing but a setting that is empty is left out, as if it did not stand there.
+
     Raises:
         UrcError: a template needs a setting that has no value, or fails on the one it has.
     """
     options: dict[str, object] = {}
     for name, option in spec.options.items():
         try:
-            options[name] = filled(option, {"settings": settings})
+            value = _filled(option, settings)
         except ExpressionError as problem:
             raise UrcError(f"transports.{spec.name}.{name}: {problem}") from problem
+        if value is not _LEFT_OUT:
+            options[name] = value
     return options
+
+
+def _filled(option: object, settings: Mapping[str, Value]) -> object:
+    if isinstance(option, Mapping):
+        found = {name: _filled(inner, settings) for name, inner in option.items()}
+        return {name: value for name, value in found.items() if value is not _LEFT_OUT}
+    value = filled(option, {"settings": settings})
+    is_setting = isinstance(option, Template) and _ONE_SETTING.fullmatch(option.source.strip())
+    return _LEFT_OUT if is_setting and value in (None, "") else value
 
 
 def _text(text: str, found: str) -> str:

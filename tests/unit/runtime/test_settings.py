@@ -2,6 +2,8 @@
 
 import pytest
 
+from urc.expressions import compile_template
+from urc.model.driver import TransportSpec
 from urc.model.profile import Profile, Setting
 from urc.problems import UrcError
 from urc.runtime.settings import options_of, parse_setting, resolve_settings
@@ -112,3 +114,47 @@ def test_options_of_a_transport_keep_their_type() -> None:
     assert options_of(spec, {"host": "h", "port": 5}) == {"host": "h", "port": 5}
     with pytest.raises(UrcError, match=r"^transports\.wire\.port: "):
         options_of(spec, {"host": "h"})
+
+
+OPTIONAL = {
+    "user": Setting("user", "string", is_required=False),
+    "key": Setting("key", "string", is_secret=True, is_required=False),
+    "port": Setting("port", "port", is_required=False),
+    "host": Setting("host", "host"),
+    "name": Setting("name", "string", default=""),
+}
+
+
+def test_what_may_stay_empty_is_an_empty_text_or_nothing() -> None:
+    """And does not keep the robot from being connected."""
+    profile = line_profile()._replace(settings=OPTIONAL)
+    values, missing = resolve_settings(profile, {"key": ""})
+    assert missing == ("host",)
+    assert values == {"user": "", "key": "", "port": None, "name": ""}
+    given = {"host": "bot", "port": "80", "user": "pilot"}
+    values, missing = resolve_settings(profile, given)
+    assert (missing, values["port"], values["user"]) == ((), 80, "pilot")
+
+
+@pytest.mark.parametrize("name", ["port", "user", "key"])
+def test_it_may_be_emptied(name: str) -> None:
+    assert parse_setting(OPTIONAL[name], " ") == OPTIONAL[name].empty
+
+
+def test_an_option_that_is_nothing_but_an_empty_setting_is_left_out() -> None:
+    options = {
+        "host": compile_template("{{ settings.host }}"),
+        "port": compile_template("{{ settings.port }}"),
+        "auth": {"user": "x", "password": compile_template("{{settings.key}}")},
+        "path": compile_template("/{{ settings.user }}"),
+    }
+    spec = TransportSpec("wire", "http", options)
+    values = {"host": "bot", "port": None, "key": "", "user": ""}
+    assert options_of(spec, values) == {"host": "bot", "auth": {"user": "x"}, "path": "/"}
+    full = {"host": "bot", "port": 80, "key": "hush", "user": "a"}
+    assert options_of(spec, full) == {
+        "host": "bot",
+        "port": 80,
+        "auth": {"user": "x", "password": "hush"},
+        "path": "/a",
+    }

@@ -380,3 +380,16 @@ def test_what_another_program_installs_is_seen(tmp_path: Path) -> None:
         assert "No driver yet" in client.get("/").text
         stock(tmp_path)
         assert "drivers/rover 1.0.0" in client.get("/").text
+
+
+def test_what_may_stay_empty_does_not_keep_anybody_from_connecting(tmp_path: Path) -> None:
+    """Nor does a text whose default is empty."""
+    settings = {
+        "key": Setting("key", "string", is_secret=True, is_required=False),
+        "port": Setting("port", "port", is_required=False),
+        "name": Setting("name", "string", default=""),
+    }
+    with served(tmp_path, dashboard_profile(settings=settings)) as client:
+        assert "Not set yet" not in client.get("/").text
+        assert client.get("/robots/puppet/").status_code == 200
+        assert "may stay empty" in client.get("/robots/puppet/settings").text

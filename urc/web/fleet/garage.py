@@ -158,6 +158,9 @@ class Garage:
             else:
                 del everything[name]
                 withheld.add(name)
+        for name, setting in profile.settings.items():
+            if not setting.is_required:
+                everything.setdefault(name, setting.empty)
         return Filled(everything, given, place, frozenset(withheld))
 
     def _begun_at(self, profile: Profile, package: str, values: Mapping[str, Value]) -> str:

@@ -130,7 +130,7 @@ def missing_settings(robot: Robot) -> tuple[Setting, ...]:
     return tuple(
         setting
         for name, setting in robot.profile.settings.items()
-        if robot.settings.get(name, setting.default) in (None, "")
+        if setting.is_missing(robot.settings.get(name, setting.default))
     )
 
 

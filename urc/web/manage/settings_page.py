@@ -178,7 +178,7 @@ def _field(
         kind=kind,
         keys=keys,
         value=text,
-        placeholder=default,
+        placeholder=default or ("" if setting.is_required else t("may stay empty")),
         options=options,
         is_given=is_given,
         is_set=is_given or (setting.name in kept.settings and setting.name not in withheld),

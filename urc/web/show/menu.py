@@ -117,7 +117,7 @@ def menu_page(
 
 def setting_row(setting: Setting, value: Value) -> SettingRow:
     """Return a setting as people read it; what is secret is not shown."""
-    if value is None:
+    if value is None or value == "":
         shown = ""
     elif setting.is_secret:
         shown = "••••••"
@@ -126,7 +126,8 @@ def setting_row(setting: Setting, value: Value) -> SettingRow:
     else:
         shown = str(value)
     title = setting.title or spoken(setting.name)
-    return SettingRow(title, setting.name, shown, setting.description, value is None)
+    is_missing = setting.is_missing(value)
+    return SettingRow(title, setting.name, shown, setting.description, is_missing)
 
 
 def _card(name: str, robot: Robot, ways: Ways, driver: str) -> Card:
