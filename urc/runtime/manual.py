@@ -66,7 +66,7 @@ def _settings(settings: Mapping[str, Setting]) -> Iterator[str]:
         empty = "to be filled in" if setting.is_required else "may stay empty"
         default = empty if setting.default is None else _code(_value(setting.default))
         if setting.is_secret:
-            default = "secret, to be filled in"
+            default = f"secret, {empty}"
         allowed = ", ".join(_code(choice) for choice in setting.choices)
         allowed = allowed or _range(setting.min, setting.max, "")
         rows.append((_code(setting.name), _plain(setting.title), setting.type, default, allowed))
