@@ -1,7 +1,7 @@
 """The form ``regex``: a pattern whose named groups are the fields."""
 
-from collections.abc import Mapping
-from typing import cast
+from collections.abc import Iterator, Mapping
+from typing import Final, cast
 
 from urc.expressions import quoted
 from urc.model.codec import Payload, ReadSpec
@@ -10,6 +10,10 @@ from urc.protocol.codec import CodecContext, Frame, NotWritable
 from urc.protocol.texts import encoded, field_text
 
 __all__ = ["RegexReader"]
+
+_WIDEST: Final = 16
+"""Characters of a number that is spelt in other ways."""
+_PLACES: Final = 6
 
 
 class RegexReader:
@@ -28,9 +32,34 @@ class RegexReader:
 
     def write(self, fields: Mapping[str, object]) -> Payload:
         """Return text with `fields` in the places of the groups."""
-        texts = {name: field_text(value) for name, value in fields.items()}
+        texts = {name: self._text(name, value) for name, value in fields.items()}
         text = example(self._pattern, texts)
         found = self._pattern.search(text)
         if found is None or any(found[name] != texts[name] for name in texts if name in found):
             raise NotWritable(f"no text with {quoted(texts)} fits {self._pattern.source!r}")
         return encoded(text, self._encoding)
+
+    def _text(self, name: str, value: object) -> str:
+        """Return a field as its group wants it: numbers with leading zeros or fixed decimals."""
+        text = field_text(value)
+        is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
+        if not is_number or len(text) > _WIDEST or name not in self._pattern.groups:
+            return text
+        if self._takes(name, text):
+            return text
+        return next((one for one in _padded(text) if self._takes(name, one)), text)
+
+    def _takes(self, name: str, text: str) -> bool:
+        found = self._pattern.search(example(self._pattern, {name: text}))
+        return found is not None and found[name] == text
+
+
+def _padded(text: str) -> Iterator[str]:
+    """Yield other spellings of a number: with zeros in front, a sign, more or fewer decimals."""
+    own = len(text.partition(".")[2])
+    number = float(text)
+    for places in (*range(own, -1, -1), *range(own + 1, _PLACES + 1)):
+        plain = f"{number:.{places}f}"
+        for sign in ("", "+") if number >= 0 else ("",):
+            for width in range(1, _WIDEST + 1):
+                yield f"{sign}{plain}".zfill(width)

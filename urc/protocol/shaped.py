@@ -10,6 +10,7 @@ from urc.model.codec import Payload, ReadSpec
 from urc.protocol.codec import CodecContext, Frame, NotWritable, Reader
 from urc.protocol.convert import BadValue, Unusable, build_conversion, build_inverse
 from urc.protocol.topics import frame_of
+from urc.protocol.word import Word
 
 __all__ = ["ShapedReader"]
 
@@ -60,8 +61,13 @@ class ShapedReader:
         return found
 
     def _is_meant(self, namespace: Mapping[str, object]) -> bool:
+        # As in 'match', text is equal to the number that it spells.
+        names = {
+            name: Word(value) if isinstance(value, str) else value
+            for name, value in namespace.items()
+        }
         try:
-            return self._when is not None and bool(self._when.evaluate(namespace))
+            return self._when is not None and bool(self._when.evaluate(names))
         except ExpressionError:
             return False  # it asks for a field that only another frame has
 

@@ -27,6 +27,10 @@ when: "_kind == 'X'"
 fields: {{ a: {{ scale: 0.1, not_available: ["-"] }} }}
 set: {{ p: "a * 2" }}
 """
+CODED = """
+split: { by: ',', fields: [_code, a] }
+when: _code == 1 or _code in [3, 4]
+"""
 PAIRS = "keyvalue: { pairs: ';', separator: ':' }"
 NAMED = "keyvalue: { pairs: ' ', separator: '=', fields: { B: bat } }"
 JSON = """json: { a: b.c, d: "e[1].f", g: h, k: "e[0].f", q: '"x y".z' }"""
@@ -78,6 +82,9 @@ READS = [
     (SHAPED, b"X,12,,4", {"_kind": "X", "a": 1.2, "b": "4", "p": 2.4}),
     (SHAPED, b"X,-,,4", {"_kind": "X", "a": None, "b": "4", "p": None}),
     (SHAPED, b"Y,12,,4", None),
+    (CODED, b"01,5", {"_code": "01", "a": "5"}),
+    (CODED, b"3,5", {"_code": "3", "a": "5"}),
+    (CODED, b"2,5", None),
     (PAIRS, b"bat:87;baro:31.02;x:1;\r\n", {"bat": "87", "baro": "31.02"}),
     (PAIRS, b" bat : 87 ; mode:", {"bat": "87", "mode": None}),
     (PAIRS, b"x:1;y:2", None),
@@ -153,6 +160,7 @@ WRITES = [
     (BLANKS, {"a": 1, "b": True}, b"1 true"),
     (SHAPED, {"_kind": "X", "a": 1.2, "p": 7}, b"X,12,,"),
     (SHAPED, {"_kind": "X", "a": None}, b"X,-,,"),
+    (CODED, {"_code": 1, "a": 2}, b"1,2"),
     (PAIRS, {"bat": 87, "mode": "x"}, b"bat:87;mode:x"),
     (NAMED, {"bat": 2.5}, b"B=2.5"),
     (JSON, {"a": 1, "d": [1]}, b'{"b":{"c":1},"e":[null,{"f":[1]}]}'),
@@ -161,6 +169,10 @@ WRITES = [
     ("equals: pong", {}, b"pong"),
     ("regex: '^V(?P<v>[0-9]+)( (?P<w>[a-z]+))?$'", {"v": 3}, b"V3"),
     ("regex: '^V(?P<v>[0-9]+)( (?P<w>[a-z]+))?$'", {"v": 3, "w": "x"}, b"V3 x"),
+    (r"regex: '^V(?P<v>\d{3})$'", {"v": 5}, b"V005"),
+    (r"regex: '^V(?P<v>[+-]\d{4}) (?P<i>\d{2}\.\d)$'", {"v": -12, "i": 7}, b"V-0012 07.0"),
+    (r"regex: '^V(?P<v>[+-]\d{4})$'", {"v": 12}, b"V+0012"),
+    (r"regex: '^V(?P<v>\d{2}\.\d{2})$'", {"v": 5.5}, b"V05.50"),
 ]  # fmt: skip
 
 
