@@ -170,15 +170,21 @@ def compile_pattern(text: str, *, is_over_bytes: bool = False) -> Pattern:
     return Pattern(text, groups, _re2_search(text), False)
 
 
-def example(pattern: Pattern, groups: Mapping[str, str]) -> str:
+def example(pattern: Pattern, groups: Mapping[str, str], variant: int = 0) -> str:
     """Return a short text made after `pattern`, with `groups` in the places of its named groups.
 
-    What is optional is left out unless a given group is in it; a class of characters gives its
-    first printable one. Whether the pattern really takes the text is the caller's to check.
+    Whether the pattern really takes the text is the caller's to check.
+
+    Args:
+        pattern: what the text is made after.
+        groups: name of a group → its text.
+        variant: at 0, what is optional is left out unless a given group is in it, the first of
+            several ways is taken, and a class of characters gives its first printable one. Other
+            numbers take other ways, characters and repeats.
     """
     tree = _parser.parse(pattern.source, re.ASCII)
     names = {number: name for name, number in tree.state.groupdict.items()}
-    return _example(tree, names, groups)
+    return _example(tree, names, groups, variant)
 
 
 def literal_prefix(pattern: Pattern) -> str:
@@ -241,24 +247,26 @@ def _letters(tree: Any) -> frozenset[int]:
     return letters
 
 
-def _example(tree: Any, names: Mapping[int, str], groups: Mapping[str, str]) -> str:
+def _example(tree: Any, names: Mapping[int, str], groups: Mapping[str, str], variant: int) -> str:
     pieces: list[str] = []
     for operation, argument in tree:
         if operation is _constants.SUBPATTERN:
             name = names.get(argument[0], "")
-            inner = _example(argument[3], names, groups)
+            inner = _example(argument[3], names, groups, variant)
             pieces.append(groups.get(name, inner) if name else inner)
         elif operation is _constants.BRANCH:
             chosen = [part for part in argument[1] if _mentions(part, names, groups)]
-            pieces.append(_example((chosen or argument[1])[0], names, groups))
+            ways = chosen or argument[1]
+            pieces.append(_example(ways[variant % len(ways)], names, groups, variant))
         elif operation in (_constants.MAX_REPEAT, _constants.MIN_REPEAT):
-            low, _, inner = argument
-            times = max(low, int(_mentions(inner, names, groups)))
-            pieces.append(_example(inner, names, groups) * times)
+            low, high, inner = argument
+            most = low + variant if high is _constants.MAXREPEAT else high
+            times = max(min(low + variant, most), int(_mentions(inner, names, groups)))
+            pieces.append(_example(inner, names, groups, variant) * times)
         elif operation is _constants.LITERAL:
             pieces.append(chr(argument))
         elif operation is not _constants.AT:
-            pieces.append(_first_printable(_characters(operation, argument)))
+            pieces.append(_printable(_characters(operation, argument), variant))
     return "".join(pieces)
 
 
@@ -272,10 +280,12 @@ def _mentions(tree: Any, names: Mapping[int, str], groups: Mapping[str, str]) ->
     return False
 
 
-def _first_printable(characters: frozenset[int] | None) -> str:
+def _printable(characters: frozenset[int] | None, variant: int) -> str:
     wanted = characters or _ALL
-    printable = (code for code in (*range(48, 58), *range(97, 123), *range(32, 127)))
-    return chr(next((code for code in printable if code in wanted), min(wanted, default=63)))
+    preferred = (*range(48, 58), *range(97, 123), *range(32, 48), *range(58, 97), *range(123, 127))
+    found = [code for code in preferred if code in wanted] or [min(wanted, default=63)]
+    # The first, the last, and others between them.
+    return chr(found[0 if not variant else -1 if variant == 1 else variant * 7 % len(found)])
 
 
 def _check_dialect(tree: Any, text: str) -> None:

@@ -40,6 +40,8 @@ __all__ = [
 NOW: Final = "now"
 """The root name of the time of day, in seconds since 1970."""
 _HASHES: Final = frozenset(f"_filter_{name}" for name in ("md5", "sha1", "sha256", "hmac_sha256"))
+_SUMMARIES: Final = frozenset(("_filter_length", "_is_defined", "_is_none", "_match", "_search"))
+"""What tells too little of its operand to be of use."""
 _NONCE: Final = re.compile(rf"ns\['{re.escape(NONCE)}'\]\(\d+\)")
 MAX_SOURCE: Final = 4096
 """Characters of one template."""
@@ -246,7 +248,7 @@ def last_filter(template: Template) -> str:
 
 
 def digested_settings(template: Template) -> frozenset[str]:
-    """Return the settings that show nowhere but in hashes with something new in them.
+    """Return the settings that show nowhere but in hashes with something new in them, or in tests.
 
     Such a hash tells nothing about the setting, and is worth nothing a second time.
     """
@@ -264,10 +266,14 @@ def _sort(node: ast.AST, shown: set[str], digested: set[str], *, is_digested: bo
             roots = {one.value for one in ast.walk(node) if isinstance(one, ast.Constant)}
             is_new = {NONCE, NOW} & roots or any(str(one).startswith("_") for one in roots)
             is_digested = is_digested or bool(is_new)
+        elif node.func.id in _SUMMARIES:
+            is_digested = True
         elif node.func.id == "_item" and ast.unparse(node.args[0]) == "ns['settings']":
             (digested if is_digested else shown).add(ast.literal_eval(node.args[1]))
     for inner in ast.iter_child_nodes(node):
-        _sort(inner, shown, digested, is_digested=is_digested)
+        # What only decides between two values shows no more than its length does.
+        is_test = isinstance(node, ast.Compare) or inner is getattr(node, "test", None)
+        _sort(inner, shown, digested, is_digested=is_digested or is_test)
 
 
 def is_nonce(template: Template) -> bool:

@@ -18,6 +18,7 @@ CONTROL_NAMES: Final = {name: bytes((place,)) for place, name in enumerate(_NAME
 }
 """Names of control characters that bytes may be written with."""
 _HEX = re.compile(r"0x((?:[0-9A-Fa-f]{2})+)")
+_TEMPLATE = re.compile(r"\{\{.*?\}\}")
 _BACKSLASH = re.compile(r"\\(?:x[0-9A-Fa-f]{2}|[abefnrtv0])")
 _SPELT = {r"\r": "CR", r"\n": "LF", r"\t": "TAB", r"\0": "NUL", r"\e": "ESC", r"\x1b": "ESC"}
 
@@ -41,6 +42,17 @@ def parse_bytes(part: Part | None, encoding: str, findings: Findings) -> bytes |
 
 
 def _literal(text: str, part: Part, encoding: str, findings: Findings) -> bytes | None:
+    template = _TEMPLATE.search(text)
+    if template is not None:
+        findings.error(
+            part,
+            "bad-template",
+            "these bytes are always the same: a template is not filled in here",
+            offset=template.start(),
+            length=len(template[0]),
+            hint="write the bytes themselves; what depends on settings belongs in what is sent",
+        )
+        return None
     backslash = _BACKSLASH.search(text)
     if backslash is not None:
         names = [_SPELT.get(escape, escape) for escape in _BACKSLASH.findall(text)]

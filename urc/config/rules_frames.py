@@ -20,8 +20,9 @@ from urc.patterns import Pattern, can_be_empty, example
 
 __all__ = ["check_frames_apart"]
 
-_FILLINGS: Final = ("0", "7", "-1.5", "q", "Zq", "a b", "~")
+_FILLINGS: Final = ("0", "7", "-1.5", "q", "Zq", "a b", "~", "A5", "F", "+12", "x_1", "")
 """What may stand in a field; only those that its pattern takes are tried."""
+_VARIANTS: Final = 6
 _SHOWN: Final = 40
 _WORD: Final = re.compile(r"\w+")
 _LETTERS: Final = re.compile(r"\^([A-Za-z0-9 :,=/_-]*)")
@@ -111,7 +112,7 @@ class _Text:
         if self._pattern is None:
             return (self._text,)
         groups = self._pattern.groups
-        made = [example(self._pattern, {})]
+        made = [example(self._pattern, {}, variant) for variant in range(_VARIANTS)]
         made += [example(self._pattern, dict.fromkeys(groups, one)) for one in _FILLINGS]
         return tuple(dict.fromkeys(one for one in made if _finds(self._pattern, one)))
 
