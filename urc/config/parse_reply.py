@@ -20,6 +20,9 @@ __all__ = [
 
 _OF_THE_WHOLE = ("match", "stages", "framing")
 """Keys that belong to the reply, not to one of its stages."""
+_BESIDE_SILENCE = (
+    "fields", "head", "set", "when", "lines", "match", "timeout", "framing", "resend", "extend",
+)  # fmt: skip
 _MOST_BUSY_S = 600.0
 """How long a robot may be busy in all where ``within`` does not say it."""
 
@@ -33,7 +36,17 @@ def parse_reply(part: Part | None, findings: Findings, context: FormContext) -> 
     for inner in stages:
         refuse(inner, _OF_THE_WHOLE, "belongs to the whole reply", findings)
     if stages:
-        beside = (*READ_FORMS, "fields", "set", "when", "lines", "timeout", "resend", "extend")
+        beside = (
+            *READ_FORMS,
+            "fields",
+            "set",
+            "when",
+            "lines",
+            "timeout",
+            "silence",
+            "resend",
+            "extend",
+        )
         refuse(part, beside, "belongs to one of the stages", findings)
     first, *others = [parse_stage(inner, findings, context) for inner in stages or [part]]
     errors, faults = parse_errors(part, findings, context) if stages else ((), ())
@@ -61,6 +74,8 @@ def implied_reply(send: WriteSpec) -> Reply | None:
 def parse_stage(part: Part, findings: Findings, context: FormContext) -> Stage:
     """Return one answer, whatever it belongs to."""
     errors, faults = parse_errors(part, findings, context)
+    if "silence" in part.data:
+        return _silence(part, errors, faults, findings)
     return Stage(
         read=_read(part, findings, context),
         errors=errors,
@@ -68,6 +83,28 @@ def parse_stage(part: Part, findings: Findings, context: FormContext) -> Stage:
         timeout_s=findings.duration(part, "timeout", 0.0, most=3600) or None,
         asides=_asides(part, findings, context),
     )
+
+
+def _silence(
+    part: Part,
+    errors: tuple[Pattern, ...],
+    faults: tuple[ErrorReply, ...],
+    findings: Findings,
+) -> Stage:
+    """Return the answer of a robot that says nothing when it does what was asked."""
+    beside = (*READ_FORMS, *_BESIDE_SILENCE)
+    refuse(part, beside, "means nothing beside 'silence', which is the answer", findings)
+    if "errors" not in part.data:
+        findings.error(
+            part,
+            "nothing-refuses",
+            "silence is the answer, and nothing says how the robot refuses",
+            at="silence",
+            key=True,
+            hint="write errors: with what it says then, or leave 'reply' out",
+        )
+    read, within_s = ReadSpec("silence"), findings.duration(part, "silence", 0.3, most=60)
+    return Stage(read=read, errors=errors, faults=faults, timeout_s=within_s)
 
 
 def _asides(part: Part, findings: Findings, context: FormContext) -> Asides:

@@ -84,6 +84,8 @@ class Answer(NamedTuple):
     """What the robot may ask for instead of answering, and the frame by which it does."""
     extend_s: float = 0.0
     """For how long it may ask for more time, in all."""
+    is_silence: bool = False
+    """The robot says nothing when it does what was asked: the time that passes is the answer."""
     takes_redirects: bool = False
     """It reads where the robot sends whoever asks, so that this is no failure."""
 

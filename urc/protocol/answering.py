@@ -166,12 +166,22 @@ class Answering(Connection):
         text = f"the answer to {flight.exchange.ask.label} came too late and was dropped"
         return Fault(self.spec.name, "late-reply", text)
 
+    def _silent(self, flight: Flight, now: float) -> list[LineEvent]:
+        """Take the silence of the robot for its answer."""
+        if flight.next_stage(now):
+            return []
+        self._flights.remove(flight)
+        done: list[LineEvent] = [Ended(flight.exchange, Outcome(values=flight.values))]
+        return done + self.leave(now) if self.is_per_request and self.is_ready else done
+
     def _overdue(self, flight: Flight, now: float) -> list[LineEvent]:
         if flight not in self._flights:
             return []  # the line was given up for another one
         if flight.is_late:
             self._flights.remove(flight)
             return []
+        if flight.ear.answer.is_silence:
+            return self._silent(flight, now)
         exchange, reply_s = flight.exchange, flight.ear.answer.timeout_s
         text = f"no answer to {exchange.ask.label} {flight.waited(now)}"
         came = self.inbox.came_since(exchange.sent_at, f"no answer to {exchange.ask.label}")

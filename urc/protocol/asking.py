@@ -205,6 +205,7 @@ class Builder:
                 (kind, self._matcher(read, context)) for kind, read in asides if read is not None
             ),
             extend_s=stage.asides.extend_s,
+            is_silence=stage.read.form == "silence",
             takes_redirects=LOCATION in stage.read.head.values(),
         )
 

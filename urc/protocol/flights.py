@@ -214,7 +214,8 @@ class Flights(list[Flight]):
                 is_realtime = flight.exchange.is_realtime
                 if has_first_realtime if is_realtime else has_first:
                     continue
-                if not flight.is_late:  # what is late may never come: it blocks nobody's answer
+                # What is late may never come, and silence never does: they block no other answer.
+                if not (flight.is_late or flight.ear.answer.is_silence):
                     has_first_realtime |= is_realtime
                     has_first |= not is_realtime
             if flight.ear.answer.lines is not None:

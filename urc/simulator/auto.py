@@ -328,9 +328,11 @@ class AutoLine:
         reply = asked.reply
         answers: list[Answer] = []
         if reply is not None:
-            answers.append(self._answer(reply.read, reply.framing, reply.match))
+            reads = [reply.read, *(stage.read for stage in reply.stages)]
             answers += [
-                self._answer(stage.read, reply.framing, reply.match) for stage in reply.stages
+                self._answer(read, reply.framing, reply.match)
+                for read in reads
+                if read.form != "silence"
             ]
         return self._sent(label, asked.send, tuple(answers), arguments)
 
