@@ -21,6 +21,7 @@ FLOORS = {
     "config": 3, "protocol": 3, "transports": 3, "packages": 3, "motion": 3,
     "model": 2,
     "source": 1, "registry": 1, "shipped": 1, "private_files": 1, "expressions": 1, "patterns": 1,
+    "images": 1,
     "problems": -1,  # the ground: every error of ours is an UrcError, so all may stand on it
 }  # fmt: skip
 

@@ -11,6 +11,7 @@ from binascii import a2b_base64, b2a_base64
 from collections.abc import Callable, Mapping
 
 from urc.expressions import quoted
+from urc.images import MAX_PIXELS, picture_size, pixels
 from urc.model.values import Reading, Signal, Value
 from urc.protocol.convert import BadValue
 
@@ -86,6 +87,9 @@ def bytes_converter(signal: Signal) -> Callable[[object], Reading]:
             raise BadValue(f"{quoted(raw)} is neither bytes nor their base64")
         if len(data) > most:
             raise BadValue(f"{len(data)} bytes, {most} are the most")
+        if signal.type == "image" and pixels(data) > MAX_PIXELS:
+            width, height = picture_size(data) or (0, 0)
+            raise BadValue(f"a picture of {width} by {height} pixels; {MAX_PIXELS} are the most")
         return data
 
     return convert

@@ -7,6 +7,7 @@ import struct
 import pytest
 
 from tests.unit.web.test_client import FakeLine
+from urc.images import media_type
 from urc.model.interface import WidgetUse
 from urc.model.values import Sample, Signal
 from urc.runtime.hub import Hub
@@ -19,7 +20,7 @@ from urc.web.fleet.robots import Robot, Station
 from urc.web.show.demos import colour_bars
 from urc.web.socket import Client
 from urc.web.wire import messages as wire
-from urc.web.wire.picture import Show, as_frame, media_type, picture_head
+from urc.web.wire.picture import Show, as_frame, picture_head
 
 pytestmark = pytest.mark.anyio
 

@@ -14,6 +14,7 @@ from typing import Any, Final, NamedTuple, get_args
 
 import msgspec
 
+from urc.images import media_type
 from urc.model.driver import Driver
 from urc.model.values import Alarm, Reading, Sample, Signal
 from urc.runtime.audit import Entry
@@ -43,13 +44,6 @@ _LAST_S: Final = 1e9
 _LAST_NS: Final = 2**63 - 1
 """Latest time that every program reads."""
 LEVELS: Final = {"info": 2, "warning": 3, "error": 4}
-_FORMATS: Final = (
-    (b"\xff\xd8\xff", "jpeg"),
-    (b"\x89PNG\r\n\x1a\n", "png"),
-    (b"GIF8", "gif"),
-    (b"BM", "bmp"),
-)
-
 _TEXT: Final = {"type": "string"}
 _WHOLE: Final = {"type": "integer"}
 _TIME: Final = {
@@ -247,9 +241,8 @@ def _stamp(time_ns: int) -> dict[str, int]:
 
 
 def _format(data: bytes) -> str:
-    if data[:4] == b"RIFF" and data[8:12] == b"WEBP":
-        return "webp"
-    return next((name for sign, name in _FORMATS if data.startswith(sign)), "")
+    kind, _, name = media_type(data).partition("/")
+    return name if kind == "image" else ""
 
 
 def _json(told: Mapping[str, object]) -> bytes:

@@ -7,6 +7,7 @@ import json
 
 import msgspec
 
+from urc.images import MAX_PIXELS, media_type, pixels
 from urc.model.codec import Envelope
 from urc.runtime.hub import Note, Traffic
 from urc.web.wire.text import cut
@@ -24,7 +25,7 @@ SHOWN_BYTES = 4096
 """Of one piece of traffic; the rest is only counted."""
 THUMBNAIL_BYTES = 48 * 1024
 """Largest picture that is shown as one."""
-_PICTURES = {b"\x89PNG\r\n": "image/png", b"\xff\xd8\xff": "image/jpeg", b"GIF8": "image/gif"}
+_SHOWN = ("image/png", "image/jpeg", "image/gif")
 _NAMES = ("topic", "action", "service", "method", "path", "url")
 """Attributes that say where a message goes or comes from, in this order."""
 
@@ -93,12 +94,12 @@ def fill(row: Row, envelope: Envelope) -> None:
 
 def _fill_bytes(row: Row, data: bytes) -> None:
     row.size = len(data)  # of what is shown: how long a secret is, is part of it
-    for head, kind in _PICTURES.items():
-        if data.startswith(head):
-            row.text = f"<{grouped(len(data))} bytes, {kind}>"
-            if len(data) <= THUMBNAIL_BYTES:
-                row.picture, row.data = kind, data
-            return
+    kind = media_type(data)
+    if kind in _SHOWN:
+        row.text = f"<{grouped(len(data))} bytes, {kind}>"
+        if len(data) <= THUMBNAIL_BYTES and pixels(data) <= MAX_PIXELS:
+            row.picture, row.data = kind, data
+        return
     row.data = data[:SHOWN_BYTES]
 
 

@@ -11,11 +11,11 @@ from starlette.requests import Request
 from starlette.responses import JSONResponse, Response
 from starlette.routing import Route
 
+from urc.images import media_type
 from urc.model.driver import Driver
 from urc.model.values import Reading, Signal
 from urc.web.fleet.robots import Station
 from urc.web.show.cells import spoken
-from urc.web.wire.picture import media_type
 from urc.web.words import t
 
 __all__ = ["VALUES", "Cards", "small_values"]

@@ -12,6 +12,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from urc.images import media_type
 from urc.model.codec import ReadSpec, WriteSpec
 from urc.model.driver import Argument, Command, Driver, Reply, TransportSpec
 from urc.model.flow import Hold
@@ -23,7 +24,6 @@ from urc.problems import ProblemsError, UrcError
 from urc.source import Document, read_document
 from urc.web.show.demo_shape import check_demo
 from urc.web.wire.messages import encode_hello
-from urc.web.wire.picture import media_type
 
 __all__ = ["DemoState", "demo_states", "colour_bars"]
 

@@ -15,7 +15,9 @@ from typing import Annotated
 
 import msgspec
 
-__all__ = ["Show", "as_frame", "media_type", "picture_head"]
+from urc.images import media_type
+
+__all__ = ["Show", "as_frame", "picture_head"]
 
 _PICTURE = 1
 _HEADER = struct.Struct(">BBHId")
@@ -26,14 +28,6 @@ _FINAL_TEXT, _FINAL_BINARY = b"\x81", b"\x82"
 _SHORT, _MEDIUM = 126, 1 << 16
 """A frame's length takes one byte below the first, three below the second, else nine."""
 
-_SIGNS = (
-    (b"\xff\xd8\xff", b"image/jpeg"),
-    (b"\x89PNG\r\n\x1a\n", b"image/png"),
-    (b"GIF8", b"image/gif"),
-    (b"BM", b"image/bmp"),
-)
-OTHER = b"application/octet-stream"
-
 
 class Show(msgspec.Struct, tag_field="t", tag="show", forbid_unknown_fields=True, frozen=True):
     """Says which images the page shows now; all others are not sent."""
@@ -41,22 +35,6 @@ class Show(msgspec.Struct, tag_field="t", tag="show", forbid_unknown_fields=True
     signals: Annotated[
         tuple[Annotated[str, msgspec.Meta(max_length=256)], ...], msgspec.Meta(max_length=64)
     ] = ()
-
-
-def media_type(data: bytes) -> str:
-    """Return what the bytes are, by how they begin; ``application/octet-stream`` when unknown."""
-    return _kind(data).decode()
-
-
-def _kind(data: bytes) -> bytes:
-    for sign, name in _SIGNS:
-        if data.startswith(sign):
-            return name
-    if data[:4] == b"RIFF" and data[8:12] == b"WEBP":
-        return b"image/webp"
-    if data[4:8] == b"ftyp" and data[8:12] in (b"avif", b"avis"):
-        return b"image/avif"
-    return OTHER
 
 
 def picture_head(index: int, data: bytes, age_ms: int, now_ms: int) -> tuple[bytes, int]:
@@ -68,7 +46,7 @@ def picture_head(index: int, data: bytes, age_ms: int, now_ms: int) -> tuple[byt
         age_ms: how old it is now.
         now_ms: the server's clock.
     """
-    kind = _kind(data)
+    kind = media_type(data).encode("ascii")
     age_ms = 0 if age_ms < 0 else age_ms if age_ms < _OLDEST_MS else _OLDEST_MS
     length = len(kind)
     size = _HEADER.size + length + len(data)
