@@ -10,6 +10,8 @@ from playwright.async_api import Browser, FrameLocator, Page, expect
 from tests.e2e.conftest import PageMaker
 from tests.e2e.dashboards import running_dashboard, until, until_text
 from tests.e2e.motion.driving import CALM_LEASE_S, STOP, Wire, commands, moved, push
+from urc.model.codec import WriteSpec
+from urc.model.driver import Command
 from urc.model.interface import Given, WidgetUse
 from urc.model.values import Signal
 from urc.model.widget import Widget
@@ -352,3 +354,77 @@ async def test_one_that_spins_later_stops_neither_the_page_nor_who_drives(
         await expect(hanging).to_contain_text("it stopped answering", timeout=SLOW_MS)
         await page.mouse.up()
         assert await page.locator(".urc-fault").count() == 2
+
+
+async def test_a_foreign_widget_moves_nothing_without_a_yes(
+    new_page: PageMaker, tmp_path: Path
+) -> None:
+    """The driver asks nothing before this command; the page does, where the code is foreign."""
+    eager = "export default { mount({ send, el }) { void send('press', {}); } };"
+    uses = [WidgetUse("eager", "eager", {}, {"press": "takeoff"})]
+    takeoff = Command("takeoff", "wire", WriteSpec("text", {}), title="Take off", moves=True)
+    robot = FakeRobot(
+        dashboard_profile(
+            uses=uses, widgets=[made(tmp_path, "eager", eager)], commands={"takeoff": takeoff}
+        )
+    )
+    async with running_dashboard(robot) as address:
+        page = await new_page()
+        new_page.allow(page, is_told)
+        await page.goto(f"{address}robots/puppet/")
+        question = page.locator(f"{cell(page, 'eager', uses)} .urc-ask")
+        await expect(question).to_contain_text("“Take off”", timeout=SLOW_MS)
+        assert robot.commands == []
+        await question.get_by_role("button", name="Yes").click()
+        await until(lambda: robot.commands == [("takeoff", {})])
+
+
+async def test_a_reset_holds_against_a_widget_that_stops_by_itself(
+    new_page: PageMaker, tmp_path: Path
+) -> None:
+    """It may stop the robot once; its cell says that it did."""
+    nervous = "export default { mount({ stop }) { setInterval(stop, 50); } };"
+    uses = [
+        WidgetUse("nervous", "nervous", {}),
+        WidgetUse("left", "joystick", {}, {"moved": "drive"}),
+    ]
+    robot = Zoo(uses, [made(tmp_path, "nervous", nervous)])
+    async with running_dashboard(robot) as address:
+        page = await new_page()
+        new_page.allow(page, is_told)
+        await page.goto(f"{address}robots/puppet/")
+        remark = page.locator(f"{cell(page, 'nervous', uses)} .urc-remark")
+        await expect(remark).to_contain_text("pressed STOP by itself", timeout=SLOW_MS)
+        stop = page.locator(STOP)
+        await expect(stop).not_to_have_attribute("data-phase", "", timeout=SLOW_MS)
+        await page.get_by_role("button", name="Reset").click()
+        await expect(stop).to_have_attribute("data-phase", "")
+        await page.wait_for_timeout(1000)  # twenty more presses
+        await expect(stop).to_have_attribute("data-phase", "")
+
+
+async def test_a_flood_past_the_port_ends_the_frame(new_page: PageMaker, tmp_path: Path) -> None:
+    """The page answers all the while: it counts such messages, and does not read them."""
+    loud = """
+        export default { mount() { setInterval(() => {
+          for (let count = 0; count < 2000; count += 1) parent.postMessage({ count }, "*");
+        }, 20); } };"""
+    quiet = """
+        export default { mount({ el }) {
+          for (let count = 0; count < 10; count += 1) parent.postMessage({ count }, "*");
+          el.dataset.stands = "yes";
+        } };"""
+    uses = [WidgetUse("loud", "loud", {}), WidgetUse("quiet", "quiet", {})]
+    uses.append(WidgetUse("left", "joystick", {}, {"moved": "drive"}))
+    robot = Zoo(uses, [made(tmp_path, "loud", loud), made(tmp_path, "quiet", quiet)])
+    async with running_dashboard(robot) as address:
+        page = await new_page()
+        new_page.allow(page, is_told)
+        await page.goto(f"{address}robots/puppet/")
+        card = page.locator(f"{cell(page, 'loud', uses)} .urc-fault")
+        await expect(card).to_contain_text("it floods the page with messages", timeout=SLOW_MS)
+        assert await page.locator(f"{cell(page, 'loud', uses)} .urc-frame").count() == 0
+        quiet_one = inside(page, cell(page, "quiet", uses)).locator("[data-frame]")
+        await expect(quiet_one).to_have_attribute("data-stands", "yes", timeout=SLOW_MS)
+        await page.locator(STOP).click()
+        await expect(page.locator(STOP)).not_to_have_attribute("data-phase", "")

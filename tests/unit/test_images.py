@@ -51,7 +51,9 @@ def test_a_small_file_of_a_huge_picture_is_no_value() -> None:
     huge = picture("PNG", 4, 4)[:16] + (14_000).to_bytes(4, "big") * 2 + b"\x08\x02\0\0\0"
     with pytest.raises(BadValue, match="a picture of 14000 by 14000 pixels; 16000000 are the most"):
         build_converter(signal)(huge)
-    assert build_converter(Signal("file", "blob"))(huge) == huge, "what is no image is not looked at"
+    assert build_converter(Signal("file", "blob"))(huge) == huge, (
+        "what is no image is not looked at"
+    )
 
 
 def test_a_picture_of_a_good_camera_passes() -> None:

@@ -88,6 +88,8 @@ export class Cell {
     this.seenOutlets = null;
     /** Edition of the store of which all was shown. */
     this.edition = -1;
+    /** Whether the widget's code is not ours. */
+    this.isForeign = false;
     /** Its inputs that are images. @type {{edition: number, names: readonly string[]}} */
     this.images = { edition: -1, names: NONE };
     /** Places of the images that the widget shows, by input; without an entry, all. @type {Map<string, ReadonlySet<number>>} */

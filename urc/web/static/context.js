@@ -70,7 +70,7 @@ export function contextOf(cell) {
 /**
  * Give the command that an output is bound to, after the questions that the driver has for people.
  *
- * @param {Pick<Cell, "doors" | "el" | "end" | "output">} cell
+ * @param {Pick<Cell, "doors" | "el" | "end" | "output" | "isForeign">} cell
  * @param {string} output
  * @param {Record<string, Given>} given by the names of the widget's manifest
  */
@@ -80,13 +80,31 @@ export async function give(cell, output, given) {
   const { command } = bound;
   const args = argumentsOf(bound, given);
   const questions = questionsOf(bound.asks ?? [], args);
-  if (questions.length === 0) return cell.doors.run(command, args);
+  if (questions.length === 0) {
+    // Foreign code has no hand: a person says yes before it moves anything.
+    if (cell.isForeign && bound.mayMove) await agreed(cell, bound.title || command);
+    return cell.doors.run(command, args);
+  }
   const ticket = await cell.doors.asks.ask(cell.el, questions, cell.end.signal);
   try {
     return await cell.doors.run(command, args, ticket);
   } finally {
     ticket.close();
   }
+}
+
+/**
+ * Ask whether a foreign widget may give a command that moves the robot; rejects when it may not.
+ *
+ * @param {Pick<Cell, "doors" | "el" | "end">} cell
+ * @param {string} title of the command
+ */
+async function agreed(cell, title) {
+  const text = t("This widget wants to give “{command}”. The robot may move.", { command: title });
+  /** @type {import("./types.js").Question} */
+  const question = { argument: "", value: "", text, level: "normal", isTwoPerson: false };
+  const ticket = await cell.doors.asks.ask(cell.el, [question], cell.end.signal);
+  ticket.close();
 }
 
 /**

@@ -24,6 +24,7 @@
  * @property {string} refusal Why a widget can never give it; "" when it can.
  * @property {boolean} isHeld Whether it is motion, and given by holding.
  * @property {boolean} [moves] Whether it moves something by itself, without a hand that holds it.
+ * @property {boolean} [mayMove] Whether it moves something with some arguments.
  * @property {number} leaseMs How long motion lasts when nothing is heard.
  * @property {boolean} isAnswered Whether the robot says that it was done.
  * @property {string} [title] What the command is called; "" when the driver does not say.

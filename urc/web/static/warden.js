@@ -30,6 +30,20 @@ const LOADING_MS = 5000;
 const PADS_EVERY_MS = 50;
 /** Presses of STOP a second: one is enough. */
 const MOST_STOPS = 5;
+/** Messages a second to the page itself. Extensions of the browser may say something, widgets have a port. */
+const MOST_ASIDE = 20;
+
+/** Those whose frames may speak to the page. @type {Set<Warden>} */
+const wardens = new Set();
+// First of all listeners, and without a look at what was said: a flood costs next to nothing.
+addEventListener("message", (event) => {
+  for (const warden of wardens) {
+    if (event.source !== warden.frameEl?.contentWindow) continue;
+    event.stopImmediatePropagation();
+    warden.aside();
+    return;
+  }
+}, { capture: true });
 
 const watch = new Watch();
 setInterval(() => {
@@ -43,6 +57,9 @@ export class Warden extends Cell {
    */
   constructor(el, doors) {
     super(el, doors);
+    this.isForeign = true;
+    /** Whether it pressed STOP by itself, and nobody has touched it since. */
+    this.hasStopped = false;
     this.html = el.dataset["html"] ?? "";
     this.url = el.dataset["frame"] ?? "";
     /** @type {HTMLIFrameElement | null} */
@@ -64,6 +81,7 @@ export class Warden extends Cell {
     this.toldEdition = -1;
     this.isUp = false;
     this.messages = new Rate(MOST_MESSAGES);
+    this.asides = new Rate(MOST_ASIDE);
     this.commands = new Rate(MOST_COMMANDS);
     this.stops = new Rate(MOST_STOPS);
     /** @type {Set<string>} */
@@ -120,6 +138,7 @@ export class Warden extends Cell {
     this.frameEl = frame;
     frame.src = this.url;
     this.el.prepend(frame);
+    wardens.add(this);
     watch.add(this);
   }
 
@@ -135,6 +154,11 @@ export class Warden extends Cell {
     port1.start();
     // A frame without an origin has no name to be addressed by; nothing secret is said here.
     frame.contentWindow?.postMessage({ t: "port" }, "*", [port2]);
+  }
+
+  /** It said something to the page, past its port. */
+  aside() {
+    if (!this.asides.take(performance.now())) this.fail(new Error(t("it floods the page with messages")));
   }
 
   /** A frame may take the focus with a hand, and not by itself. */
@@ -210,11 +234,10 @@ export class Warden extends Cell {
         if (this.isTouched()) doors.drive(message.wish);
         break;
       case "stop":
-        if (this.stops.take(performance.now())) doors.stop.press();
+        this.stop();
         break;
       case "space":
-        if (message.isTaken && !doors.input.isDriving()) break;
-        if (this.stops.take(performance.now())) doors.stop.press();
+        if (!message.isTaken || doors.input.isDriving()) this.stop();
         break;
       case "onstop":
         doors.stop.follow((state) => this.post({ t: "stopstate", state }), life.signal);
@@ -234,6 +257,17 @@ export class Warden extends Cell {
       default:
         this.overlays.take(message);
     }
+  }
+
+  /** A hand may press STOP as often as it likes; the widget by itself once, so that a reset holds. */
+  stop() {
+    // Escape is no activation for browsers: the focus that a hand brought counts as one.
+    const isByHand = this.isTouched() || (this.isUsed && document.activeElement === this.frameEl);
+    if (!isByHand && this.hasStopped) return;
+    if (!this.stops.take(performance.now())) return;
+    this.hasStopped = !isByHand;
+    if (!isByHand) this.remark(t("■ this widget pressed STOP by itself"));
+    this.doors.stop.press();
   }
 
   /** The frame listens: hand the widget over. */
@@ -365,6 +399,7 @@ export class Warden extends Cell {
   /** Take the frame out; what it held is let go. */
   leave() {
     watch.remove(this);
+    wardens.delete(this);
     this.life.abort();
     this.port?.close();
     this.port = null;
