@@ -4,6 +4,7 @@ import base64
 import hashlib
 import re
 from pathlib import Path
+from typing import NoReturn
 
 import pytest
 from starlette.testclient import TestClient
@@ -17,7 +18,8 @@ from urc.web.app import Robot, build_app
 from urc.web.load.foreign import OURS, Border
 
 CODE = " ".join(
-    f"http://localhost:8080/{folder}/" for folder in ("static", "vendor", "words", "widgets/lamp")
+    f"http://localhost:8080{ACCESS.frame_code}/{folder}/"
+    for folder in ("static", "vendor", "words", "widgets/lamp")
 )
 
 
@@ -33,6 +35,11 @@ def lamp(folder: Path) -> FakeRobot:
             widgets=[plain_widget("lamp", ["level"], folder / "lamp")],
         )
     )
+
+
+def lamp_session() -> NoReturn:
+    """Open no session: no page is opened here that wants one."""
+    raise AssertionError
 
 
 def use_of(widget: str) -> WidgetUse:
@@ -97,6 +104,31 @@ def test_a_frame_may_load_code_of_ours_and_its_own_and_reach_nothing(
     assert "gamepad=()" in answer.headers["permissions-policy"]
     assert "access-control-allow-origin" not in answer.headers
     assert "puppet" not in answer.text
+
+
+@pytest.mark.parametrize("file", ["/static/kit.css", "/widgets/lamp/widget.js", "/words/de.js"])
+def test_code_is_open_to_frames_and_to_no_other_site(tmp_path: Path, file: str) -> None:
+    """By a path of this start, which only our own pages are told; a frame has no cookies."""
+    app = build_app({"puppet": Robot(lamp(tmp_path).profile, {}, lamp_session)}, access=ACCESS)
+    frame = TestClient(app, base_url="http://localhost:8080", headers={"origin": "null"})
+    answer = frame.get(f"{ACCESS.frame_code}{file}")
+    assert answer.status_code == 200
+    assert answer.headers["access-control-allow-origin"] == "*"
+    assert answer.headers["cross-origin-resource-policy"] == "cross-origin"
+    site = TestClient(app, base_url="http://localhost:8080", cookies=HERE)
+    for path in (file, f"/frame-code/guessed{file}"):
+        answer = site.get(path, headers={"origin": "http://evil.example"})
+        assert "access-control-allow-origin" not in answer.headers
+        assert answer.headers["cross-origin-resource-policy"] == "same-origin"
+    assert frame.get("/widgets/lamp/widget.js").status_code == 401
+
+
+@pytest.mark.parametrize(
+    "path", ["/", "/healthz", "/robots/puppet/", "/api/v1/robots/puppet/timeline", "/frames/lamp"]
+)
+def test_nothing_but_code_is_below_the_path_of_frames(tmp_path: Path, path: str) -> None:
+    browser = client(lamp(tmp_path))
+    assert browser.get(f"{ACCESS.frame_code}{path}").status_code == 404
 
 
 def test_there_is_a_frame_only_for_a_widget_that_is_served(tmp_path: Path) -> None:

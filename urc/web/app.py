@@ -160,7 +160,7 @@ class _Dashboard(Starlette):
             border=routes.border,
             ways=routes.ways,
         )
-        frames = Frames(routes.modules, files.has_widget)
+        frames = Frames(routes.modules, files.has_widget, access.frame_code)
         super().__init__(
             routes=[
                 Route("/", routes.menu),

@@ -23,9 +23,11 @@ __all__ = ["Door", "DoorPage", "Stoppable"]
 SAID = "open the address that URC printed when it started: it has the key"
 """To programs and sockets; `words.js` knows it, too."""
 _OPEN = re.compile(
-    r"/healthz|/favicon\.ico|/app\.webmanifest|/sw\.js|/(?:static|vendor|words|widgets)/.+\.\w+"
+    r"/healthz|/favicon\.ico|/app\.webmanifest|/sw\.js|/(?:static|vendor|words)/.+\.\w+"
 )
-"""What says nothing of a robot. Frames of widgets have no cookies, so their files are open."""
+"""What says nothing of a robot."""
+_CODE = re.compile(r"/(?:static|vendor|words|widgets)/.+\.\w+")
+"""What frames load, below a path that only our own pages are told."""
 _HEADERS = {"cache-control": "no-store"}
 _REFUSED = {**_HEADERS, "www-authenticate": 'Bearer realm="URC"'}
 
@@ -78,6 +80,11 @@ class Door:
         """Hand on what may go on, and answer the rest."""
         if scope["type"] == "lifespan":
             await self._app(scope, receive, send)
+            return
+        code = scope["path"].removeprefix(self._access.frame_code)
+        if code != scope["path"] and _CODE.fullmatch(code) and scope["type"] == "http":
+            scope["state"]["is_code"] = True
+            await self._app({**scope, "path": code}, receive, send)
             return
         visitor: Visitor = scope["state"]["visitor"]
         query = parse_qsl(scope["query_string"].decode("latin-1"), keep_blank_values=True)

@@ -25,8 +25,6 @@ KIT = ("curve", "giving", "kit", "meter", "motion", "padmap", "palette", "scale"
 WIDGET_FILES = ("widget.js", "widget.css")
 MOST_FILES = 200
 """That pages may load of one widget."""
-CODE = ("/static/", "/vendor/", "/words/", "/widgets/")
-"""Where frames may load from."""
 MEDIA_TYPES = {
     ".css": "text/css; charset=utf-8",
     ".js": "text/javascript; charset=utf-8",
@@ -88,8 +86,6 @@ def script(source: str, request: Request) -> Response:
 
 
 def _kept(body: bytes, tag: str, media_type: str, request: Request) -> Response:
-    # Foreign widgets load it from their frames.
-    request.state.is_code = request.url.path.startswith(CODE)
     headers = {"etag": tag, "cache-control": "no-cache"}
     if tag in request.headers.get("if-none-match", ""):
         return Response(status_code=304, headers=headers)

@@ -58,6 +58,8 @@ class Access:
         self.key = key or secrets.token_urlsafe(24)
         self.instance = instance or secrets.token_hex(4)
         self.cookie = PREFIX + self.instance
+        self.frame_code = f"/frame-code/{secrets.token_urlsafe(16)}"
+        """Path below which frames load code: they have no origin, and so no cookies."""
         self._token = token
         self._sessions: dict[str, Visitor] = {}
         self._codes: dict[str, None] = {}

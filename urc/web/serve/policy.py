@@ -85,8 +85,8 @@ _FRAME_HEADERS = (
 _CODE_FOLDERS = ("static", "vendor", "words")
 _CODE_HEADERS = (
     *(pair for pair in _FIXED_HEADERS if pair[0] != b"cross-origin-resource-policy"),
-    # A frame without an origin is nobody's own, so what it may load is open to all; it is code
-    # that anybody can download, and says nothing of a robot.
+    # A frame without an origin is nobody's own, so what it may load is open to all who know the
+    # path: our pages, and the frames in them.
     (b"cross-origin-resource-policy", b"cross-origin"),
     (b"access-control-allow-origin", b"*"),
 )
@@ -167,7 +167,7 @@ def is_origin_ours(origin: str, scheme: str, authority: Authority) -> bool:
     )
 
 
-def frame_policy(scope: Scope, widget: str, digest: str) -> str:
+def frame_policy(scope: Scope, widget: str, digest: str, place: str) -> str:
     """Return the policy of a frame: code of ours and of one widget, and nothing else at all.
 
     No nonce: with one, a script or style of any other address could be loaded, and an address is a
@@ -177,6 +177,7 @@ def frame_policy(scope: Scope, widget: str, digest: str) -> str:
         scope: of the request for the frame, whose host was let in.
         widget: its name, as in a URL.
         digest: ``sha256-…`` of the import map.
+        place: path below which frames load code.
     """
     authority = parse_host(_values(scope, b"host")[0])
     # The grammar of sources has no IPv6 addresses.
@@ -185,7 +186,7 @@ def frame_policy(scope: Scope, widget: str, digest: str) -> str:
     port = "" if authority.port is None else f":{authority.port}"
     origin = f"{scope['scheme']}://{authority.host}{port}"
     folders = (*_CODE_FOLDERS, f"widgets/{widget}")
-    code = " ".join(f"{origin}/{folder}/" for folder in folders)
+    code = " ".join(f"{origin}{place}/{folder}/" for folder in folders)
     return _FRAME_POLICY.format(digest=digest, code=code)
 
 

@@ -8,6 +8,7 @@ import base64
 import hashlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import cast
 
 from jinja2.utils import htmlsafe_json_dumps
 from markupsafe import Markup
@@ -30,6 +31,8 @@ class FramePage:
     """JSON; the policy names its digest, so it is written exactly so."""
     style: str
     """URL of the widget's style sheet."""
+    place: str
+    """Path below which it loads all of this."""
 
 
 class Frames:
@@ -38,19 +41,28 @@ class Frames:
     Args:
         modules: the import map.
         has: whether pages may load that widget's files.
+        place: path below which frames load code.
     """
 
-    def __init__(self, modules: Mapping[str, object], has: Callable[[str], bool]) -> None:
+    def __init__(
+        self, modules: Mapping[str, object], has: Callable[[str], bool], place: str
+    ) -> None:
         self._modules = modules
         self._has = has
+        self._place = place
 
     async def frame(self, request: Request) -> Response:
         """Return the document for one widget; raise 404 when there is none of that name."""
-        name = request.path_params["widget"]
+        name, place = request.path_params["widget"], self._place
         if not self._has(name):
             raise HTTPException(404)
-        text = htmlsafe_json_dumps(with_words(self._modules))
+        text = htmlsafe_json_dumps(self._below(with_words(self._modules)))
         digest = base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()
-        request.state.frame_policy = frame_policy(request.scope, name, f"sha256-{digest}")
-        page = FramePage(name, text, f"/widgets/{name}/widget.css")
+        request.state.frame_policy = frame_policy(request.scope, name, f"sha256-{digest}", place)
+        page = FramePage(name, text, f"{place}/widgets/{name}/widget.css", place)
         return HTMLResponse(render("frame.html.j2", page), headers={"cache-control": "no-store"})
+
+    def _below(self, modules: Mapping[str, object]) -> Mapping[str, object]:
+        """Return the import map with all of it below the frames' path."""
+        imports = cast("Mapping[str, str]", modules["imports"])
+        return {"imports": {name: f"{self._place}{url}" for name, url in imports.items()}}

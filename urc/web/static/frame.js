@@ -15,6 +15,14 @@ import { contextOf } from "./frame_context.js";
 import { Grips } from "./frame_grips.js";
 import { part, t } from "./kit.js";
 
+/** Where this code comes from, as all of a frame's does: it has no cookies, and no other way to it. */
+const PLACE = new URL("..", import.meta.url);
+
+/** @param {string} url of a module, as our pages load it */
+function below(url) {
+  return new URL(url.replace(/^\//, ""), PLACE).href;
+}
+
 /** A widget that is slow gets its news so often. */
 const SLOW_EVERY_MS = 1000;
 
@@ -116,7 +124,7 @@ export class Frame {
     this.el.innerHTML = markup ? markup.createHTML(html) : html;
     try {
       /** @type {WidgetModule} */
-      const module = await import(url);
+      const module = await import(below(url));
       this.say({ t: "in" });
       const mounting = module.default.mount(contextOf(this, opened(options, files)));
       this.say({ t: "out" });
