@@ -11,6 +11,7 @@ from urc.model.driver import TransportSpec
 from urc.model.profile import Profile
 from urc.problems import ProblemsError, UrcError
 from urc.runtime.catalog import built_in_catalog
+from urc.runtime.near import check_hosts
 from urc.runtime.shelves import shelf_of
 from urc.shipped import shipped
 
@@ -34,6 +35,8 @@ def permissions(document: Path, folder: Path, widgets: Sequence[str]) -> list[st
     errors = [problem for problem in checked.problems if problem.severity == "error"]
     if errors:
         raise ProblemsError(errors)
+    if checked.profile:
+        check_hosts(checked.profile)
     lines = _of_profile(checked.profile) if checked.profile else []
     return [
         *lines,

@@ -22,6 +22,7 @@ from urc.packages.store import Store
 from urc.problems import UrcError
 from urc.runtime.destination import destination_of
 from urc.runtime.kept import DRIVEN, Kept, KeptFile, in_use
+from urc.runtime.near import check_hosts
 from urc.runtime.opened import open_document
 from urc.runtime.session import Session
 from urc.runtime.settings import parse_setting
@@ -227,7 +228,9 @@ class Garage:
 
     def profile(self, lock: Lock) -> Profile:
         """Return the profile of an installed package; raise `UrcError`."""
-        return open_document(self.store.document(lock))
+        profile = open_document(self.store.document(lock))
+        check_hosts(profile)
+        return profile
 
     def reread(self, profile: Profile) -> Profile:
         """Return what the document of a robot that was there from the start says; raise."""

@@ -1,0 +1,69 @@
+"""Hosts that lead to this machine itself, or to whatever is plugged into it.
+
+A package that fixes such a host would speak to the programs of whoever installs it. It may reach
+this machine by a setting, which a person sees and fills in.
+"""
+
+import ipaddress
+import re
+import socket
+from collections.abc import Mapping
+from typing import Final
+
+from urc._addresses import unmapped
+from urc.expressions import Template
+from urc.model.profile import Profile
+from urc.problems import UrcError
+
+__all__ = ["check_hosts", "is_near"]
+
+_LOCAL: Final = re.compile(r"(.*\.)?localhost(\.localdomain)?\.?|ip6-(localhost|loopback)", re.I)
+_BEGINS: Final = re.compile(r"127\.|169\.254\.|\[?(::1|fe[89ab][0-9a-f]:)|localhost", re.I)
+"""Of a host that settings only complete."""
+_URL: Final = re.compile(r"[a-z]+://(?P<host>\[[^\]]*\]|[^/:?#]*)", re.I)
+_OPTIONS: Final = ("host", "url")
+
+
+def is_near(host: str) -> bool:
+    """Return whether `host`, in whatever form, is this machine, or link-local."""
+    text = host.strip().removeprefix("[").removesuffix("]").partition("%")[0]
+    if _LOCAL.fullmatch(text):
+        return True
+    try:
+        address = unmapped(ipaddress.ip_address(text))
+    except ValueError:
+        try:  # "127.1", "0x7f.1" and "2130706433" are addresses, too
+            address = ipaddress.ip_address(socket.inet_aton(text))
+        except (OSError, ValueError):
+            return False
+    return address.is_loopback or address.is_link_local or address.is_unspecified
+
+
+def check_hosts(profile: Profile) -> None:
+    """Raise `UrcError` when the document of a package fixes a host to this machine."""
+    for spec in profile.driver.transports.values():
+        if spec.via or spec.options.get("mode") == "listen":
+            continue  # seen from another machine; or the robot comes here
+        host = _fixed(spec.options)
+        if host:
+            raise UrcError(
+                f"{profile.file}: the transport {spec.name} always leads to {host}, this machine"
+                " itself: a package may only do so by a setting that you fill in"
+            )
+
+
+def _fixed(options: Mapping[str, object]) -> str:
+    """Return the near host that no setting decides, or ""."""
+    for name in _OPTIONS:
+        value = options.get(name)
+        text = value.source if isinstance(value, Template) else value
+        if not isinstance(text, str):
+            continue
+        found = _URL.match(text) if name == "url" else None
+        host = found["host"] if found else text
+        if "{{" in host:
+            if not host.startswith("{{") and _BEGINS.match(host):
+                return host
+        elif is_near(host):
+            return host
+    return ""
