@@ -27,6 +27,7 @@ __all__ = [
     "Template",
     "compile_expression",
     "compile_template",
+    "defaulted_names",
     "digested_settings",
     "is_byte_filter",
     "is_nonce",
@@ -245,6 +246,26 @@ def last_filter(template: Template) -> str:
     """Return the filter that makes the value of an expression, or ""."""
     name = template.python.partition("(")[0]
     return name.removeprefix("_filter_") if name.startswith("_filter_") else ""
+
+
+def defaulted_names(template: Template) -> frozenset[str]:
+    """Return the root names that an expression can do without: ``default`` stands behind each."""
+    if "_filter_default(" not in template.python:
+        return frozenset()
+    needed, spare = set[str](), set[str]()
+    _gather(ast.parse(template.python, mode="eval"), needed, spare, has_default=False)
+    return frozenset(spare - needed)
+
+
+def _gather(node: ast.AST, needed: set[str], spare: set[str], *, has_default: bool) -> None:
+    """Sort the root names under `node` into those that must be there and those that need not."""
+    if isinstance(node, ast.Subscript) and ast.unparse(node.value) == "ns":
+        (spare if has_default else needed).add(str(ast.literal_eval(node.slice)))
+        return
+    is_default = isinstance(node, ast.Call) and ast.unparse(node.func) == "_filter_default"
+    for inner in ast.iter_child_nodes(node):
+        within = has_default or (is_default and isinstance(inner, ast.Lambda))
+        _gather(inner, needed, spare, has_default=within)
 
 
 def digested_settings(template: Template) -> frozenset[str]:

@@ -45,14 +45,16 @@ def _check_purpose(part: Part, test: DocumentTest, driver: Driver, findings: Fin
     text = ""
     if not test.feed and test.run is None and test.reply_to is None:
         text = "'feed' or 'run' is missing: this test does nothing"
-    elif not (test.expect or test.sent or test.fails is not None or _is_answered(test, driver)):
+    elif not (test.expect or test.sent or test.fails is not None or _reads(test, driver)):
         text = "'expect', 'sent' or 'fails' is missing: this test cannot fail"
     if text:
         findings.error(part, "missing-key", text, key=True)
 
 
-def _is_answered(test: DocumentTest, driver: Driver) -> bool:
-    """Return whether a command is asked and answered: it has to be done, which is a check."""
+def _reads(test: DocumentTest, driver: Driver) -> bool:
+    """Return whether something fed has to be read: as the answer to a command, or at all."""
+    if test.feed and test.run is None and test.reply_to is None:
+        return True
     asked = test.run if test.run is not None else test.reply_to
     command = driver.commands.get(asked) if isinstance(asked, str) else None
     return bool(test.feed) and command is not None and command.reply is not None

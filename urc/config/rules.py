@@ -9,7 +9,7 @@ from urc.config.link_wire import Uses
 from urc.config.part import Findings, Part, shown_duration
 from urc.config.rules_flow import check_flow
 from urc.config.suggest import did_you_mean
-from urc.model.driver import Driver, Poll
+from urc.model.driver import Driver, Poll, Timeouts
 from urc.model.interface import Interface
 
 __all__ = ["check_profile"]
@@ -141,7 +141,10 @@ def _drawn(part: Part, slot: str) -> tuple[Part, int] | None:
 
 
 def _check_pace(part: Part, poll: Poll, driver: Part, findings: Findings) -> None:
-    """Warn of a request that is due again before the wait for its answer is over."""
+    """Warn of a request whose lost answer is waited for while the next ones are due.
+
+    A written timeout up to the default is no worse than the default, of which nobody is warned.
+    """
     if poll.reply is None:
         return
     asked = driver.must("commands").must(poll.run) if poll.run else part
@@ -154,7 +157,7 @@ def _check_pace(part: Part, poll: Poll, driver: Part, findings: Findings) -> Non
         if where is None:
             return  # the default is nobody's decision
         seconds = Findings().duration(timeouts, "reply", 2.0) if timeouts else None
-    if seconds is not None and seconds > poll.every_s:
+    if seconds is not None and seconds > max(poll.every_s, Timeouts().reply_s):
         findings.warn(
             part.must("every"),
             "impatient-poll",

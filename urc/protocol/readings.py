@@ -7,7 +7,7 @@ frames set has one alarm state, and a computed signal sees the newest value of e
 from collections.abc import Callable, Iterable, Mapping
 from typing import NamedTuple
 
-from urc.expressions import ExpressionError, Template
+from urc.expressions import ExpressionError, Template, defaulted_names
 from urc.model.values import NOTHING, Alarm, Limits, Reading, Sample, Signal
 from urc.protocol.convert import BadValue
 from urc.protocol.decode import Convert, build_converter
@@ -24,6 +24,8 @@ class _Computed(NamedTuple):
     name: str
     formula: Template
     inputs: tuple[str, ...]
+    spare: frozenset[str]
+    """Inputs that need not have been read."""
     shortest_s: float
     """Age at which the first of its inputs is old."""
     convert: Convert
@@ -168,11 +170,13 @@ class Readings:
             self._namespace[sample.signal] = sample.value
 
     def _compute(self, computed: _Computed, now: float) -> Sample | None:
-        """Return the sample, or None while an input has never been read."""
+        """Return the sample, or None while an input that it needs has never been read."""
         time_s, is_absent = now, False
         for name in computed.inputs:
             sample = self._last.get(name)
             if sample is None:
+                if name in computed.spare:
+                    continue
                 return None
             # As old as the first of its inputs to grow old: never fresh over a dead one.
             left_s = self.signals[name].stale_after_s - computed.shortest_s
@@ -208,5 +212,10 @@ class Readings:
                     inputs = tuple(one for one in sorted(formula.names) if one in self.signals)
                     ages = [self.signals[one].stale_after_s for one in inputs]
                     yield _Computed(
-                        name, formula, inputs, min(ages, default=0.0), self._converter(name)
+                        name,
+                        formula,
+                        inputs,
+                        defaulted_names(formula),
+                        min(ages, default=0.0),
+                        self._converter(name),
                     )

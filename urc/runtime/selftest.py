@@ -155,7 +155,8 @@ def _in_an_instant(trial: Trial, test: DocumentTest) -> list[str]:
     command = test.run or (test.reply_to if isinstance(test.reply_to, str) else None)
     checks = bool(test.expect or test.sent or test.fails is not None)
     asked = trial.driver.commands.get(command or "")
-    if not checks and (not test.feed or asked is None or asked.reply is None):
+    is_fed_only = bool(test.feed) and command is None and test.reply_to is None
+    if not checks and not is_fed_only and (not test.feed or asked is None or asked.reply is None):
         return ["it checks nothing; say what it should 'expect', what is 'sent' or how it 'fails'"]
     trial.begin()
     if command is not None:
@@ -170,6 +171,8 @@ def _in_an_instant(trial: Trial, test: DocumentTest) -> list[str]:
         complaints = _check_failure(trial, test.fails)
     complaints += check_values(trial, test.expect, Remedy(trial, in_steps=False))
     complaints += check_bytes(trial, trial.driver, test.sent)
+    if not checks and is_fed_only and not complaints and not trial.fresh and not trial.used:
+        complaints.append("nothing declared reads what is fed; is the end of the frame missing?")
     if not checks and command is not None and not complaints:
         complaints += check_reply(trial.ended, {}, command)  # all that it says: it is done
     return complaints

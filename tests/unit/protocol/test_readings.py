@@ -185,3 +185,23 @@ messages:
     talk.says(said)
     assert list(talk.values.values()) == [value]
     assert talk.faults == []
+
+
+NEVER_READ = """
+signals:
+  a: { type: integer }
+  b: { type: integer }
+  either: { value: "(a | default(7)) + b" }
+  both: { value: "(a | default(7)) + a + b" }
+  nested: { value: "((a + 1) | default(0)) + b" }
+messages: { a: { regex: '^a(?P<a>\\d+)$' }, b: { regex: '^b(?P<b>\\d+)$' } }
+"""
+
+
+def test_a_default_stands_for_what_was_never_read() -> None:
+    """Until it is read; a value that is used without a default as well is waited for."""
+    talk = Dialogue(NEVER_READ).connect()
+    talk.says("b3")
+    assert talk.values == {"b": 3, "either": 10, "nested": 3}
+    talk.says("a1")
+    assert talk.values == {"a": 1, "b": 3, "either": 4, "both": 5, "nested": 5}

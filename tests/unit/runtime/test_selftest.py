@@ -126,9 +126,19 @@ def test_message_that_nobody_asked_for_is_read() -> None:
     assert complaint(trial(feed={"wire": "note hi\n"}, expect={"note": "hi"})) == ""
 
 
+def test_a_test_that_only_feeds_holds_when_all_is_read() -> None:
+    """What nothing declared reads is a fault, and so is a frame that never ends."""
+    assert complaint(trial(feed={"wire": "note hi\n"})) == ""
+
+
 @pytest.mark.parametrize(
     ("test", "message"),
     [
+        (trial(feed={"wire": "nota hi\n"}), "no-match: nothing declared matches 'nota hi'"),
+        (
+            trial(feed={"wire": "note hi"}),
+            "nothing declared reads what is fed; is the end of the frame missing?",
+        ),
         (
             trial(feed={"wire": "42\n"}, reply_to=0),
             "it checks nothing; say what it should 'expect', what is 'sent' or how it 'fails'",
