@@ -299,3 +299,21 @@ async def test_what_was_taken_is_told_to_the_byte() -> None:
         await guard.line.receive()
     told = [one for one in guard.said if isinstance(one, wire.Credit)]
     assert told == [wire.Credit("wire", 1, WINDOW_BYTES // 4)] * 4
+
+
+async def test_frames_whose_numbers_were_used_up_are_sent_in_a_round_of_their_own() -> None:
+    """Each time; a new connection begins with the first round."""
+    guard = Guard()
+    stands: list[tuple[str, dict[str, int], bool]] = []
+    guard.line._stands = lambda *told: stands.append(told)  # type: ignore[arg-type]
+    await guard.line.open(1.0)
+    for number in (1, 2):
+        assert guard.line.offer(b"a")
+        guard.tell(wire.Stale("wire", 1, number, {"n": number}))
+    rounds = [(one.number, one.round) for one in guard.said if isinstance(one, wire.Send)]
+    assert rounds == [(1, 0), (1, 1), (2, 1), (2, 2)]
+    assert stands[1:] == [("wire", {"n": 1}, True), ("wire", {"n": 2}, True)]
+    await guard.line.open(1.0)
+    guard.said.clear()
+    assert guard.line.offer(b"b")
+    assert guard.said == [wire.Send("wire", 2, 1, b"b")]

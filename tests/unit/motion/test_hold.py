@@ -269,3 +269,13 @@ def test_other_rate_counts_from_now_on() -> None:
         held.tick(b"go on", now)
         written += [now] if held.due(now, is_clear=True) else []
     assert 5 <= len(written) <= 6
+
+
+def test_a_value_that_is_forgotten_is_not_written_and_the_lease_goes_on() -> None:
+    held = mover()
+    held.tick(b"go", 1.0)
+    held.forget()
+    assert not held.is_waiting
+    assert held.due(1.0, is_clear=True) is None
+    assert held.deadline == 1.25
+    assert held.due(1.3, is_clear=False) == STOP
