@@ -11,7 +11,7 @@ from tests.unit.guard.lines import TERMS, CountedWire
 from urc.guard import client, wire
 from urc.guard.client import Guard, LineSpec
 from urc.guard.pipe import Pipe
-from urc.guard.process import Door, Standing
+from urc.guard.process import CAN_INHERIT, Door, Standing
 from urc.testing.clock import settle
 from urc.transports.base import ConnectFailed, PeerClosed
 
@@ -76,8 +76,10 @@ class House:
         self.fault: OSError | None = None
         self._news = asyncio.Event()
         self.guard = Guard([LineSpec(MAKE, CountedWire())])
+        self.is_inherited = CAN_INHERIT
 
     def launch(self, *, is_inherited: bool) -> tuple[Process, socket.socket]:
+        assert is_inherited is self.is_inherited
         self._news.set()
         if self.fault is not None:
             raise self.fault
@@ -234,12 +236,15 @@ async def test_guard_that_died_is_killed_for_good(house: House) -> None:
 
 
 async def test_guards_that_end_at_once_are_started_at_a_pace(
-    house: House, caplog: pytest.LogCaptureFixture
+    house: House, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    """The second and the third right away."""
+    monkeypatch.setattr(client, "_AGAIN_S", 60.0)
     house.begin()
     for number in (1, 2):
         house.started[-1].die()
         await house.nth(number + 1)
+    monkeypatch.setattr(client, "_AGAIN_S", 0.02)
     house.started[-1].die()
     await house.until(lambda: house.guard.pid == 0)
     assert len(house.started) == 3
@@ -386,7 +391,7 @@ async def test_end_does_not_wait_for_a_guard_at_its_door(
     house: House, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     door = StubDoor()
-    process, line = house.launch(is_inherited=False)
+    process, line = house.launch(is_inherited=house.is_inherited)
     monkeypatch.setattr(client, "launch", lambda is_inherited: (process, door))
     house.guard.start()
     await house.guard.finish()
@@ -400,7 +405,10 @@ async def test_guard_that_falls_silent_is_replaced(
     """It is looked at again and again, as long as it lives."""
     monkeypatch.setattr(client, "_LOOK_S", 0.02)
     monkeypatch.setattr(client, "standing", lambda pid: Standing())
+    monkeypatch.setattr(client, "_START_LOOKS", 3)
     first = house.begin()
     first.pipe.post(wire.Beat(0.0))
-    await house.nth(2)
+    second = await house.nth(2)
     assert first.is_killed
+    await house.nth(3)
+    assert second.is_killed, "that one has never spoken"

@@ -13,6 +13,8 @@ from hypothesis import strategies as st
 
 from tests.effort import examples
 from tests.unit.guard.counted import NUMBERS, Robot, World, opened, parted
+from urc.guard.tally import Tally
+from urc.model.codec import Count, Numbered
 from urc.model.flow import MOST_STOPS
 from urc.motion.hold import STOP_EVERY_S, STOP_FOR_S
 
@@ -194,3 +196,12 @@ def test_whatever_happens_numbers_are_gapless_and_the_stop_is_last(
 ) -> None:
     """Polls, ticks, leases, releases, commands, cuts and the end, whole and byte by byte."""
     asyncio.run(play(steps, is_prompt=is_prompt, is_lossy=is_lossy, is_bytewise=is_bytewise))
+
+
+def test_stop_with_a_wrong_number_is_better_than_none() -> None:
+    """The last one is of the newest numbers."""
+    tally = Tally()
+    stops = [Numbered(b"%d" % at, Count({"n": at - 1}, {"n": at})) for at in (5, 6, 7)]
+    assert tally.choose(stops).data == b"7"
+    tally.left(stops[0].takes)
+    assert tally.choose(stops).data == b"6"

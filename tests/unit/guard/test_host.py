@@ -164,7 +164,9 @@ async def ran(monkeypatch: pytest.MonkeyPatch) -> AsyncIterator[Ran]:
 
 
 async def test_guard_beats_and_looks_at_its_precedence(ran: Ran) -> None:
+    began_s = asyncio.get_running_loop().time()
     beats = await ran.server.hears(wire.Beat, 5)
+    assert asyncio.get_running_loop().time() - began_s >= 3 * program.BEAT_S
     assert beats[0].late_s < 1.0
     assert all(-0.001 <= beat.late_s < BOUND_S for beat in beats)
     assert ran.looks >= 5
@@ -212,6 +214,23 @@ async def test_signal_stops_what_moves(ran: Ran, number: signal.Signals) -> None
     assert ran.ended == [0]
 
 
+async def test_end_does_not_wait_for_a_line_that_does_not_close(
+    ran: Ran, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Whoever started the guard would kill it otherwise."""
+    monkeypatch.setattr(program, "FINISH_S", 0.0)
+    monkeypatch.setattr(program, "_GRACE_S", 0.01)
+    await drive(ran)
+
+    async def never(self: Host) -> None:
+        await asyncio.Event().wait()
+
+    monkeypatch.setattr(Host, "finish", never)
+    ran.server.pipe.end()
+    await ran.over()
+    assert ran.ended == [0]
+
+
 def test_pipe_is_inherited() -> None:
     ours, theirs = socket.socketpair()
     with ours, program._line(str(theirs.detach())) as line:
@@ -235,7 +254,8 @@ def test_process_is_prepared_before_it_guards(monkeypatch: pytest.MonkeyPatch) -
     """Ctrl-C is for the server; what is loaded stays; then precedence is asked for."""
     ours, theirs = socket.socketpair()
     done: list[object] = []
-    monkeypatch.setattr(sys, "argv", ["guard", str(theirs.detach())])
+    monkeypatch.setattr(sys, "argv", ["guard", str(theirs.detach()), "a door of ours"])
+    monkeypatch.setattr(type(program.OWN_DOORS), "learn", lambda self, told: done.extend(told))
     monkeypatch.setattr(signal, "signal", lambda *told: done.append(told))
     monkeypatch.setattr(logging, "basicConfig", lambda **told: done.append(told["level"]))
     monkeypatch.setattr(gc, "freeze", lambda: done.append("freeze"))
@@ -252,7 +272,8 @@ def test_process_is_prepared_before_it_guards(monkeypatch: pytest.MonkeyPatch) -
     with ours:
         assert ours.recv(10) == b"here"
     assert done == [
-        (signal.SIGINT, signal.SIG_IGN), logging.WARNING, "freeze", "ask", Precedence,
+        (signal.SIGINT, signal.SIG_IGN), logging.WARNING,
+        "a door of ours", "freeze", "ask", Precedence,
     ]  # fmt: skip
 
 

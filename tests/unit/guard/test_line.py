@@ -354,3 +354,21 @@ async def test_a_tick_without_bytes_renews_the_lease_and_writes_nothing(rig: Rig
     assert rig.robot.written == [b"go 1"]
     await rig.clock.advance(0.3)
     assert rig.robot.written == [b"go 1", STOP]
+
+
+async def test_control_may_be_stopping_for_a_while_after_its_stop_was_told(rig: Rig) -> None:
+    """It may be repeated, and whoever hears of it is behind."""
+    assert not rig.guard.is_stopping("drive")
+    await rig.drive()
+    assert not rig.guard.is_stopping("turn")
+    assert rig.guard.is_stopping("drive")
+    await rig.clock.advance(5.0)
+    rig.tick(b"refused, and nobody knows yet")
+    assert rig.guard.is_stopping("drive")
+    rig.guard.arm("wire", "drive", TERMS)
+    rig.tick(b"go")
+    rig.guard.release("drive")
+    await rig.clock.advance(0.9)
+    assert rig.guard.is_stopping("drive")
+    await rig.clock.advance(0.2)
+    assert not rig.guard.is_stopping("drive")

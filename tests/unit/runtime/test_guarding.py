@@ -229,7 +229,9 @@ def test_guard_is_a_process_where_the_system_can(
 ) -> None:
     driver = robot("tcp")
     assert isinstance(reins(driver).client, LocalGuard)
-    assert isinstance(reins(driver, is_guarded=True).client, Guard)
+    guarded = reins(driver, is_guarded=True)
+    assert isinstance(guarded.client, Guard)
+    assert not guarded.is_open("away")
     assert not caplog.records
     monkeypatch.setattr(guarding, "CAN_GUARD", False)
     assert isinstance(reins(driver, is_guarded=True).client, LocalGuard)
