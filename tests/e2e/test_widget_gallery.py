@@ -35,7 +35,7 @@ pytestmark = pytest.mark.anyio
 LOW = (
     *("joystick", "dpad", "axis", "tilt", "keyboard", "value"),
     *("button", "number", "select", "switch", "text", "sequence", "log"),
-    *("slider", "battery", "plot"),
+    *("slider", "battery", "plot", "link"),
 )
 LOW_CELLS = (
     (126, 128),

@@ -72,7 +72,9 @@ export default {
       const words = !isUp
         ? t("No connection to URC")
         : { lost: t("Robot lost"), silent: t("Robot silent"), live: t("Live") }[worst ?? ""] ?? t("Connecting");
-      write(now, `${SIGNS[sign]} ${words}${tripMs === null ? "" : ` · ${figure(tripMs)} ms`}`);
+      // The way to URC: beside a robot that is lost, it would be taken for the way to the robot.
+      const trip = tripMs === null || worst !== "live" ? "" : ` · ${figure(tripMs)} ms`;
+      write(now, `${SIGNS[sign]} ${words}${trip}`);
       if (facts) draw(facts);
     }
 
