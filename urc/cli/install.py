@@ -71,7 +71,7 @@ def run(arguments: argparse.Namespace) -> int:
         used = used_lock(store, plan.lock.key)
         look = Looks()
         risks = _show(plan, folder, origin_lines(plan, store), look)
-        difference = _compare(used, plan, store, folder, look)
+        difference = _compare(used, plan, store, folder, look, risks)
         if difference is not None:
             risks = difference.risks
         if not is_agreed_to(difference, risks, arguments, "Install it?"):
@@ -108,10 +108,15 @@ def _pinned(file: Path | None) -> "Lock | None":
 
 
 def _compare(
-    used: "Lock | None", plan: "Plan", store: "Store", folder: Path, look: "Looks"
+    used: "Lock | None",
+    plan: "Plan",
+    store: "Store",
+    folder: Path,
+    look: "Looks",
+    risks: list[str],
 ) -> "Difference | None":
     """Print what another version changes, and return it; None where nothing is compared."""
-    from urc.packages.update import staged_difference
+    from urc.packages.update import Difference, staged_difference
     from urc.problems import UrcError, printable
 
     if used is None or used.key != plan.lock.key or used == plan.lock:
@@ -121,7 +126,8 @@ def _compare(
     except UrcError as error:
         line = str(error).strip().partition("\n")[0]
         complain(f"urc install: what changes is not known: {used} cannot be read: {line}")
-        return None
+        # It may do more, then: nobody can say that it does not.
+        return Difference([], ["whatever stands above"], [], risks, [])
     print(f"{used} is in use; this changes:")
     for line in difference_lines(found):
         print(printable(line))

@@ -167,6 +167,20 @@ def test_what_cannot_be_compared_can_still_be_replaced(tmp_path: Path) -> None:
         assert any("drivers/rover 1.0.0" in line and "not known" in line for line in job["notes"])
 
 
+def test_urc_install_of_what_cannot_be_compared_is_not_agreed_to_beforehand(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("URC_DATA_DIR", str(tmp_path))
+    store = stock(tmp_path)
+    (old,) = store.installed()
+    store.blob_file(old.packages["drivers/rover"].sha256).write_bytes(b"rubbish")
+    assert main(["install", str(ATTACK), "--yes"]) == 1
+    said = capsys.readouterr().err
+    assert "what changes is not known: drivers/rover 1.0.0 cannot be read" in said
+    assert "--allow-more" in said
+    assert main(["install", str(ATTACK), "--yes", "--allow-more"]) == 0
+
+
 def test_urc_install_shows_and_asks_the_same(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
