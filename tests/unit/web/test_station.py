@@ -114,15 +114,16 @@ async def test_a_session_that_cannot_be_opened_is_told_and_tried_again() -> None
 
 
 def test_a_robot_is_not_ready_while_a_setting_is_undefined() -> None:
-    """None and the empty text are both "not set"; False and 0 are values."""
+    """Nothing and an empty text are both "not set"; False, 0 and an empty default are values."""
     settings = {
         name: Setting(name, "string", default=default)
         for name, default in {"a": None, "b": "", "c": "x", "d": False, "e": 0}.items()
     }
     profile = dashboard_profile(settings=settings)
-    robot = Robot(profile, {"b": ""}, FakeRobot(profile).open)
-    assert [setting.name for setting in missing_settings(robot)] == ["a", "b"]
-    robot = Robot(profile, {"a": "1", "b": "2"}, FakeRobot(profile).open)
+    for values in ({}, {"a": "", "b": ""}):
+        robot = Robot(profile, values, FakeRobot(profile).open)
+        assert [setting.name for setting in missing_settings(robot)] == ["a"]
+    robot = Robot(profile, {"a": "1"}, FakeRobot(profile).open)
     assert missing_settings(robot) == ()
 
 
