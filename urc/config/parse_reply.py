@@ -94,15 +94,6 @@ def _silence(
     """Return the answer of a robot that says nothing when it does what was asked."""
     beside = (*READ_FORMS, *_BESIDE_SILENCE)
     refuse(part, beside, "means nothing beside 'silence', which is the answer", findings)
-    if "errors" not in part.data:
-        findings.error(
-            part,
-            "nothing-refuses",
-            "silence is the answer, and nothing says how the robot refuses",
-            at="silence",
-            key=True,
-            hint="write errors: with what it says then, or leave 'reply' out",
-        )
     read, within_s = ReadSpec("silence"), findings.duration(part, "silence", 0.3, most=60)
     return Stage(read=read, errors=errors, faults=faults, timeout_s=within_s)
 

@@ -1,10 +1,10 @@
-"""Rules about lines on which the robot says nothing, by design (``answers: never``)."""
+"""Rules about robots that say nothing: on a line by design, or when they do what was asked."""
 
 from typing import Final
 
 from urc.config.link_steps import steps_of
 from urc.config.part import Findings, Part
-from urc.model.driver import Driver, TransportSpec
+from urc.model.driver import Driver, Reply, TransportSpec
 from urc.model.flow import ExpectStep, PromptStep, Step, all_steps
 
 __all__ = ["check_answers"]
@@ -13,13 +13,18 @@ _HINT: Final = "leave out 'answers: never', or leave out whatever waits for the 
 
 
 def check_answers(part: Part, driver: Driver, findings: Findings) -> None:
-    """Report whatever waits for a line that never answers.
+    """Report whatever waits for a line that never answers, and silence that nothing can break.
 
     Args:
         part: the driver's mapping.
         driver: as loaded, without errors.
         findings: takes the errors.
     """
+    for name, inner in part.named("commands").items():
+        one = driver.commands[name]
+        _check_silence(inner, one.reply, driver.transports.get(one.transport), findings)
+    for inner, poll in zip(part.listed("polls"), driver.polls, strict=True):
+        _check_silence(inner, poll.reply, driver.transports.get(poll.transport), findings)
     mute = {name for name, spec in driver.transports.items() if spec.never_answers}
     if not mute:
         return
@@ -44,6 +49,28 @@ def check_answers(part: Part, driver: Driver, findings: Findings) -> None:
             )
     for name, inner in part.named("sequences").items():
         _check_steps(steps_of(inner), driver.commands[name].steps, mute, findings)
+
+
+def _check_silence(
+    part: Part, reply: Reply | None, spec: TransportSpec | None, findings: Findings
+) -> None:
+    """Report an answer that is silence where nothing could break it."""
+    place = part.get("reply")
+    if reply is None or place is None or (spec is not None and (spec.errors or spec.faults)):
+        return
+    answers = [(reply.read, reply.errors, reply.faults)]
+    answers += [(one.read, one.errors, one.faults) for one in reply.stages]
+    inners = place.listed("stages") or [place]
+    for inner, (read, errors, faults) in zip(inners, answers, strict=True):
+        if read.form == "silence" and not (errors or faults):
+            findings.error(
+                inner,
+                "nothing-refuses",
+                "silence is the answer, and nothing says how the robot refuses",
+                at="silence",
+                key=True,
+                hint="write errors: with what it says then, or leave 'reply' out",
+            )
 
 
 def _refuse(part: Part, key: str, name: str, findings: Findings) -> None:
