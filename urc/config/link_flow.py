@@ -199,6 +199,8 @@ def link_keepalives(linker: Linker, part: Part) -> None:
             continue
         linker.transport(inner, "type", name)  # it is used by this
         place = inner.must("keepalive")
+        for one in place.listed("after"):
+            _link_counting(linker, one, name)
         if keepalive.send is not None:
             linker.templates(place.must("send"), keepalive.send, said_on(linker.driver, name))
             continue
@@ -207,6 +209,19 @@ def link_keepalives(linker: Linker, part: Part) -> None:
             link_arguments(linker.findings, place, command, {}, "run")
             refuse_two_person(linker, place.must("run"), command)
             refuse_moving(linker.findings, place.must("run"), command, {})
+
+
+def _link_counting(linker: Linker, part: Part, transport: str) -> None:
+    """Check a command that counts as a word on a line."""
+    command = find_command(linker, part, str(part.data))
+    if command is not None and (command.steps or command.transport != transport):
+        what = "is a sequence" if command.steps else f"goes to {command.transport!r}"
+        linker.findings.error(
+            part,
+            "wrong-command",
+            f"{command.name!r} {what}, and keeps nothing alive on {transport!r}",
+            hint="name commands that are sent on this line",
+        )
 
 
 def find_command(linker: Linker, part: Part, name: str) -> Command | None:

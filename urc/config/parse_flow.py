@@ -278,6 +278,7 @@ def _keepalive(part: Part | None, context: FormContext, findings: Findings) -> K
         run=part.text("run"),
         send=parse_write(send, findings, context) if send else None,
         watchdog_s=findings.duration(part, "watchdog", 0.0) or None,
+        after=tuple(str(inner.data) for inner in part.listed("after")),
     )
 
 

@@ -79,6 +79,8 @@ class Keepalive(NamedTuple):
     send: WriteSpec | None = None
     watchdog_s: float | None = None
     """After how long without a word the robot hangs up or stops, as its maker says."""
+    after: tuple[str, ...] = ()
+    """Commands that the robot counts as a word; () for all that is sent."""
 
 
 class ErrorReply(NamedTuple):

@@ -33,6 +33,9 @@ class Connection:
         self.is_ready = False
         """Whether anybody may talk here; else only those who make it so, or say good-bye."""
         self.last_sent = float("-inf")
+        """When something was last sent that counts."""
+        self.counting: frozenset[str] | None = None
+        """Names of requests that count as a word to the robot; None: all do."""
         self.counters = Counters()
         self.learnt: dict[str, object] = {}
         """What the steps of this connection have read: ``_name`` → value."""

@@ -120,6 +120,11 @@ class Line(Answering):
         events: list[LineEvent] = [] if gone is None else [Ended(*gone)]
         return events + self._pump(now)
 
+    def _note_sent(self, exchange: Exchange, now: float) -> None:
+        exchange.sent_at = now
+        if self.counting is None or exchange.ask.label in self.counting:
+            self.last_sent = now
+
     def is_idle(self, now: float) -> bool:
         """Whether a persistent line is usable, with nothing under way: `send_idle` may be used."""
         outbox = self._outbox
@@ -131,7 +136,7 @@ class Line(Answering):
 
         The caller tells that its data is sent, and what ends with that.
         """
-        self.last_sent = exchange.sent_at = now
+        self._note_sent(exchange, now)
         self._outbox.next_send = now + self._gap_s
         if exchange.ask.answers:
             self._flights.append(Flight(exchange, now))
@@ -190,7 +195,7 @@ class Line(Answering):
         data = self._as_sent(exchange, number)
         if exchange.on_sent is not None and not exchange.is_secret:
             exchange.on_sent(data)
-        self.last_sent = exchange.sent_at = now
+        self._note_sent(exchange, now)
         self._outbox.sent(exchange, now)
         shared = None
         if count is not None and count.after and self.counters.is_shared:

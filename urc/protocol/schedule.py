@@ -148,6 +148,7 @@ class Schedule:
             if spec.keepalive is not None:
                 send = spec.keepalive.send
                 ask = builder.plain(f"{name}.keepalive", name, send) if send else None
+                self._lines[name].counting = _counting(spec.keepalive, driver)
                 self._kept_alive[name] = KeptAlive(spec.keepalive, self._lines[name], ask, known)
 
     @property
@@ -206,6 +207,14 @@ class Schedule:
         for one in self._kept_alive.values():
             if one.deadline is not None and one.deadline <= now:
                 yield one.speak(partial(_run_for, run, one, now), now)
+
+
+def _counting(keepalive: Keepalive, driver: Driver) -> frozenset[str] | None:
+    """Return the names of requests that keep a line alive; None for all."""
+    if not keepalive.after:
+        return None
+    named = {*keepalive.after, keepalive.run}
+    return frozenset((*named, *(poll.name for poll in driver.polls if poll.run in named)))
 
 
 def _run_for(run: Run, one: KeptAlive, now: float, command: str) -> list[LineEvent]:

@@ -130,3 +130,27 @@ def test_an_unknown_command_ends_once() -> None:
     talk = Dialogue(ALIVE).connect()
     talk.take(talk.engine.command(Request(1, "fly"), 0.0))
     assert talk.outcomes == {1: "unknown-command"}
+
+
+COUNTED = """
+wire: keepalive: { every: 2s, run: ping, after: [beat] }
+commands:
+  ping: { send: PING }
+  beat: { send: BEAT }
+  other: { send: OTHER }
+polls: [{ run: beat, every: 60s, phase: 11s }]
+"""
+
+
+def test_only_what_the_robot_counts_puts_off_the_keepalive() -> None:
+    """Its own words count, and so does a poll that runs what counts."""
+    talk = Dialogue(COUNTED).connect()
+    talk.at(1.0).run("other")
+    assert talk.at(1.9).sent == ["OTHER"]
+    assert talk.at(2.0).sent == ["PING"]
+    talk.at(3.0).run("beat")
+    assert talk.at(4.9).sent == ["BEAT"]
+    assert talk.at(5.0).sent == ["PING"]
+    assert talk.at(10.9).sent == ["PING", "PING"]
+    assert talk.at(12.9).sent == ["BEAT"]
+    assert talk.at(13.0).sent == ["PING"]
