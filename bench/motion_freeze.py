@@ -18,7 +18,7 @@ from urc.testing.rig_freeze import HEARD_MS, STOP_MS, Freeze, freeze
 __all__ = ["run"]
 
 TRIALS, TRIALS_IF_FULL = 4, 100
-LANES, LANES_IF_FULL = 2, 5
+LANES, LANES_IF_FULL = 2, 10
 BIN_MS = 10
 
 

@@ -142,7 +142,7 @@ class Builder:
         is_fresh = bool((send.names & {NOW, NONCE}) - arguments.keys())
         learnt = (send.names & self._driver.learnt(transport)) - arguments.keys()
         is_numbered = send.options.get("verb") in NUMBERED
-        is_local = send.names <= arguments.keys()
+        is_local = send.names <= {*arguments, COUNTERS}
         if reply is None:
             return Ask(
                 label,

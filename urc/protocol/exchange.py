@@ -84,7 +84,7 @@ class Ask(NamedTuple):
     is_fresh: bool = False
     """It has the time in it, or bytes that are never sent twice."""
     is_local: bool = False
-    """Its templates use nothing but its arguments."""
+    """Its templates use nothing but its arguments, and counters."""
     queue_s: float = 0.0
     """How long it may wait to be sent."""
     quick: "Quick | None" = None

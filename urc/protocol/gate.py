@@ -145,6 +145,12 @@ class Counters:
         made.update(frames)
         return Series(tuple(frames.values()))
 
+    def is_near(self, made: Made, most: int) -> bool:
+        """Return whether a series was made for `most` numbers before the next one, or fewer."""
+        key = tuple(sorted(self._known.items()))
+        place = next((at for at, one in enumerate(made) if one == key), most)
+        return place + self.ahead < most
+
     def begin(self) -> None:
         """Begin anew, as each connection does. Shared counters begin when that is told."""
         if not self.is_shared:

@@ -26,7 +26,7 @@ from urc.protocol.line import Line
 
 __all__ = ["Motions", "NotNow"]
 
-_SPARE_STOPS: Final = 8
+_SPARE_STOPS: Final = 24
 """Numbers that other frames may use up before the stops are rendered again."""
 
 Check = Callable[[Mapping[str, object]], dict[str, Reading]]
@@ -129,6 +129,17 @@ class Motions:
         """
         ask, line = self._asks[command], self._lines[self._found(command).transport]
         return ask.is_local and not (ask.has_counters or line.spec.is_half_duplex)
+
+    def has_stops(self, command: str) -> bool:
+        """Return whether the stops that were made last are enough for now.
+
+        They are while most of those that were made to spare are left, and while they depend on
+        nothing but their numbers.
+        """
+        made, line = self._made.get(command), self._found(command).transport
+        if made is None or not self._asks[command].is_local or line not in self._lengths:
+            return False
+        return self._lines[line].counters.is_near(made, _SPARE_STOPS // 2)
 
     def is_ready(self, command: str) -> bool:
         """Return whether its line is connected, and the steps of the connection are done."""

@@ -28,6 +28,9 @@ class Frames(Protocol):
     def is_lasting(self, command: str) -> bool:
         """Return whether the stop of a held command is the same for ever."""
 
+    def has_stops(self, command: str) -> bool:
+        """Return whether the stops that it was given last are enough for now."""
+
     def is_ready(self, command: str) -> bool:
         """Return whether its line is connected, and its start-up steps are done."""
 

@@ -349,7 +349,7 @@ class MotionDesk:
         if frames is None or movers is None:
             return
         for name, control in self._controls.items():
-            if control.line != line or frames.is_lasting(name):
+            if control.line != line or frames.is_lasting(name) or frames.has_stops(name):
                 continue
             if not (control.is_armed or movers.is_stopping(name)):
                 continue

@@ -34,6 +34,10 @@ class FakeFrames:
         self._known(command)
         return not self.number
 
+    def has_stops(self, command: str) -> bool:
+        """Return whether its stops are enough for now."""
+        return False
+
     def is_ready(self, command: str) -> bool:
         """Return whether its line is ready."""
         self._known(command)

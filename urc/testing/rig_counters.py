@@ -27,7 +27,7 @@ __all__ = ["NUMBERS", "Gesture", "gestures"]
 NUMBERS: Final = 65536
 _TICK_S: Final = 0.05
 _SETTLED_S: Final = 1.0
-_READY_S: Final = 10.0
+_READY_S: Final = 30.0
 _DOCUMENT: Final = """\
 urc: 1
 kind: robot
@@ -138,8 +138,10 @@ async def _drive(session: Session, lasts_s: float, dice: random.Random) -> str:
             return "the line was never ready"
         await asyncio.sleep(0.02)
     desk.drive("hand", "take", loop.time())
-    ends_s, ticks, refused = loop.time() + lasts_s, 0, ""
-    while loop.time() < ends_s and not refused:
+    ends_s, ticks = loop.time() + lasts_s, 0
+    following = asyncio.create_task(_follow(session, desk))
+    while loop.time() < ends_s:
+        refused = ""
         for command in ("drive", "lift") if ticks % 60 > 30 else ("drive",):
             ticks, now = ticks + 1, loop.time()
             given = Input(desk.lease.state.epoch, ticks, desk.beat("hand", now))
@@ -148,13 +150,27 @@ async def _drive(session: Session, lasts_s: float, dice: random.Random) -> str:
                 refused = refused or desk.tick("hand", command, value, given, now)
         if ticks % 60 == 0:
             desk.release("hand", "lift")
+        if refused:  # a machine that was too slow for the lease: a hand lets go, and begins anew
+            desk.release("hand", "drive")
+            desk.release("hand", "lift")
+            desk.drive("hand", "leave", loop.time())
+            desk.drive("hand", "take", loop.time())
         await asyncio.sleep(_TICK_S * dice.uniform(0.5, 1.2))
     if dice.random() < 0.5:
         desk.release("hand", "drive")
         desk.release("hand", "lift")
     await asyncio.sleep(_SETTLED_S)
+    following.cancel()
     desk.detach()
-    return refused
+    return ""
+
+
+async def _follow(session: Session, desk: MotionDesk) -> None:
+    """Tell the desk of stops, for ever."""
+    assert session.movers is not None  # noqa: S101 - there are held commands
+    while True:
+        for command, reason in await session.movers.stops():
+            desk.stopped(command, reason)
 
 
 def _judged(lasts_s: float, heard: Sequence[tuple[int, str]], fault: str) -> Gesture:
@@ -166,4 +182,6 @@ def _judged(lasts_s: float, heard: Sequence[tuple[int, str]], fault: str) -> Ges
     last = {words.split()[0]: words for words in motions}
     moving = [words for words in last.values() if not words.endswith(" 0")]
     fault = fault or (f"nothing stops {moving[0]}" if moving else "")
+    if len(motions) < lasts_s:
+        fault = fault or f"only {len(motions)} frames of motion"
     return Gesture(lasts_s, len(heard), len(motions), fault)
