@@ -62,6 +62,9 @@ class Freeze(NamedTuple):
     """Whether nothing came after the stop."""
     late_ms: float
     """By how much the machine itself was late."""
+    was_moving: bool = True
+    """Whether the robot moved when the counterpart came to a stand. A machine that was too slow for
+    the lease has stopped it before."""
 
     @property
     def is_good(self) -> bool:
@@ -70,8 +73,9 @@ class Freeze(NamedTuple):
 
     @property
     def is_excused(self) -> bool:
-        """Whether the machine was so late that nothing is shown."""
-        return not self.is_good and self.is_last and self.late_ms > STOP_MS / 2
+        """Whether the machine was so slow that nothing is shown."""
+        is_late = not self.is_good and self.is_last and self.late_ms > STOP_MS / 2
+        return is_late or not self.was_moving
 
 
 async def freeze(
@@ -159,10 +163,12 @@ def _judged(robots: Robots, frozen_ns: int, thawed_ns: int) -> Freeze:
     sent_ns = [sent_us * 1000 for _, sent_us in heard if sent_us]
     stops = [at_ns for at_ns, sent_us in heard if not sent_us and at_ns >= thawed_ns]
     late = [ms for at_ns, ms in robots.late if at_ns > thawed_ns + 50_000_000]
+    before = [one for one in robots.since(0, 0) if one.time_ns < frozen_ns]
     return Freeze(
         lasted_s=(thawed_ns - frozen_ns) / 1e9,
         newest_ms=(max(sent_ns, default=frozen_ns) - frozen_ns) / 1e6,
         stop_ms=(stops[0] - thawed_ns) / 1e6 if stops else inf,
         is_last=bool(heard) and not heard[-1][1],
         late_ms=max(late, default=0.0),
+        was_moving=bool(sent_ns) or (bool(before) and before[-1].text != "M 0"),
     )
