@@ -69,14 +69,15 @@ class Gesture(NamedTuple):
 
 class _Robot(asyncio.DatagramProtocol):
     def __init__(self) -> None:
-        self.heard: list[tuple[int, str]] = []
+        self.heard: list[tuple[int, int, str]] = []
+        """Port of the sender, which each connection has of its own, number and words."""
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         self._transport = cast("asyncio.DatagramTransport", transport)
 
     def datagram_received(self, data: bytes, addr: tuple[str, int]) -> None:
         number, _, words = data.decode().partition(" ")
-        self.heard.append((int(number), words))
+        self.heard.append((addr[1], int(number), words))
         if words == "VOLTS":
             self._transport.sendto(f"{number} V 12".encode(), addr)
 
@@ -173,10 +174,12 @@ async def _follow(session: Session, desk: MotionDesk) -> None:
             desk.stopped(command, reason)
 
 
-def _judged(lasts_s: float, heard: Sequence[tuple[int, str]], fault: str) -> Gesture:
+def _judged(lasts_s: float, heard: Sequence[tuple[int, int, str]], fault: str) -> Gesture:
     """Find the first gap, and motion that no stop comes after."""
-    motions = [words for _, words in heard if words.startswith(("DRIVE", "LIFT"))]
-    for place, (number, words) in enumerate(heard):
+    motions = [words for _, _, words in heard if words.startswith(("DRIVE", "LIFT"))]
+    places: dict[int, int] = {}
+    for port, number, words in heard:
+        place = places[port] = places.get(port, -1) + 1  # each connection begins with 0
         if number != place % NUMBERS and not fault:
             fault = f"{number} {words} in the place of {place % NUMBERS}"
     last = {words.split()[0]: words for words in motions}
