@@ -160,6 +160,7 @@ def table(mutants: list[Mutant], explained: Explained) -> Iterator[str]:
         lives = [one for one in those if one.status not in (*DEAD, "waiting")]
         counts["explained"] = sum(map(explained.covers, lives))
         killed = sum(counts[status] for status in DEAD)
-        share = f"{100 * killed / len(those):.1f}" if those else "-"
+        tried = len(those) - counts["waiting"]
+        share = f"{100 * killed / tried:.1f}" if tried else "-"
         cells = [*(counts[head] for head in heads), len(those), share]
         yield f"{module or 'all':<28}" + "".join(f"{cell:>10}" for cell in cells)

@@ -210,11 +210,12 @@ def test_a_run_that_was_stopped_says_that_there_is_more(
 
 
 def test_the_table_has_a_line_for_each_module(tmp_path: Path) -> None:
-    ran(tmp_path, _1=1, _2=0)
+    """Shares are of those that were tried."""
+    ran(tmp_path, _1=1, _2=0, _3=None)
     mutants = mutants_in(tmp_path, SETTINGS)
     head, module, all_of_them = table(mutants, Explained({}))
     assert head.split()[:4] == ["killed", "timeout", "survived", "explained"]
-    assert module.split() == ["urc.guard.reins", "1", "0", "1", "0", "0", "0", "0", "2", "50.0"]
+    assert module.split() == ["urc.guard.reins", "1", "0", "1", "0", "0", "0", "1", "3", "50.0"]
     assert all_of_them.split()[0] == "all"
 
 

@@ -6,7 +6,7 @@ import pytest
 
 from tests.unit.guard.lines import STOP, TERMS, CountedWire, GatedWire, Rig, Wire
 from urc.guard import proxy, wire
-from urc.model.codec import Envelope
+from urc.model.codec import Count, Counted, Envelope, Numbered, Payload
 from urc.testing.clock import settle
 from urc.transports.base import ConnectFailed
 
@@ -372,3 +372,22 @@ async def test_control_may_be_stopping_for_a_while_after_its_stop_was_told(rig: 
     assert rig.guard.is_stopping("drive")
     await rig.clock.advance(0.2)
     assert not rig.guard.is_stopping("drive")
+
+
+async def test_tick_whose_number_was_used_up_is_made_again_whatever_else_was(rig: Rig) -> None:
+    """Unless it was let go meanwhile, or a newer one is under way; it is as old as it was."""
+    await rig.drive()
+    rig.guard.arm("wire", "turn", TERMS._replace(stop=b"halt"))
+    first = Numbered(b"7 left", Count({}, {"n": 7}))
+    again = Numbered(b"8 left", Count({"n": 7}, {"n": 8}))
+    rig.guard.tick("turn", Counted(first, lambda: again))
+    passed: list[tuple[str, Payload]] = []
+    rig.guard._pass_newest = (  # type: ignore[method-assign]
+        lambda slot, said: passed.append((slot, said.data))  # type: ignore[union-attr]
+    )
+    rig.guard._take(wire.Counted("wire", 1, 0, {}, [("drive", 1), ("lift", 1), ("turn", 1)]), 0)
+    assert passed == [("turn", b"8 left")]
+    rig.guard._take(wire.Counted("wire", 1, 0, {}, [("turn", 9)]), 0)
+    rig.guard.release("turn")
+    rig.guard._take(wire.Counted("wire", 1, 0, {}, [("turn", 1)]), 0)
+    assert len(passed) == 1

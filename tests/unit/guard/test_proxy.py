@@ -7,7 +7,7 @@ import pytest
 from urc.guard import wire
 from urc.guard.line import WINDOW_BYTES
 from urc.guard.proxy import GuardedTransport
-from urc.model.codec import Envelope
+from urc.model.codec import Count, Counted, Envelope, Numbered, Payload
 from urc.testing.clock import settle
 from urc.transports.base import ConnectFailed, PeerClosed, Prompt, TransportError
 
@@ -317,3 +317,18 @@ async def test_frames_whose_numbers_were_used_up_are_sent_in_a_round_of_their_ow
     guard.said.clear()
     assert guard.line.offer(b"b")
     assert guard.said == [wire.Send("wire", 2, 1, b"b")]
+
+
+async def test_numbers_count_when_their_frame_has_left() -> None:
+    """Not when it was refused; and with the bytes that left."""
+    guard = Guard()
+    await guard.line.open(1.0)
+    gone: list[Payload] = []
+    for number in (1, 2):
+        count = Count({"n": number - 1}, {"n": number})
+        counted = Counted(Numbered(b"%d go" % number, count), lambda: None)
+        assert guard.line.offer_counted(counted, gone.append)
+    guard.tell(wire.Sent("wire", 1, 1))
+    assert gone == [b"1 go"]
+    guard.tell(wire.Refused("wire", 1, 2, "no room", False))
+    assert gone == [b"1 go"]
