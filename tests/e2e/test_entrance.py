@@ -126,9 +126,9 @@ async def test_the_page_at_the_door_stops_a_robot(
     await page.evaluate("address => location.assign(address)", f"{address}robots/tello/")
     await expect(page.locator("h1")).to_have_text("Open the printed address")
     await page.get_by_role("button", name="STOP").click()
-    await expect(page.get_by_role("status")).to_contain_text("Stop")
+    await expect(page.get_by_role("status")).to_have_text(re.compile("confirmed it$"))
     latch = tmp_path / "latches" / "emulated" / "tello.latch.json"
-    assert json.loads(latch.read_text("utf-8"))["latched_by"]
+    await until(lambda: latch.exists() and json.loads(latch.read_text("utf-8"))["latched_by"])
     await page.evaluate("address => location.assign(address)", f"{address}robots/tello/?key={key}")
     await expect(page.locator("[data-badge]")).to_have_attribute("data-state", "good")
     assert page.url == f"{address}robots/tello/"
