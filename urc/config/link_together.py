@@ -35,6 +35,7 @@ def link_together(
     bound = {**use.inputs, **use.lists, **use.outputs}
     _check_needs(part, use, widget, bound, findings)
     _check_groups(part, widget, bound, findings)
+    _check_instead(part, widget, bound, findings)
     _check_units(part, use, widget, driver, findings)
     _check_order(part, use, widget, findings)
     _check_local(part, widget, findings)
@@ -79,6 +80,26 @@ def _check_groups(
                 f"{mine[0]!r} of widget {widget.name!r} means nothing without {listed(missing)}",
                 key=True,
                 hint=f"bind {listed(missing)} too, or leave {mine[0]} out",
+            )
+
+
+def _check_instead(
+    part: Part, widget: Widget, bound: Mapping[str, object], findings: Findings
+) -> None:
+    """Warn of what this document says in vain: another binding of the slot wins.
+
+    What the driver says of the slot is no mistake of the interface that binds something better.
+    """
+    said = (*part.named("bind").items(), *part.named("options").items())
+    for port in widget.inputs.values():
+        lost = [inner for name, inner in said if port.name in bound and name in port.instead_of]
+        for inner in lost:
+            findings.warn(
+                inner,
+                "unused-binding",
+                f"{inner.name!r} of widget {widget.name!r} means nothing beside {port.name!r}",
+                key=True,
+                hint=f"leave {inner.name} out, or do not bind {port.name}",
             )
 
 

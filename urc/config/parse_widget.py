@@ -62,6 +62,8 @@ def _check_names(part: Part, widget: Widget, findings: Findings) -> None:
     for inner in (*part.named("inputs").values(), *part.named("outputs").values()):
         if "unit_of" in inner.data:
             told.append((inner.must("unit_of"), ports))
+    for inner in part.named("inputs").values():
+        told += [(one, (*widget.inputs, *options)) for one in inner.listed("instead_of")]
     for inner in part.named("options").values():
         if "below" in inner.data:
             told.append((inner.must("below"), options))
@@ -97,6 +99,7 @@ def _input(part: Part) -> Port:
         is_many=part.flag("many", default=False),
         is_each=part.flag("each", default=False),
         quantity=part.text("quantity"),
+        instead_of=tuple(str(inner.data) for inner in part.listed("instead_of")),
     )
 
 

@@ -35,6 +35,8 @@ class Port(NamedTuple):
     """Of an input: it takes a list of signals, each of which must fit."""
     is_each: bool = False
     """Of an input: each reading counts, not only the newest."""
+    instead_of: tuple[str, ...] = ()
+    """Of an input: inputs and options of the same widget that mean nothing where it is bound."""
 
 
 class Widget(NamedTuple):
