@@ -23,14 +23,22 @@ states:
 """
 
 
+def lamp(folder: Path) -> Widget:
+    """Return the widget of the demo."""
+    inputs = {
+        "level": Port("level"),
+        "series": Port("series", is_many=True),
+        "extra": Port("extra", is_required=False),
+    }
+    options = {"label": {"type": "string", "maxLength": 8}}
+    return Widget("lamp", "Lamp", folder, inputs, {"press": Port("press")}, options)
+
+
 def told(folder: Path, demo: str) -> str:
     """Return the findings about a demo, a line each, without the folder."""
     (folder / "demo.yaml").write_text(demo, "utf-8")
-    inputs = {"level": Port("level"), "series": Port("series", is_many=True)}
-    options = {"label": {"type": "string", "maxLength": 8}}
-    widget = Widget("lamp", "Lamp", folder, inputs, {"press": Port("press")}, options)
     try:
-        demo_states(widget)
+        demo_states(lamp(folder))
     except ProblemsError as error:
         found = (one.headline.replace(f"{folder}/", "") for one in error.problems)
         return "\n".join(found)
@@ -72,6 +80,37 @@ def test_a_mistake_in_a_demo_is_told_at_its_place(
 ) -> None:
     """With line and column, as mistakes in every document."""
     assert told(tmp_path, DEMO.replace(before, after)).startswith(found)
+
+
+MORE = """\
+  low:
+    signals: { extra: { type: array, unit: deg } }
+    values: { level: 1, extra: [2, 3] }
+"""
+
+
+def test_a_state_binds_an_input_that_the_others_leave_alone(tmp_path: Path) -> None:
+    """An input that takes the place of another one is bound where it is shown, and nowhere else."""
+    assert told(tmp_path, DEMO + MORE) == ""
+    normal, low = demo_states(lamp(tmp_path))
+    assert set(normal.use.inputs) == {"level"}
+    assert dict(low.use.inputs) == {"level": "level", "extra": "extra"}
+    assert low.profile.driver.signals["extra"].unit == "deg"
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "found"),
+    [
+        ("signals: { extra", "signals: { extr", "demo.yaml:13:16: error unknown-key states.low"),
+        ("unit: deg", "unti: deg", "demo.yaml:13:38: error unknown-key states.low.signals.extra"),
+        (MORE, "  low: { values: { extra: [1] } }", "demo.yaml:12:20: error unknown-key"),
+    ],
+)
+def test_a_mistake_in_what_a_state_binds_is_told_at_its_place(
+    tmp_path: Path, before: str, after: str, found: str
+) -> None:
+    """What is bound in one state is unknown in the others."""
+    assert told(tmp_path, (DEMO + MORE).replace(before, after)).startswith(found)
 
 
 def test_a_demo_that_is_missing_is_told(tmp_path: Path) -> None:

@@ -114,17 +114,22 @@ def check_demo(widget: Widget, document: Document) -> list[Problem]:
 def _demo(widget: Widget, data: Any) -> dict[str, Any]:
     signals = _part(data, "signals")
     outputs = _part(data, "outputs")
-    state = _state(signals, outputs)
     ports = {
         name: {"type": "array", "items": _SIGNAL} if port.is_many else _SIGNAL
         for name, port in widget.inputs.items()
     }
+    bound = _mapping("the inputs of this widget", ports) | {"type": ["object", "null"]}
+    plain = _state(bound, signals, outputs)
+    own = {
+        name: _state(bound, {**signals, **_part(given, "signals")}, outputs)
+        for name, given in _part(data, "states").items()
+    }
     states = {
-        **_mapping("the states of a demo", {"normal": state}, "normal"),
-        "additionalProperties": state,
+        **_mapping("the states of a demo", {"normal": plain, **own}, "normal"),
+        "additionalProperties": plain,
     }
     parts = {
-        "signals": _mapping("the inputs of this widget", ports) | {"type": ["object", "null"]},
+        "signals": bound,
         "outputs": _mapping("the outputs of this widget", dict.fromkeys(widget.outputs, _OUTPUT))
         | {"type": ["object", "null"]},
         "states": states,
@@ -137,14 +142,17 @@ def _part(data: Any, key: str) -> dict[str, Any]:
     return found if isinstance(found, dict) else {}
 
 
-def _state(signals: Mapping[str, Any], outputs: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the schema of a state: it speaks of what the demo binds."""
+def _state(
+    bound: Mapping[str, Any], signals: Mapping[str, Any], outputs: Mapping[str, Any]
+) -> dict[str, Any]:
+    """Return the schema of a state: it speaks of the signals that the demo, or it alone, binds."""
     values = {name: _values(given) for name, given in signals.items()}
     past = {"type": "array", "items": {"type": "array", "minItems": 2, "maxItems": 2}}
     answered = {*outputs, *_commands(outputs.values())}
     state = _mapping(
         "state of a demo",
         {
+            "signals": bound,
             "values": _mapping("the signals of this demo", values),
             "title": _TEXT,
             "options": {"type": "object"},

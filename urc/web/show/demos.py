@@ -61,7 +61,9 @@ def demo_states(widget: Widget) -> list[DemoState]:
 
 def _state(widget: Widget, document: Document, demo: Mapping[str, Any], name: str) -> DemoState:
     shown: Mapping[str, Any] = demo["states"][name] or {}
-    signals, inputs, lists = _signals(demo.get("signals") or {})
+    signals, inputs, lists = _signals(
+        {**(demo.get("signals") or {}), **(shown.get("signals") or {})}
+    )
     commands, outputs = _commands(widget, demo.get("outputs") or {})
     options = {**_defaults(widget), **(shown.get("options") or {})}
     use = WidgetUse(name, widget.name, inputs, outputs, options, shown.get("title", ""))
