@@ -9,9 +9,10 @@ import {
 } from "../../widgets/map/geo.js";
 import { bearing, crop, firstView, poseOf, target, tilted, turned } from "../../widgets/pano360/look.js";
 import { Track, at, bearings, besides, kindOf, nearestOf, sector, shareOf, sideOf, zoneOf } from "../../widgets/range/sight.js";
+import { Even, NO_RAY, Uneven, faultOf } from "../../widgets/scan/fan.js";
 import { arc, band, chart, dots, graph, view } from "../../widgets/scan/paint.js";
 import {
-  NO_RAY, directions, measured, nearest, rayAt, rayOfPixels, raysOfColumns, reachOfPixels, ringStep, sideOf as scanSide,
+  bearingOfPixels, directions, measured, nearest, rayOfPixels, raysOfColumns, reachOfPixels, ringStep, sideOf as scanSide,
 } from "../../widgets/scan/rays.js";
 import { fileOf } from "../../widgets/scene3d/model.js";
 import { angles, cameraAt, cloud, fromAngles, fromOrientation, posture, turned as spun } from "../../widgets/scene3d/pose.js";
@@ -71,19 +72,19 @@ test("the track of a distance is bounded in time and number, with gaps where not
 });
 
 test("rays go counter-clockwise from their start, either way round", () => {
-  const fan = { count: 4, start: -Math.PI, step: Math.PI / 2 };
-  assert.deepEqual([-Math.PI, -Math.PI / 2, 0, Math.PI / 2, 0.2].map((angle) => rayAt(fan, angle)), [0, 1, 2, 3, 2]);
-  assert.equal(rayAt({ count: 3, start: -0.1, step: 0.1 }, 2), NO_RAY);
-  assert.equal(rayAt({ count: 3, start: -0.1, step: 0.1 }, -0.14), 0);
-  assert.equal(rayAt({ count: 4, start: 0, step: -Math.PI / 2 }, -Math.PI / 2), 1);
+  const fan = new Even(4, -Math.PI, Math.PI / 2);
+  assert.deepEqual([-Math.PI, -Math.PI / 2, 0, Math.PI / 2, 0.2].map((angle) => fan.rayAt(angle)), [0, 1, 2, 3, 2]);
+  assert.equal(new Even(3, -0.1, 0.1).rayAt(2), NO_RAY);
+  assert.equal(new Even(3, -0.1, 0.1).rayAt(-0.14), 0);
+  assert.equal(new Even(4, 0, -Math.PI / 2).rayAt(-Math.PI / 2), 1);
   const { right, down } = directions(fan);
   allNear([right[2] ?? 9, down[2] ?? 9, right[3] ?? 9, down[1] ?? 9], [0, -1, -1, 0].map((value) => Math.fround(value)));
-  assert.deepEqual([...raysOfColumns({ count: 3, start: 0, step: 1 }, 3)], [2, 1, 0]);
-  assert.deepEqual([...raysOfColumns({ count: 3, start: 0, step: -1 }, 3)], [0, 1, 2]);
+  assert.deepEqual([...raysOfColumns(new Even(3, 0, 1), 3)], [2, 1, 0]);
+  assert.deepEqual([...raysOfColumns(new Even(3, 0, -1), 3)], [0, 1, 2]);
 });
 
 test("the nearest thing of a sweep is told with its side; what is clear or not known is none", () => {
-  const fan = { count: 4, start: -Math.PI, step: Math.PI / 2 };
+  const fan = new Even(4, -Math.PI, Math.PI / 2);
   const seen = measured([9, 2.5, NaN, null], 0.1, 8, new Float32Array(4));
   assert.deepEqual([...seen.slice(0, 2)], [8, 2.5]);
   assert.ok(Number.isNaN(seen[2]) && Number.isNaN(seen[3]));
@@ -98,7 +99,7 @@ test("the nearest thing of a sweep is told with its side; what is clear or not k
 const INK = { wall: 1, near: 2, stop: 3, free: 4, unknown: 5 };
 
 test("each picture of a scan puts things where they are", () => {
-  const fan = { count: 4, start: -Math.PI, step: Math.PI / 2 }; // behind, right, ahead, left
+  const fan = new Even(4, -Math.PI, Math.PI / 2); // behind, right, ahead, left
   const limits = { most: 10, near: 6, stop: 3 };
   const seen = measured([10, 5, 2, NaN], 0, 10, new Float32Array(4));
   const size = 101;
@@ -106,12 +107,12 @@ test("each picture of a scan puts things where they are", () => {
   const look = (/** @type {number} */ x, /** @type {number} */ y) => pixels[y * size + x];
   dots(pixels, size, seen, directions(fan), limits, INK);
   assert.deepEqual([look(75, 50), look(50, 40), look(50, 100), look(10, 50)], [2, 3, 0, 0]);
-  const [rays, reach] = [rayOfPixels(fan, size), reachOfPixels(size)];
+  const [rays, reach] = [rayOfPixels(fan, bearingOfPixels(size)), reachOfPixels(size)];
   chart(pixels, rays, reach, size, seen, limits, INK);
   assert.deepEqual([look(60, 50), look(75, 50), look(90, 50), look(50, 45), look(50, 40), look(30, 50)], [4, 2, 0, 4, 3, 5]);
   assert.equal(look(50, 90), INK.free, "behind is clear to the rim");
   const shades = palette();
-  arc(pixels, band(rays, reach, size), seen, limits, shades, INK.unknown);
+  arc(pixels, band(reach, size), rays, seen, limits, shades, INK.unknown);
   assert.equal(look(50, 50), 0);
   assert.equal(look(50, 12), shades[204]); // ahead, at 2 of 10: bright
   assert.equal(look(9, 50), INK.unknown);
@@ -125,8 +126,66 @@ test("each picture of a scan puts things where they are", () => {
   assert.equal(wide[4 * 78 + 2], INK.stop);
 });
 
+const degrees = (/** @type {readonly number[]} */ given) => given.map((each) => (each * Math.PI) / 180);
+
+test("uneven beams reach half-way to their neighbours, and not into the sector without beams", () => {
+  const fan = new Uneven(degrees([90, 50, 30, 10, -10, -30, -50, -90])); // a ring of sonars on the front
+  const seen = degrees([0, 12, 45, 65, 75, 95, 120, 180, -45, -75, -120, 365]).map((angle) => fan.rayAt(angle));
+  assert.deepEqual(seen, [seen[0], 3, 1, 1, 0, 0, NO_RAY, NO_RAY, 6, 7, NO_RAY, 3]);
+  assert.ok(seen[0] === 3 || seen[0] === 4, "straight ahead lies between two");
+  const { right, down } = directions(fan);
+  allNear([right[0] ?? 9, down[3] ?? 9].map((each) => Math.round(each * 1000)), [-1000, -985]);
+});
+
+test("uneven beams may come in any order and over several turns, and a single one covers no full turn", () => {
+  const fan = new Uneven(degrees([350, 730, 180, 95]));
+  assert.deepEqual(degrees([-9, 12, 181, 90]).map((angle) => fan.rayAt(angle)), [0, 1, 2, 3]);
+  const single = new Uneven([0]);
+  assert.deepEqual(degrees([0, 40, 50, 180]).map((angle) => single.rayAt(angle)), [0, 0, NO_RAY, NO_RAY]);
+  assert.equal(new Uneven([]).rayAt(0), NO_RAY);
+  const same = new Uneven([1, 1, 1]);
+  assert.ok(same.rayAt(1) < 3);
+  const found = nearest(measured([5, 4, 2, 9], 0, 8, new Float32Array(4)), fan, 8);
+  assert.equal(scanSide(found?.angle ?? 0), "behind");
+});
+
+test("as the robot sees it, uneven beams go from left to right, and the cut is where none looks", () => {
+  assert.deepEqual([...raysOfColumns(new Uneven(degrees([-60, -20, 30, 60])), 5)], [3, 2, 1, 1, 0]);
+  assert.deepEqual([...raysOfColumns(new Uneven(degrees([150, 180, 210])), 3)], [2, 1, 0]);
+  assert.equal(raysOfColumns(new Uneven(degrees([0, 90, 180, 270])), 5)[2], 0, "a full turn has ahead in the middle");
+  assert.deepEqual([...raysOfColumns(new Uneven([]), 2)], [NO_RAY, NO_RAY]);
+});
+
+test("angles that cannot be those of the distances are a fault; a beam without both is left out", () => {
+  assert.equal(faultOf([0, 1], [5, 6]), null);
+  assert.deepEqual(faultOf([0, 1], [5]), { text: "▲ {angles} angles for {distances} distances", names: { angles: 2, distances: 1 } });
+  assert.deepEqual(faultOf([0, null, 2], [5, 6, 7]), { text: "▲ angle {place} of {count} is not a number", names: { place: 2, count: 3 } });
+  assert.deepEqual(faultOf([0, "1"], [5, 6])?.names, { place: 2, count: 2 });
+  assert.deepEqual(faultOf([Infinity], [5])?.names, { place: 1, count: 1 });
+  assert.equal(faultOf([0, null, NaN], [5, null, NaN]), null);
+  const fan = new Uneven([0, null, Math.PI]);
+  assert.equal(fan.rayAt(0), 0);
+  assert.equal(nearest(measured([5, null, 7], 0, 8, new Float32Array(3)), fan, 8)?.distance, 5);
+});
+
+test("uneven beams are drawn where they look", () => {
+  const fan = new Uneven(degrees([0, 90, 120]));
+  const limits = { most: 10, near: 6, stop: 3 };
+  const seen = measured([2, 5, 8], 0, 10, new Float32Array(3));
+  const size = 101;
+  const pixels = new Uint32Array(size * size);
+  const look = (/** @type {number} */ x, /** @type {number} */ y) => pixels[y * size + x];
+  dots(pixels, size, seen, directions(fan), limits, INK);
+  assert.deepEqual([look(50, 40), look(25, 50), look(15, 70), look(75, 50), look(50, 90)], [3, 2, 1, 0, 0]);
+  chart(pixels, rayOfPixels(fan, bearingOfPixels(size)), reachOfPixels(size), size, seen, limits, INK);
+  assert.deepEqual([look(50, 45), look(25, 50), look(15, 70), look(75, 50), look(50, 90)], [4, 2, 1, 0, 0]);
+  const [shades, reach] = [palette(), reachOfPixels(size)];
+  arc(pixels, band(reach, size), rayOfPixels(fan, bearingOfPixels(size)), seen, limits, shades, INK.unknown);
+  assert.deepEqual([look(50, 12), look(88, 50), look(50, 88)], [shades[204], 0, 0]);
+});
+
 test("a sweep of 1080 rays is drawn without a new object for each", () => {
-  const fan = { count: 1080, start: -Math.PI, step: (2 * Math.PI) / 1080 };
+  const fan = new Even(1080, -Math.PI, (2 * Math.PI) / 1080);
   const values = Array.from({ length: 1080 }, (_, index) => 2 + Math.sin(index / 40));
   const [seen, pixels] = [new Float32Array(1080), new Uint32Array(420 * 420)];
   measured(values, 0, 5, seen);

@@ -15,7 +15,8 @@
  * @property {number} near
  * @property {number} stop
  */
-import { NO_RAY, wallHeight } from "./rays.js";
+import { NO_RAY } from "./fan.js";
+import { wallHeight } from "./rays.js";
 
 /**
  * @param {number} distance
@@ -120,24 +121,19 @@ export function view(into, width, height, rays, distances, limits, palette, unkn
 }
 
 /**
- * Return the pixels of the arc: where each is, which ray passes it, and how deep in it lies, 0 to 1.
+ * Return the pixels of the arc: where each is, and how deep in it lies, 0 to 1.
  *
- * @param {Uint16Array} rays
- * @param {Float32Array} reach
+ * @param {Float32Array} reach distance of each pixel from the middle, in pixels
  * @param {number} size
  */
-export function band(rays, reach, size) {
+export function band(reach, size) {
   const outer = ((size - 1) / 2) * ARC.outer;
   const thick = ((size - 1) / 2) * (ARC.outer - ARC.inner);
   const places = Uint32Array.from(reach.keys()).filter((place) => {
     const depth = outer - (reach[place] ?? 0);
-    return depth >= 0 && depth <= thick && rays[place] !== NO_RAY;
+    return depth >= 0 && depth <= thick;
   });
-  return {
-    places,
-    rays: Uint16Array.from(places, (place) => rays[place] ?? NO_RAY),
-    depths: Float32Array.from(places, (place) => (outer - (reach[place] ?? 0)) / thick),
-  };
+  return { places, depths: Float32Array.from(places, (place) => (outer - (reach[place] ?? 0)) / thick) };
 }
 
 /**
@@ -145,19 +141,21 @@ export function band(rays, reach, size) {
  *
  * @param {Uint32Array} into
  * @param {ReturnType<typeof band>} band
+ * @param {Uint16Array} rays ray of each pixel
  * @param {Float32Array} distances
  * @param {Limits} limits
  * @param {Uint32Array} palette
  * @param {number} unknown
  */
-export function arc(into, { places, rays, depths }, distances, limits, palette, unknown) {
+export function arc(into, { places, depths }, rays, distances, limits, palette, unknown) {
   into.fill(0);
   // The nearer, the further the bar reaches in: brightness is not the only sign.
   const lengths = distances.map((each) => (each === each ? Math.max(0.06, 1 - each / limits.most) : 0.06));
   const colours = Uint32Array.from(distances, (each) => (each === each ? shade(each, limits.most, palette) : unknown));
   for (let index = 0; index < places.length; index += 1) {
-    const ray = rays[index] ?? 0;
-    if ((depths[index] ?? 1) <= (lengths[ray] ?? 0)) into[places[index] ?? 0] = colours[ray] ?? 0;
+    const place = places[index] ?? 0;
+    const ray = rays[place] ?? NO_RAY;
+    if (ray !== NO_RAY && (depths[index] ?? 1) <= (lengths[ray] ?? 0)) into[place] = colours[ray] ?? 0;
   }
 }
 

@@ -5,15 +5,10 @@
  * Angles are radians from straight ahead, counter-clockwise (REP 103). A pixel's x is to the right
  * and its y down, so ahead is up and left is left.
  *
- * @typedef {object} Fan Where the rays point.
- * @property {number} count
- * @property {number} start radians of the first ray
- * @property {number} step radians between two; negative when they go clockwise
+ * @typedef {import("./fan.js").Fan} Fan
  */
 
 const TURN = 2 * Math.PI;
-/** Two rays further apart than so many steps are not joined. */
-export const NO_RAY = 0xffff;
 
 /**
  * Return the distances as they are drawn: NaN where nothing is known, `most` where it is clear, and
@@ -39,46 +34,39 @@ export function measured(ranges, least, most, into) {
  *
  * @param {Fan} fan
  */
-export function directions({ count, start, step }) {
-  const right = new Float32Array(count);
-  const down = new Float32Array(count);
-  for (let index = 0; index < count; index += 1) {
-    right[index] = -Math.sin(start + step * index);
-    down[index] = -Math.cos(start + step * index);
+export function directions(fan) {
+  const right = new Float32Array(fan.count);
+  const down = new Float32Array(fan.count);
+  for (let index = 0; index < fan.count; index += 1) {
+    right[index] = -Math.sin(fan.angleAt(index));
+    down[index] = -Math.cos(fan.angleAt(index));
   }
   return { right, down };
 }
 
 /**
- * Return the ray that looks into a direction, or NO_RAY when none does.
+ * Return the direction of each pixel of a square picture around the sensor, in radians.
  *
- * @param {Fan} fan
- * @param {number} angle radians, any turn
+ * @param {number} size pixels
  */
-export function rayAt({ count, start, step }, angle) {
-  if (count === 0 || step === 0) return NO_RAY;
-  const sense = Math.sign(step);
-  const along = ((((angle - start) * sense) % TURN) + TURN) % TURN;
-  const index = Math.round(along / Math.abs(step));
-  if (index < count) return index;
-  // Just before the first ray is still the first ray.
-  return TURN - along <= Math.abs(step) / 2 ? 0 : NO_RAY;
+export function bearingOfPixels(size) {
+  const bearings = new Float32Array(size * size);
+  const centre = (size - 1) / 2;
+  for (let y = 0; y < size; y += 1) {
+    for (let x = 0; x < size; x += 1) bearings[y * size + x] = Math.atan2(centre - x, centre - y);
+  }
+  return bearings;
 }
 
 /**
- * Return for each pixel of a square picture around the sensor which ray passes through it.
+ * Return for each pixel which ray passes through it.
  *
  * @param {Fan} fan
- * @param {number} size pixels
+ * @param {Float32Array} bearings direction of each pixel
  */
-export function rayOfPixels(fan, size) {
-  const rays = new Uint16Array(size * size);
-  const centre = (size - 1) / 2;
-  for (let y = 0; y < size; y += 1) {
-    for (let x = 0; x < size; x += 1) {
-      rays[y * size + x] = rayAt(fan, Math.atan2(centre - x, centre - y));
-    }
-  }
+export function rayOfPixels(fan, bearings) {
+  const rays = new Uint16Array(bearings.length);
+  for (let place = 0; place < rays.length; place += 1) rays[place] = fan.rayAt(bearings[place] ?? 0);
   return rays;
 }
 
@@ -115,7 +103,7 @@ export function nearest(distances, fan, most) {
       found = index;
     }
   }
-  return found < 0 ? null : { distance: least, angle: fan.start + fan.step * found };
+  return found < 0 ? null : { distance: least, angle: fan.angleAt(found) };
 }
 
 /**
@@ -134,15 +122,9 @@ export function wallHeight(distance, close) {
  * @param {Fan} fan
  * @param {number} columns
  */
-export function raysOfColumns({ count, step }, columns) {
-  const rays = new Uint16Array(columns);
-  for (let column = 0; column < columns; column += 1) {
-    const share = columns > 1 ? column / (columns - 1) : 0;
-    // Counter-clockwise rays go from right to left.
-    const along = step > 0 ? 1 - share : share;
-    rays[column] = count > 0 ? Math.min(count - 1, Math.round(along * (count - 1))) : NO_RAY;
-  }
-  return rays;
+export function raysOfColumns(fan, columns) {
+  const last = Math.max(1, columns - 1);
+  return Uint16Array.from({ length: columns }, (_, column) => fan.across(column / last));
 }
 
 /**

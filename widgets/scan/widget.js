@@ -2,14 +2,18 @@
 /** @typedef {import("../../urc/web/static/types.js").Context} Context */
 /** @typedef {import("../../urc/web/static/types.js").Instance} Instance */
 /** @typedef {import("../../urc/web/static/types.js").Reading} Reading */
-/** @typedef {import("./rays.js").Fan} Fan */
+/** @typedef {import("./fan.js").Fan} Fan */
+/** @typedef {import("./fan.js").Fault} Fault */
 /** @typedef {import("./paint.js").Ink} Ink */
-import { DASH, attribute, colours, format, noteOf, number, part, write } from "urc/kit";
+import { DASH, attribute, colours, format, noteOf, number, part, worst, write } from "urc/kit";
 import { palette, pixel } from "urc/palette";
 import { Sheet } from "urc/sheet";
+import { Even, Uneven, faultOf } from "./fan.js";
 import { Overlay } from "./overlay.js";
 import { arc, band, chart, dots, graph, view } from "./paint.js";
-import { directions, measured, nearest, rayOfPixels, raysOfColumns, reachOfPixels, sideOf } from "./rays.js";
+import {
+  bearingOfPixels, directions, measured, nearest, rayOfPixels, raysOfColumns, reachOfPixels, sideOf,
+} from "./rays.js";
 
 /** Largest picture in pixels: a slow device fills no more in a frame. */
 const MOST_PIXELS = 420;
@@ -40,6 +44,16 @@ export default {
   },
 };
 
+/**
+ * Return where the pixels of a picture are.
+ *
+ * @param {number} size
+ */
+function placesOf(size) {
+  const reach = reachOfPixels(size);
+  return { size, reach, bearings: bearingOfPixels(size), band: band(reach, size) };
+}
+
 class Scan {
   /** @param {Context} ctx */
   constructor({ el, options, t, unit, signal }) {
@@ -63,14 +77,18 @@ class Scan {
     this.most = 10;
     this.distances = new Float32Array(0);
     /** @type {Fan} */
-    this.fan = { count: 0, start: 0, step: 0 };
+    this.fan = new Even(0, 0, 0);
+    /** What the fan was made of. */
+    this.made = "";
+    /** @type {Fault | null} */
+    this.fault = null;
+    /** Where the pixels of a picture of this size are. */
+    this.places = placesOf(0);
     /** What was made for this fan and this size. */
     this.tables = {
       key: "",
       ways: directions(this.fan),
       rays: new Uint16Array(0),
-      reach: new Float32Array(0),
-      band: band(new Uint16Array(0), new Float32Array(0), 1),
     };
     this.image = new ImageData(1, 1);
     this.pixels = new Uint32Array(this.image.data.buffer);
@@ -132,27 +150,40 @@ class Scan {
     if (!reading) return;
     this.reading = reading;
     this.heading = number(readings["heading"]) ?? NaN;
-    const values = Array.isArray(reading.value) ? reading.value : [];
     this.most = number(readings["range_max"]) ?? Number(this.options["range_max"] ?? 10);
-    this.setFan(values.length, readings);
-    attribute(this.root, "data-state", reading.state);
+    this.setFan(reading, readings);
+    const { angles } = readings;
+    const lead = !angles || reading.value === null ? reading : angles.value === null ? angles : worst([reading, angles]);
+    attribute(this.root, "data-state", lead.state);
+    attribute(this.root, "data-fault", this.fault ? "yes" : null);
     this.draw();
-    this.tell(reading, values.length);
+    this.tell(lead, lead === angles && lead.state === "none" ? this.t("no angles yet") : noteOf(lead, this.t));
   }
 
   /**
-   * @param {number} count
+   * Learn where the rays point. There are none where that cannot be known: a dot in a wrong place
+   * would hide what stands in its way.
+   *
+   * @param {Reading} reading of the distances
    * @param {Readonly<Record<string, Reading>>} readings
    */
-  setFan(count, readings) {
+  setFan(reading, readings) {
+    const ranges = Array.isArray(reading.value) ? reading.value : [];
+    const { angles } = readings;
+    const ways = Array.isArray(angles?.value) ? angles.value : [];
+    this.fault = angles?.value && reading.value ? faultOf(ways, ranges) : null;
+    const isPlaced = !this.fault && (!angles || ways.length === ranges.length);
+    const count = isPlaced ? ranges.length : 0;
     const option = (/** @type {string} */ name, /** @type {number} */ otherwise) => {
       const given = number(readings[name]) ?? this.options[name];
       return typeof given === "number" ? given : otherwise;
     };
     const start = option("angle_min", -Math.PI);
     const step = option("angle_increment", count > 0 ? (2 * Math.PI) / count : 0);
-    if (this.fan.count === count && this.fan.start === start && this.fan.step === step) return;
-    this.fan = { count, start, step };
+    const made = angles ? `${count} at ${angles.serial}` : `${count} ${start} ${step}`;
+    if (this.made === made) return;
+    this.made = made;
+    this.fan = angles ? new Uneven(ways.slice(0, count)) : new Even(count, start, step);
     this.distances = new Float32Array(count);
     this.serial = -1;
   }
@@ -199,18 +230,15 @@ class Scan {
   /** @param {boolean} isFlat */
   makeTables(isFlat) {
     const { width } = this.image;
-    const { count, start, step } = this.fan;
-    const key = `${this.view} ${width} ${count} ${start} ${step}`;
+    const key = `${this.view} ${width} ${this.made}`;
     if (key === this.tables.key) return;
     const isWhole = this.view === "map" || this.view === "arc";
-    const whole = isWhole ? rayOfPixels(this.fan, width) : new Uint16Array(0);
-    const reach = isWhole ? reachOfPixels(width) : new Float32Array(0);
+    if (isWhole && this.places.size !== width) this.places = placesOf(width);
+    const whole = isWhole ? rayOfPixels(this.fan, this.places.bearings) : new Uint16Array(0);
     this.tables = {
       key,
       ways: directions(this.fan),
       rays: isFlat ? raysOfColumns(this.fan, width) : whole,
-      reach,
-      band: band(whole, this.view === "arc" ? reach : new Float32Array(0), width),
     };
   }
 
@@ -224,17 +252,18 @@ class Scan {
     const { width, height } = image;
     if (all.length === 0) pixels.fill(0);
     else if (this.view === "polar") dots(pixels, width, all, tables.ways, limits, ink);
-    else if (this.view === "map") chart(pixels, tables.rays, tables.reach, width, all, limits, ink);
+    else if (this.view === "map") chart(pixels, tables.rays, this.places.reach, width, all, limits, ink);
     else if (this.view === "graph") graph(pixels, width, height, all, limits, ink);
     else if (this.view === "depth") view(pixels, width, height, tables.rays, all, limits, this.palette, ink.unknown);
-    else arc(pixels, tables.band, all, limits, this.palette, ink.unknown);
+    else arc(pixels, this.places.band, tables.rays, all, limits, this.palette, ink.unknown);
   }
 
   /**
-   * @param {Reading} reading
-   * @param {number} count
+   * @param {Pick<Reading, "state">} lead what the sweep is as old as
+   * @param {string} aged how old that is, for people
    */
-  tell(reading, count) {
+  tell(lead, aged) {
+    const { count } = this.fan;
     const found = count > 0 ? nearest(this.distances, this.fan, this.most) : null;
     const { symbol, factor } = this.unit("ranges");
     const { near, stop } = { near: Number(this.options["near"] ?? 0), stop: Number(this.options["stop"] ?? 0) };
@@ -246,7 +275,8 @@ class Scan {
       ? `${mark}${found.distance === 0 ? this.t("too close") : `${format(factor(found.distance), 2)} ${symbol}`.trim()} · ${this.t(sideOf(found.angle))}`
       : count === 0 || isBlind ? DASH : this.t("clear");
     write(this.text, words);
-    const blind = isBlind && reading.state === "live" ? this.t("not known") : "";
-    write(this.note, [blind, noteOf(reading, this.t)].filter(Boolean).join(" · "));
+    const blind = isBlind && lead.state === "live" ? this.t("not known") : "";
+    const fault = this.fault ? this.t(this.fault.text, this.fault.names) : "";
+    write(this.note, [blind, fault, aged].filter(Boolean).join(" · "));
   }
 }

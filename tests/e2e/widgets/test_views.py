@@ -68,6 +68,50 @@ async def test_distances_around_the_robot(new_page: PageMaker) -> None:
         await until_pixel(page, ".scan-data", 0.5, 0.12, "a === 255 && r > 170 && r > b + 60")
 
 
+async def test_rays_at_uneven_angles_are_drawn_where_they_look(new_page: PageMaker) -> None:
+    """Degrees of the robot become directions; angles that cannot be right draw nothing."""
+    signals = {
+        "sweep": Signal("sweep", "array", unit="m", stale_after_s=60),
+        "ways": Signal("ways", "array", unit="deg", stale_after_s=60),
+    }
+    use = WidgetUse(
+        "s", "scan", {"ranges": "sweep", "angles": "ways"}, options={"range_max": 10, "stop": 3.0}
+    )
+    page = await new_page(size="tablet")
+    async with shown(page, signals, use) as robot:
+        ahead, right, behind_left = (0.5, 0.4), (0.75, 0.5), (0.5 + 0.2 * -0.866, 0.5 + 0.2 * 0.5)
+        robot.say("sweep", (2.0, 5.0, 4.0))  # type: ignore[arg-type]
+        await until_text(page, ".scan-note", "no angles yet")
+        assert await page.inner_text(".scan-text") == "—"
+        robot.say("ways", (0.0, -90.0, 120.0))  # type: ignore[arg-type]
+        await until_text(page, ".scan-text", "▲ 2.00 m · ahead")
+        await until_pixel(page, ".scan-data", *ahead, "r > 120 && r > b + 40 && a === 255")
+        for x, y in (right, behind_left):
+            await until_pixel(page, ".scan-data", x, y, "a === 255 && Math.abs(r - b) < 40")
+        # Where even steps would have put the second and the third.
+        await until_pixel(page, ".scan-data", 0.5 + 0.25 * 0.866, 0.5 - 0.25 * 0.5, "a === 0")
+        await until_pixel(page, ".scan-data", 0.5 - 0.2 * 0.866, 0.5 - 0.2 * 0.5, "a === 0")
+        robot.say("ways", (0.0, -90.0))  # type: ignore[arg-type]
+        await until_text(page, ".scan-note", "▲ 2 angles for 3 distances")
+        for x, y in (ahead, right, behind_left):
+            await until_pixel(page, ".scan-data", x, y, "a === 0")
+        assert await page.inner_text(".scan-text") == "—"
+        assert await page.get_attribute(".scan", "data-zone") == ""
+        robot.say("ways", (0.0, None, 120.0))  # type: ignore[arg-type]
+        await until_text(page, ".scan-note", "▲ angle 2 of 3 is not a number")
+        await until_pixel(page, ".scan-data", *ahead, "a === 0")
+        robot.say("ways", (0.0, -90.0, 90.0))  # type: ignore[arg-type]
+        await until_text(page, ".scan-text", "▲ 2.00 m · ahead")
+        assert await page.inner_text(".scan-note") == ""
+        await page.get_by_role("button", name="View: Dots").click()
+        await until_attribute(page, ".scan", "data-view", "map")
+        await until_pixel(page, ".scan-data", 0.4, 0.5, "a > 0")  # free, up to the wall on the left
+        await until_pixel(page, ".scan-data", 0.5, 0.6, "a === 0")  # no ray looks behind
+        robot.say("ways", (0.0, 180.0, 90.0))  # type: ignore[arg-type]
+        await until_pixel(page, ".scan-data", 0.5, 0.6, "a > 0")
+        await until_pixel(page, ".scan-data", 0.6, 0.5, "a === 0")
+
+
 async def test_depth_is_coloured_and_probed(new_page: PageMaker) -> None:
     """16 bits of millimetres: near is bright; a tap and a key choose what is measured and sent."""
     use = WidgetUse(
