@@ -4,7 +4,7 @@ mutmut makes the mutants and runs the tests, as `[tool.mutmut]` in pyproject.tom
 the tree under `.mutate`. Results stay there: a run that is stopped goes on where it was, and only
 what a change concerns is tried again. `tests/mutants.toml` explains the mutants that no test can
 kill. Exit code 0: all of them are killed or explained, and 90 % are killed; 1: not so; 3: there is
-more to do. Why mutmut, and what it leaves out: docs/decisions/0023-mutants-by-mutmut.md.
+more to do. Why mutmut, and what it leaves out: docs/decisions/0024-mutants-by-mutmut.md.
 """
 
 import argparse
