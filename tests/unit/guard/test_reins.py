@@ -15,7 +15,7 @@ from tests.unit.guard.lines import (
     Wire,
 )
 from urc.guard import wire
-from urc.model.codec import Envelope, Payload
+from urc.model.codec import Count, Envelope, Payload
 from urc.testing.clock import settle
 from urc.transports.base import TransportError
 
@@ -291,3 +291,37 @@ async def test_rescued_line_is_handed_over(bench: Bench) -> None:
     bench.tell(wire.Send("wire", 2, 1, b"hello"))
     await settle()
     assert bench.robot.written[-1] == b"hello"
+
+
+async def test_tick_that_finds_its_number_used_up_is_told_of_once(bench: Bench) -> None:
+    """What was told is made again elsewhere; nothing of it stays here."""
+    await bench.drive()
+    bench.heard()
+    bench.tell(wire.Send("wire", 1, 1, b"0 ping", Count({}, {"n": 0})))
+    bench.heard()
+    bench.tell(wire.Tick("drive", 2, b"0 go", bench.clock.now(), Count({}, {"n": 0})))
+    assert bench.heard() == [wire.Counted("wire", 1, 1, {"n": 0}, [("drive", 2)])]
+    bench.tell(wire.Send("wire", 1, 2, b"1 ping", Count({"n": 0}, {"n": 1})))
+    told = [said for said in bench.heard() if isinstance(said, wire.Counted)]
+    assert told == [wire.Counted("wire", 1, 2, {"n": 1}, [])]
+    assert bench.robot.written == [b"go 1", b"0 ping", b"1 ping"]
+
+
+async def test_motion_whose_number_is_used_up_before_its_turn_is_not_sent(
+    benches: list[Bench],
+) -> None:
+    """It comes just when the line is free again, and a poll that waited goes first."""
+    robot = GatedWire()
+    benches.append(bench := Bench(robot))
+    await bench.drive()
+    bench.tell(wire.Send("wire", 1, 1, b"0 poll", Count({}, {"n": 0})))
+    await settle()
+    tick = wire.Tick("drive", 2, b"0 go", bench.clock.now(), Count({}, {"n": 0}))
+    robot.let_through(1)
+    asyncio.get_running_loop().call_soon(bench.tell, tick)
+    await settle()
+    robot.let_through(5)
+    await settle()
+    assert robot.written == [b"go 1", b"0 poll"]
+    stale = [one for said in bench.heard() if isinstance(said, wire.Counted) for one in said.stale]
+    assert stale == [("drive", 2)]

@@ -1,9 +1,12 @@
 """A line that does not take what is written: what waits, what is reset, and what comes first."""
 
+import asyncio
+
 import pytest
 
 from tests.unit.guard.lines import STOP, TERMS, CountedWire, Rig, ScatteredWire, SlowWire
-from urc.motion.stall import AFRESH_S, SHORTEST_CUT_S, STOP_WITHIN_S
+from urc.model.codec import Envelope, Payload
+from urc.motion.stall import AFRESH_S, SHORTEST_CUT_S, STALLED_S, STOP_WITHIN_S
 from urc.testing.clock import settle
 from urc.transports.base import PeerClosed
 
@@ -41,7 +44,7 @@ async def test_newest_waits_while_bytes_are_unsent(rig: Rig) -> None:
     for number in range(2, 6):
         await rig.clock.advance(0.04)
         rig.tick(b"go %d" % number)
-    await settle()
+    await rig.clock.advance(0.02)
     assert robot.written == [b"go 1", b"go 2", b"go 3", b"go 4"]
     robot.stuck_bytes = 0
     robot.is_stuck = False
@@ -174,3 +177,94 @@ async def test_a_stop_that_is_on_its_way_is_not_given_up_for_the_next_one(rigs: 
     rig.guard.release("drive")
     await settle()
     assert robot.forgotten_bytes == len(b"go 2"), "motion that came since is"
+
+
+async def test_first_stop_of_all_gives_up_what_is_on_its_way(rigs: list[Rig]) -> None:
+    """No motion need have gone before it: a command may move a robot too."""
+    robot = ScatteredWire()
+    rigs.append(rig := Rig(robot))
+    await rig.transport.open(1.0)
+    robot.is_stuck = True
+    await rig.transport.send(b"go home")
+    rig.guard.stop([("wire", "drive", TERMS)])
+    await settle()
+    assert (robot.written, robot.forgotten_bytes) == ([b"go home", STOP], len(b"go home"))
+
+
+async def test_motion_that_has_arrived_by_its_own_connection_stalls_nothing(
+    rigs: list[Rig],
+) -> None:
+    robot = ScatteredWire()
+    rigs.append(rig := Rig(robot))
+    await rig.drive(TERMS._replace(lease_s=1.0))
+    await rig.clock.advance(0.9)
+    assert (robot.written, robot.aborts, robot.opens) == ([b"go 1"], 0, 1)
+
+
+class Unconnected(ScatteredWire):
+    """One that finds no connection for what comes after the first."""
+
+    def offer(self, data: bytes) -> bool:
+        return not self.written and super().offer(data)
+
+    async def send(self, data: Payload) -> None:
+        if self.opens == 1:
+            await asyncio.Event().wait()
+        await super().send(data)
+
+
+async def test_stop_without_a_connection_waits_no_longer_than_the_motion_it_gave_up(
+    rigs: list[Rig],
+) -> None:
+    """Nothing of it is unsent yet, so only the motion's age tells."""
+    robot = Unconnected()
+    rigs.append(rig := Rig(robot))
+    robot.is_stuck = True
+    await rig.drive(TERMS._replace(lease_s=1.0))
+    await rig.clock.advance(0.15)
+    rig.guard.release("drive")
+    await rig.clock.advance(STALLED_S - 0.15 + 0.01)
+    assert (robot.forgotten_bytes, robot.aborts, robot.opens) == (len(b"go 1"), 1, 2)
+    assert robot.written == [b"go 1", STOP]
+
+
+async def test_bytes_are_as_old_as_their_write_however_late_one_looks(rig: Rig) -> None:
+    robot = rig.robot
+    assert isinstance(robot, CountedWire)
+    robot.is_stuck = True
+    await rig.drive(TERMS._replace(lease_s=1.0))
+    await rig.clock.hold_up(0.03)
+    robot.stuck_bytes -= 1
+    await rig.clock.advance(STALLED_S - 0.03 - 0.01)
+    assert robot.aborts == 0
+    await rig.clock.advance(0.02)
+    assert robot.aborts == 1
+
+
+class Messages(SlowWire):
+    """One of messages, which tells how many bytes are unsent."""
+
+    unsent_bytes = 0
+
+    def unsent(self) -> int:
+        return self.unsent_bytes
+
+
+async def test_message_of_unknown_length_makes_what_is_unsent_no_younger(
+    rigs: list[Rig],
+) -> None:
+    """All but one of the first message's bytes have left; that one has waited since."""
+    robot = Messages()
+    rigs.append(rig := Rig(robot))
+    await rig.drive(TERMS._replace(lease_s=1.0))
+    go = Envelope("publish", {"topic": "/v"}, {"x": 1})
+    rig.tick(go)
+    robot.unsent_bytes = 10
+    await rig.clock.advance(0.1)
+    rig.tick(go)
+    await rig.clock.advance(0.05)
+    robot.unsent_bytes = 1
+    await rig.clock.advance(STALLED_S - 0.15 - 0.01)
+    assert robot.opens == 1
+    await rig.clock.advance(0.02)
+    assert robot.opens == 2

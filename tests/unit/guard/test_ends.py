@@ -1,0 +1,124 @@
+"""The end of a line: what is left of it keeps nothing waiting, and comes back in no other one."""
+
+import asyncio
+
+import pytest
+
+from tests.unit.guard.lines import STOP, TERMS, Bench, CountedWire
+from urc.guard import line, wire
+from urc.testing.clock import settle
+from urc.transports.base import PeerClosed
+
+pytestmark = pytest.mark.anyio
+
+BOUND_S = 5.0
+
+
+async def finish(bench: Bench) -> None:
+    """End the guard, which has a bounded time for it."""
+    finishing = asyncio.ensure_future(bench.host.finish())
+    async with asyncio.timeout(BOUND_S):
+        while not finishing.done():
+            await bench.clock.advance(0.1)
+            await asyncio.sleep(0.001)
+
+
+class Hanging(CountedWire):
+    """One that does not close."""
+
+    async def close(self) -> None:
+        await asyncio.Event().wait()
+
+
+class Stubborn(CountedWire):
+    """One whose reading does not end when it is told to."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.relents = asyncio.Event()
+
+    async def receive(self) -> bytes:
+        while not self.relents.is_set():
+            try:
+                await self.relents.wait()
+            except asyncio.CancelledError:
+                continue
+        raise PeerClosed("at last")
+
+
+class Broken(CountedWire):
+    """One with a bug in its close."""
+
+    async def close(self) -> None:
+        raise RuntimeError("no such handle")
+
+
+async def test_fault_of_a_connection_that_was_closed_does_not_cut_the_next_one() -> None:
+    bench = Bench(CountedWire())
+    await bench.open(1)
+    of_the_first = bench.robot.arriving
+    bench.tell(wire.Close("wire", 1))
+    await settle()
+    assert bench.heard() == [wire.Closed("wire", 1)]
+    await bench.open(2)
+    of_the_first.put_nowait(PeerClosed("too late"))
+    await settle()
+    assert bench.heard() == []
+    assert bench.robot.is_open
+    await finish(bench)
+
+
+async def test_owed_stop_is_written_after_an_attempt_of_the_engine_that_failed() -> None:
+    """Nothing is left of that attempt; the guard opens the line by itself."""
+    bench = Bench(CountedWire())
+    bench.robot.refusal = "nothing listens"
+    bench.tell(wire.Open("wire", 1, 1.0))
+    await settle()
+    assert bench.heard() == [wire.OpenFailed("wire", 1, "nothing listens")]
+    bench.robot.refusal = ""
+    bench.tell(wire.Owe("wire", "drive", TERMS))
+    await bench.clock.advance(0.1)
+    assert bench.robot.written == [STOP]
+    await finish(bench)
+
+
+async def test_last_stop_is_not_thrown_away_at_the_end() -> None:
+    """A line that takes what it is given is closed; a reset would drop what is still under way."""
+    bench = Bench(robot := CountedWire())
+    await bench.drive()
+    await finish(bench)
+    assert robot.written == [b"go 1", STOP]
+    assert (robot.is_open, robot.aborts) == (False, 0)
+
+
+async def test_reading_that_does_not_end_does_not_hold_up_the_end(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(line, "_CLOSE_S", 0.01)  # of real time, and it is waited for in full
+    bench = Bench(robot := Stubborn())
+    await bench.drive()
+    try:
+        await finish(bench)
+        assert robot.written == [b"go 1", STOP]
+        assert not robot.is_open
+    finally:
+        robot.relents.set()
+        await settle()
+
+
+async def test_line_that_does_not_close_does_not_hold_up_the_end(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr(line, "_CLOSE_S", 0.01)  # as above
+    bench = Bench(robot := Hanging())
+    await bench.drive()
+    await finish(bench)
+    assert robot.written == [b"go 1", STOP]
+    assert "wire did not close in time" in caplog.text
+
+
+async def test_log_says_why_a_line_could_not_be_closed(caplog: pytest.LogCaptureFixture) -> None:
+    bench = Bench(Broken())
+    await bench.open()
+    await finish(bench)
+    assert "no such handle" in caplog.text
