@@ -1,0 +1,51 @@
+"""Which stop frames the desk hands on, where they carry numbers."""
+
+from collections.abc import Mapping
+
+from tests.unit.runtime.desks import DRIVER, Scene, held
+from urc.model.codec import Payload
+from urc.problems import UrcError
+
+
+def test_stop_of_the_second_control_of_a_robot_is_made_anew_as_well() -> None:
+    """The first one is of another line, or does not move."""
+    for line in ("air", "wire"):
+        commands = {"drive": held("drive"), "lift": held("lift", line)}
+        it = Scene(driver=DRIVER._replace(commands=commands))
+        it.frames.number = 10
+        it.drive("ann", "take")
+        assert it.tick(command="lift") == ""
+        it.heard()
+        assert it.frames.send(line) == 12
+        assert it.heard() == ["stop is 13 lift stop"]
+
+
+def test_stop_that_may_still_be_repeated_is_made_anew() -> None:
+    """Its control is not armed any more, and that of the other one never was."""
+    it = Scene()
+    it.movers.is_stopping = lambda command: command == "drive"  # type: ignore[method-assign]
+    it.frames.number = 10
+    it.frames.send()
+    assert it.heard() == ["stop is 12 drive stop"]
+
+
+def test_newest_stop_goes_out_when_none_can_be_made_any_more() -> None:
+    it = Scene()
+    it.frames.number = 10
+    it.drive("ann", "take")
+    it.tick(speed=0.5)
+    it.tick(speed=0.6)
+    it.frames.send()
+    assert it.heard()[-1] == "stop is 14 drive stop"
+    stops: dict[str, Payload] = {}
+
+    def keep(frames: Mapping[str, Payload]) -> None:
+        stops.update(frames)
+
+    def broken(command: str) -> Payload:
+        raise UrcError("no such setting")
+
+    it.movers.stop = keep  # type: ignore[method-assign]
+    it.frames.stop_frame = broken  # type: ignore[method-assign]
+    it.desk.stop("ann")
+    assert stops == {"drive": b"14 drive stop"}
