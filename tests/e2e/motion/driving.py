@@ -7,6 +7,7 @@ from pathlib import Path
 
 from playwright.async_api import CDPSession, Locator, Page
 
+from tests.e2e.browser import PLAIN_HOST
 from tests.e2e.conftest import PageMaker
 from tests.e2e.dashboards import WAIT_S, until
 from urc.model.codec import WriteSpec
@@ -115,7 +116,11 @@ async def driven(
     wire = robot or Wire()
     ready: asyncio.Future[str] = asyncio.get_running_loop().create_future()
     app = build_app(
-        {"puppet": Robot(wire.profile, {}, wire.open)}, access=ACCESS, linger_s=0.2, data=data
+        {"puppet": Robot(wire.profile, {}, wire.open)},
+        access=ACCESS,
+        allowed_hosts=[PLAIN_HOST],
+        linger_s=0.2,
+        data=data,
     )
     task = asyncio.create_task(serve(app, port=0, on_ready=ready.set_result))
     try:
