@@ -88,7 +88,10 @@ async def cart(
 async def test_a_robot_that_falls_silent_is_told_on_the_badge_and_on_the_stick(
     urc_process: Callable[..., UrcProcess], tmp_path: Path, new_page: PageMaker
 ) -> None:
-    """The stick says for as long as it is held why nothing moves; then all is as before."""
+    """The guard resets the line of a silent robot, and the stick says so while it is held.
+
+    Then all is as before.
+    """
     async with cart(urc_process, tmp_path) as (robot, _, address):
         page = await fresh(new_page)
         await page.goto(address)
@@ -97,10 +100,10 @@ async def test_a_robot_that_falls_silent_is_told_on_the_badge_and_on_the_stick(
         await until(robot.is_driven)
         robot.is_mute = True
         await until_text(page, "[data-badge-text]", "Robot silent")
-        await until_text(page, NOTE, "◆ the robot has said nothing for 1 s")
+        await until_text(page, NOTE, "◆ the line to the robot was cut")
         robot.is_mute = False
         await until_text(page, "[data-badge-text]", "Live")
-        await until_text(page, NOTE, "◆ the robot has said nothing for 1 s")
+        await until_text(page, NOTE, "◆ the line to the robot was cut")
         await page.mouse.up()
         await push(page, ".joystick-pad")
         await until(robot.is_driven)
