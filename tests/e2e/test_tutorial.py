@@ -15,6 +15,7 @@ from playwright.async_api import Page
 
 from tests.documentation import TUTORIAL, Block, blocks
 from tests.e2e.conftest import PageMaker
+from tests.e2e.keys import learn
 from tests.e2e.ports import free_port
 from tests.e2e.processes import ROOT
 
@@ -81,12 +82,14 @@ class Reader:
                 ["bash", "-c", f"exec {command}"], cwd=self.folder, env=self.environment,
                 stdin=subprocess.DEVNULL, stdout=output, stderr=subprocess.STDOUT,
             )  # fmt: skip
-        last = answer.splitlines()[-1]
+        last = _pattern(answer.splitlines()[-1])
         deadline = time.monotonic() + TIMEOUT_S
-        while last not in log.read_text("utf-8").splitlines():
+        while not any(re.fullmatch(last, line) for line in _lines(log)):
             assert self.running[name].poll() is None, log.read_text("utf-8")
             assert time.monotonic() < deadline, log.read_text("utf-8")
             time.sleep(0.05)
+        for line in _lines(log):
+            learn(line)
         return log.read_text("utf-8")
 
     def ends(self, name: str) -> None:
@@ -95,9 +98,19 @@ class Reader:
         process.wait(TIMEOUT_S)
 
 
+def _lines(log: Path) -> list[str]:
+    """Return the lines that are whole."""
+    return log.read_text("utf-8").split("\n")[:-1]
+
+
+def _pattern(shown: str) -> str:
+    """Return a pattern for a line of the page."""
+    return re.escape(shown).replace("…", ".*")
+
+
 def _compare(said: str, answer: str, where: str) -> None:
     """See to it that every line is one of those shown, and that each of those came."""
-    shown = [re.escape(line).replace("…", ".*") for line in answer.splitlines()]
+    shown = [_pattern(line) for line in answer.splitlines()]
     lines = said.splitlines()
     unknown = [line for line in lines if not any(re.fullmatch(one, line) for one in shown)]
     missing = [one for one in shown if not any(re.fullmatch(one, line) for line in lines)]
