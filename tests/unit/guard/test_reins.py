@@ -325,3 +325,23 @@ async def test_motion_whose_number_is_used_up_before_its_turn_is_not_sent(
     assert robot.written == [b"go 1", b"0 poll"]
     stale = [one for said in bench.heard() if isinstance(said, wire.Counted) for one in said.stale]
     assert stale == [("drive", 2)]
+
+
+async def test_motion_that_waits_for_a_clear_line_does_not_leave_with_a_used_up_number(
+    bench: Bench,
+) -> None:
+    """A poll takes its number just when the line is clear again. That is told once."""
+    robot = bench.robot
+    assert isinstance(robot, CountedWire)
+    robot.is_stuck = True
+    await bench.drive()
+    await bench.clock.advance(0.16)
+    count = Count({}, {"n": 0})
+    bench.tell(wire.Tick("drive", 2, b"0 go", bench.clock.now(), count))
+    assert robot.written == [b"go 1"]
+    robot.is_stuck, robot.stuck_bytes = False, 0
+    bench.tell(wire.Send("wire", 1, 1, b"0 poll", count))
+    await bench.clock.advance(0.1)
+    assert robot.written == [b"go 1", b"0 poll"]
+    told = [said for said in bench.heard() if isinstance(said, wire.Counted)]
+    assert told == [wire.Counted("wire", 1, 1, {"n": 0}, [("drive", 2)])]

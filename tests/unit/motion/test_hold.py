@@ -7,6 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.effort import examples
+from urc.model.codec import Count, Numbered, Series
 from urc.motion.hold import Mover, Terms
 
 STOP = b"STOP"
@@ -279,3 +280,11 @@ def test_a_value_that_is_forgotten_is_not_written_and_the_lease_goes_on() -> Non
     assert held.due(1.0, is_clear=True) is None
     assert held.deadline == 1.25
     assert held.due(1.3, is_clear=False) == STOP
+
+
+def test_stop_without_a_number_takes_the_place_of_all_that_had_one() -> None:
+    plain = Terms(b"halt", period_s=0.05)
+    numbered = Numbered(b"7 halt", Count({"n": 6}, {"n": 7}))
+    counted = plain.stopped_by(Series((numbered,)))
+    assert (counted.stop, counted.stops) == (b"7 halt", (numbered,))
+    assert counted.stopped_by(b"halt") == plain

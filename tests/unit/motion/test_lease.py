@@ -62,6 +62,41 @@ def test_the_holder_may_keep_the_controls() -> None:
     assert lease.state.holder == ANNA
 
 
+def test_a_request_that_was_declined_leaves_no_trace() -> None:
+    lease = Lease()
+    lease.take(ANNA, 0.0)
+    before = lease.state
+    asked = before._replace(asked_by=BERT, asked_until=11.0)
+    assert lease.ask(BERT, 1.0) == Changed(asked, must_stop=False)
+    assert lease.answer("a", 2.0, is_granted=False) == Changed(before, must_stop=False)
+
+
+def test_only_the_holder_answers_a_request() -> None:
+    """Nobody gives the controls to themselves."""
+    lease = Lease()
+    lease.take(ANNA, 0.0)
+    lease.ask(BERT, 1.0)
+    for who in ("b", "c"):
+        for is_granted in (True, False):
+            answered = lease.answer(who, 2.0, is_granted=is_granted)
+            assert answered == Refused("nobody asks you for the controls")
+    assert (lease.state.holder, lease.state.asked_by) == (ANNA, BERT)
+    lease.answer("a", 2.0, is_granted=False)
+    late = lease.answer("a", 3.0, is_granted=True)
+    assert late == Refused("nobody asks you for the controls")
+
+
+def test_one_asks_at_a_time_and_may_ask_again() -> None:
+    lease = Lease()
+    lease.take(ANNA, 0.0)
+    lease.ask(BERT, 1.0)
+    assert lease.ask(CARL, 2.0) == Refused("Bert asks for the controls already")
+    assert lease.ask(EVE, 2.0) == Refused("viewers cannot drive")
+    again = lease.ask(BERT, 3.0)
+    assert isinstance(again, Changed)
+    assert (again.state.asked_by, again.state.asked_until) == (BERT, 13.0)
+
+
 def test_a_request_lasts_3_to_60_seconds() -> None:
     for asked_s, waits_s in ((0.1, 3.0), (20.0, 20.0), (1e9, 60.0)):
         lease = Lease()

@@ -52,6 +52,7 @@ class Movers:
 
     def rehearse(self, command: str, data: Payload) -> None:
         assert isinstance(data, bytes)
+        assert command in data.decode()
         self.told.append(f"rehearse {data.decode()}")
 
     def renew(self, command: str, stop: Payload) -> None:

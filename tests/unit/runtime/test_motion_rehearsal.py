@@ -1,6 +1,6 @@
 """The desk goes the way of a tick, and nothing has changed."""
 
-from tests.unit.runtime.desks import Scene
+from tests.unit.runtime.desks import DRIVER, Scene, held
 from urc.motion.fresh import Input
 from urc.runtime.motion import LET_GO
 
@@ -66,3 +66,38 @@ def test_a_frame_that_is_refused_is_not_rehearsed() -> None:
     assert rehearse(it, 2) == []
     it.frames.refusal = ""
     assert it.tick(speed=0.6) == ""
+
+
+def test_a_rehearsal_says_what_the_tick_would() -> None:
+    it = Scene()
+    it.drive("ann", "take")
+    it.tick(speed=0.5)
+    given = Input(it.desk.lease.state.epoch, 2, it.desk.beat("ann", it.now))
+    assert it.desk.tick("ann", "drive", {"speed": 0.5}, given, it.now, counts=False) == ""
+
+
+def test_a_frame_that_waits_for_an_answer_is_not_rehearsed() -> None:
+    it = Scene()
+    it.drive("ann", "take")
+    it.tick(speed=0.5)
+    it.heard()
+    it.frames.motion_frame = lambda *_: b""  # type: ignore[method-assign,misc,assignment]
+    assert rehearse(it, 2) == []
+
+
+def test_a_rehearsal_does_not_slow_the_motion_down() -> None:
+    """Its value is none that the robot was given: speed goes on growing from where it is."""
+    slow = held("drive")
+    assert slow.hold is not None
+    slow = slow._replace(hold=slow.hold._replace(slew={"speed": 2.0}))
+    it = Scene(driver=DRIVER._replace(commands={"drive": slow}))
+    it.drive("ann", "take")
+    it.tick(speed=1.0)
+    it.now += 0.05
+    given = Input(it.desk.lease.state.epoch, 2, it.desk.beat("ann", it.now))
+    it.desk.tick("ann", "drive", {"speed": 0.0}, given, it.now, counts=False)
+    it.heard()
+    moved: list[float] = []
+    it.desk.on_moved = lambda *what: moved.append(what[3]["speed"])  # type: ignore[arg-type]
+    it.tick(speed=1.0)
+    assert [round(speed, 3) for speed in moved] == [0.3]

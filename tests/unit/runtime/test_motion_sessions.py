@@ -1,0 +1,83 @@
+"""The desk and the sessions of its robot: what it hands on, and what a session lacks."""
+
+from collections.abc import Mapping
+
+from tests.unit.runtime.desks import DRIVER, Scene
+from urc.model.codec import Count, Counted, Numbered, Payload
+from urc.model.flow import WaitStep
+from urc.model.values import Reading
+from urc.motion.lease import Client
+
+
+def test_a_request_lasts_as_long_as_it_says_and_may_be_declined() -> None:
+    it = Scene()
+    it.drive("ann", "take")
+    assert it.drive("bob", "ask", for_s=5) == ""
+    assert it.desk.lease.state.asked_until == it.now + 5
+    assert it.drive("ann", "no") == ""
+    state = it.desk.lease.state
+    assert (state.holder, state.asked_by) == (Client("ann", "ann", "driver"), None)
+
+
+def test_a_new_session_owes_no_stop_to_what_rests() -> None:
+    it = Scene()
+    it.desk.detach()
+    it.desk.attach(it.frames, it.movers)
+    it.frames.on_ready("wire")
+    assert it.heard() == []
+
+
+def test_a_session_without_movers_moves_nothing_and_goes_on() -> None:
+    """Numbers that are used up in it, and reports that come late, change nothing."""
+    wire = DRIVER.transports["wire"]._replace(on_connect=(WaitStep(0.1),))
+    it = Scene(
+        is_attached=False,
+        driver=DRIVER._replace(transports={**DRIVER.transports, "wire": wire}),
+    )
+    it.frames.number = 10
+    it.desk.attach(it.frames, None)
+    it.drive("ann", "take")
+    assert it.tick(speed=0.5) == "the robot is not connected"
+    it.frames.send()
+    it.desk.stopped("drive", "stopped")
+    assert it.heard() == []
+
+
+def test_a_frame_is_made_for_the_time_of_its_tick() -> None:
+    """By that it is judged whether what the command requires was heard lately."""
+    it = Scene()
+    whole, times = it.frames.motion_frame, list[float]()
+
+    def noting(command: str, arguments: Mapping[str, Reading], now: float) -> Payload:
+        times.append(now)
+        return whole(command, arguments, now)
+
+    it.frames.motion_frame = noting  # type: ignore[method-assign]
+    it.drive("ann", "take")
+    it.tick(speed=0.5)
+    assert times == [it.now]
+
+
+def test_the_audit_has_a_frame_as_it_was_made_also_where_it_carries_a_number() -> None:
+    it = Scene()
+    ticked: list[object] = []
+    audited: list[object] = []
+    frame = Counted(Numbered(b"7 left", Count({}, {"n": 7})), lambda: None)
+    it.frames.motion_frame = lambda *_: frame  # type: ignore[method-assign,misc,assignment]
+    it.movers.tick = lambda *what: ticked.append(what)  # type: ignore[method-assign,misc,assignment]
+    it.desk.on_moved = lambda *what: audited.append(what[4])
+    it.drive("ann", "take")
+    assert it.tick(speed=0.5) == ""
+    assert ticked == [("drive", frame)]
+    assert audited == [b"7 left"]
+
+
+def test_stops_that_are_enough_for_now_are_not_made_anew() -> None:
+    it = Scene()
+    it.frames.number = 10
+    it.frames.has_stops = lambda command: True  # type: ignore[method-assign]
+    it.drive("ann", "take")
+    it.tick(speed=0.5)
+    it.tick(speed=0.6)
+    it.frames.send()
+    assert it.heard() == ["arm drive", "11 drive speed=0.5", "12 drive speed=0.6"]
