@@ -45,7 +45,8 @@ def line(port: Path | str, **options: object) -> SerialTransport:
 async def cable(folder: Path, far_end: str = "PIPE") -> AsyncIterator[Path]:
     """Let socat be a port with something at its other end: an echo, or what `far_end` names."""
     port = folder / "port"
-    async with program("socat", f"PTY,raw,echo=0,link={port}", far_end):
+    # socat reads and writes in turn: a write beyond one free page of its pipe would block for ever.
+    async with program("socat", "-b4096", f"PTY,raw,echo=0,link={port}", far_end):
         await listens(port)
         yield port
     port.unlink(missing_ok=True)

@@ -37,7 +37,7 @@ async def secret_echo(pair: Pair, more: str = "verify=0") -> AsyncIterator[int]:
     """Run socat as a robot that speaks TLS and says everything back; give its port."""
     port = free_port()
     where = f"OPENSSL-LISTEN:{port},bind=127.0.0.1,reuseaddr,fork,cert={pair.cert},key={pair.key}"
-    async with program("socat", f"{where},{more}", "PIPE"):
+    async with program("socat", "-b4096", f"{where},{more}", "PIPE"):
         await listens(port)
         yield port
 
@@ -184,7 +184,7 @@ async def test_robot_connects_to_us() -> None:
             await transport.open(0.2)
         expected = f"no robot has connected to 127.0.0.1:{transport.port} within 0.2 s"
         assert str(told.value) == expected
-        async with program("socat", f"TCP:127.0.0.1:{transport.port}", "PIPE"):
+        async with program("socat", "-b4096", f"TCP:127.0.0.1:{transport.port}", "PIPE"):
             await transport.open(20.0)
             await says_back(transport, b"hello")
             await transport.close()
@@ -265,12 +265,12 @@ async def test_robot_connects_to_us_with_tls(authority: Authority) -> None:
     own, robots = authority.sign("127.0.0.1"), authority.sign("robot")
     transport = listener(tls={"cert": own.cert, "key": own.key, "ca": authority.file})
     where = f"OPENSSL:127.0.0.1:{transport.port},cafile={authority.file},retry=20,interval=0.1"
-    async with program("socat", f"{where},cert={robots.cert},key={robots.key}", "PIPE"):
+    async with program("socat", "-b4096", f"{where},cert={robots.cert},key={robots.key}", "PIPE"):
         await transport.open(20.0)
         await says_back(transport, b"hello")
         await transport.close()
     stranger = f"OPENSSL:127.0.0.1:{transport.port},verify=0,retry=20,interval=0.1"
-    async with program("socat", stranger, "PIPE"):
+    async with program("socat", "-b4096", stranger, "PIPE"):
         with pytest.raises(TransportError):
             await hears_something(transport)
         await transport.close()
@@ -315,7 +315,7 @@ async def test_quiet_line_that_is_cut_is_told() -> None:
     """Nobody sends anything; the system's own probes find out."""
     port = free_port()
     loss = Loss(port)
-    async with program("socat", f"TCP-LISTEN:{port},bind=127.0.0.1", "PIPE"):
+    async with program("socat", "-b4096", f"TCP-LISTEN:{port},bind=127.0.0.1", "PIPE"):
         await listens(port)
         transport = TcpTransport("127.0.0.1", port)
         await transport.open(20.0)
