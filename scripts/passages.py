@@ -1,0 +1,196 @@
+"""The prose of the tree: documentation, docstrings, and strings that people read.
+
+The draw of sentences and the check of prose both read it, so they mean the same by "prose". Left
+out are pages written by a program (docs/reference, docs/robots), tests, code blocks and licences.
+"""
+
+import ast
+import json
+import re
+from collections.abc import Iterator, Mapping
+from typing import NamedTuple
+
+import yaml
+
+__all__ = ["Passage", "Sentence", "is_read", "passages", "sentences"]
+
+GENERATED = ("docs/reference/", "docs/robots/")
+CODE_FOLDERS = ("urc/", "bench/", "scripts/")
+YAML_FOLDERS = ("robots/", "widgets/")
+PROSE_KEYS = ("title", "summary", "description", "help", "notes", "why")
+"""Keys of schemas and documents whose values are prose."""
+FEWEST_WORDS = 4
+"""A shorter string in code is a name or a label, and no sentence."""
+
+_FENCE = re.compile(r"^\s*(```|~~~)")
+_ITEM = re.compile(r"^\s*(?:[-*+]|\d+\.)\s+|^\s*#+\s+|^\s*>\s?")
+_LINK = re.compile(r"!?\[([^\]]*)\]\([^)]*\)")
+_MARKED = re.compile(r"""\b(?:t|mark|phrase)\(\s*(?:"((?:[^"\\\n]|\\.)*)"|'((?:[^'\\\n]|\\.)*)')""")
+_WORD = re.compile(
+    r"""[("“‘'*]*(?:[A-Za-z][a-z’'-]*|[A-Z]+|\{\}|`[^`]+`|[0-9]+)[)."”’:;,!?…%*']*"""
+)
+_END = re.compile(r"[.!?][)\"”*]*\s+(?=[\"“(*`A-Z0-9])")
+
+
+class Passage(NamedTuple):
+    """A paragraph, a list item, a table cell or a string."""
+
+    path: str
+    line: int
+    kind: str
+    """`docs`, `docstring` or `string`."""
+    text: str
+    """Line breaks are kept, so that each sentence has its line."""
+
+
+class Sentence(NamedTuple):
+    """One sentence in its place."""
+
+    path: str
+    line: int
+    kind: str
+    text: str
+
+
+def is_read(path: str) -> bool:
+    """Return whether the file has prose that is checked."""
+    if path.startswith(GENERATED):
+        return False
+    if path.endswith(".md"):
+        return "/" not in path or path.startswith(("docs/", "urc/"))
+    if path.endswith(".py"):
+        return path.startswith(CODE_FOLDERS) or "/" not in path
+    if path.startswith("schemas/"):
+        return path.endswith(".json")
+    if path.endswith((".j2", ".js")):
+        return path.startswith(("templates/", "widgets/", "urc/web/"))
+    return path == "dev" or (path.startswith(YAML_FOLDERS) and path.endswith(".yaml"))
+
+
+def passages(files: Mapping[str, str]) -> Iterator[Passage]:
+    """Yield every passage of `files`, a mapping of path to text, in the order of the paths."""
+    for path in sorted(files):
+        text = files[path]
+        if path.endswith(".md"):
+            yield from _of_markdown(path, text)
+        elif path.endswith(".py") or path == "dev":
+            yield from _of_python(path, text)
+        elif path.endswith(".json"):
+            yield from _of_schema(path, text)
+        elif path.endswith(".yaml"):
+            yield from _of_document(path, text)
+        else:
+            yield from _of_page(path, text)
+
+
+def sentences(found: Passage) -> Iterator[Sentence]:
+    """Yield the sentences of a passage."""
+    start = 0
+    for end in [*(match.end() for match in _END.finditer(found.text)), len(found.text)]:
+        piece = found.text[start:end]
+        blank = len(piece) - len(piece.lstrip())
+        line = found.line + found.text.count("\n", 0, start + blank)
+        if text := " ".join(piece.split()):
+            yield Sentence(found.path, line, found.kind, text)
+        start = end
+
+
+def _of_markdown(path: str, text: str) -> Iterator[Passage]:
+    fence = ""
+    lines: list[tuple[int, str]] = []
+    for number, line in enumerate([*text.splitlines(), ""], 1):
+        mark = _FENCE.match(line)
+        is_code = bool(fence or mark)
+        if mark and fence in ("", mark[1]):
+            fence = "" if fence else mark[1]
+        is_row = line.lstrip().startswith("|")
+        if is_code or is_row or not line.strip() or _ITEM.match(line):
+            yield from _paragraph(path, "docs", lines)
+            lines = []
+        if is_code:
+            continue
+        if is_row:
+            for cell in re.split(r"(?<!\\)\|", line.strip().strip("|")):
+                yield from _paragraph(path, "docs", [(number, cell)])
+        elif line.strip():
+            lines.append((number, _ITEM.sub("", line)))
+
+
+def _paragraph(path: str, kind: str, lines: list[tuple[int, str]]) -> Iterator[Passage]:
+    text = _LINK.sub(r"\1", "\n".join(line for _, line in lines)).replace("**", "")
+    if re.search("[A-Za-z]", text):
+        yield Passage(path, lines[0][0], kind, text)
+
+
+def _of_python(path: str, text: str) -> Iterator[Passage]:
+    tree = ast.parse(text)
+    apart: set[ast.AST] = set()
+    """Strings that another node has yielded already."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant):
+            apart.add(node.value)
+            if isinstance(node.value.value, str):
+                yield from _of_docstring(path, node.lineno, node.value.value)
+        elif isinstance(node, ast.JoinedStr):
+            apart.update(node.values)
+            pieces = (_constant(value) for value in node.values)
+            yield from _of_string(path, node.lineno, "".join(pieces))
+        elif isinstance(node, ast.Constant) and node not in apart and isinstance(node.value, str):
+            yield from _of_string(path, node.lineno, node.value)
+
+
+def _constant(value: ast.expr) -> str:
+    return str(value.value) if isinstance(value, ast.Constant) else "{}"
+
+
+def _of_docstring(path: str, line: int, text: str) -> Iterator[Passage]:
+    lines: list[tuple[int, str]] = []
+    after_blank = False
+    for number, one in enumerate([*text.splitlines(), ""], line):
+        inner = one.lstrip()
+        is_example = after_blank and len(one) - len(inner) > _indent(text) + 3
+        if not inner or _ITEM.match(one) or is_example:
+            yield from _paragraph(path, "docstring", lines)
+            lines = []
+        if inner and not is_example:
+            lines.append((number, _ITEM.sub("", one)))
+        after_blank = not inner or is_example
+
+
+def _indent(text: str) -> int:
+    rest = [one for one in text.splitlines()[1:] if one.strip()]
+    return min((len(one) - len(one.lstrip()) for one in rest), default=0)
+
+
+def _of_string(path: str, line: int, text: str) -> Iterator[Passage]:
+    words = text.split()
+    fit = sum(1 for word in words if _WORD.fullmatch(word))
+    if len(words) >= FEWEST_WORDS and fit >= 0.8 * len(words):
+        yield Passage(path, line, "string", text)
+
+
+def _of_schema(path: str, text: str) -> Iterator[Passage]:
+    keys = "|".join(PROSE_KEYS)
+    for match in re.finditer(rf'"(?:{keys})":\s*("(?:[^"\\]|\\.)*")', text):
+        line = text.count("\n", 0, match.start()) + 1
+        yield Passage(path, line, "string", json.loads(match[1]))
+
+
+def _of_document(path: str, text: str) -> Iterator[Passage]:
+    waiting: list[yaml.Node] = list(yaml.compose_all(text, yaml.SafeLoader))
+    while waiting:
+        node = waiting.pop(0)
+        if isinstance(node, yaml.SequenceNode):
+            waiting.extend(node.value)
+        if not isinstance(node, yaml.MappingNode):
+            continue
+        for key, value in node.value:
+            waiting.append(value)
+            if isinstance(value, yaml.ScalarNode) and key.value in PROSE_KEYS:
+                yield Passage(path, value.start_mark.line + 1, "string", value.value)
+
+
+def _of_page(path: str, text: str) -> Iterator[Passage]:
+    for match in _MARKED.finditer(text):
+        said = match[1] or match[2] or ""
+        yield Passage(path, text.count("\n", 0, match.start()) + 1, "string", said)

@@ -1,0 +1,71 @@
+"""Draws sentences at random from the prose of a commit, for a reader who judges the English.
+
+    python -m scripts.sentences             60 sentences of HEAD
+    python -m scripts.sentences COMMIT      of another commit
+
+The seed is the hash of the commit: the same commit gives the same sentences on every machine, and
+no one can choose them. Each sentence of at least four words is as likely as any other, once for all
+its copies. `scripts/passages.py` says what counts as prose.
+"""
+
+import argparse
+import io
+import random
+import subprocess
+import tarfile
+from collections import Counter
+from pathlib import Path
+
+from scripts.passages import FEWEST_WORDS, Sentence, is_read, passages, sentences
+
+ROOT = Path(__file__).resolve().parents[1]
+COUNT = 60
+
+
+def main() -> int:
+    """Print the sentences with their places; return the exit code."""
+    parser = argparse.ArgumentParser(prog="python -m scripts.sentences", description=__doc__)
+    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+    parser.add_argument("commit", nargs="?", default="HEAD", help="the commit to draw from")
+    commit = _git("rev-parse", "--verify", f"{parser.parse_args().commit}^{{commit}}")
+    name = commit.decode().strip()
+    found = candidates(files_of(name))
+    kinds = Counter(one.kind for one in found)
+    parts = ", ".join(f"{kind} {count}" for kind, count in sorted(kinds.items()))
+    print(f"{COUNT} of {len(found)} sentences ({parts}), seed {name}\n")
+    for number, one in enumerate(draw(found, name), 1):
+        print(f"{number:2}. {one.path}:{one.line}\n    {one.text}")
+    return 0
+
+
+def candidates(files: dict[str, str]) -> list[Sentence]:
+    """Return every sentence that may be drawn, in the order of the files."""
+    found: dict[str, Sentence] = {}
+    for passage in passages(files):
+        for one in sentences(passage):
+            if len(one.text.split()) >= FEWEST_WORDS:
+                found.setdefault(one.text, one)
+    return list(found.values())
+
+
+def draw(found: list[Sentence], seed: str, count: int = COUNT) -> list[Sentence]:
+    """Return `count` of the sentences, chosen by the seed."""
+    return random.Random(seed).sample(found, min(count, len(found)))  # noqa: S311  no secret
+
+
+def files_of(commit: str) -> dict[str, str]:
+    """Return path and text of every file of a commit that has prose."""
+    with tarfile.open(fileobj=io.BytesIO(_git("archive", "--format=tar", commit))) as archive:
+        return {
+            member.name: file.read().decode("utf-8")
+            for member in archive
+            if member.isfile() and is_read(member.name) and (file := archive.extractfile(member))
+        }
+
+
+def _git(*arguments: str) -> bytes:
+    return subprocess.run(["git", *arguments], cwd=ROOT, capture_output=True, check=True).stdout
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

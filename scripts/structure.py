@@ -1,0 +1,305 @@
+"""Measures the structure of the code: how much there is, and how it is cut up.
+
+    python -m scripts.structure             this tree
+    python -m scripts.structure ROOT        another one, such as a worktree of an older commit
+
+Figures to compare before and after a change; none is a goal by itself. `--names` lists the modules,
+classes and functions behind the counts. How each is counted:
+
+- modules with one importer: modules of `urc` that exactly one other module imports, at any level or
+  by an entry `"urc.module:name"` of a table; packages and `__main__` apart;
+- class names used more than once: the same name defined in two places of `urc`;
+- functions over 60 lines: decorators are not counted, the docstring is;
+- repeated lines: each function is read as a list of statements (of a compound one its head), with
+  names of variables and values of constants blanked; four in a row that an earlier function has too
+  are repeats; lines of repeats are counted once.
+"""
+
+import argparse
+import ast
+import io
+import re
+import tokenize
+from collections import defaultdict
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+LONG = 60
+WINDOW = 4
+_ENTRY = re.compile(r"(urc(?:\.\w+)+):\w+")
+
+
+@dataclass
+class Module:
+    """One Python file, parsed."""
+
+    path: str
+    name: str
+    text: str
+    tree: ast.Module
+
+    @property
+    def is_package(self) -> bool:
+        """Whether it is the file of a folder."""
+        return self.path.endswith("__init__.py")
+
+
+@dataclass
+class Lines:
+    """Lines of Python by what stands on them."""
+
+    total: int = 0
+    blank: int = 0
+    docstring: int = 0
+    comments: int = 0
+    """Comments, whether they stand alone or behind code."""
+
+    @property
+    def code(self) -> int:
+        """Lines with code, or with a comment alone."""
+        return self.total - self.blank - self.docstring
+
+
+@dataclass
+class Structure:
+    """Every figure, and what is behind it."""
+
+    lines: Lines = field(default_factory=Lines)
+    files: int = 0
+    one_importer: list[str] = field(default_factory=list)
+    public_twice: dict[str, list[str]] = field(default_factory=dict)
+    private_twice: dict[str, list[str]] = field(default_factory=dict)
+    classes: int = 0
+    long_functions: list[str] = field(default_factory=list)
+    repeated: int = 0
+
+
+def main() -> int:
+    """Print the table, and the names when they are wanted; return the exit code."""
+    parser = argparse.ArgumentParser(prog="python -m scripts.structure", description=__doc__)
+    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+    parser.add_argument("root", nargs="?", type=Path, default=ROOT, help="the tree to measure")
+    parser.add_argument("--names", action="store_true", help="list what is behind the counts")
+    options = parser.parse_args()
+    root: Path = options.root
+    found = structure(modules(root, "urc"))
+    rows = [
+        *table(found),
+        ("lines of Python in bench/", lines_of(modules(root, "bench")).total),
+        ("lines of JavaScript in urc/", javascript(root / "urc")),
+        ("lines of JavaScript in widgets/", javascript(root / "widgets")),
+    ]
+    width = max(len(name) for name, _ in rows)
+    for name, figure in rows:
+        print(f"{name:<{width}}  {figure:>8}")
+    if options.names:
+        print("\n".join(names(found)))
+    return 0
+
+
+def table(found: Structure) -> list[tuple[str, str | int]]:
+    """Return the name and figure of each row that is about `urc`."""
+    lines = found.lines
+    return [
+        ("lines of Python in urc/", lines.total),
+        ("  code", lines.code),
+        ("  blank", lines.blank),
+        ("  docstring", lines.docstring),
+        ("files", found.files),
+        ("modules with one importer", len(found.one_importer)),
+        ("classes", found.classes),
+        ("public class names used more than once", len(found.public_twice)),
+        ("private class names used more than once", len(found.private_twice)),
+        (f"functions over {LONG} lines", len(found.long_functions)),
+        ("comments", lines.comments),
+        ("comments per 100 lines", f"{100 * lines.comments / max(1, lines.total):.1f}"),
+        (f"repeated lines (windows of {WINDOW} statements)", found.repeated),
+    ]
+
+
+def names(found: Structure) -> Iterator[str]:
+    """Yield the lists behind the counts."""
+    yield "\nmodules with one importer"
+    yield from (f"  {name}" for name in found.one_importer)
+    yield "\nclass names used more than once"
+    for name, places in [*found.public_twice.items(), *found.private_twice.items()]:
+        yield f"  {name}: {', '.join(places)}"
+    yield f"\nfunctions over {LONG} lines"
+    yield from (f"  {name}" for name in found.long_functions)
+
+
+def modules(root: Path, folder: str) -> list[Module]:
+    """Return every Python module below a folder, in the order of their paths."""
+    found = []
+    for file in sorted((root / folder).rglob("*.py")):
+        path = file.relative_to(root).as_posix()
+        text = file.read_text("utf-8")
+        name = path.removesuffix(".py").removesuffix("/__init__").replace("/", ".")
+        found.append(Module(path, name, text, ast.parse(text)))
+    return found
+
+
+def structure(found: list[Module]) -> Structure:
+    """Return every figure about the modules."""
+    public, private = repeated_names(found)
+    return Structure(
+        lines=lines_of(found),
+        files=len(found),
+        one_importer=with_one_importer(found),
+        public_twice=public,
+        private_twice=private,
+        classes=sum(1 for _ in classes(found)),
+        long_functions=long_functions(found),
+        repeated=repeated_lines(found),
+    )
+
+
+def lines_of(found: list[Module]) -> Lines:
+    """Count the lines of the modules together."""
+    counted = Lines()
+    for module in found:
+        lines = module.text.splitlines()
+        documented = {
+            number
+            for node in ast.walk(module.tree)
+            if isinstance(node, ast.Expr)
+            and isinstance(node.value, ast.Constant)
+            and isinstance(node.value.value, str)
+            for number in range(node.lineno, (node.end_lineno or node.lineno) + 1)
+        }
+        counted.total += len(lines)
+        counted.docstring += len(documented)
+        counted.blank += sum(
+            1
+            for number, line in enumerate(lines, 1)
+            if not line.strip() and number not in documented
+        )
+        tokens = tokenize.generate_tokens(io.StringIO(module.text).readline)
+        counted.comments += sum(1 for token in tokens if token.type == tokenize.COMMENT)
+    return counted
+
+
+def with_one_importer(found: list[Module]) -> list[str]:
+    """Return the names of modules that exactly one other module imports."""
+    known = {module.name for module in found}
+    importers: dict[str, set[str]] = defaultdict(set)
+    for module in found:
+        for name in imported(module, known) - {module.name}:
+            importers[name].add(module.name)
+    plain = [one for one in found if not one.is_package and not one.name.endswith("__main__")]
+    return [one.name for one in plain if len(importers[one.name]) == 1]
+
+
+def imported(module: Module, known: set[str]) -> set[str]:
+    """Return the modules among `known` that a module imports or names in a table."""
+    found: set[str] = set()
+    for node in ast.walk(module.tree):
+        if isinstance(node, ast.Import):
+            found.update(alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
+            inner = {f"{node.module}.{alias.name}" for alias in node.names}
+            found |= inner & known or {node.module}
+        elif isinstance(node, ast.Constant) and (entry := _ENTRY.fullmatch(str(node.value))):
+            found.add(entry[1])
+    return found & known
+
+
+def classes(found: list[Module]) -> Iterator[tuple[str, str]]:
+    """Yield name and place of each class."""
+    for module in found:
+        for node in ast.walk(module.tree):
+            if isinstance(node, ast.ClassDef):
+                yield node.name, f"{module.path}:{node.lineno}"
+
+
+def repeated_names(found: list[Module]) -> tuple[dict[str, list[str]], dict[str, list[str]]]:
+    """Return the public, then the private, class names that stand for two classes, with places."""
+    places: dict[str, list[str]] = defaultdict(list)
+    for name, place in classes(found):
+        places[name].append(place)
+    twice = {name: places[name] for name in sorted(places) if len(places[name]) > 1}
+    public = {name: where for name, where in twice.items() if not name.startswith("_")}
+    return public, {name: where for name, where in twice.items() if name not in public}
+
+
+def functions(module: Module) -> Iterator[ast.FunctionDef | ast.AsyncFunctionDef]:
+    """Yield each function of a module, methods and inner ones included."""
+    for node in ast.walk(module.tree):
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+            yield node
+
+
+def long_functions(found: list[Module]) -> list[str]:
+    """Return name, place and length of each function that is too long."""
+    return [
+        f"{node.name} {module.path}:{node.lineno} ({length} lines)"
+        for module in found
+        for node in functions(module)
+        if (length := (node.end_lineno or node.lineno) - node.lineno + 1) > LONG
+    ]
+
+
+def repeated_lines(found: list[Module]) -> int:
+    """Count the lines in runs of statements that an earlier function has, too."""
+    seen: set[tuple[str, ...]] = set()
+    repeated: set[tuple[str, int]] = set()
+    for module in found:
+        for function in functions(module):
+            heads = list(statements(function))
+            shapes = [shape for _, shape in heads]
+            fresh: set[tuple[str, ...]] = set()
+            for start in range(len(heads) - WINDOW + 1):
+                window = tuple(shapes[start : start + WINDOW])
+                if window in seen:
+                    repeated.update(
+                        (module.path, number)
+                        for lines, _ in heads[start : start + WINDOW]
+                        for number in lines
+                    )
+                fresh.add(window)
+            # Only now: rows of alike statements within one function are no copy of another.
+            seen |= fresh
+    return len(repeated)
+
+
+def statements(node: ast.AST) -> Iterator[tuple[range, str]]:
+    """Yield lines and shape of each statement in a function, in the order of reading."""
+    for inner in ast.iter_child_nodes(node):
+        if isinstance(inner, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):
+            continue  # counted by itself
+        if isinstance(inner, ast.Expr) and isinstance(inner.value, ast.Constant):
+            continue  # a docstring
+        if isinstance(inner, ast.stmt):
+            blocks = [one.lineno for one in ast.walk(inner) if isinstance(one, ast.stmt)][1:]
+            end = min(blocks, default=(inner.end_lineno or inner.lineno) + 1)
+            yield range(inner.lineno, max(end, inner.lineno + 1)), shape_of(inner)
+        if isinstance(inner, ast.stmt | ast.ExceptHandler | ast.match_case):
+            yield from statements(inner)
+
+
+def shape_of(node: ast.AST) -> str:
+    """Return a statement without its blocks, its names of variables and its constants."""
+    if isinstance(node, ast.Name | ast.Constant):
+        return type(node).__name__
+    parts = [type(node).__name__]
+    for name, value in ast.iter_fields(node):
+        for one in value if isinstance(value, list) else [value]:
+            if isinstance(one, ast.stmt | ast.ExceptHandler | ast.match_case) or name == "ctx":
+                continue
+            parts.append(shape_of(one) if isinstance(one, ast.AST) else str(one))
+    return f"({' '.join(parts)})"
+
+
+def javascript(folder: Path) -> int:
+    """Count the lines of JavaScript below a folder."""
+    return sum(
+        len(file.read_text("utf-8").splitlines())
+        for file in folder.rglob("*.js")
+        if not {"node_modules", "vendor"} & set(file.parts)
+    )
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
