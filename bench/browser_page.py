@@ -15,8 +15,8 @@ from pathlib import Path
 from playwright.async_api import Browser, CDPSession, Page
 
 from bench.harness import Result
+from bench.rig.programs import Program, Server
 from tests.e2e.browser import running_browser
-from urc.testing.rig import Program, Server
 
 __all__ = [
     "FRAME_MS",

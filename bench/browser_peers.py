@@ -23,9 +23,9 @@ from playwright.async_api import Browser, Error
 from bench.browser_ages import TooFew, ages
 from bench.browser_page import HERE, at_share, opened, peer, running_browser, served
 from bench.harness import Result
+from bench.rig.programs import Program
 from hatch_build import npm_command
 from scripts.node import node_executable
-from urc.testing.rig import Program
 
 __all__ = ["CLOCK", "run"]
 

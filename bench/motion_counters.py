@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 from bench.figures import tell
 from bench.harness import Result
 from bench.kept import Kept
-from urc.testing.rig_counters import gestures
+from bench.rig.counters import gestures
 
 __all__ = ["run"]
 

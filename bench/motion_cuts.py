@@ -16,9 +16,9 @@ from pathlib import Path
 
 from bench.figures import distribution, tell
 from bench.harness import Result
-from urc.testing.rig import can_relay
-from urc.testing.rig_cuts import Cut, CutRig
-from urc.testing.rig_kinds import KINDS, bounds_of
+from bench.rig.cuts import Cut, CutRig
+from bench.rig.kinds import KINDS, bounds_of
+from bench.rig.programs import can_relay
 
 __all__ = ["run"]
 

@@ -12,8 +12,8 @@ from pathlib import Path
 
 from bench.figures import distribution, tell
 from bench.harness import Result
-from urc.testing.rig_deaths import Trial
-from urc.testing.rig_engine import ENGINE_DEATHS, EngineRig
+from bench.rig.deaths import Trial
+from bench.rig.engine import ENGINE_DEATHS, EngineRig
 
 __all__ = ["repeated", "run", "said"]
 

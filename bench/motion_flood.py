@@ -15,9 +15,9 @@ from pathlib import Path
 from bench.figures import distribution, tell
 from bench.harness import Result
 from bench.motion_path import PROFILE, TimedPage, ticks_of
-from urc.testing.rig import Operators, Robots, Server
-from urc.testing.rig_deaths import lane_profile
-from urc.testing.rig_operator import Plan
+from bench.rig.deaths import lane_profile
+from bench.rig.operator_process import Plan
+from bench.rig.programs import Operators, Robots, Server
 
 __all__ = ["run"]
 

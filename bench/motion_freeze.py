@@ -13,7 +13,7 @@ from math import inf
 from bench.figures import distribution, tell
 from bench.harness import Result
 from bench.kept import Kept
-from urc.testing.rig_freeze import HEARD_MS, STOP_MS, Freeze, freeze
+from bench.rig.freeze import HEARD_MS, STOP_MS, Freeze, freeze
 
 __all__ = ["run"]
 

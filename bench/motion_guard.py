@@ -10,7 +10,7 @@ from pathlib import Path
 
 from bench.harness import Result
 from bench.motion_engine import repeated, said
-from urc.testing.rig_engine import EngineRig
+from bench.rig.engine import EngineRig
 
 __all__ = ["run"]
 

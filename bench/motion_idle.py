@@ -14,10 +14,10 @@ from pathlib import Path
 
 from bench.figures import tell
 from bench.harness import Result
+from bench.rig.cuts import CutRig
+from bench.rig.kinds import KINDS
+from bench.rig.programs import can_relay
 from urc.motion.hold import STOP_FOR_S
-from urc.testing.rig import can_relay
-from urc.testing.rig_cuts import CutRig
-from urc.testing.rig_kinds import KINDS
 
 __all__ = ["run"]
 

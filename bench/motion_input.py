@@ -19,10 +19,10 @@ from typing import NamedTuple
 from bench.browser_page import SIZE, Opened, opened, running_browser
 from bench.figures import distribution, tell
 from bench.harness import Result
+from bench.rig.programs import Heard, Robots, Server
 from tests.e2e.motion.driving import LEFT, push
 from tests.e2e.motion.test_input import renderers_of
 from tests.e2e.motion.ways import WAYS, start_over
-from urc.testing.rig import Heard, Robots, Server
 
 __all__ = ["run"]
 

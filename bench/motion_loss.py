@@ -15,8 +15,8 @@ from pathlib import Path
 
 from bench.figures import tell
 from bench.harness import Result
-from urc.testing.rig import can_relay
-from urc.testing.rig_deaths import Rig
+from bench.rig.deaths import Rig
+from bench.rig.programs import can_relay
 
 __all__ = ["run"]
 

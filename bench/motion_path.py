@@ -19,8 +19,8 @@ from pathlib import Path
 
 from bench.figures import tell
 from bench.harness import Result
-from urc.testing.rig import Program, Robots, Server
-from urc.testing.rig_operator import Page, Plan
+from bench.rig.operator_process import Page, Plan
+from bench.rig.programs import Program, Robots, Server
 
 __all__ = ["PROFILE", "TimedPage", "run", "ticks_of"]
 

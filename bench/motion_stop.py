@@ -13,8 +13,8 @@ from pathlib import Path
 
 from bench.figures import distribution, tell
 from bench.harness import Result
-from urc.testing.rig import can_relay
-from urc.testing.rig_deaths import BOUND_MS, DEATHS, LINK_DEATHS, Rig, Trial
+from bench.rig.deaths import BOUND_MS, DEATHS, LINK_DEATHS, Rig, Trial
+from bench.rig.programs import can_relay
 
 __all__ = ["run"]
 

@@ -33,8 +33,8 @@ from bench.browser_page import (
 )
 from bench.browser_peers import CLOCK
 from bench.harness import Result
+from bench.rig.programs import Heard, Robots
 from tests.e2e.browser import PLAIN_HOST
-from urc.testing.rig import Heard, Robots
 
 __all__ = ["run"]
 

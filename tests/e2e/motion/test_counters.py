@@ -2,7 +2,7 @@
 
 import pytest
 
-from urc.testing.rig_counters import gestures
+from bench.rig.counters import gestures
 
 pytestmark = pytest.mark.anyio
 

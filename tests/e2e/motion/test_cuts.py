@@ -4,9 +4,9 @@ from collections.abc import Iterator
 
 import pytest
 
+from bench.rig.cuts import Cut, CutRig
+from bench.rig.kinds import KINDS
 from tests.e2e.motion.verdict import judged
-from urc.testing.rig_cuts import Cut, CutRig
-from urc.testing.rig_kinds import KINDS
 
 pytestmark = [
     pytest.mark.alone,

@@ -4,9 +4,9 @@ from collections.abc import Iterator
 
 import pytest
 
+from bench.rig.deaths import DEATHS, LEASE_MS, LINK_DEATHS, Rig, Trial
+from bench.rig.programs import can_relay
 from tests.e2e.motion.verdict import judged
-from urc.testing.rig import can_relay
-from urc.testing.rig_deaths import DEATHS, LEASE_MS, LINK_DEATHS, Rig, Trial
 
 EACH = 100
 LANES = 20

@@ -10,12 +10,12 @@ from typing import NamedTuple
 
 import pytest
 
+from bench.rig.deaths import Rig, Trial, lane_profile
+from bench.rig.engine import ENGINE_DEATHS, EngineRig
+from bench.rig.operator_process import Page, Plan
+from bench.rig.programs import Operators, Robots, Server
 from tests.e2e.motion.verdict import judged
 from tests.effort import IS_THOROUGH
-from urc.testing.rig import Operators, Robots, Server
-from urc.testing.rig_deaths import Rig, Trial, lane_profile
-from urc.testing.rig_engine import ENGINE_DEATHS, EngineRig
-from urc.testing.rig_operator import Page, Plan
 
 LANES = 8
 EACH = 16

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from urc.testing.rig import Heard, Robots, Server
-from urc.testing.rig_deaths import lane_profile
-from urc.testing.rig_operator import Page, Plan
+from bench.rig.deaths import lane_profile
+from bench.rig.operator_process import Page, Plan
+from bench.rig.programs import Heard, Robots, Server
 
 PERIOD_NS = 1_000_000
 FLOOD_NS = 2_000_000_000

@@ -2,7 +2,7 @@
 
 import pytest
 
-from urc.testing.rig_freeze import freeze
+from bench.rig.freeze import freeze
 
 pytestmark = [pytest.mark.anyio, pytest.mark.alone]
 

@@ -16,10 +16,10 @@ from typing import NamedTuple
 
 import pytest
 
+from bench.rig.programs import Heard, Program, Robots
 from tests.e2e.motion.verdict import judged
 from tests.e2e.transports.packets import Loss
 from tests.effort import IS_THOROUGH
-from urc.testing.rig import Heard, Program, Robots
 
 pytestmark = [
     pytest.mark.anyio,

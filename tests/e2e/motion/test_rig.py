@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from urc.testing.rig import SERVER_ADDRESS, Operators, Program, Relay, Robots
-from urc.testing.rig_relay import ports_of
+from bench.rig.programs import SERVER_ADDRESS, Operators, Program, Relay, Robots
+from bench.rig.relay_process import ports_of
 
 pytestmark = [
     pytest.mark.skipif("sys.platform != 'linux'", reason="the rig is for Linux"),

@@ -1,8 +1,8 @@
-"""The rig: programs that play robots, operators and the link between them, and a server amid them.
+"""The programs of the test rig: robots, operators, the network between them, and a real server.
 
-All of them are processes of their own, and all stamp what they do by one clock, the machine's
-monotonic one, so that times of different programs can be compared. A program ends when its
-standard input does: none outlives the test that started it, whatever becomes of that.
+Each is a separate process. All stamp events by the monotonic clock of the machine, so times of
+different programs can be compared. A program ends when its standard input does, so none outlives
+the test that started it.
 
 Linux only. `Relay` needs root and /dev/net/tun; see `can_relay`.
 """
@@ -34,7 +34,7 @@ __all__ = [
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
 SERVER_ADDRESS = "10.77.0.2"
-"""Of side ``b`` of the relay, see `urc.testing.rig_relay`."""
+"""Of side ``b`` of the relay, see `bench.rig.relay_process`."""
 READY_S = 40.0
 ANSWER_S = 10.0
 END_S = 5.0
@@ -57,7 +57,7 @@ class Program:
         self.changed = threading.Condition()
         self._has_ended = False
         self._ordering = threading.Lock()
-        self._process = subprocess.Popen(  # noqa: S603 - tests name what is run
+        self._process = subprocess.Popen(
             [*inside, *arguments],
             cwd=ROOT,
             env=os.environ | {"PYTHONUNBUFFERED": "1", "PYTHONDONTWRITEBYTECODE": "1"},
@@ -167,7 +167,7 @@ class Heard(NamedTuple):
 
 
 class Robots(Program):
-    """Some robots in one process, see `urc.testing.rig_robot`."""
+    """Some robots in one process, see `bench.rig.robot_process`."""
 
     def __init__(self, places: Sequence[str], *, inside: Sequence[str] = ()) -> None:
         self.heard: list[list[Heard]] = [[] for _ in places]
@@ -178,7 +178,7 @@ class Robots(Program):
         """Of each process that is watched: until when it waited for a processor, how many ms."""
         self.visits: list[list[tuple[int, bool]]] = [[] for _ in places]
         """Of each robot: when, and whether a connection was made or ended."""
-        super().__init__(_script("rig_robot.py", *places), inside=inside)
+        super().__init__(_script("robot_process.py", *places), inside=inside)
         self.ports = [int(port) for port in self.wait_for("ready")[1:]]
 
     def take(self, line: str) -> None:
@@ -216,12 +216,12 @@ class Robots(Program):
 
 
 class Operators(Program):
-    """Pages and their ends, see `urc.testing.rig_operator`."""
+    """Pages and their ends, see `bench.rig.operator_process`."""
 
     def __init__(self, *, inside: Sequence[str] = ()) -> None:
         self.news: dict[tuple[str, int], str] = {}
         """(word, number of the plan) → the rest of the line."""
-        super().__init__(_script("rig_operator.py"), inside=inside)
+        super().__init__(_script("operator_process.py"), inside=inside)
 
     def take(self, line: str) -> None:
         """Sort what they tell."""
@@ -231,7 +231,7 @@ class Operators(Program):
             self.news[word, int(number)] = rest
 
     def start(self, plan: Mapping[str, object]) -> None:
-        """Let a page live by a plan, whose fields are those of `rig_operator.Plan`."""
+        """Let a page live by a plan, whose fields are those of `operator_process.Plan`."""
         self.order(json.dumps(plan))
 
     def await_told(self, word: str, number: int, timeout_s: float = PATIENCE_S) -> str:
@@ -258,12 +258,12 @@ def can_relay() -> bool:
 
 
 class Relay(Program):
-    """A link between two network namespaces, see `urc.testing.rig_relay`."""
+    """A link between two network namespaces, see `bench.rig.relay_process`."""
 
     def __init__(self) -> None:
         self._done = 0
         self._doing = threading.Lock()
-        super().__init__(_script("rig_relay.py"))
+        super().__init__(_script("relay_process.py"))
         _, *found = self.wait_for("ready")
         self._descriptors = dict(zip("ab", found, strict=True))
 
@@ -304,9 +304,9 @@ class Server(Program):
             options: more of ``urc serve``.
             host: where it listens.
             inside: as of `Program`.
-            can_hang: let it be held up by a signal, see `urc.testing.rig_server`.
+            can_hang: let it be held up by a signal, see `bench.rig.server_process`.
         """
-        script = ["-P", str(HERE / "rig_server.py")] if can_hang else ["-m", "urc.cli.main"]
+        script = ["-P", str(HERE / "server_process.py")] if can_hang else ["-m", "urc.cli.main"]
         command = [sys.executable, *script, "serve", *map(str, profiles)]
         command += ["--host", host, "--port", "0", "--data-dir", str(data), *options]
         self.host = host

@@ -4,7 +4,7 @@ import os
 import signal
 import time
 
-from urc.testing.rig_deaths import Rig, Trial
+from bench.rig.deaths import Rig, Trial
 
 __all__ = ["ENGINE_DEATHS", "RESTART_MS", "EngineRig"]
 

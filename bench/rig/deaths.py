@@ -13,8 +13,8 @@ from pathlib import Path
 from types import TracebackType
 from typing import NamedTuple, Self
 
-from urc.testing.rig import SERVER_ADDRESS, Heard, Operators, Relay, Robots, Server
-from urc.testing.rig_operator import Plan
+from bench.rig.operator_process import Plan
+from bench.rig.programs import SERVER_ADDRESS, Heard, Operators, Relay, Robots, Server
 
 __all__ = ["BOUND_MS", "DEATHS", "LEASE_MS", "LINK_DEATHS", "Rig", "Trial", "lane_profile"]
 
@@ -87,7 +87,7 @@ class Rig:
     """Some robots, a real server, and pages that die; with a relay between them where one is."""
 
     can_hang = False
-    """Whether the server can be held up, see `urc.testing.rig.Server`."""
+    """Whether the server can be held up, see `bench.rig.programs.Server`."""
 
     def __init__(
         self,

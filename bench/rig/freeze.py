@@ -1,8 +1,8 @@
 """Robots behind a counterpart that stands still for seconds, while they are driven.
 
-The counterpart is a program of its own (`urc.testing.rig_robot`), which is stopped and let go on by
-signals; its kernel goes on taking what is written. The driver is a session with its guard. Each
-frame of motion says when it was sent, and the counterpart stamps what it hears.
+The counterpart is a separate program (`bench.rig.robot_process`). Signals suspend and resume it,
+while its kernel still accepts bytes. The driver is a session with its guard. Each motion frame
+holds the time of its sending, and the counterpart stamps each line that it receives.
 """
 
 import asyncio
@@ -17,6 +17,7 @@ from math import inf
 from pathlib import Path
 from typing import Final, NamedTuple
 
+from bench.rig.programs import Robots
 from urc.config.load import load_profile
 from urc.model.profile import Profile
 from urc.motion.hold import Terms
@@ -24,7 +25,6 @@ from urc.problems import UrcError
 from urc.runtime.catalog import built_in_catalog
 from urc.runtime.held import is_lossy
 from urc.runtime.session import Session
-from urc.testing.rig import Robots
 
 __all__ = ["HEARD_MS", "STOP_MS", "Freeze", "freeze"]
 
@@ -125,7 +125,7 @@ def _profile(port: int) -> Profile:
 async def _one(session: Session, robots: Robots, moment_s: float, lasts_s: float) -> Freeze:
     """Drive, let the counterpart stand still and go on, and look at what it heard."""
     movers = session.movers
-    assert movers is not None  # noqa: S101 - there is a held command
+    assert movers is not None
     ends_s = time.monotonic() + _READY_S
     while not (movers.is_open("go") and session.frames.is_ready("go")):
         if time.monotonic() > ends_s:
@@ -150,7 +150,7 @@ async def _one(session: Session, robots: Robots, moment_s: float, lasts_s: float
 
 async def _hold(session: Session) -> None:
     """Tick as a hand does that notices nothing, for ever."""
-    assert session.movers is not None  # noqa: S101 - as above
+    assert session.movers is not None
     while True:
         now_ns = time.monotonic_ns()
         with suppress(UrcError):  # the line is not open: a hand goes on all the same

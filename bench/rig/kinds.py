@@ -1,6 +1,6 @@
 """The kinds of line that robots of the rig have, and the programs that stand between: real ones.
 
-For each kind: the robot's place (see `urc.testing.rig_robot`), its document, and what is required
+For each kind: the robot's place (see `bench.rig.robot_process`), its document, and what is required
 of it after a cut. Where a line is opened afresh at once, no motion older than 300 ms may come, and
 the stop within 100 ms. Where that is dear, or cannot be noticed, other bounds hold.
 """
@@ -10,7 +10,7 @@ import subprocess
 from pathlib import Path
 from typing import Final, NamedTuple
 
-from urc.testing.rig import SERVER_ADDRESS, Program
+from bench.rig.programs import SERVER_ADDRESS, Program
 
 __all__ = [
     "KINDS",
@@ -121,7 +121,7 @@ class Counterpart(Program):
 
 
 def place_of(kind: str, lane: int) -> str:
-    """Return the place of a robot of this kind, as `rig_robot` takes it."""
+    """Return the place of a robot of this kind, as `robot_process` takes it."""
     if kind == "mqtt":
         return f"mqtt:127.0.0.1:{FIRST_PORT[kind] + lane}"
     if kind == "ssh":
@@ -175,7 +175,7 @@ def _login(port: int, folder: Path, inside: tuple[str, ...]) -> Counterpart:
     folder.mkdir(mode=0o755)
     for name in ("host", "user"):
         make = ["ssh-keygen", "-q", "-t", "ed25519", "-N", "", "-f", str(folder / name)]
-        subprocess.run(make, check=True, timeout=30)  # noqa: S603 - a program by its name
+        subprocess.run(make, check=True, timeout=30)
     users = Path("/etc/passwd").read_text("utf-8")
     home = f"robot:x:{_USER_ID}:{_USER_ID}::/:/bin/sh\n"
     (folder / "passwd").write_text(users + home, "utf-8")
@@ -192,6 +192,6 @@ def _login(port: int, folder: Path, inside: tuple[str, ...]) -> Counterpart:
     command = ["unshare", "--mount", "--pid", "--fork", "--kill-child", "sh", "-c", _ENTER, "sh"]
     made = Counterpart([*command, str(folder), program], inside=inside, port=port)
     look = ["ssh-keygen", "-l", "-f", str(folder / "host.pub")]
-    shown = subprocess.run(look, check=True, capture_output=True, text=True, timeout=30)  # noqa: S603
+    shown = subprocess.run(look, check=True, capture_output=True, text=True, timeout=30)
     made.options = {"KEY": str(folder / "user"), "SHOWN": shown.stdout.split()[1]}
     return made

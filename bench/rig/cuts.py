@@ -15,8 +15,7 @@ from threading import Lock
 from types import TracebackType
 from typing import NamedTuple, Self
 
-from urc.testing.rig import Heard, Operators, Relay, Robots, Server
-from urc.testing.rig_kinds import (
+from bench.rig.kinds import (
     FIRST_PORT,
     Bounds,
     bounds_of,
@@ -24,6 +23,7 @@ from urc.testing.rig_kinds import (
     place_of,
     start_counterpart,
 )
+from bench.rig.programs import Heard, Operators, Relay, Robots, Server
 
 __all__ = ["LATE_MS", "Cut", "CutRig"]
 

@@ -1,6 +1,6 @@
-"""A link between two network namespaces that can be slow, lossy, or cut: a program of its own.
+"""A link between two network namespaces that can be slow, lossy, or cut: a separate program.
 
-Linux and root only; it needs /dev/net/tun and nothing of URC. ``python rig_relay.py`` makes two
+Linux and root only; it needs /dev/net/tun and nothing of URC. ``python relay_process.py`` makes two
 namespaces, a TUN device in each, and moves packets between them: side ``a`` is 10.77.0.1, side
 ``b`` 10.77.0.2, and each has a loopback of its own. Other programs enter by
 ``nsenter --net=/proc/PID/fd/FD``. Told on standard output::
@@ -208,4 +208,4 @@ if __name__ == "__main__":
     try:
         Relay().run()
     except OSError as error:
-        sys.exit(f"rig_relay: {error}")
+        sys.exit(f"relay_process: {error}")

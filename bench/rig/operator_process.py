@@ -1,4 +1,4 @@
-"""People at screens, and how they vanish: a program of its own, which imports nothing of URC.
+"""People at screens, and how they vanish: a separate program, which imports nothing of URC.
 
 Reads one plan a line from standard input, as JSON, and forks a process for each: a page that takes
 the controls, ticks every 50 ms, and dies in the way that the plan says. What it does is told on

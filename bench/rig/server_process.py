@@ -1,7 +1,7 @@
-"""A real ``urc serve`` that a pattern can hold up: a program of its own.
+"""A real ``urc serve`` that a pattern can block: a separate program.
 
-``python rig_server.py serve …``. At SIGUSR2 its one thread matches a pattern of which every letter
-more doubles the work, which keeps the interpreter from everything else. Told on standard output::
+``python server_process.py serve …``. At SIGUSR2 its only thread matches a pattern whose work
+doubles with each letter. The interpreter does nothing else meanwhile. It then prints::
 
     backtracked TIME TIME   from when to when, monotonic nanoseconds
 """

@@ -168,7 +168,7 @@ async def _drive(session: Session, lasts_s: float, dice: random.Random) -> str:
 
 async def _follow(session: Session, desk: MotionDesk) -> None:
     """Tell the desk of stops, for ever."""
-    assert session.movers is not None  # noqa: S101 - there are held commands
+    assert session.movers is not None
     while True:
         for command, reason in await session.movers.stops():
             desk.stopped(command, reason)

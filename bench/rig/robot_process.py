@@ -1,11 +1,10 @@
-"""Robots that stamp every line they hear: a program of its own, which imports nothing of URC.
+"""Robots that stamp every line they receive: a separate program, which imports nothing of URC.
 
-``python rig_robot.py tcp:127.0.0.1:0 udp:127.0.0.1:0 …`` is one robot for each argument. ``ws`` is
-a WebSocket whose messages are the lines, ``bridge`` one that takes messages as rosbridge does and
-hears ``M NUMBER`` for ``{"data": NUMBER}`` on ``/go``, ``http`` a server that hears it when
-``/go?t=NUMBER`` is asked for; ``mqtt:HOST:PORT`` listens to the topic ``go`` of a broker there.
-What they hear is told on standard output, one line each, with times of the monotonic
-clock in nanoseconds::
+``python robot_process.py tcp:127.0.0.1:0 udp:127.0.0.1:0 …`` plays one robot for each argument.
+``ws`` is a WebSocket whose messages are the lines. ``bridge`` speaks the protocol of rosbridge, and
+receives ``M NUMBER`` for ``{"data": NUMBER}`` on ``/go``. ``http`` is a server that receives it by
+a request for ``/go?t=NUMBER``. ``mqtt:HOST:PORT`` subscribes to the topic ``go`` of that broker.
+It prints one line for each event, with times of the monotonic clock in nanoseconds::
 
     ready 40001 40002 …     their ports, once
     open ROBOT TIME         a connection was made; a broker has taken the subscription
