@@ -15,7 +15,7 @@ from typing import cast
 
 from bench.documents import DOCUMENT, by_json, by_orjson, json_lines
 from bench.harness import Goal, Result, compare
-from urc.config.parse_driver import parse_driver
+from urc.config.parse.driver import parse_driver
 from urc.config.part import Findings, Part
 from urc.model.driver import Driver
 from urc.model.values import Sample

@@ -16,7 +16,7 @@ from playwright.async_api import Browser, Page
 from tests.e2e.browser import LOCALE, running_browser
 from tests.e2e.dashboards import running_dashboard
 from tests.e2e.keys import known_here
-from urc.config.parse_widget import Shelf
+from urc.config.parse.widget import Shelf
 from urc.shipped import shipped
 from urc.testing.dashboard import FakeRobot, dashboard_profile
 

@@ -5,10 +5,10 @@ from pathlib import Path
 
 import pytest
 
-from urc.config.forms import FormContext, parse_write
 from urc.config.messaging import MESSAGING
+from urc.config.parse.form import FormContext, parse_write
 from urc.config.part import Findings, Part
-from urc.config.shape import read_schema
+from urc.config.shape.check import read_schema
 from urc.problems import to_text
 from urc.source import parse_document
 from urc.testing.struct import reader, struct_read

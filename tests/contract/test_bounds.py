@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from urc.config.parse_widget import Shelf
+from urc.config.parse.widget import Shelf
 from urc.runtime import apart
 from urc.runtime.apart import look_apart
 from urc.shipped import shipped

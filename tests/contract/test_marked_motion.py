@@ -8,7 +8,7 @@ import pytest
 import yaml
 
 from tests.documentation import ROOT, Block, blocks
-from urc.config.rules_unmarked import why_it_moves
+from urc.config.rules.unmarked import why_it_moves
 from urc.model.codec import WriteSpec
 from urc.model.driver import Argument, Command
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from urc.config.load import check, load_profile
-from urc.config.parse_widget import Shelf
+from urc.config.parse.widget import Shelf
 from urc.config.resolve import resolve
 from urc.runtime.catalog import built_in_catalog
 from urc.shipped import shipped

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from urc.config.parse_widget import Shelf
+from urc.config.parse.widget import Shelf
 from urc.model.widget import Widget
 from urc.shipped import shipped
 from urc.source import read_document

@@ -8,7 +8,7 @@ from typing import Any
 
 from playwright.async_api import Page
 
-from urc.config.parse_widget import Shelf
+from urc.config.parse.widget import Shelf
 from urc.shipped import shipped
 from urc.web.show.demos import DemoState, demo_states
 

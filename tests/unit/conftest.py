@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from urc.config.parse_widget import Shelf
+from urc.config.parse.widget import Shelf
 from urc.model.widget import Widget
 from urc.shipped import shipped
 from urc.web.load import file_routes

@@ -9,8 +9,8 @@ import re
 from collections.abc import Iterator, Mapping
 from typing import Final
 
-from urc.config.link_look import misfit
-from urc.config.parse_widget import Shelf
+from urc.config.link.look import misfit
+from urc.config.parse.widget import Shelf
 from urc.model.driver import Argument, Command, Driver
 from urc.model.interface import Given, WidgetUse
 from urc.model.units import are_apart

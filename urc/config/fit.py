@@ -4,10 +4,10 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
 
-from urc.config.gather import gather
-from urc.config.link_look import link_interface
-from urc.config.parse_interface import parse_interface
-from urc.config.parse_widget import Shelf
+from urc.config.compose.gather import gather
+from urc.config.link.look import link_interface
+from urc.config.parse.interface import parse_interface
+from urc.config.parse.widget import Shelf
 from urc.config.part import Findings
 from urc.model.interface import Interface
 from urc.model.profile import Profile

@@ -9,19 +9,19 @@ from os import PathLike, fspath
 from typing import NamedTuple
 
 from urc.config.automatic import automatic_slots
-from urc.config.gather import Sources, gather
+from urc.config.compose.gather import Sources, gather
 from urc.config.layout import default_interface
-from urc.config.link_look import link_interface, link_slots
-from urc.config.link_tests import link_test
-from urc.config.link_wire import link_driver, link_simulator
-from urc.config.parse_driver import parse_driver, spoken_name
-from urc.config.parse_interface import check_names, parse_interface
-from urc.config.parse_profile import parse_setting
-from urc.config.parse_simulator import Simulated, parse_simulator
-from urc.config.parse_test import parse_test
-from urc.config.parse_widget import Shelf, parse_widget
+from urc.config.link.driver import link_driver, link_simulator
+from urc.config.link.look import link_interface, link_slots
+from urc.config.link.tests import link_test
+from urc.config.parse.driver import parse_driver, spoken_name
+from urc.config.parse.interface import check_names, parse_interface
+from urc.config.parse.profile import parse_setting
+from urc.config.parse.simulator import Simulated, parse_simulator
+from urc.config.parse.test import parse_test
+from urc.config.parse.widget import Shelf, parse_widget
 from urc.config.part import Findings
-from urc.config.rules import check_profile
+from urc.config.rules.profile import check_profile
 from urc.model.driver import Driver
 from urc.model.interface import Interface, WidgetUse
 from urc.model.profile import DocumentTest, Profile, Setting

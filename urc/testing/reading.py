@@ -2,7 +2,7 @@
 
 from collections.abc import Collection
 
-from urc.config.forms import FormContext, parse_read
+from urc.config.parse.form import FormContext, parse_read
 from urc.config.part import Findings, Part
 from urc.model.codec import ReadSpec
 from urc.problems import ProblemsError

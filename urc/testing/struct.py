@@ -2,11 +2,11 @@
 
 from collections.abc import Mapping
 
-from urc.config.form_struct import parse_read, parse_write
-from urc.config.forms import FormContext
-from urc.config.parse_types import parse_types
+from urc.config.parse.form import FormContext
+from urc.config.parse.forms.struct import parse_read, parse_write
+from urc.config.parse.struct.numbers import parse_enums
+from urc.config.parse.types import parse_types
 from urc.config.part import Findings, Part
-from urc.config.struct_numbers import parse_enums
 from urc.model.codec import ReadSpec, WriteSpec
 from urc.problems import to_text
 from urc.protocol.codec import CodecContext, Frame, Reader, Writer

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from tests.effort import examples
 from urc.config.load import check
-from urc.config.parse_widget import Shelf
+from urc.config.parse.widget import Shelf
 from urc.config.resolve import resolve, written
 from urc.runtime.catalog import built_in_catalog
 from urc.source import read_document

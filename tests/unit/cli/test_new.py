@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from urc.cli.main import main
-from urc.config.parse_widget import Shelf
+from urc.config.parse.widget import Shelf
 from urc.web.show.cells import render_widget, widget_context
 from urc.web.show.demos import demo_states
 

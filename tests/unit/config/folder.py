@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from urc.config.load import Checked, check
-from urc.config.parse_widget import Shelf
+from urc.config.parse.widget import Shelf
 from urc.problems import Problem
 from urc.runtime.catalog import built_in_catalog
 

@@ -9,7 +9,7 @@ from tests.unit.config.folder import WIRE, head
 from urc.config.automatic import MOST_PLAIN, automatic_slots
 from urc.config.layout import default_interface
 from urc.config.load import Checked, check
-from urc.config.parse_widget import Shelf
+from urc.config.parse.widget import Shelf
 from urc.config.resolve import resolve
 from urc.model.codec import WriteSpec
 from urc.model.driver import Argument, Command, Driver

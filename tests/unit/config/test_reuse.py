@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.unit.config.folder import WIRE, Folder, head
-from urc.config.fill import Budget, TooMuch, fill
-from urc.config.merge import Tree, merge
+from urc.config.compose.fill import Budget, TooMuch, fill
+from urc.config.compose.merge import Tree, merge
 from urc.config.resolve import written
 from urc.source import Document, parse_document
 from urc.source import Path as Place

@@ -6,7 +6,7 @@ import pytest
 
 from tests.unit.config.folder import WIRE, Folder, head
 from urc.config.load import check
-from urc.config.parse_widget import Shelf
+from urc.config.parse.widget import Shelf
 from urc.problems import Problem
 from urc.runtime.catalog import built_in_catalog
 from urc.shipped import shipped

@@ -5,7 +5,7 @@ from typing import Any
 
 from tests.unit.protocol.framing_samples_sized import SIZED, Sample, wire
 from tests.unit.protocol.framing_samples_text import TEXT
-from urc.config.parse_framing import parse_framing
+from urc.config.parse.framing import parse_framing
 from urc.config.part import Findings, Part
 from urc.model.driver import FramingSpec
 from urc.problems import to_text

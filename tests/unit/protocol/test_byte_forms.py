@@ -7,15 +7,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.effort import examples
-from urc.config import form_bytes, form_hex, form_json_text
-from urc.config.forms import FormContext
+from urc.config.parse.form import FormContext
+from urc.config.parse.forms import bytes as bytes_form
+from urc.config.parse.forms import hex as hex_form
+from urc.config.parse.forms import json_text
 from urc.config.part import Findings, Part
 from urc.expressions import ExpressionError
 from urc.protocol.codec import CodecContext, Frame, NotWritable, Writer
 from urc.protocol.forms import build_writer
 from urc.source import parse_document
 
-FORMS = {"hex": form_hex, "bytes": form_bytes, "json": form_json_text}
+FORMS = {"hex": hex_form, "bytes": bytes_form, "json": json_text}
 
 
 def writer(source: str, encoding: str = "utf-8") -> Writer:

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from tests.effort import examples
 from tests.unit.protocol.framing_samples import NMEA, framing, spec
 from urc._sums import NAMED, build_algorithm
-from urc.config.parse_checksum import parse_checksum
+from urc.config.parse.checksum import parse_checksum
 from urc.config.part import Findings, Part
 from urc.expressions import compile_template
 from urc.model.codec import WriteSpec

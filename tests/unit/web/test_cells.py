@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from urc.config.parse_widget import Shelf
+from urc.config.parse.widget import Shelf
 from urc.shipped import shipped
 from urc.web.show.cells import widget_cell
 from urc.web.show.demos import demo_states

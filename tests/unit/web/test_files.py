@@ -8,7 +8,7 @@ from starlette.testclient import TestClient
 
 from tests.unit.config.folder import WIRE, head
 from urc.config.load import check
-from urc.config.parse_widget import Shelf
+from urc.config.parse.widget import Shelf
 from urc.model.interface import WidgetUse
 from urc.runtime.catalog import built_in_catalog
 from urc.runtime.permissions import permissions

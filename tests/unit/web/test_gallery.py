@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from starlette.testclient import TestClient
 
-from urc.config.parse_widget import Shelf
+from urc.config.parse.widget import Shelf
 from urc.model.widget import Port, Widget
 from urc.problems import UrcError
 from urc.shipped import shipped

@@ -2,7 +2,7 @@
 
 import pytest
 
-from urc.config.parse_widget import Shelf
+from urc.config.parse.widget import Shelf
 from urc.shipped import shipped
 from urc.web.show.cells import widget_context
 from urc.web.show.demos import demo_states

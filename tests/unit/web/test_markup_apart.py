@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from tests.unit.packages.made import write_package
-from urc.config.parse_widget import Shelf
+from urc.config.parse.widget import Shelf
 from urc.model.interface import WidgetUse
 from urc.testing.dashboard import dashboard_profile
 from urc.web import words

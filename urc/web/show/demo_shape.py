@@ -6,7 +6,7 @@ Floor 5. The gallery and `urc validate` both ask here, so that they never differ
 from collections.abc import Iterable, Mapping
 from typing import Any, Final
 
-from urc.config.shape import check_inline, check_options
+from urc.config.shape.check import check_inline, check_options
 from urc.model.widget import Widget
 from urc.problems import Problem
 from urc.source import Document

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import NamedTuple
 
-from urc.config.parse_widget import Shelf
+from urc.config.parse.widget import Shelf
 from urc.model.profile import Profile
 from urc.model.widget import Widget
 from urc.problems import Problem

@@ -1,0 +1,180 @@
+"""Names in single braces → what they stand for: ``{i}`` of an `each`, ``{params.id}`` of a driver.
+
+They are filled in while a document is loaded, in keys and texts alike; templates, which have double
+braces, come later and know nothing of it. A text that is one name and nothing else becomes the
+value itself, so ``"{i}"`` may be a number.
+"""
+
+import re
+from collections.abc import Mapping
+from typing import Final, Protocol
+
+from urc.config.compose.merge import Tree, mark_inside, merge
+from urc.source import Mark, Path, Written
+
+__all__ = ["Budget", "Listener", "Names", "TooMuch", "fill", "fill_key"]
+
+Names = Mapping[str, object]
+"""Name → a plain value, or a mapping of plain values."""
+
+
+class Listener(Protocol):
+    """Who is told of names that cannot be filled in."""
+
+    def unknown(self, path: Path, name: str, word: str, offset: int) -> None:
+        """Take note that `name` is known, and the word behind its dot is not."""
+
+    def unquoted(self, path: Path, text: str) -> None:
+        """Take note of ``max: {i}``: without quotes that is a mapping to YAML."""
+
+
+_NAME: Final = re.compile(
+    # Double braces are a template's; but {{n}:number} is a field whose name is filled in.
+    r"(?:(?<!\{)|(?<=\{)(?=\{[a-z0-9_.]+\}:[a-z]))"
+    r"\{([a-z][a-z0-9_]*)(?:\.([a-z0-9_]+))?\}(?!\})"
+)
+_CHARACTERS_MOST: Final = 4 << 20
+
+
+class TooMuch(Exception):
+    """The document would become larger than any document may be."""
+
+
+class Budget:
+    """How much may still be written out."""
+
+    def __init__(self, nodes: int) -> None:
+        self._nodes = nodes
+        self._characters = _CHARACTERS_MOST
+
+    def spend(self, nodes: int, characters: int = 0) -> None:
+        """Take note of what is written out; raise `TooMuch` when that is more than there may be."""
+        self._nodes -= nodes
+        self._characters -= characters
+        if self._nodes < 0 or self._characters < 0:
+            raise TooMuch
+
+
+class _Filler:
+    def __init__(self, names: Names, budget: Budget, listener: Listener | None) -> None:
+        self.names = names
+        self.budget = budget
+        self.listener = listener
+
+    def tree(self, tree: Tree, path: Path) -> Tree:
+        value = tree.value
+        if isinstance(value, str):
+            filled, written = self.text(value, path)
+            if written is None:
+                return tree
+            mark = tree.mark.copy()
+            mark.written = written
+            return Tree(filled, mark, tree.home)
+        if isinstance(value, dict):
+            return self._mapping(value, tree, path)
+        if isinstance(value, list):
+            return self._list(value, tree, path)
+        return tree
+
+    def _mapping(self, value: dict[str, object], tree: Tree, path: Path) -> Tree:
+        if len(value) == 1 and self.listener is not None:
+            ((word, nothing),) = value.items()
+            text = f"{{{word}}}"
+            filled, written = self.text(text, path) if nothing is None else (None, None)
+            if written is not None:
+                self.listener.unquoted(path, text)
+                return Tree(filled, tree.mark, tree.home)
+        made: dict[str, Tree] = {}
+        is_same = True
+        for key, item in value.items():
+            name = str(self.text(key, (*path, key))[0])
+            inner = self.tree(_item(tree, key, item), (*path, key))
+            is_same = is_same and name == key and inner.value is item
+            if name not in made:
+                made[name] = inner
+            elif name not in value:
+                made[key] = inner  # two became one: as it stands, this one is no name
+            else:
+                # What is declared by its full name goes before what was filled in.
+                below, above = (made[name], inner) if name == key else (inner, made[name])
+                if above.value is None:
+                    del made[name]
+                else:
+                    made[name] = merge(below, above, (*path, name))
+        if is_same:
+            return tree
+        marks: dict[str | int, Mark] = {
+            name: mark_inside(inner, tree) for name, inner in made.items()
+        }
+        data = {name: inner.value for name, inner in made.items()}
+        return Tree(data, tree.mark.copy(marks), tree.home)
+
+    def _list(self, value: list[object], tree: Tree, path: Path) -> Tree:
+        items = [
+            self.tree(_item(tree, place, item), (*path, place)) for place, item in enumerate(value)
+        ]
+        if all(inner.value is item for inner, item in zip(items, value, strict=True)):
+            return tree
+        marks: dict[str | int, Mark] = {
+            place: mark_inside(item, tree) for place, item in enumerate(items)
+        }
+        return Tree([item.value for item in items], tree.mark.copy(marks), tree.home)
+
+    def text(self, text: str, path: Path) -> tuple[object, Written | None]:
+        """Return the text with its names filled in, and how that came about."""
+        if "{" not in text:
+            return text, None
+        edits: list[tuple[int, int, int]] = []
+        pieces: list[str] = []
+        end = 0
+        for found in _NAME.finditer(text):
+            is_known, value = self._value(found, path)
+            if not is_known:
+                continue
+            if found.span() == (0, len(text)):
+                return value, Written(text, ((0, len(text), len(_written(value))),))
+            piece = _written(value)
+            self.budget.spend(0, len(piece))
+            edits.append((found.start(), len(found[0]), len(piece)))
+            pieces += (text[end : found.start()], piece)
+            end = found.end()
+        if not edits:
+            return text, None
+        self.budget.spend(0, len(text))
+        return "".join((*pieces, text[end:])), Written(text, tuple(edits))
+
+    def _value(self, found: re.Match[str], path: Path) -> tuple[bool, object]:
+        name, word = found[1], found[2]
+        if name not in self.names:
+            return False, None
+        value = self.names[name]
+        if isinstance(value, Mapping):
+            if word in value:
+                return True, value[word]
+        elif word is None:
+            return True, value
+        if self.listener is not None:
+            self.listener.unknown(path, name, word or "", found.start() + 1)
+        return False, None
+
+
+def _item(tree: Tree, key: str | int, item: object) -> Tree:
+    mark = tree.mark.children[key]
+    return Tree(item, mark, mark.origin or tree.home)
+
+
+def fill(tree: Tree, path: Path, names: Names, budget: Budget, listener: Listener) -> Tree:
+    """Return `tree` with every name filled in; what has none is shared, not copied."""
+    return _Filler(names, budget, listener).tree(tree, path)
+
+
+def fill_key(key: str, names: Names, budget: Budget) -> str:
+    """Return a key with every name filled in."""
+    return str(_Filler(names, budget, None).text(key, ())[0])
+
+
+def _written(value: object) -> str:
+    """Return a value as text has it."""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    return "" if value is None else str(value)

@@ -1,0 +1,195 @@
+"""Two trees of data with their marks → one: what stands above goes before what it stands on.
+
+Mappings are merged key by key, lists of named things name by name; anything else is replaced. Of
+the rules of a simulator those with names are changed, and the others stay. A
+``null`` takes a key away, ``remove: true`` an item of such a list. No finding loses its place: each
+mark of the result says in which document it stands.
+"""
+
+from collections.abc import Callable
+from typing import Final, NamedTuple
+
+from urc.config.parse.form import READ_FORMS, WRITE_FORMS
+from urc.source import Document, Mark, Path
+
+__all__ = ["Tree", "children", "count_nodes", "item_name", "mark_inside", "merge"]
+
+_NAMES: Final = ("name", "id")
+_EXCLUSIVE: Final = (frozenset(("grid", "grids", "tabs")),)
+"""Keys of which a mapping has at most one, beside the forms of frames."""
+
+
+_OF_USED_DRIVER: Final = frozenset(("use", "params", "overrides"))
+"""Keys of a driver in a document of its own."""
+
+
+class Tree(NamedTuple):
+    """Data, and where it stands."""
+
+    value: object
+    mark: Mark
+    home: Document
+    """In whose text it stands, unless a mark inside says otherwise."""
+
+
+_Clash = Callable[[Path, Tree, Tree], None]
+"""Told of two values for one key, of which the second is kept."""
+
+
+def _pinned(tree: Tree) -> Mark:
+    """Return the mark with the document that it stands in."""
+    if tree.mark.origin is not None:
+        return tree.mark
+    mark = tree.mark.copy()
+    mark.origin = tree.home
+    return mark
+
+
+def mark_inside(inner: Tree, around: Tree) -> Mark:
+    """Return the mark of what stands inside `around`, with its document where that is another."""
+    return _pinned(inner) if inner.home is not around.home else inner.mark
+
+
+def children(tree: Tree) -> dict[str | int, Tree]:
+    """Return what is inside a mapping or list."""
+    home = tree.mark.origin or tree.home
+    if isinstance(tree.value, dict):
+        inside = tree.value.items()
+    elif isinstance(tree.value, list):
+        inside = dict(enumerate(tree.value)).items()
+    else:
+        return {}
+    return {
+        key: Tree(item, tree.mark.children[key], tree.mark.children[key].origin or home)
+        for key, item in inside
+    }
+
+
+def item_name(value: object) -> str | None:
+    """Return the name by which an item of a list is known, or None."""
+    if isinstance(value, dict):
+        for key in _NAMES:
+            name = value.get(key)
+            if isinstance(name, str):
+                return name
+    return None
+
+
+def count_nodes(value: object) -> int:
+    """Return how many keys, values, mappings and lists there are."""
+    if isinstance(value, dict):
+        return 1 + len(value) + sum(map(count_nodes, value.values()))
+    if isinstance(value, list):
+        return 1 + sum(map(count_nodes, value))
+    return 1
+
+
+def merge(base: Tree, over: Tree, path: Path = (), clash: _Clash | None = None) -> Tree:
+    """Return `base` with all that `over` says.
+
+    Args:
+        base: what is changed; it is left as it is.
+        over: what changes it.
+        path: where both stand in their documents.
+        clash: asked about each value that is replaced by another one.
+    """
+    if path == ("driver",) and isinstance(over.value, dict):
+        base = _driver_in_full(base, over.value)
+    if isinstance(base.value, dict) and isinstance(over.value, dict):
+        if path[-1:] == ("framing",) and _has_other_type(base.value, over.value):
+            return over  # the keys of another framing mean nothing to this one
+        return _mappings(base, over, path, clash)
+    if isinstance(base.value, list) and isinstance(over.value, list):
+        old, new = _by_name(base), _by_name(over)
+        is_rules = path[:1] == ("simulator",)
+        if old is not None and new is not None and not is_rules:
+            return _lists(old, new, over, path, clash)
+        if new and is_rules:
+            return _rules(base, new, over, path, clash)
+    if clash is not None and base.value != over.value:
+        clash(path, base, over)
+    return over
+
+
+def _driver_in_full(base: Tree, over: dict[str, object]) -> Tree:
+    """Return a driver that is only named as one that can be changed, where `over` changes it."""
+    if not isinstance(base.value, str) or not over.keys() <= _OF_USED_DRIVER:
+        return base
+    mark = base.mark.copy({"use": _pinned(base)})
+    return Tree({"use": base.value}, mark, base.home)
+
+
+def _mappings(base: Tree, over: Tree, path: Path, clash: _Clash | None) -> Tree:
+    result = children(base)
+    above = children(over)
+    for group in _exclusive(path):
+        if group & above.keys():
+            for other in group - above.keys():
+                result.pop(other, None)
+    for key, inner in above.items():
+        if key not in result:
+            result[key] = inner
+        elif inner.value is None:
+            del result[key]
+        else:
+            result[key] = merge(result[key], inner, (*path, key), clash)
+    return _built({key: tree.value for key, tree in result.items()}, result, over)
+
+
+def _exclusive(path: Path) -> tuple[frozenset[str], ...]:
+    """Return groups of keys of which the mapping at `path` has one at most."""
+    if path[-1:] == ("send",):
+        return (frozenset(WRITE_FORMS),)
+    if path[-1:] == ("reply",) or path[-2:-1] == ("messages",):
+        return (frozenset(READ_FORMS),)
+    return _EXCLUSIVE
+
+
+def _has_other_type(base: dict[str, object], over: dict[str, object]) -> bool:
+    return "type" in base and "type" in over and base["type"] != over["type"]
+
+
+def _by_name(tree: Tree) -> dict[str, Tree] | None:
+    """Return the items of a list by their names, or None when they have none of their own."""
+    found: dict[str, Tree] = {}
+    for inner in children(tree).values():
+        name = item_name(inner.value)
+        if name is None or name in found:
+            return None
+        found[name] = inner
+    return found
+
+
+def _lists(
+    old: dict[str, Tree], new: dict[str, Tree], over: Tree, path: Path, clash: _Clash | None
+) -> Tree:
+    result = dict(old)
+    for name, inner in new.items():
+        if name in old and isinstance(inner.value, dict) and inner.value.get("remove") is True:
+            del result[name]
+        elif name in old:
+            result[name] = merge(old[name], inner, (*path, name), clash)
+        else:
+            result[name] = inner
+    items = list(result.values())
+    return _built([tree.value for tree in items], dict(enumerate(items)), over)
+
+
+def _rules(base: Tree, new: dict[str, Tree], over: Tree, path: Path, clash: _Clash | None) -> Tree:
+    """Return rules of which some are changed by their names; new ones go before all others."""
+    left, items = dict(new), []
+    for inner in children(base).values():
+        name = item_name(inner.value)
+        changed = None if name is None else left.pop(name, None)
+        if changed is None:
+            items.append(inner)
+        elif not (isinstance(changed.value, dict) and changed.value.get("remove") is True):
+            items.append(merge(inner, changed, (*path, str(name)), clash))
+    items = [*left.values(), *items]
+    return _built([tree.value for tree in items], dict(enumerate(items)), over)
+
+
+def _built(value: object, inside: dict[str | int, Tree] | dict[int, Tree], over: Tree) -> Tree:
+    mark = over.mark.copy({key: _pinned(tree) for key, tree in inside.items()})
+    mark.origin = over.mark.origin or over.home
+    return Tree(value, mark, mark.origin)

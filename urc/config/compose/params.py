@@ -1,0 +1,215 @@
+"""`params`: what a driver leaves open for each robot, ``{params.id}`` in keys and texts.
+
+They are filled in while the documents are loaded. What an operator fills in are settings.
+"""
+
+from collections.abc import Mapping
+from typing import Any, Final
+
+from urc.config.compose.copies import report_unquoted
+from urc.config.compose.fill import Budget, TooMuch, fill
+from urc.config.compose.merge import Tree, count_nodes
+from urc.config.part import Findings, Part
+from urc.config.shape.check import fits
+from urc.config.suggest import did_you_mean
+from urc.config.values import check_range, check_within, fit, fit_hint
+from urc.model.values import Value
+from urc.source import Document, Mark, Path
+
+__all__ = ["fill_params"]
+
+_NODES_MOST: Final = 10_000
+_SAMPLES: Final[Mapping[str, Value]] = {
+    "integer": 1, "number": 1.0, "boolean": False, "string": "sample",
+}  # fmt: skip
+
+
+def fill_params(
+    document: Document, given: Part | None, use: Part | None, findings: Findings
+) -> Document:
+    """Return a driver's document with its params filled in.
+
+    Args:
+        document: the driver, merged from all that it is made of.
+        given: what a robot gives for them, if it gives any.
+        use: where the robot names the driver; None while the driver is looked at alone, when what
+            has no default gets a sample of its type.
+        findings: where faults go.
+    """
+    data = document.data
+    if not isinstance(data, dict):
+        return document
+    if "params" not in data:
+        if given is not None:
+            for inner in given.entries().values():
+                _report_unknown(inner, (), findings)
+        return document
+    if not fits("driver.schema.json#/$defs/params", data["params"]):
+        return document  # the shape pass tells
+    part = Part(document, (), data).must("params")
+    values = _values(part, given, use, findings)
+    filler = _Filler(document, values, findings)
+    result = filler.document()
+    for name, inner in part.entries().items():
+        if name not in filler.used:
+            findings.warn(
+                inner,
+                "unused-param",
+                f"nothing uses the param {name!r}",
+                key=True,
+                hint=f"write {{params.{name}}} where it belongs",
+            )
+    return result
+
+
+def _values(
+    part: Part, given: Part | None, use: Part | None, findings: Findings
+) -> dict[str, Value]:
+    gifts = given.entries() if given is not None else {}
+    for name, gift in gifts.items():
+        if name not in part.data:
+            _report_unknown(gift, part.data, findings)
+    values = {}
+    for name, inner in part.entries().items():
+        kind = inner.text("type", "string")
+        bounds = check_range(inner, kind, findings)
+        choices = [choice.data for choice in inner.listed("choices")]
+        default = inner.get("default")
+        if default is not None:
+            _checked(default, kind, bounds, choices, findings)
+        own = gifts.get(name)
+        if own is not None:
+            values[name] = _checked(own, kind, bounds, choices, findings)
+        elif default is not None:
+            values[name] = default.data
+        else:
+            values[name] = _sample(kind, bounds, choices)
+            if use is not None:
+                findings.error(
+                    use,
+                    "missing-param",
+                    f"this driver needs the param {name!r}",
+                    key=True,
+                    hint=f"write driver: {{ use: …, params: {{ {name}: … }} }}",
+                )
+    return values
+
+
+def _report_unknown(gift: Part, known: Mapping[str, Any] | tuple[()], findings: Findings) -> None:
+    findings.error(
+        gift,
+        "unknown-param",
+        f"the driver has no param {gift.name!r}",
+        key=True,
+        hint=did_you_mean(gift.name, known, "params"),
+    )
+
+
+def _checked(
+    part: Part,
+    kind: str,
+    bounds: tuple[float | None, float | None],
+    choices: list[Value],
+    findings: Findings,
+) -> Value:
+    if any(type(part.data) is type(one) and part.data == one for one in choices):
+        return part.data  # type: ignore[no-any-return] # choices may be of several types
+    try:
+        value = fit(part.data, kind)
+    except ValueError as error:
+        findings.error(part, "wrong-type", str(error), hint=fit_hint(part.data, kind))
+        return _SAMPLES[kind]
+    check_within(value, *bounds, part, findings)
+    if choices and value not in choices:
+        findings.error(
+            part,
+            "unknown-word",
+            f"{value!r} is not one of the choices",
+            hint=did_you_mean(str(value), map(str, choices), "choices"),
+        )
+    return value
+
+
+def _sample(kind: str, bounds: tuple[float | None, float | None], choices: list[Value]) -> Value:
+    if choices:
+        return choices[0]
+    low, high = bounds
+    value = _SAMPLES[kind]
+    if isinstance(value, (int, float)) and not isinstance(value, bool):
+        if low is not None and value < low:
+            return low
+        if high is not None and value > high:
+            return high
+    return value
+
+
+class _Filler:
+    """Fills the params into one document, and remembers which were used."""
+
+    def __init__(self, document: Document, values: Mapping[str, Value], findings: Findings) -> None:
+        self.used: set[str] = set()
+        self._document = document
+        self._values = values
+        self._findings = findings
+
+    def document(self) -> Document:
+        """Return the document with everything filled in."""
+        document, data = self._document, self._document.data
+        assert isinstance(data, dict)  # noqa: S101 - the caller looked
+        budget = Budget(_NODES_MOST - count_nodes(data) + len(data))
+        value: dict[str, object] = {}
+        marks: dict[str | int, Mark] = {}
+        for key, item in data.items():
+            tree = Tree(item, document.mark.children[key], document)
+            if key != "params":
+                try:
+                    names = {"params": _Watched(self._values, self.used)}
+                    tree = fill(tree, (key,), names, budget, self)
+                except TooMuch:
+                    self._findings.error(
+                        Part(document, (key,), item),
+                        "too-large",
+                        "this becomes too long once the params are filled in",
+                        key=True,
+                    )
+            value[key], marks[key] = tree.value, tree.mark
+        mark = document.mark.copy(marks)
+        return Document(
+            document.file, document.text, document.lines, value, mark, document.findings
+        )
+
+    def unquoted(self, path: Path, text: str) -> None:
+        """Report a name in braces that YAML takes for a mapping."""
+        report_unquoted(Part(self._document, path, None), text, self._findings)
+
+    def unknown(self, path: Path, name: str, word: str, offset: int) -> None:
+        """Report a param that the driver does not declare."""
+        place: dict[str, Any] = {"offset": offset, "length": len(name) + len(word) + bool(word)}
+        self._findings.error(
+            Part(self._document, path, None),
+            "unknown-param",
+            f"there is no param {word!r}" if word else "'params' is all of them; name one",
+            hint=did_you_mean(word, self._values, "params"),
+            **place,
+        )
+
+
+class _Watched(Mapping[str, Value]):
+    """Values that take note of who was asked for."""
+
+    def __init__(self, values: Mapping[str, Value], used: set[str]) -> None:
+        self._values = values
+        self._used = used
+
+    def __getitem__(self, name: str) -> Value:
+        self._used.add(name)
+        return self._values[name]
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._values
+
+    def __iter__(self) -> Any:
+        return iter(self._values)
+
+    def __len__(self) -> int:
+        return len(self._values)

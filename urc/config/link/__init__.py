@@ -1,0 +1,1 @@
+"""Names in a model → what they refer to."""

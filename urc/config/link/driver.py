@@ -1,0 +1,312 @@
+"""Names on the wire's side: transports, signals, settings and arguments, wherever they are used."""
+
+import re
+from collections.abc import Iterable, Mapping
+
+from urc.config.compose.gather import Sources
+from urc.config.link.flow import (
+    link_command,
+    link_keepalives,
+    link_poll,
+    link_refusals,
+    said_on,
+)
+from urc.config.link.frames import check_frames
+from urc.config.link.messages import check_messages, check_via
+from urc.config.link.options import check_option
+from urc.config.link.signals import link_signals
+from urc.config.link.steps import link_sequences
+from urc.config.parse.form import read_form, write_form
+from urc.config.parse.line import option_templates
+from urc.config.parse.reply import refuse
+from urc.config.parse.simulator import Simulated
+from urc.config.part import Findings, Part
+from urc.config.suggest import did_you_mean
+from urc.expressions import COUNTERS, NONCE, Template
+from urc.model.codec import ReadSpec, WriteSpec
+from urc.model.driver import Driver
+from urc.model.profile import Setting
+from urc.model.values import NOTHING, Reading
+from urc.model.world import WorldSpec
+
+__all__ = ["Uses", "link_driver", "link_simulator"]
+
+
+class Uses:
+    """What is used by something, for the rules that ask what is not."""
+
+    def __init__(self) -> None:
+        self.settings: set[str] = set()
+        self.transports: set[str] = set()
+        self.signals: set[str] = set()
+        """Signals that a frame can set."""
+
+
+class _Linker:
+    def __init__(self, driver: Driver, settings: Mapping[str, Setting], findings: Findings) -> None:
+        self.driver = driver
+        self.settings = settings
+        self.findings = findings
+        self.uses = Uses()
+
+    def transport(self, part: Part, key: str, name: str) -> None:
+        """Check the transport that `part` names under `key`, or leaves out."""
+        if name in self.driver.transports:
+            self.uses.transports.add(name)
+            return
+        names = self.driver.transports
+        if key in part.data:
+            self.findings.error(
+                part,
+                "unknown-transport",
+                f"there is no transport {name!r}",
+                at=key,
+                hint=did_you_mean(name, names, "transports"),
+            )
+        else:
+            self.findings.error(
+                part,
+                "missing-key",
+                f"'{key}' is missing, and there are {len(names)} transports",
+                key=True,
+                hint=did_you_mean("", names, "transports"),
+            )
+
+    def fields(self, part: Part, read: ReadSpec) -> None:
+        """Check that each field of a reply or message is a signal, or the document's own."""
+        found = read_form(part)
+        if found is None:
+            return
+        inner, form = found
+        for field in read.fields:
+            if field in read.sets:
+                self.field(part.must("set").must(field), field, {"key": True})
+            elif field in read.head:
+                self.field(part.must("head").must(field), field, {"key": True})
+            elif field in read.collects:
+                self.field(part.must("collect").must(field), field, {"key": True})
+            elif field in self.driver.signals or not field.startswith("_"):
+                place, where = form.place_of(inner, field)
+                self.field(place, field, where)
+        self._beside(part, read)
+
+    def field(self, part: Part, name: str, place: Mapping[str, int | bool]) -> None:
+        """Check one name of a signal that is set at `part`."""
+        if name in self.driver.signals:
+            self.uses.signals.add(name)
+        elif not name.startswith("_"):
+            self.findings.error(
+                part,
+                "unknown-signal",
+                f"{name!r} is not a signal",
+                hint=did_you_mean(name, self.driver.signals, "signals"),
+                **place,
+            )
+
+    def _beside(self, part: Part, read: ReadSpec) -> None:
+        """Check the names in what stands beside a form."""
+        known = [
+            name for name in read.fields if name not in read.sets and name not in read.collects
+        ]
+        for name, inner in part.named("fields").items():
+            if name not in known:
+                self.findings.error(
+                    inner,
+                    "unknown-field",
+                    f"{name!r} is not a field of this frame",
+                    key=True,
+                    hint=did_you_mean(name, known, "fields"),
+                )
+        if read.topic is not None:
+            self.template(part.must("subscribe").must("topic"), read.topic)
+        for name, template in read.sets.items():
+            self.template(part.must("set").must(name), template, known)
+        if read.when is not None:
+            self.template(part.must("when"), read.when, known)
+        for name, collect in read.collects.items():
+            inner = part.must("collect").must(name)
+            for key in ("value", "begin", "end"):
+                template = getattr(collect, key)
+                if template is not None:
+                    self.template(inner.must(key), template, (*known, *read.sets))
+
+    def templates(self, part: Part, spec: WriteSpec, known: Iterable[str] = ()) -> None:
+        """Check the names in every template under ``send:``."""
+        inner, form = write_form(part)
+        for place, template in form.templates(inner, spec):
+            self.template(place, template, known)
+
+    def template(self, part: Part, template: Template, known: Iterable[str] = ()) -> None:
+        """Check the names that a template uses."""
+        allowed = {*known, "settings"}
+        for used in sorted(template.names - allowed):
+            name, hint = self._meant(used, allowed - {COUNTERS, NONCE})
+            self._unknown(
+                part,
+                template,
+                rf"(?<![\w.]){name}(?!\w)",
+                name,
+                "unknown-name",
+                f"{name!r} means nothing here",
+                hint,
+            )
+        signals = self.driver.signals
+        if any(name in signals and signals[name].states for name in template.names & allowed):
+            from urc.config.link.words import check_words
+
+            check_words(self.findings, part, template, signals)
+        if "world" in template.names and "world" not in self.driver.signals:
+            from urc.config.link.world import check_readings
+
+            check_readings(self.findings, part, template)
+        self.uses.settings |= template.settings
+        for name in sorted(template.settings - self.settings.keys()):
+            self._unknown(
+                part,
+                template,
+                rf"settings\W+{name}(?!\w)",
+                name,
+                "unknown-setting",
+                f"there is no setting {name!r}",
+                did_you_mean(name, self.settings, "settings"),
+            )
+        if "settings" in template.names and not template.settings:
+            self._unknown(
+                part,
+                template,
+                r"settings",
+                "settings",
+                "unknown-setting",
+                "'settings' is all of them; name one",
+                did_you_mean("", self.settings, "settings"),
+            )
+
+    def _meant(self, name: str, allowed: Iterable[str]) -> tuple[str, str]:
+        """Return an unknown name as it is written, and what to do about it."""
+        if name == NONCE:
+            return "nonce", "fresh bytes belong into what is sent: 'send'"
+        if name == COUNTERS:
+            return "seq", "a counter counts what is sent: it belongs into 'send'"
+        if name in self.settings:
+            return name, f"write settings.{name}"
+        if name == "params":
+            return name, "params are filled in earlier: write {params.NAME}, in single braces"
+        return name, did_you_mean(name, allowed, "names")
+
+    def _unknown(
+        self,
+        part: Part,
+        template: Template,
+        pattern: str,
+        name: str,
+        code: str,
+        message: str,
+        hint: str,
+    ) -> None:
+        found = re.search(pattern, template.source)
+        offset = found.end() - len(name) if found else 0
+        self.findings.error(part, code, message, offset=offset, length=len(name), hint=hint)
+
+
+def link_driver(
+    part: Part, driver: Driver, settings: Mapping[str, Setting], findings: Findings
+) -> Uses:
+    """Check every name in the driver at `part`; return what is used."""
+    linker = _Linker(driver, settings, findings)
+    answered = {one.transport for one in driver.commands.values() if one.reply}
+    answered |= {one.transport for one in driver.polls if one.reply}
+    for name, inner in part.named("transports").items():
+        link_refusals(linker, inner, driver.transports[name].faults)
+        if name not in answered:
+            refuse(
+                inner, ("errors",), "refuses nothing: nothing on this line has a reply", findings
+            )
+        for place, template in option_templates(inner, driver.transports[name]):
+            linker.template(place, template)
+            check_option(place, driver.transports[name].type, template, settings, findings)
+    linker.uses.transports |= check_via(part.named("transports"), driver.transports, findings)
+    for inner, poll in zip(part.listed("polls"), driver.polls, strict=True):
+        link_poll(linker, inner, poll)
+    _check_poll_names(part, driver, findings)
+    link_signals(part, driver, linker.template, findings)
+    for name, inner in part.named("commands").items():
+        command = driver.commands[name]
+        linker.transport(inner, "to", command.transport)
+        known = (*command.arguments, *said_on(driver, command.transport))
+        linker.templates(inner.must("send"), command.send, known)
+        _check_arguments_used(inner, command.send, findings)
+        link_command(linker, inner, command)
+    link_keepalives(linker, part)
+    link_sequences(linker, part)
+    check_frames(part, driver, findings)
+    check_messages(part, driver, findings)
+    for name, inner in part.named("messages").items():
+        message = driver.messages[name]
+        linker.transport(inner, "from", message.transport)
+        linker.fields(inner, message.read)
+        if message.answer is not None:
+            known = (*message.read.fields, *driver.signals, *said_on(driver, message.transport))
+            linker.templates(inner.must("answer"), message.answer, known)
+    return linker.uses
+
+
+def _check_poll_names(part: Part, driver: Driver, findings: Findings) -> None:
+    """Report names that two polls, or a poll and a command, share: a test could not tell them."""
+    seen: set[str] = set(driver.commands)
+    for inner, poll in zip(part.listed("polls"), driver.polls, strict=True):
+        if poll.name in seen:
+            other = "a command" if poll.name in driver.commands else "another poll"
+            findings.error(
+                inner,
+                "duplicate-name",
+                f"{other} is called {poll.name!r} too",
+                at="name",
+                hint="give each its own name",
+            )
+        seen.add(poll.name)
+
+
+def _check_arguments_used(part: Part, send: WriteSpec, findings: Findings) -> None:
+    for name, inner in part.named("args").items():
+        if name not in send.names:
+            findings.warn(
+                inner,
+                "unused-argument",
+                f"nothing sends the argument {name!r}",
+                key=True,
+                hint=f"write {{{{ {name} }}}} in 'send', or take the argument away",
+            )
+
+
+def link_simulator(
+    sources: Sources,
+    driver: Driver,
+    simulated: Simulated,
+    settings: Mapping[str, Setting],
+    findings: Findings,
+) -> tuple[Mapping[str, Reading], WorldSpec | None]:
+    """Check every name in the emulated robot; return the values it begins with, and its world."""
+    if not sources.simulator and not sources.rules:
+        return NOTHING, None
+    from urc.config.link.rules import link_rules, link_values
+
+    linker = _Linker(driver, settings, findings)
+    parts, world = sources.simulator, simulated.world
+    state = parts["state"].data if "state" in parts else ()
+    if world is not None:
+        from urc.config.link.world import link_world
+
+        world = link_world(linker, parts["world"], world, state, parts)
+    for name, found in simulated.rules.items():
+        part = sources.rules[name]
+        if name not in driver.transports:
+            findings.error(
+                part,
+                "unknown-transport",
+                f"there is no transport {name!r}",
+                key=True,
+                hint=did_you_mean(name, driver.transports, "transports"),
+            )
+            continue
+        link_rules(linker, part, found, state, world)
+    return link_values(parts, driver, findings), world

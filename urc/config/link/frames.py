@@ -1,0 +1,110 @@
+"""Constant frames that their own framing cannot carry: told when a document is checked, not later.
+
+Frames with expressions in them are checked when they are made.
+"""
+
+from collections.abc import Iterable
+from typing import cast
+
+from urc.config.parse.form import write_form
+from urc.config.part import Findings, Part
+from urc.expressions import ExpressionError, Template
+from urc.model.codec import WriteSpec, each_of
+from urc.model.driver import Driver, FramingSpec, TransportSpec
+from urc.model.framing import FrameLayout
+
+__all__ = ["check_frames"]
+
+
+def check_frames(part: Part, driver: Driver, findings: Findings) -> None:
+    """Report constant texts under ``send:`` that would be two frames, or none."""
+    for name, inner in part.named("commands").items():
+        command = driver.commands.get(name)
+        if command is not None:
+            _check(inner, command.send, driver.transports.get(command.transport), findings)
+    for inner, poll in zip(part.listed("polls"), driver.polls, strict=True):
+        _check(inner, poll.send, driver.transports.get(poll.transport), findings)
+
+
+def _check(part: Part, send: WriteSpec, spec: TransportSpec | None, findings: Findings) -> None:
+    written = part.get("send")
+    if spec is None or written is None:
+        return
+    places = written.items() if send.form == "frames" else [written]
+    for place, one in zip(places, each_of(send), strict=True):
+        _check_one(place, one, spec, findings)
+
+
+def _check_one(part: Part, send: WriteSpec, spec: TransportSpec, findings: Findings) -> None:
+    inner, form = write_form(part)
+    if send.form == "text":
+        _check_end(inner, findings)
+        data = _text(form.templates(inner, send), spec.encoding)
+    else:
+        data = _bytes(send)
+    if data is None:
+        return
+    framing = spec.framing.sent or spec.framing
+    layout = cast("FrameLayout | None", framing.options.get("layout")) or FrameLayout()
+    for mark in _marks(framing, layout):
+        if mark and mark in data:
+            findings.error(
+                inner,
+                "contains-delimiter",
+                f"{_what(send)} {_shown(mark)} in it, which the framing puts around each frame:"
+                " it would be two frames",
+                hint="take it away: the framing adds what marks a frame",
+            )
+            return
+    wanted = None if layout.size is None else layout.size - layout.head - layout.tail
+    if wanted is not None and wanted != len(data):
+        findings.error(
+            inner,
+            "wrong-size",
+            f"{_what(send)} {len(data)} bytes, and a frame of this line holds exactly {wanted}",
+        )
+
+
+def _text(templates: Iterable[tuple[Part, Template]], encoding: str) -> bytes | None:
+    """Return the bytes of a constant text; None when it is none, or that is told elsewhere."""
+    found = [template for _, template in templates]
+    if len(found) != 1 or not found[0].is_constant:
+        return None
+    try:
+        return found[0].render({}).encode(encoding)
+    except (ExpressionError, UnicodeEncodeError):
+        return None
+
+
+def _bytes(send: WriteSpec) -> bytes | None:
+    """Return the bytes that ``hex`` and ``bytes`` write out; None where something varies."""
+    pieces = cast("tuple[object, ...]", send.options.get("pieces", (None,)))
+    fixed = [one for one in pieces if isinstance(one, bytes)]
+    return b"".join(fixed) if len(fixed) == len(pieces) else None
+
+
+def _what(send: WriteSpec) -> str:
+    return "the text has" if send.form == "text" else "the frame has"
+
+
+def _check_end(part: Part, findings: Findings) -> None:
+    """Warn of a text that ends in a backslash and a letter, as if it were a line end."""
+    if isinstance(part.data, str) and part.data.endswith(("\\n", "\\r")):
+        findings.warn(
+            part,
+            "literal-backslash",
+            f"this ends in the 2 characters {part.data[-2:]}, not in a control character",
+            hint='take them away: the framing adds the end; "\\r" in double quotes is a CR',
+        )
+
+
+def _marks(framing: FramingSpec, layout: FrameLayout) -> tuple[bytes, ...]:
+    if framing.type == "brackets":
+        return layout.start, layout.end
+    if framing.type in ("delimiter", "regex"):
+        return (cast("bytes", framing.options.get("tx", b"")),)
+    return ()
+
+
+def _shown(mark: bytes) -> str:
+    return {b"\n": "LF", b"\r": "CR", b"\r\n": "CRLF"}.get(mark, ascii(mark.decode("latin-1")))

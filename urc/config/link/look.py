@@ -1,0 +1,313 @@
+"""Names on the side of the look: which widget fills a slot, and what it is bound to."""
+
+from collections.abc import Mapping
+from typing import NamedTuple, TypeVar
+
+from urc.config.compose.gather import Sources
+from urc.config.link.files import link_files
+from urc.config.link.outputs import link_output, takes
+from urc.config.link.pages import link_pages
+from urc.config.link.together import link_together
+from urc.config.parse.widget import Shelf
+from urc.config.part import Findings, Part
+from urc.config.shape.check import check_options
+from urc.config.suggest import did_you_mean, listed
+from urc.model.driver import Driver
+from urc.model.interface import Given, Interface, WidgetUse
+from urc.model.units import conversion, quantity_of
+from urc.model.values import Signal
+from urc.model.widget import Port, Widget
+
+__all__ = ["link_interface", "link_slots", "misfit"]
+
+_T = TypeVar("_T")
+
+
+def link_slots(
+    sources: Sources, driver: Driver, shelf: Shelf, findings: Findings
+) -> dict[str, WidgetUse]:
+    """Return what fills each slot unless an interface says otherwise."""
+    slots: dict[str, WidgetUse] = {}
+    for slot, parts in sources.slots.items():
+        use: WidgetUse | None = None
+        for part in parts:
+            use = _use(part, use, driver, shelf, findings) or use
+        if use is not None:
+            slots[slot] = use
+    return slots
+
+
+def link_interface(
+    part: Part,
+    interface: Interface,
+    slots: Mapping[str, WidgetUse],
+    driver: Driver | None,
+    shelf: Shelf,
+    findings: Findings,
+) -> Interface:
+    """Return the interface with what it changes in the slots.
+
+    Args:
+        part: where the interface stands.
+        interface: as parsed.
+        slots: what the driver fills.
+        driver: None when the interface is checked by itself, without any driver.
+        shelf: the widgets there are.
+        findings: takes what is wrong.
+    """
+    shown = set(interface.shown)
+    uses = {}
+    for slot, inner in part.named("widgets").items():
+        if slot not in shown:
+            findings.warn(
+                inner,
+                "slot-not-shown",
+                f"no grid of this interface has a slot {slot!r}",
+                key=True,
+                hint=did_you_mean(slot, shown, "slots"),
+            )
+        use = _use(inner, slots.get(slot), driver, shelf, findings)
+        if use is not None:
+            uses[slot] = use
+    if interface.background and driver is not None:
+        _check_background(part, interface, {**slots, **uses}, findings)
+    return interface._replace(widgets=uses)
+
+
+def _check_background(
+    part: Part, interface: Interface, slots: Mapping[str, WidgetUse], findings: Findings
+) -> None:
+    name = interface.background
+    if name not in slots:
+        findings.warn(
+            part,
+            "slot-not-filled",
+            f"no widget fills the background {name!r}",
+            at="background",
+            hint=did_you_mean(name, slots, "slots"),
+        )
+
+
+def _use(
+    part: Part, base: WidgetUse | None, driver: Driver | None, shelf: Shelf, findings: Findings
+) -> WidgetUse | None:
+    """Return what `part` makes of a slot that `base` fills so far; None when it was reported."""
+    name = part.text("use", base.widget if base else "")
+    if not name:
+        if driver is not None:
+            findings.error(
+                part,
+                "missing-key",
+                f"'use' is missing: no widget fills {part.name!r}",
+                key=True,
+                hint=shelf.hint(""),
+            )
+        return None
+    widget = shelf.get(name)
+    if widget is None:
+        if not shelf.has(name):
+            findings.error(
+                part,
+                "unknown-widget",
+                f"there is no widget {name!r}",
+                at="use",
+                hint=shelf.hint(name),
+            )
+        return None  # a broken manifest is told where it stands
+    bound = _bindings(part, widget, base, driver, findings)
+    options, files, pages = _options(part, widget, base, findings)
+    use = WidgetUse(
+        slot=part.name,
+        widget=name,
+        inputs=bound.inputs,
+        outputs=bound.outputs,
+        options=options,
+        title=part.text("title", base.title if base else ""),
+        given=bound.given,
+        lists=bound.lists,
+        files=files,
+        pages=pages,
+    )
+    if driver is not None:
+        link_together(part, use, widget, driver, findings)
+    return use
+
+
+class _Bound(NamedTuple):
+    """What is bound so far; the fields are those of `WidgetUse`."""
+
+    inputs: dict[str, str]
+    lists: dict[str, tuple[str, ...]]
+    outputs: dict[str, str]
+    given: dict[str, Given]
+
+
+def _bindings(
+    part: Part, widget: Widget, base: WidgetUse | None, driver: Driver | None, findings: Findings
+) -> _Bound:
+    old = base or WidgetUse("", "")
+    outputs = _kept(old.outputs, widget.outputs)
+    given = {key: one for key, one in old.given.items() if key in outputs}
+    bound = _Bound(
+        _kept(old.inputs, {key: port for key, port in widget.inputs.items() if not port.is_many}),
+        _kept(old.lists, {key: port for key, port in widget.inputs.items() if port.is_many}),
+        outputs,
+        given,
+    )
+    for key, inner in part.named("bind").items():
+        if key in widget.inputs:
+            _bind_input(inner, widget, bound, driver, findings)
+        elif key not in widget.outputs:
+            findings.error(
+                inner,
+                "unknown-input",
+                f"widget {widget.name!r} has no input {key!r}",
+                key=True,
+                hint=did_you_mean(key, (*widget.inputs, *widget.outputs), "inputs"),
+            )
+        elif isinstance(inner.data, list):
+            findings.error(
+                inner,
+                "wrong-type",
+                f"{key!r} is an output: the name of a command is expected",
+                hint="only inputs that take many signals have a list",
+            )
+        else:
+            port = widget.outputs[key]
+            outputs[key], given[key] = link_output(inner, port, widget, driver, findings)
+    if driver is not None:
+        _check_required(part, widget, {**bound.inputs, **bound.lists, **outputs}, driver, findings)
+    return bound
+
+
+def _bind_input(
+    part: Part, widget: Widget, bound: _Bound, driver: Driver | None, findings: Findings
+) -> None:
+    """Add the signal, or the signals, of one input."""
+    port = widget.inputs[part.name]
+    if isinstance(part.data, dict):
+        findings.error(
+            part,
+            "wrong-type",
+            f"{port.name!r} is an input: the name of a signal is expected",
+            hint="only outputs take a command with its arguments",
+        )
+    elif isinstance(part.data, list) and not port.is_many:
+        findings.error(
+            part,
+            "wrong-type",
+            f"{port.name!r} of widget {widget.name!r} takes one signal, not a list",
+        )
+    elif port.is_many:
+        each = part.items() if isinstance(part.data, list) else [part]
+        bound.lists[port.name] = tuple(inner.data for inner in each)
+        if driver is not None:
+            for inner in each:
+                _check_signal(inner, widget, port, driver, findings)
+    else:
+        bound.inputs[port.name] = part.data
+        if driver is not None:
+            _check_signal(part, widget, port, driver, findings)
+
+
+def _check_required(
+    part: Part, widget: Widget, bound: Mapping[str, object], driver: Driver, findings: Findings
+) -> None:
+    tried = part.named("bind")  # what is wrong with those has been told
+    for port in (*widget.inputs.values(), *widget.outputs.values()):
+        if port.is_required and port.name not in bound and port.name not in tried:
+            findings.error(
+                part,
+                "unbound-input",
+                f"{port.name!r} of widget {widget.name!r} is not bound",
+                at="bind" if "bind" in part.data else "",
+                key=True,
+                hint=_output_hint(port, driver)
+                if port.name in widget.outputs
+                else _binding_hint(port, driver),
+            )
+
+
+def _kept(bound: Mapping[str, _T], ports: Mapping[str, Port]) -> dict[str, _T]:
+    return {key: target for key, target in bound.items() if key in ports}
+
+
+def _binding_hint(port: Port, driver: Driver) -> str:
+    fitting = [signal.name for signal in driver.signals.values() if not misfit(port, signal)]
+    return f"signals that fit: {listed(fitting)}" if fitting else "no signal of the driver fits"
+
+
+def _output_hint(port: Port, driver: Driver) -> str:
+    fitting = [one.name for one in driver.commands.values() if takes(one, port)]
+    if fitting:
+        return f"commands that fit: {listed(fitting)}"
+    held = "a command with 'hold'" if port.is_held else "a command without 'hold'"
+    return f"no command of the driver fits: this is an output, and needs {held}"
+
+
+def _check_signal(
+    part: Part, widget: Widget, port: Port, driver: Driver, findings: Findings
+) -> None:
+    signal = driver.signals.get(part.data)
+    if signal is None:
+        findings.error(
+            part,
+            "unknown-signal",
+            f"there is no signal {part.data!r}",
+            hint=did_you_mean(part.data, driver.signals, "signals"),
+        )
+        return
+    wrong = misfit(port, signal)
+    if wrong:
+        code = "wrong-unit" if wrong.startswith("unit") else "wrong-type"
+        findings.error(
+            part,
+            code,
+            f"signal {signal.name!r} does not fit {port.name!r} of widget {widget.name!r}: {wrong}",
+        )
+
+
+def misfit(port: Port, signal: Signal) -> str:
+    """Return why a signal cannot be bound to an input, or "" when it can."""
+    types = (*port.types, "integer") if "number" in port.types else port.types
+    if signal.type not in types:
+        return f"type {' or '.join(port.types)} is wanted, the signal is {signal.type}"
+    if signal.type == "array":
+        of = (*port.of, "integer") if "number" in port.of else port.of
+        if of and signal.of not in of:
+            return f"an array of {' or '.join(port.of)} is wanted, the signal is of {signal.of}"
+        if None not in (port.size, signal.size) and port.size != signal.size:
+            return f"an array of {port.size} elements is wanted, the signal has {signal.size}"
+    if port.unit and conversion(signal.unit, port.unit) is None:
+        has = f"in {signal.unit!r}" if signal.unit else "without a unit"
+        return f"unit {port.unit!r} is wanted, the signal is {has}"
+    measured = quantity_of(signal.unit)
+    if port.quantity and measured not in ("", port.quantity):
+        return f"unit of {port.quantity} is wanted, the signal is in {signal.unit!r}"
+    return ""
+
+
+def _options(
+    part: Part, widget: Widget, base: WidgetUse | None, findings: Findings
+) -> tuple[dict[str, object], dict[str, str], dict[str, tuple[str, ...]]]:
+    """Return the options, the manifest's defaults filled in, and the files and pages they name."""
+    options: dict[str, object] = {
+        name: schema["default"]
+        for name, schema in widget.options.items()
+        if isinstance(schema, dict) and "default" in schema
+    }
+    files: dict[str, str] = {}
+    pages: dict[str, tuple[str, ...]] = {}
+    if base is not None and base.widget == widget.name:
+        options |= base.options
+        files |= base.files
+        pages |= base.pages
+    given = part.get("options")
+    if given is not None:
+        problems = check_options(given.document, given.path, given.data, widget.options)
+        findings.problems += problems
+        options |= given.data
+        if not problems:
+            files |= link_files(given, widget, findings)
+            pages |= link_pages(given, widget, findings)
+    return options, files, pages

@@ -1,0 +1,227 @@
+"""What is said and heard on transports that carry messages: does it fit the kind of transport?"""
+
+from collections.abc import Iterator, Mapping
+
+from urc.config.messaging import BYTE_LINES, CARRIERS, MESSAGING
+from urc.config.parse.form import WRITE_FORMS
+from urc.config.part import Findings, Part
+from urc.config.suggest import did_you_mean
+from urc.model.driver import Driver, TransportSpec
+
+__all__ = ["check_messages", "check_via"]
+
+_VERBS = {verb for one in MESSAGING.values() for verb in one.verbs}
+_ANSWERED = ("call", "goal", "request")
+
+
+def check_messages(part: Part, driver: Driver, findings: Findings) -> None:
+    """Report what a transport cannot carry, and messages that come from nowhere."""
+    for name, inner in part.named("messages").items():
+        spec = driver.transports.get(driver.messages[name].transport)
+        _check_read(inner, spec, findings, wants_topic=True)
+        _check_answer(inner.get("answer"), spec, findings)
+    for place, inner in _requests(part):
+        spec = driver.transports.get(_target(place, driver))
+        verb = _check_send(inner.get("send"), spec, findings)
+        reply = inner.get("reply")
+        if reply is not None:
+            _check_read(reply, spec, findings, wants_topic=verb not in _ANSWERED)
+    for name, inner in part.named("transports").items():
+        keepalive, spec = inner.get("keepalive"), driver.transports.get(name)
+        if keepalive is not None:
+            _check_send(keepalive.get("send"), spec, findings)
+        for key in ("on_connect", "on_close"):
+            is_asked = False  # the step before makes a request, whose answer may be expected
+            for step in inner.listed(key):
+                _check_step(step, spec, findings, wants_topic=not is_asked)
+                send = step.get("send")
+                if send is not None:
+                    data = send.data
+                    is_asked = isinstance(data, dict) and not data.keys().isdisjoint(_ANSWERED)
+
+
+def _check_answer(part: Part | None, spec: TransportSpec | None, findings: Findings) -> None:
+    """Report what cannot be sent back: nobody would take the answer to an answer."""
+    verb = _check_send(part, spec, findings)
+    if part is not None and verb in _ANSWERED:
+        findings.error(
+            part,
+            "wrong-form",
+            f"a message cannot be answered by a {verb!r}, which is answered itself",
+            at=verb,
+            key=True,
+            hint="write 'publish', or text and bytes where the line carries those",
+        )
+
+
+def _requests(part: Part) -> Iterator[tuple[tuple[str, int | str], Part]]:
+    for name, inner in part.named("commands").items():
+        yield ("commands", name), inner
+    for place, inner in enumerate(part.listed("polls")):
+        yield ("polls", place), inner
+
+
+def _target(place: tuple[str, int | str], driver: Driver) -> str:
+    kind, key = place
+    if kind == "polls":
+        return driver.polls[int(key)].transport
+    return driver.commands[str(key)].transport
+
+
+def _check_step(
+    part: Part, spec: TransportSpec | None, findings: Findings, *, wants_topic: bool
+) -> None:
+    _check_send(part.get("send"), spec, findings)
+    expect = part.get("expect")
+    if expect is not None and isinstance(expect.data, dict):
+        _check_read(expect, spec, findings, wants_topic=wants_topic)
+
+
+def _check_send(part: Part | None, spec: TransportSpec | None, findings: Findings) -> str:
+    """Report a form that the transport cannot carry; return the form's key."""
+    if part is None or spec is None:
+        return ""
+    data = part.data
+    form = next((key for key in data if key in WRITE_FORMS), "") if isinstance(data, dict) else ""
+    kind = MESSAGING.get(spec.type)
+    if kind is not None and form not in kind.verbs:
+        verbs = ", ".join(kind.verbs)
+        findings.error(
+            part,
+            "wrong-form",
+            f"{spec.type} carries messages, and {form or 'text'} says not where they go",
+            hint=f"on {spec.type} use: {verbs}; the text goes inside, as text: …",
+        )
+    elif kind is None and form in _VERBS and spec.type not in MESSAGING:
+        findings.error(
+            part,
+            "wrong-form",
+            f"{spec.type} carries bytes and knows no {form!r}",
+            at=form,
+            key=True,
+            hint="write text, or one of the forms hex, bytes, struct and json",
+        )
+    elif form and spec.type == "rosbridge":
+        _check_ros(part.must(form), findings)
+    return form
+
+
+def _check_ros(part: Part, findings: Findings) -> None:
+    """Report what a bridge to ROS cannot pass on: it speaks JSON, and wants to know the type."""
+    for key in ("text", "hex", "bytes", "struct"):
+        if key in part.data:
+            findings.error(
+                part,
+                "wrong-form",
+                f"rosbridge carries JSON and knows no {key!r}",
+                at=key,
+                key=True,
+                hint="write the message's fields: json: { data: … }",
+            )
+    if part.name == "publish" and "type" not in part.data:
+        findings.error(
+            part,
+            "missing-key",
+            "'type' is missing: nobody may have advertised the topic yet",
+            key=True,
+            hint="type: geometry_msgs/Twist, as 'rostopic info' shows it",
+        )
+
+
+def _check_read(
+    part: Part, spec: TransportSpec | None, findings: Findings, *, wants_topic: bool
+) -> None:
+    if spec is None:
+        return
+    subscribe, kind = part.get("subscribe"), MESSAGING.get(spec.type)
+    for inner in _answers(part):
+        _check_head(inner, spec, findings)
+    if kind is None:
+        if subscribe is not None:
+            findings.error(
+                part,
+                "misplaced-key",
+                f"{spec.type} has no topics to subscribe to",
+                at="subscribe",
+                key=True,
+                hint="take 'subscribe' away: everything on this line is offered to the form",
+            )
+        return
+    if subscribe is None:
+        if wants_topic and "stages" not in part.data:
+            findings.error(
+                part,
+                "missing-key",
+                f"'subscribe' is missing: nothing says which topic of {spec.type} it comes from",
+                key=True,
+                hint="subscribe: { topic: NAME }",
+            )
+        return
+    for name, inner in subscribe.entries().items():
+        if name != "topic" and name not in kind.listen:
+            known = ", ".join(("topic", *kind.listen))
+            findings.error(
+                inner,
+                "misplaced-key",
+                f"{name!r} means nothing on {spec.type}",
+                key=True,
+                hint=f"here 'subscribe' takes: {known}",
+            )
+
+
+def _answers(part: Part) -> list[Part]:
+    """Return a frame that is read, its stages, and the refusals of each."""
+    stages = part.listed("stages") if "stages" in part.data else []
+    given = [one for one in (part, *stages) if "errors" in one.data]
+    refusals = [inner for one in given for inner in one.listed("errors")]
+    return [part, *stages, *(inner for inner in refusals if isinstance(inner.data, dict))]
+
+
+def _check_head(part: Part, spec: TransportSpec, findings: Findings) -> None:
+    """Report headers where no answer has any."""
+    if "head" in part.data and spec.type != "http" and spec.type in (*MESSAGING, *BYTE_LINES):
+        findings.error(
+            part,
+            "misplaced-key",
+            f"what comes over {spec.type} has no headers and no status",
+            at="head",
+            key=True,
+            hint="take 'head' away: it is for the answers of http",
+        )
+
+
+def check_via(
+    parts: Mapping[str, Part], transports: Mapping[str, TransportSpec], findings: Findings
+) -> set[str]:
+    """Report what goes through something that cannot carry it; return what carries others."""
+    carriers: set[str] = set()
+    for name, spec in transports.items():
+        if not spec.via:
+            continue
+        part = parts[name]
+        carrier = transports.get(spec.via)
+        if carrier is None:
+            hint = did_you_mean(spec.via, transports, "transports")
+            text = f"there is no transport {spec.via!r}"
+            findings.error(part, "unknown-transport", text, at="via", hint=hint)
+        elif carrier.type not in CARRIERS:
+            text = f"{spec.via!r} is a {carrier.type} transport, which carries no others"
+            hint = f"these do: {', '.join(sorted(CARRIERS))}"
+            findings.error(part, "wrong-form", text, at="via", hint=hint)
+        elif _is_circular(name, transports):
+            text = f"{name!r} would go through itself"
+            findings.error(part, "wrong-form", text, at="via", hint="break the circle")
+        else:
+            carriers.add(spec.via)
+    return carriers
+
+
+def _is_circular(name: str, transports: Mapping[str, TransportSpec]) -> bool:
+    seen = {name}
+    through = transports[name].via
+    while through in transports:
+        if through in seen:
+            return True
+        seen.add(through)
+        through = transports[through].via
+    return False

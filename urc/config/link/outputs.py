@@ -1,0 +1,237 @@
+"""Outputs of a widget → commands of the driver: which one, and where its values go."""
+
+from collections.abc import Mapping, Sequence
+from typing import Final
+
+from urc.config.link.flow import check_value
+from urc.config.part import Findings, Part
+from urc.config.suggest import did_you_mean, listed
+from urc.config.values import known_argument
+from urc.model.binding import targets
+from urc.model.driver import Argument, Command, Driver
+from urc.model.interface import Given
+from urc.model.units import are_apart
+from urc.model.widget import Port, Widget
+
+__all__ = ["link_output", "takes"]
+
+_GIVERS: Final = {
+    "integer": "slider, knob, number",
+    "number": "slider, knob, number",
+    "boolean": "switch",
+    "string": "text",
+}
+"""Type of an argument → the shipped widgets that give one."""
+
+
+def link_output(
+    part: Part, port: Port, widget: Widget, driver: Driver | None, findings: Findings
+) -> tuple[str, Given]:
+    """Return the command that an output is bound to, and what it gives to its arguments.
+
+    Args:
+        part: what stands under the output in ``bind``: a name, or a mapping.
+        port: the output.
+        widget: whose output it is.
+        driver: None when the interface is checked by itself, without any driver.
+        findings: takes what is wrong.
+    """
+    is_short = isinstance(part.data, str)
+    name = part.data if is_short else part.text("command")
+    given = Given() if is_short else _given(part, port, widget, findings)
+    if driver is None:
+        return name, given
+    command = driver.commands.get(name)
+    if command is None:
+        findings.error(
+            part,
+            "unknown-command",
+            f"there is no command {name!r}",
+            at="" if is_short else "command",
+            hint=did_you_mean(name, driver.commands, "commands"),
+        )
+        return name, given
+    is_right = _check_hold(part, port, widget, command, findings)
+    is_right &= is_short or _check_targets(part, command, findings)
+    if is_right:
+        _check_values(part, port, widget, command, given, findings)
+    return name, given
+
+
+def _given(part: Part, port: Port, widget: Widget, findings: Findings) -> Given:
+    names: dict[str, str] = {}
+    for source, inner in part.named("args").items():
+        if source not in port.arguments:
+            findings.error(
+                inner,
+                "unknown-argument",
+                f"output {port.name!r} of widget {widget.name!r} gives no {source!r}",
+                key=True,
+                hint=f"it gives: {listed(port.arguments)}" if port.arguments else "",
+            )
+        elif inner.data in names:
+            findings.error(
+                inner,
+                "given-twice",
+                f"{source!r} goes to {inner.data!r}, where {names[inner.data]!r} goes already",
+                hint="each argument takes one value",
+            )
+        names[inner.data] = source
+    fixed = part.named("set")
+    for name, inner in fixed.items():
+        if name in names:
+            findings.error(
+                inner,
+                "given-twice",
+                f"{name!r} is set here, and {names[name]!r} of {port.name!r} goes there too",
+                key=True,
+                hint="each argument takes one value",
+            )
+    return Given(names, {name: inner.data for name, inner in fixed.items()})
+
+
+def _check_hold(
+    part: Part, port: Port, widget: Widget, command: Command, findings: Findings
+) -> bool:
+    """Return whether what holds is bound to what is held."""
+    if port.is_held and command.hold is None:
+        findings.error(
+            part,
+            "not-held",
+            f"{port.name!r} of widget {widget.name!r} is held, and command"
+            f" {command.name!r} does not say what stops it",
+            hint="give the command 'hold: { repeat: 50ms, release: … }'",
+        )
+    elif command.hold is not None and not port.is_held:
+        findings.warn(
+            part,
+            "not-held",
+            f"command {command.name!r} is held, and {port.name!r} of widget"
+            f" {widget.name!r} cannot hold it",
+            hint="use a widget that holds: joystick, hold-button",
+        )
+    return port.is_held is (command.hold is not None)
+
+
+def _check_targets(part: Part, command: Command, findings: Findings) -> bool:
+    """Check the arguments that are named and their constants; return whether there are all."""
+    is_known = True
+    for inner in part.named("args").values():
+        is_known &= known_argument(inner.data, inner, command, findings, key=False) is not None
+    for name, inner in part.named("set").items():
+        argument = known_argument(name, inner, command, findings)
+        if argument is None:
+            is_known = False
+        else:
+            check_value(inner, argument, findings)
+    return is_known
+
+
+def _check_values(
+    part: Part, port: Port, widget: Widget, command: Command, given: Given, findings: Findings
+) -> None:
+    """Report what the command needs and does not get, and what it gets and cannot take."""
+    if port.types and not port.arguments:
+        return  # it gives a value, and nobody says by which name
+    taken = targets(command, port, given)
+    missing = [
+        name
+        for name, one in command.arguments.items()
+        if one.is_required and name not in taken and name not in given.fixed
+    ]
+    if missing:
+        findings.error(
+            part,
+            "missing-argument",
+            f"{port.name!r} of widget {widget.name!r} does not give what command {command.name!r}"
+            f" needs: {listed(missing)}",
+            hint=_remedy(command, port, taken, missing),
+        )
+    elif port.arguments and not taken:
+        _check_nothing(part, port, widget, command, given, findings)
+    for target, source in taken.items():
+        wrong = _misfit(port, command.arguments[target])
+        if wrong and source in port.arguments:
+            findings.error(
+                _place(part, source),
+                "wrong-unit" if wrong.startswith("unit") else "wrong-type",
+                f"{source!r} of widget {widget.name!r} does not fit argument {target!r} of command"
+                f" {command.name!r}: {wrong}",
+                hint="" if wrong.startswith("unit") else _giver(command.arguments[target]),
+            )
+
+
+def takes(command: Command, port: Port) -> bool:
+    """Return whether a command may be bound to an output, if the binding says where values go."""
+    if port.is_held is not (command.hold is not None):
+        return False
+    if not port.arguments:
+        return bool(port.types) or not any(one.is_required for one in command.arguments.values())
+    return any(not _misfit(port, one) for one in command.arguments.values())
+
+
+def _remedy(command: Command, port: Port, taken: Mapping[str, str], missing: Sequence[str]) -> str:
+    free = [name for name in port.arguments if name not in taken.values()]
+    wrong = [name for name in missing if not _is_of_type(port, command.arguments[name])]
+    if free and wrong:
+        return _giver(command.arguments[wrong[0]])
+    pairs = [f"{source}: {name}" for source, name in zip(free, missing, strict=False)]
+    key = "args" if pairs else "set"
+    what = ", ".join(pairs or [f"{name}: …" for name in missing])
+    return f"bind it as {{ command: {command.name}, {key}: {{ {what} }} }}"
+
+
+def _giver(argument: Argument) -> str:
+    """Return which widgets give what an argument takes."""
+    widgets = "select" if argument.choices else _GIVERS.get(argument.type, "")
+    return f"use a widget that gives what {argument.name} takes: {widgets}" if widgets else ""
+
+
+def _check_nothing(
+    part: Part, port: Port, widget: Widget, command: Command, given: Given, findings: Findings
+) -> None:
+    """Report an output none of whose values goes anywhere."""
+    what = f"{port.name!r} of widget {widget.name!r} gives {listed(port.arguments)}"
+    free = [name for name in command.arguments if name not in given.fixed]
+    if free:
+        where = f"and command {command.name!r} takes {listed(command.arguments)}"
+        hint = _remedy(command, port, {}, free)
+    else:
+        where = f"and command {command.name!r} takes no value from it"
+        plain = "hold-button" if port.is_held else "button"
+        hint = f"use a widget that needs to give none: {plain}"
+    if not port.is_held or _stands_still(command, given):
+        findings.error(part, "nothing-given", f"{what}, {where}", hint=hint)
+    elif len(port.arguments) > 1:
+        findings.warn(part, "nothing-given", f"{what}, {where}", hint=hint)
+
+
+def _stands_still(command: Command, given: Given) -> bool:
+    """Return whether a held command says while it is held what it says when it is let go."""
+    release = command.hold.release if command.hold is not None else {}
+    return bool(command.arguments) and all(
+        given.fixed.get(name, one.default) == release.get(name, one.default)
+        for name, one in command.arguments.items()
+    )
+
+
+def _is_of_type(port: Port, argument: Argument) -> bool:
+    types = ("number",) if port.is_held else port.types
+    fitting = (*types, "integer") if "number" in types else types
+    return not types or argument.type in fitting
+
+
+def _misfit(port: Port, argument: Argument) -> str:
+    """Return why an argument cannot take what an output gives, or "" when it can."""
+    if not _is_of_type(port, argument):
+        given = "number" if port.is_held else " or ".join(port.types)
+        return f"it is {given}, and the argument is {argument.type}"
+    if port.unit and are_apart(port.unit, argument.unit):
+        return f"unit {port.unit!r} is given, and the argument is in {argument.unit!r}"
+    return ""
+
+
+def _place(part: Part, source: str) -> Part:
+    """Return where a binding says where a value goes, or the binding itself."""
+    args = part.get("args") if isinstance(part.data, dict) else None
+    return (args.get(source) if args is not None else None) or part

@@ -1,0 +1,245 @@
+"""Names in the rules of the emulated robot, and its first values."""
+
+from collections.abc import Iterable, Mapping
+
+from urc.config.link.flow import Linker, find_command
+from urc.config.part import Findings, Part
+from urc.config.suggest import did_you_mean
+from urc.config.values import check_within, fit, fit_hint, shown
+from urc.expressions import COUNTERS, Template
+from urc.model.codec import ReadSpec
+from urc.model.driver import Driver
+from urc.model.profile import Reaction, SimulatorRule
+from urc.model.values import Reading, Signal, Value
+from urc.model.world import WorldSpec
+
+__all__ = ["link_rules", "link_values", "settable"]
+
+
+def link_values(
+    parts: Mapping[str, Part], driver: Driver, findings: Findings
+) -> dict[str, Reading]:
+    """Return the values with which the robot begins, of the signals' types.
+
+    Args:
+        parts: of the simulator: `signals` and `state`.
+        driver: as linked.
+        findings: takes what is wrong.
+    """
+    values: dict[str, Reading] = {}
+    if "state" in parts:
+        for name, inner in parts["state"].entries().items():
+            if name in driver.signals or name in ("now", "settings", "world"):
+                what = "a signal" if name in driver.signals else "something else"
+                text = f"{name!r} is {what} already"
+                hint = "give its first value under 'signals'" if what == "a signal" else ""
+                findings.error(inner, "duplicate-name", text, key=True, hint=hint)
+            values[name] = tuple(inner.data) if isinstance(inner.data, list) else inner.data
+    if "signals" in parts:
+        for name, inner in parts["signals"].entries().items():
+            signal = settable(name, inner, driver, findings)
+            if signal is not None:
+                values[name] = _value(inner, signal, findings)
+    return values
+
+
+def settable(name: str, part: Part, driver: Driver, findings: Findings) -> Signal | None:
+    """Return the signal that is given a value at `part`; report it if it has none of its own."""
+    signal = driver.signals.get(name)
+    if signal is None:
+        text = f"{name!r} is not a signal"
+        hint = did_you_mean(name, driver.signals, "signals")
+        findings.error(part, "unknown-signal", text, key=True, hint=hint)
+        return None
+    if signal.formula is not None:
+        text = f"{name!r} is computed from other signals"
+        findings.error(part, "misplaced-key", text, key=True, hint="set those instead")
+        return None
+    return signal
+
+
+def _value(part: Part, signal: Signal, findings: Findings) -> Reading:
+    data = part.data
+    if data is None:
+        return None
+    if signal.type in ("object", "image", "blob"):
+        text = f"signal {signal.name!r}: an {signal.type} cannot be written here"
+        findings.error(part, "wrong-type", text)
+        return None
+    if (signal.type == "array") != isinstance(data, list):
+        wanted = f"a list of {signal.of}s" if signal.type == "array" else "no list"
+        text = f"signal {signal.name!r} is of type {signal.type}: {wanted} is expected"
+        findings.error(part, "wrong-type", text)
+        return None
+    if isinstance(data, list):
+        return tuple(_single(inner, signal, signal.of, findings) for inner in part.items())
+    return _single(part, signal, signal.type, findings)
+
+
+def _single(part: Part, signal: Signal, kind: str, findings: Findings) -> Value:
+    value: Value = part.data
+    if signal.states:
+        words = [word for _, word in signal.states]
+        if value not in words:
+            text = f"signal {signal.name!r}: {shown(value)} is none of its states"
+            near = did_you_mean(str(value), words, "states")
+            hint = fit_hint(value, "string") if shown(value) in words else near
+            findings.error(part, "unknown-word", text, hint=hint)
+        return value
+    try:
+        value = fit(value, kind)
+    except ValueError as error:
+        text = f"signal {signal.name!r}: {error}"
+        findings.error(part, "wrong-type", text, hint=fit_hint(value, kind))
+        return None
+    check_within(value, signal.min, signal.max, part, findings)
+    return value
+
+
+def link_rules(
+    linker: Linker,
+    part: Part,
+    rules: Iterable[SimulatorRule],
+    state: Iterable[str],
+    world: WorldSpec | None = None,
+) -> None:
+    """Check the rules of one transport.
+
+    Args:
+        linker: of the driver.
+        part: the list of rules.
+        rules: what was made of them.
+        state: names of the robot's own state.
+        world: of the robot.
+    """
+    always = {"now", *state, *linker.driver.signals} | ({"world"} if world is not None else set())
+    told = frozenset[str]() if world is None else frozenset(world.senses)
+    for inner, rule in zip(part.items(), rules, strict=True):
+        known = always | _given(linker, inner, rule)
+        if rule.when is not None:
+            linker.template(inner.must("when"), rule.when, known)
+        places = (inner, *inner.listed("then"))
+        for place, reaction in zip(places, rule.reactions, strict=True):
+            _link_reaction(linker, place, reaction, known, set(state))
+            _check_told(linker, place, told)
+        _check_answers(linker, places, rule)
+
+
+def _given(linker: Linker, part: Part, rule: SimulatorRule) -> set[str]:
+    """Return the names that the frame of a rule brings; check who is meant."""
+    match = rule.match
+    if isinstance(match, ReadSpec):
+        fields = set(match.fields)
+        for name, inner in part.must("match").named("fields").items():
+            if name not in fields:
+                text = f"{name!r} is not a field of this frame"
+                hint = did_you_mean(name, fields, "fields")
+                linker.findings.error(inner, "unknown-field", text, key=True, hint=hint)
+        if match.topic is not None:
+            linker.template(part.must("match").must("subscribe").must("topic"), match.topic)
+        if match.when is not None:
+            linker.template(part.must("match").must("when"), match.when, fields)
+        return fields
+    if match is not None:
+        return set(match.groups)
+    if "command" in part.data:
+        return _of_command(linker, part, rule)
+    if "poll" in part.data:
+        _check_poll(linker, part, rule)
+    return set()
+
+
+def _of_command(linker: Linker, part: Part, rule: SimulatorRule) -> set[str]:
+    inner = part.must("command")
+    command = find_command(linker, inner, rule.request)
+    if command is None:
+        return set()
+    if command.steps:
+        text = f"{rule.request!r} is a sequence, which sends several frames"
+        hint = "write a rule for what each of its steps sends, with 'match'"
+        linker.findings.error(inner, "wrong-command", text, hint=hint)
+    elif command.send.form == "frames":
+        text = f"{rule.request!r} sends several frames, and a rule takes one"
+        hint = "write a rule with match: for each of its frames"
+        linker.findings.error(inner, "wrong-command", text, hint=hint)
+    elif command.transport != rule.transport:
+        _elsewhere(linker, inner, rule, command.transport)
+    return set(command.arguments)
+
+
+def _check_poll(linker: Linker, part: Part, rule: SimulatorRule) -> None:
+    inner = part.must("poll")
+    polls = {poll.name: poll for poll in linker.driver.polls}
+    poll = polls.get(rule.request)
+    if poll is None:
+        text = f"no poll is called {rule.request!r}"
+        hint = did_you_mean(rule.request, polls, "polls")
+        linker.findings.error(inner, "unknown-request", text, hint=hint)
+    elif poll.run:
+        text = f"the poll {rule.request!r} runs the command {poll.run!r}"
+        hint = f"write command: {poll.run}"
+        linker.findings.error(inner, "wrong-command", text, hint=hint)
+    elif poll.transport != rule.transport:
+        _elsewhere(linker, inner, rule, poll.transport)
+
+
+def _elsewhere(linker: Linker, part: Part, rule: SimulatorRule, transport: str) -> None:
+    if transport not in linker.driver.transports:
+        return  # it has been told of where the request stands
+    text = f"{rule.request!r} goes to {transport!r}, and this rule is for {rule.transport!r}"
+    linker.findings.error(part, "wrong-transport", text)
+
+
+def _link_reaction(
+    linker: Linker, part: Part, reaction: Reaction, known: set[str], state: set[str]
+) -> None:
+    for name, inner in part.named("set").items():
+        if name not in state and name not in linker.driver.signals:
+            text = f"{name!r} is neither a signal nor declared under 'state'"
+            names = (*linker.driver.signals, *state)
+            hint = did_you_mean(name, names, "names") or "declare it under simulator.state"
+            linker.findings.error(inner, "unknown-signal", text, key=True, hint=hint)
+        elif name not in state:
+            signal = settable(name, inner, linker.driver, linker.findings)
+            if signal is not None and not isinstance(inner.data, str):
+                _value(inner, signal, linker.findings)
+        value = reaction.sets.get(name)
+        if isinstance(value, Template):
+            linker.template(inner, value, known)
+            if value.is_constant and name in linker.driver.signals:
+                _check_word(linker, inner, value)
+    if reaction.send is not None:
+        linker.templates(part.must("send"), reaction.send, {*known, COUNTERS})
+    if reaction.message and reaction.message not in linker.driver.messages:
+        text = f"there is no message {reaction.message!r}"
+        hint = did_you_mean(reaction.message, linker.driver.messages, "messages")
+        linker.findings.error(part, "unknown-message", text, at="message", hint=hint)
+
+
+def _check_told(linker: Linker, part: Part, told: frozenset[str]) -> None:
+    """Report values for signals that the world tells."""
+    for name, inner in part.named("set").items():
+        if name in told:
+            text = f"signal {name!r} is told by the world"
+            hint = "take it away here, or from world.signals"
+            linker.findings.error(inner, "two-sources", text, key=True, hint=hint)
+
+
+def _check_word(linker: Linker, part: Part, value: Template) -> None:
+    """Check a plain text that a signal is set to: it may be a word, or an expression in want."""
+    signal = linker.driver.signals[part.name]
+    if signal.formula is None and (signal.states or signal.type != "string"):
+        text = value.evaluate({})
+        if isinstance(text, str) or signal.states:
+            _single(Part(part.document, part.path, text), signal, signal.type, linker.findings)
+
+
+def _check_answers(linker: Linker, places: tuple[Part, ...], rule: SimulatorRule) -> None:
+    """Report declared answers to nothing, and answers of a request that has none."""
+    if rule.every_s is None:
+        return
+    for place in places:
+        if place.text("answer") == "auto":
+            text = "nothing was asked that could be answered"
+            hint = "write message: NAME to say a message of the driver"
+            linker.findings.error(place, "misplaced-key", text, at="answer", hint=hint)

@@ -1,0 +1,233 @@
+"""Names in sequences: what is sent, expected and run, and that no sequence runs itself."""
+
+from urc.config.link.flow import (
+    Linker,
+    find_command,
+    link_arguments,
+    link_refusals,
+    link_requirements,
+    refuse_two_person,
+)
+from urc.config.moving import refuse_moving
+from urc.config.part import Part
+from urc.expressions import COUNTERS, NONCE, NOW, Template
+from urc.model.driver import Driver
+from urc.model.flow import (
+    ExpectStep,
+    FailStep,
+    IfStep,
+    PromptStep,
+    RepeatStep,
+    RunStep,
+    SendStep,
+    SetStep,
+    Step,
+    UntilStep,
+    all_steps,
+)
+
+__all__ = ["link_sequences", "steps_of"]
+
+
+def steps_of(part: Part) -> Part:
+    """Return the list of steps of the sequence at `part`, however it is written."""
+    return part.must("steps") if isinstance(part.data, dict) else part
+
+
+def link_sequences(linker: Linker, part: Part) -> None:
+    """Check the steps of every sequence and transport of the driver at `part`."""
+    commands = part.named("commands")
+    for name, inner in part.named("sequences").items():
+        if name in commands:
+            linker.findings.error(
+                inner,
+                "duplicate-name",
+                f"a command is called {name!r} too",
+                key=True,
+                hint="give each its own name",
+            )
+            continue
+        command = linker.driver.commands[name]
+        if isinstance(inner.data, dict):
+            link_requirements(linker, inner, command)
+        _Walk(linker, is_named=True).steps(steps_of(inner), command.steps)
+        cycle = _cycle(name, linker.driver)
+        if cycle:
+            linker.findings.error(
+                inner,
+                "circular-run",
+                f"{name!r} runs itself: {' → '.join(cycle)}",
+                key=True,
+                hint="write repeat: [ … ] with 'times' for what is done again and again",
+            )
+    for name, inner in part.named("transports").items():
+        spec = linker.driver.transports[name]
+        for key, steps in (("on_connect", spec.on_connect), ("on_close", spec.on_close)):
+            if steps:
+                linker.transport(inner, "type", name)  # it is used by them
+                is_late = key != "on_connect"
+                _Walk(linker, is_named=False, is_late=is_late).steps(inner.must(key), steps)
+
+
+class _Walk:
+    """One sequence: what its later steps know."""
+
+    def __init__(self, linker: Linker, *, is_named: bool, is_late: bool = True) -> None:
+        self._linker = linker
+        self._is_named = is_named
+        self._is_late = is_late
+        """It comes after the login of its lines, and so knows what that has learnt."""
+        self._known: set[str] = set(linker.driver.signals)
+
+    def steps(self, part: Part, steps: tuple[Step, ...]) -> None:
+        for inner, step in zip(part.items(), steps, strict=True):
+            self._step(inner, step)
+
+    def _step(self, part: Part, step: Step) -> None:
+        match step:
+            case SendStep():
+                self._transport(part, "to", step.transport)
+                known = {*self._known, COUNTERS, NONCE, NOW, *self._learnt(step.transport)}
+                self._linker.templates(part.must("send"), step.send, known)
+            case ExpectStep():
+                self._expect(part, step)
+                self._otherwise(part, step.otherwise)
+            case PromptStep():
+                self._transport(part, "from", step.transport)
+                self._must_last(part.must("prompt"), step.transport)
+                self._otherwise(part, step.otherwise)
+            case UntilStep():
+                self._template(part.must("wait").must("until"), step.condition)
+                self._otherwise(part, step.otherwise)
+            case RepeatStep():
+                self._repeat(part, step)
+            case RunStep():
+                self._run(part, step)
+            case SetStep():
+                for name, inner in part.must("set").entries().items():
+                    self._linker.field(inner, name, {"key": True})
+                    self._template(inner, step.values.get(name))
+            case IfStep():
+                self._template(part.must("if"), step.condition)
+                then = part.get("then")
+                if then is not None:
+                    self.steps(then, step.then)
+                self._otherwise(part, step.otherwise or None)
+            case FailStep(text):
+                self._template(part.must("fail"), text)
+
+    def _expect(self, part: Part, step: ExpectStep) -> None:
+        self._transport(part, "from", step.transport)
+        inner = part.must("expect")
+        self._must_last(inner, step.transport)
+        if isinstance(inner.data, dict):
+            self._linker.fields(inner, step.read)
+            link_refusals(self._linker, inner, step.faults)
+        else:
+            for name in step.read.fields:
+                offset = str(inner.data).find(f"<{name}>") + 1
+                self._linker.field(inner, name, {"offset": offset, "length": len(name)})
+        self._known |= {name for name in step.read.fields if name.startswith("_")}
+
+    def _repeat(self, part: Part, step: RepeatStep) -> None:
+        self.steps(part.must("repeat"), step.body)
+        if step.until is not None:
+            self._template(part.must("until"), step.until)
+        self._otherwise(part, step.otherwise)
+        commands = self._linker.driver.commands
+        for one in all_steps(step.body):
+            if isinstance(one, RunStep) and one.command in commands:
+                loops = _loops(one.command, self._linker.driver)
+                if loops:
+                    self._linker.findings.error(
+                        part,
+                        "too-many-steps",
+                        f"{loops!r} repeats, too, and it is run in here: nobody can say how long"
+                        " that takes",
+                        at="repeat",
+                        key=True,
+                        hint="repeat in one of them only",
+                    )
+
+    def _run(self, part: Part, step: RunStep) -> None:
+        command = find_command(self._linker, part.must("run"), step.command)
+        given = part.named("args")
+        for name, inner in given.items():
+            self._template(inner, step.arguments.get(name))
+        if command is None:
+            return
+        link_arguments(self._linker.findings, part, command, given, "run")
+        if not self._is_named:
+            refuse_two_person(self._linker, part.must("run"), command)
+            refuse_moving(self._linker.findings, part.must("run"), command, step.arguments)
+        if command.reply is not None:
+            self._known |= command.reply.names
+
+    def _learnt(self, transport: str) -> frozenset[str]:
+        """Return what is known on a line beside what the steps read; not to the login itself."""
+        driver = self._linker.driver
+        return (
+            driver.learnt(transport)
+            if self._is_late and transport in driver.transports
+            else frozenset()
+        )
+
+    def _otherwise(self, part: Part, steps: tuple[Step, ...] | None) -> None:
+        inner = part.get("else")
+        if inner is not None and steps:
+            self.steps(inner, steps)
+
+    def _template(self, part: Part, template: object) -> None:
+        if isinstance(template, Template):
+            self._linker.template(part, template, self._known)
+
+    def _transport(self, part: Part, key: str, name: str) -> None:
+        if self._is_named:
+            self._linker.transport(part, key, name)
+
+    def _must_last(self, part: Part, transport: str) -> None:
+        """Report what waits for a frame that its line cannot be there to hear."""
+        spec = self._linker.driver.transports.get(transport)
+        if self._is_named and spec is not None and spec.connection == "per_request":
+            self._linker.findings.error(
+                part,
+                "no-connection",
+                f"{transport!r} has a connection for each request, and none between two steps",
+                hint="run a command that has a reply, or make the connection persistent",
+            )
+
+
+def _loops(start: str, driver: Driver) -> str:
+    """Return the first sequence that `start` runs, or is, and that repeats something; else ""."""
+    waiting, seen = [start], {start}
+    while waiting:
+        name = waiting.pop(0)
+        command = driver.commands.get(name)
+        for step in all_steps(command.steps if command else ()):
+            if isinstance(step, RepeatStep):
+                return name
+            if isinstance(step, RunStep) and step.command not in seen:
+                seen.add(step.command)
+                waiting.append(step.command)
+    return ""
+
+
+def _cycle(start: str, driver: Driver) -> list[str]:
+    """Return the names from `start` back to itself, or nothing."""
+    came_from: dict[str, str] = {}
+    waiting = [start]
+    while waiting:
+        name = waiting.pop(0)
+        command = driver.commands.get(name)
+        for step in all_steps(command.steps if command else ()):
+            if not isinstance(step, RunStep):
+                continue
+            if step.command == start:
+                path = [name]
+                while path[-1] != start:
+                    path.append(came_from[path[-1]])
+                return [*reversed(path), start]
+            if step.command not in came_from:
+                came_from[step.command] = name
+                waiting.append(step.command)
+    return []

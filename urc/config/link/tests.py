@@ -1,0 +1,331 @@
+"""Names in the tests that documents carry about themselves."""
+
+from collections.abc import Mapping
+from typing import Final
+
+from urc.config.parse.profile import setting_value
+from urc.config.part import Findings, Part
+from urc.config.suggest import did_you_mean
+from urc.config.values import check_within, fit, fit_argument, fit_hint, known_argument
+from urc.model.driver import Command, Driver
+from urc.model.profile import DialogueStep, DocumentTest, Expected, Setting, State
+from urc.model.values import Limits, Signal, Value
+
+__all__ = ["link_test"]
+
+
+def link_test(
+    part: Part,
+    test: DocumentTest,
+    driver: Driver,
+    settings: Mapping[str, Setting],
+    findings: Findings,
+) -> DocumentTest:
+    """Return the test with values of the signals' types and the poll it names by its index."""
+    if test.steps:
+        _check_polls(part, driver, findings)
+        steps = _link_steps(part, test.steps, driver, findings)
+    else:
+        _check_purpose(part, test, driver, findings)
+        steps = ()
+    _check_transports(part, driver, findings)
+    _check_run(part, test.run, test.arguments, driver, findings, may_fail=test.fails is not None)
+    return test._replace(
+        expect=_link_expect(part, driver, findings),
+        reply_to=_reply_to(part, test, driver, findings),
+        settings={
+            name: _setting(inner, settings, findings)
+            for name, inner in part.named("settings").items()
+        },
+        steps=steps,
+    )
+
+
+def _check_purpose(part: Part, test: DocumentTest, driver: Driver, findings: Findings) -> None:
+    text = ""
+    if not test.feed and test.run is None and test.reply_to is None:
+        text = "'feed' or 'run' is missing: this test does nothing"
+    elif not (test.expect or test.sent or test.fails is not None or _reads(test, driver)):
+        text = "'expect', 'sent' or 'fails' is missing: this test cannot fail"
+    if text:
+        findings.error(part, "missing-key", text, key=True)
+
+
+def _reads(test: DocumentTest, driver: Driver) -> bool:
+    """Return whether something fed has to be read: as the answer to a command, or at all."""
+    if test.feed and test.run is None and test.reply_to is None:
+        return True
+    asked = test.run if test.run is not None else test.reply_to
+    command = driver.commands.get(asked) if isinstance(asked, str) else None
+    return bool(test.feed) and command is not None and command.reply is not None
+
+
+_COMES: Final = ("message", "response", "feedback")
+_GOES: Final = ("publish", "call", "goal", "cancel", "request")
+"""Kinds of messages that are fed, and of those that are sent."""
+
+
+def _check_transports(part: Part, driver: Driver, findings: Findings) -> None:
+    for key, verbs in (("feed", _COMES), ("sent", _GOES)):
+        for name, inner in part.named(key).items():
+            _check_transport(name, inner, driver, findings, key=True)
+            for one in inner.items() if isinstance(inner.data, list) else [inner]:
+                _check_verb(one, verbs, f"is never {'fed' if key == 'feed' else key}", findings)
+
+
+def _check_verb(part: Part, verbs: tuple[str, ...], why_not: str, findings: Findings) -> None:
+    if isinstance(part.data, dict):
+        for verb in part.data.keys() - {"hex", *verbs}:
+            hint = did_you_mean(verb, verbs, "kinds")
+            findings.error(
+                part, "misplaced-key", f"'{verb}' {why_not}", at=verb, key=True, hint=hint
+            )
+
+
+def _check_transport(
+    name: str, part: Part, driver: Driver, findings: Findings, *, key: bool = False
+) -> None:
+    if name not in driver.transports:
+        findings.error(
+            part,
+            "unknown-transport",
+            f"there is no transport {name!r}",
+            key=key,
+            hint=did_you_mean(name, driver.transports, "transports"),
+        )
+
+
+def _check_polls(part: Part, driver: Driver, findings: Findings) -> None:
+    names = [poll.name for poll in driver.polls]
+    for inner in part.listed("polls"):
+        if inner.data not in names:
+            text = f"no poll is called {inner.data!r}"
+            hint = did_you_mean(str(inner.data), names, "polls")
+            findings.error(inner, "unknown-request", text, hint=hint)
+
+
+_CHECKS: Final = ("sent", "expect", "reply", "fails", "closed")
+
+
+def _link_steps(
+    part: Part, steps: tuple[DialogueStep, ...], driver: Driver, findings: Findings
+) -> tuple[DialogueStep, ...]:
+    parts = part.listed("steps")
+    if not any(key in inner.data for inner in parts for key in _CHECKS):
+        words = ", ".join(f"'{key}'" for key in _CHECKS[:-1])
+        text = f"{words} or '{_CHECKS[-1]}' is in no step: this test cannot fail"
+        findings.error(part, "missing-key", text, at="steps", key=True)
+    linked = []
+    for place, (inner, step) in enumerate(zip(parts, steps, strict=True)):
+        after = steps[place + 1] if place + 1 < len(steps) else step
+        _check_transports(inner, driver, findings)
+        for key in ("connects", "closes", "closed"):
+            if key in inner.data:
+                named = inner.must(key)
+                _check_transport(str(named.data), named, driver, findings)
+        spec = driver.transports.get(step.connects)
+        if spec is not None and spec.connection == "per_request":
+            text = f"{spec.name!r} is connected for each request, and by it"
+            hint = "run a command that asks something there"
+            findings.error(inner, "wrong-transport", text, at="connects", hint=hint)
+        may_fail = bool(step.fails or after.fails)
+        _check_run(inner, step.run or None, step.arguments, driver, findings, may_fail=may_fail)
+        if step.of and step.of not in driver.commands:
+            text = f"there is no command {step.of!r}"
+            hint = did_you_mean(step.of, driver.commands, "commands")
+            findings.error(inner, "unknown-command", text, at="of", hint=hint)
+        linked.append(step._replace(expect=_link_expect(inner, driver, findings)))
+    return tuple(linked)
+
+
+def _link_expect(part: Part, driver: Driver, findings: Findings) -> dict[str, Expected]:
+    """Return what is expected, with values of the signals' types."""
+    return {
+        name: _state(name, inner, driver, findings) for name, inner in part.named("expect").items()
+    }
+
+
+def _state(name: str, part: Part, driver: Driver, findings: Findings) -> Expected:
+    if not isinstance(part.data, dict):
+        return _expected(name, part, driver, findings)
+    signal = driver.signals.get(name)
+    alarm = part.text("alarm")
+    if signal is not None and alarm not in ("", "none") and signal.limits == Limits():
+        text = f"signal {name!r} has no limits"
+        findings.error(part, "misplaced-key", text, at="alarm", hint="give it limits")
+    if "value" in part.data and part.text("age") == "never":
+        text = "what was never set has no value"
+        findings.error(part, "misplaced-key", text, at="value", key=True)
+    inner = part.get("value")
+    value = _expected(name, inner if inner else part, driver, findings, is_part=inner is None)
+    return State(
+        has_value=inner is not None,
+        value=value,
+        alarm=None if not alarm else "" if alarm == "none" else alarm,  # type: ignore[arg-type]  # the schema's enum
+        age=part.text("age"),  # type: ignore[arg-type]  # as above
+    )
+
+
+def _setting(part: Part, settings: Mapping[str, Setting], findings: Findings) -> Value:
+    setting = settings.get(part.name)
+    if setting is None:
+        findings.error(
+            part,
+            "unknown-setting",
+            f"there is no setting {part.name!r}",
+            key=True,
+            hint=did_you_mean(part.name, settings, "settings"),
+        )
+        return None
+    value = setting_value(part, setting.type, setting.choices, findings)
+    check_within(value, setting.min, setting.max, part, findings)
+    return value
+
+
+def _expected(
+    name: str, part: Part, driver: Driver, findings: Findings, *, is_part: bool = False
+) -> Value | tuple[Value, ...]:
+    """Return the value at `part`, or None when it is only a `part` of what is expected."""
+    signal = driver.signals.get(name)
+    if signal is None:
+        findings.error(
+            part,
+            "unknown-signal",
+            f"there is no signal {name!r}",
+            key=True,
+            hint=did_you_mean(name, driver.signals, "signals"),
+        )
+        return None
+    if part.data is None or is_part:
+        return None
+    if (signal.type == "array") != isinstance(part.data, list):
+        wanted = f"a list of {signal.of}s" if signal.type == "array" else "no list"
+        text = f"signal {name!r} is of type {signal.type}: {wanted} is expected"
+        findings.error(part, "wrong-type", text)
+        return None
+    if signal.type == "array":
+        return tuple(_fitting(inner, signal, signal.of, findings) for inner in part.items())
+    return _fitting(part, signal, signal.type, findings)
+
+
+def _fitting(part: Part, signal: Signal, kind: str, findings: Findings) -> Value:
+    value: Value = part.data
+    if value is None or (isinstance(value, str) and value in dict(signal.states).values()):
+        return value
+    if kind in ("object", "image", "blob"):
+        text = f"signal {signal.name!r}: what is in {kind}s cannot be compared"
+        findings.error(part, "wrong-type", text, hint="compare a signal that is computed from it")
+        return None
+    try:
+        return fit(value, kind)
+    except ValueError as error:
+        text = f"signal {signal.name!r}: {error}"
+        findings.error(part, "wrong-type", text, hint=fit_hint(value, kind))
+        return None
+
+
+def _reply_to(
+    part: Part, test: DocumentTest, driver: Driver, findings: Findings
+) -> int | str | None:
+    waiting = test.reply_to
+    if waiting is None:
+        return None
+    inner = part.must("reply_to")
+    if isinstance(waiting, str):
+        names = {poll.name: place for place, poll in enumerate(driver.polls)}
+        if waiting in driver.commands:
+            if test.feed and driver.commands[waiting].reply is None:
+                findings.error(inner, "no-reply", f"the command {waiting!r} waits for no reply")
+            return waiting
+        if waiting not in names:
+            findings.error(
+                inner,
+                "unknown-request",
+                f"no poll or command is called {waiting!r}",
+                hint=did_you_mean(waiting, (*names, *driver.commands), "names"),
+            )
+            return None
+        waiting = names[waiting]
+    if waiting >= len(driver.polls):
+        most = len(driver.polls) - 1
+        text = f"the last one is {most}" if most >= 0 else "there are none"
+        findings.error(
+            inner,
+            "unknown-request",
+            f"there is no poll {waiting}: {text}",
+            hint="polls are counted from 0",
+        )
+        return None
+    poll = driver.polls[waiting]
+    if test.feed and poll.reply is None:
+        findings.error(inner, "no-reply", f"poll {waiting} waits for no reply")
+    # A line that the driver does not have has been told of where the poll stands.
+    if test.feed and poll.transport in driver.transports and poll.transport not in test.feed:
+        findings.error(
+            inner,
+            "wrong-transport",
+            f"poll {waiting} waits on {poll.transport!r}, which is not fed",
+        )
+    return waiting
+
+
+def _check_run(
+    part: Part,
+    run: str | None,
+    arguments: Mapping[str, object],
+    driver: Driver,
+    findings: Findings,
+    *,
+    may_fail: bool,
+) -> None:
+    if run is None:
+        if "args" in part.data:
+            findings.error(part, "misplaced-key", "'args' without 'run'", at="args", key=True)
+        return
+    command = driver.commands.get(run)
+    if command is None:
+        findings.error(
+            part,
+            "unknown-command",
+            f"there is no command {run!r}",
+            at="run",
+            hint=did_you_mean(run, driver.commands, "commands"),
+        )
+        return
+    for name, inner in part.named("args").items():
+        _check_argument(name, inner, command, findings, may_fail=may_fail)
+    missing = [
+        name for name, one in command.arguments.items()
+        if one.is_required and one.default is None and name not in arguments
+    ]  # fmt: skip
+    if missing and not may_fail:
+        findings.error(
+            part,
+            "missing-argument",
+            f"command {run!r} needs {missing[0]!r}",
+            at="run",
+            hint=f"write args: {{ {missing[0]}: … }}",
+        )
+
+
+def _check_argument(
+    name: str, part: Part, command: Command, findings: Findings, *, may_fail: bool
+) -> None:
+    argument = known_argument(name, part, command, findings)
+    if argument is None or may_fail:
+        return  # a test about a failure may give what is refused
+    try:
+        elements = fit_argument(part.data, argument.type, argument.of, argument.size)
+    except ValueError as error:
+        findings.error(
+            part,
+            "wrong-type",
+            f"argument {name!r}: {error}",
+            hint=fit_hint(part.data, argument.type),
+        )
+        return
+    for one in elements:
+        check_within(one, argument.min, argument.max, part, findings)
+        if argument.choices and one not in argument.choices:
+            text = f"{one!r} is not one of the choices of {name!r}"
+            findings.error(part, "unknown-word", text)

@@ -1,0 +1,243 @@
+"""What bindings and options of one widget must be to each other, as its manifest declares it."""
+
+import re
+from collections.abc import Iterator, Mapping
+from typing import Any, Final
+
+from urc.config.link.files import named_texts
+from urc.config.part import Findings, Part
+from urc.config.suggest import did_you_mean, listed
+from urc.model.binding import targets
+from urc.model.driver import Argument, Driver
+from urc.model.interface import Given, WidgetUse
+from urc.model.units import are_apart
+from urc.model.widget import Port, Widget
+
+__all__ = ["link_together"]
+
+_NOTHING_GIVEN: Final = Given()
+_LOCAL: Final = re.compile(r"/(?![/\\])")
+"""How an address on the same server begins."""
+
+
+def link_together(
+    part: Part, use: WidgetUse, widget: Widget, driver: Driver, findings: Findings
+) -> None:
+    """Check bindings and options that may be right by themselves, and wrong beside the others.
+
+    Args:
+        part: what the document says of the slot; it may say a part of `use` only.
+        use: what fills the slot, with what the driver says of it.
+        widget: that is used.
+        driver: whose signals and commands are bound.
+        findings: takes what is wrong.
+    """
+    bound = {**use.inputs, **use.lists, **use.outputs}
+    _check_needs(part, use, widget, bound, findings)
+    _check_groups(part, widget, bound, findings)
+    _check_instead(part, widget, bound, findings)
+    _check_units(part, use, widget, driver, findings)
+    _check_order(part, use, widget, findings)
+    _check_local(part, widget, findings)
+    _check_given(part, use, widget, driver, findings)
+
+
+def _check_needs(
+    part: Part, use: WidgetUse, widget: Widget, bound: Mapping[str, object], findings: Findings
+) -> None:
+    tried = part.named("bind")  # what is wrong with those has been told
+    given = {name for name, value in use.options.items() if value not in ("", None)}
+    if widget.needs and not {*bound, *tried, *given} & {*widget.needs}:
+        options = [name for name in widget.needs if name in widget.options]
+        ports = [name for name in widget.needs if name not in widget.options]
+        ways = [f"bind {_one_of(ports)}"] if ports else []
+        ways += [f"give the option {_one_of(options)}"] if options else []
+        findings.error(
+            part,
+            "unbound-input",
+            f"nothing is given to widget {widget.name!r}: it has nothing to show or to do",
+            key=True,
+            hint=", or ".join(ways),
+        )
+
+
+def _one_of(names: list[str]) -> str:
+    return names[0] if len(names) == 1 else f"one of {listed(names)}"
+
+
+def _check_groups(
+    part: Part, widget: Widget, bound: Mapping[str, object], findings: Findings
+) -> None:
+    tried = part.named("bind")
+    for group in widget.together:
+        there = [name for name in group if name in bound or name in tried]
+        missing = [name for name in group if name not in there]
+        mine = [name for name in there if name in tried]
+        if mine and missing:
+            findings.error(
+                tried[mine[0]],
+                "half-bound",
+                f"{mine[0]!r} of widget {widget.name!r} means nothing without {listed(missing)}",
+                key=True,
+                hint=f"bind {listed(missing)} too, or leave {mine[0]} out",
+            )
+
+
+def _check_instead(
+    part: Part, widget: Widget, bound: Mapping[str, object], findings: Findings
+) -> None:
+    """Warn of what this document says in vain: another binding of the slot wins.
+
+    What the driver says of the slot is no mistake of the interface that binds something better.
+    """
+    said = (*part.named("bind").items(), *part.named("options").items())
+    for port in widget.inputs.values():
+        lost = [inner for name, inner in said if port.name in bound and name in port.instead_of]
+        for inner in lost:
+            findings.warn(
+                inner,
+                "unused-binding",
+                f"{inner.name!r} of widget {widget.name!r} means nothing beside {port.name!r}",
+                key=True,
+                hint=f"leave {inner.name} out, or do not bind {port.name}",
+            )
+
+
+# ---- units
+
+
+def _check_units(
+    part: Part, use: WidgetUse, widget: Widget, driver: Driver, findings: Findings
+) -> None:
+    """Report two bindings that are compared as they are, and have different units."""
+    mine = part.named("bind")
+    for port in (*widget.inputs.values(), *widget.outputs.values()):
+        place = mine.get(port.name) or mine.get(port.unit_of)
+        other = widget.inputs.get(port.unit_of) or widget.outputs.get(port.unit_of)
+        if place is None or other is None:
+            continue
+        wanted = next(_units(use, other, driver), ("", ""))
+        for what, unit in _units(use, port, driver):
+            if are_apart(unit, wanted[1]):
+                findings.error(
+                    place,
+                    "wrong-unit",
+                    f"{port.name!r} and {other.name!r} of widget {widget.name!r} need the same"
+                    f" unit: {what} is in {unit!r}, {wanted[0]} in {wanted[1]!r}",
+                    hint="nothing is converted between them; bind others, or compute a signal in"
+                    " that unit",
+                )
+                break
+
+
+def _units(use: WidgetUse, port: Port, driver: Driver) -> Iterator[tuple[str, str]]:
+    """Yield what a port is bound to, and its unit."""
+    single = use.inputs.get(port.name)
+    for name in (single,) if single is not None else use.lists.get(port.name, ()):
+        signal = driver.signals.get(name)
+        if signal is not None:
+            yield f"signal {name!r}", port.unit or signal.unit
+    for argument in _arguments(use, port, driver):
+        yield f"argument {argument.name!r}", argument.unit
+
+
+def _arguments(use: WidgetUse, port: Port, driver: Driver) -> Iterator[Argument]:
+    """Yield the arguments that take what an output gives."""
+    command = driver.commands.get(use.outputs.get(port.name, ""))
+    if command is not None:
+        taken = targets(command, port, use.given.get(port.name, _NOTHING_GIVEN))
+        yield from (command.arguments[name] for name in taken if name in command.arguments)
+
+
+# ---- options
+
+
+def _check_order(part: Part, use: WidgetUse, widget: Widget, findings: Findings) -> None:
+    """Report an option that is not below the one that it must be below."""
+    own = part.named("options")
+    for name, schema in widget.options.items():
+        above = schema.get("below") if isinstance(schema, Mapping) else None
+        if above is None or not (name in own or above in own):
+            continue
+        low, high = use.options.get(name), use.options.get(above)
+        if isinstance(low, (int, float)) and isinstance(high, (int, float)) and low >= high:
+            findings.error(
+                own.get(name) or own[above],
+                "wrong-order",
+                f"option {name!r} is {low:g}, and must be below {above!r}, which is {high:g}",
+                hint="change one of them" if above in own else f"give the option {above} too",
+            )
+
+
+def _check_local(part: Part, widget: Widget, findings: Findings) -> None:
+    """Report an address on another server."""
+    options = part.get("options")
+    for name, inner in named_texts(options, widget.options, "local") if options else ():
+        if inner.data and not _LOCAL.match(inner.data):
+            findings.error(
+                inner,
+                "not-local",
+                f"option {name!r} must be an address on this dashboard's server,"
+                f" found {inner.data!r}",
+                hint="a page loads nothing from other servers; begin it with one slash",
+            )
+
+
+def _check_given(
+    part: Part, use: WidgetUse, widget: Widget, driver: Driver, findings: Findings
+) -> None:
+    """Report a text of the options that the argument it goes to cannot take."""
+    options = part.get("options")
+    if options is None:
+        return
+    for name, inner in named_texts(options, widget.options, "gives"):
+        schema: Any = widget.options[name]
+        is_item = "gives" not in schema
+        port = widget.outputs[schema["items"]["gives"] if is_item else schema["gives"]]
+        text = inner.data.partition("=")[0] if is_item else inner.data
+        for argument in _arguments(use, port, driver):
+            _check_text(inner, text, argument, use.outputs[port.name], findings)
+
+
+def _check_text(
+    part: Part, text: str, argument: Argument, command: str, findings: Findings
+) -> None:
+    value = _read(text, argument)
+    if value is None:
+        code, wrong = "wrong-type", f"takes {argument.type}"
+    elif argument.choices and value not in argument.choices:
+        code, wrong = "unknown-word", "has other choices"
+    elif not isinstance(value, str) and _is_outside(value, argument):
+        code, wrong = "out-of-range", f"goes from {_bound(argument.min)} to {_bound(argument.max)}"
+    else:
+        return
+    choices = [str(one) for one in argument.choices]
+    findings.error(
+        part,
+        code,
+        f"command {command!r} cannot take {text!r}: its argument {argument.name!r} {wrong}",
+        hint=did_you_mean(text, choices, "choices") if choices else "",
+    )
+
+
+def _read(text: str, argument: Argument) -> bool | float | str | None:
+    """Return what a page makes of a text for an argument; None when it cannot."""
+    if argument.type == "boolean":
+        return {"true": True, "false": False}.get(text)
+    if argument.type not in ("integer", "number"):
+        return text
+    try:
+        number = float(text)
+    except ValueError:
+        return None
+    is_whole = number.is_integer()
+    return number if is_whole or argument.type == "number" else None
+
+
+def _is_outside(value: float, argument: Argument) -> bool:
+    low, high = argument.min, argument.max
+    return (low is not None and value < low) or (high is not None and value > high)
+
+
+def _bound(value: float | None) -> str:
+    return "any" if value is None else f"{value:g}"

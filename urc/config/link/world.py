@@ -1,0 +1,102 @@
+"""Names in the world of an emulated robot, and what its rules read of it."""
+
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Final
+
+from urc.config.link.flow import Linker
+from urc.config.link.rules import settable
+from urc.config.part import Findings, Part
+from urc.config.suggest import did_you_mean
+from urc.expressions import Template
+from urc.model.driver import Driver
+from urc.model.world import READINGS, Failsafe, WorldSpec
+
+__all__ = ["check_readings", "link_world"]
+
+_READING: Final = re.compile(r"_item\(ns\['world'\], '(\w+)'\)(?:, '(\w+)'\))?")
+"""What ``world.NAME`` and ``world.NAME.PART`` become."""
+
+
+def link_world(
+    linker: Linker, part: Part, spec: WorldSpec, state: Iterable[str], parts: Mapping[str, Part]
+) -> WorldSpec:
+    """Check every name in a world; return it with the commands that keep it going.
+
+    Args:
+        linker: of the driver.
+        part: the world.
+        spec: what was made of it.
+        state: names of the robot's own state.
+        parts: of the simulator.
+    """
+    driver, findings, own = linker.driver, linker.findings, {*state}
+    known = {"now", "world", *own, *driver.signals}
+    for place, template in _templates(part, spec):
+        linker.template(place, template, known)
+    if "world" in driver.signals:
+        text = "a signal is called 'world' already, and expressions could not tell them apart"
+        findings.error(part, "duplicate-name", text, key=True, hint="call the signal otherwise")
+    _link_signals(part, driver, findings, parts)
+    if spec.failsafe is None:
+        return spec
+    return spec._replace(failsafe=_link_failsafe(part.must("failsafe"), spec.failsafe, linker, own))
+
+
+def check_readings(findings: Findings, part: Part, template: Template) -> None:
+    """Report what a template reads of the world and is not there."""
+    for name, inner in _READING.findall(template.python):
+        if name not in READINGS:
+            text, hint = f"the world has no {name!r}", did_you_mean(name, READINGS, "readings")
+            findings.error(part, "unknown-name", text, hint=hint)
+        elif READINGS[name] and inner not in READINGS[name]:
+            text = f"world.{name} has no {inner!r}" if inner else f"world.{name} has parts"
+            hint = did_you_mean(inner, READINGS[name], "parts")
+            findings.error(part, "unknown-name", text, hint=hint)
+
+
+def _templates(part: Part, spec: WorldSpec) -> Iterator[tuple[Part, Template]]:
+    for key, values in (("drive", spec.drive), ("signals", spec.senses)):
+        for name, inner in part.named(key).items():
+            value = values.get(name)
+            if isinstance(value, Template):
+                yield inner, value
+    for key in ("flip", "mirror"):
+        value = getattr(spec.camera, key)
+        if isinstance(value, Template):
+            yield part.must("camera").must(key), value
+    if spec.failsafe is not None:
+        for name, inner in part.must("failsafe").named("set").items():
+            new = spec.failsafe.sets[name]
+            if isinstance(new, Template):
+                yield inner, new
+
+
+def _link_signals(
+    part: Part, driver: Driver, findings: Findings, parts: Mapping[str, Part]
+) -> None:
+    begun = parts["signals"].data if "signals" in parts else {}
+    for name, inner in part.named("signals").items():
+        if settable(name, inner, driver, findings) is not None and name in begun:
+            text = f"signal {name!r} is told by the world"
+            hint = "take it away here, or from the world"
+            findings.error(parts["signals"], "two-sources", text, at=name, key=True, hint=hint)
+
+
+def _link_failsafe(part: Part, spec: Failsafe, linker: Linker, state: set[str]) -> Failsafe:
+    driver, findings = linker.driver, linker.findings
+    for place, name in enumerate(spec.without):
+        if name not in driver.commands:
+            text = f"there is no command {name!r}"
+            hint = did_you_mean(name, driver.commands, "commands")
+            inner = part.must("without").items()[place]
+            findings.error(inner, "unknown-command", text, hint=hint)
+    for name, inner in part.named("set").items():
+        if name not in state:
+            settable(name, inner, driver, findings)
+    held = tuple(name for name, one in driver.commands.items() if one.hold is not None)
+    without = spec.without or held
+    if not without:
+        text = "no command is held, so nothing says which ones keep it going"
+        findings.error(part, "missing-key", text, key=True, hint="write without: [COMMAND]")
+    return spec._replace(without=without)

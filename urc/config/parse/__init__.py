@@ -1,0 +1,1 @@
+"""Parts of a document → values of the model; names are still text."""

@@ -1,0 +1,99 @@
+"""The keys beside a form of reading: fields, set, when, and the lines of a reply."""
+
+from urc.config.parse.conversion import parse_conversion, parse_states
+from urc.config.part import Findings, Part
+from urc.expressions import Template
+from urc.model.codec import Collect, ReadSpec
+from urc.model.values import NOTHING, Conversion, Value
+from urc.patterns import Pattern
+
+_DURATIONS = ("throttle", "every")
+
+__all__ = ["beside_form", "parse_lines", "with_collected"]
+
+
+def beside_form(part: Part, spec: ReadSpec, findings: Findings) -> ReadSpec:
+    """Return `spec` with what stands beside its form in the reply or message at `part`."""
+    conversions = {
+        name: _conversion(inner, findings) for name, inner in part.named("fields").items()
+    }
+    sets = {
+        name: findings.expression(inner, allows_bytes=True)
+        for name, inner in part.named("set").items()
+    }
+    for name, inner in part.named("set").items():
+        if name in spec.fields:
+            text = f"the frame gives {name!r} already"
+            hint = f"call the field _{name}, and write it so in the expression"
+            findings.error(inner, "duplicate-name", text, key=True, hint=hint)
+    heads = part.named("head") if "head" in part.data else {}
+    for name, inner in heads.items():
+        if name in spec.fields:
+            text = f"the frame gives {name!r} already"
+            findings.error(inner, "duplicate-name", text, key=True, hint="call one of them _other")
+    when, subscribe = part.get("when"), part.get("subscribe")
+    topic = findings.template(subscribe.must("topic")) if subscribe else None
+    if topic is not None and ("+" in topic.source or "#" in topic.source):
+        spec = spec._replace(fields=(*spec.fields, "_topic"))
+    head = {name: str(inner.data).lower() for name, inner in heads.items()}
+    spec = spec._replace(head=head, fields=(*spec.fields, *head))
+    return spec._replace(
+        topic=topic,
+        listen=_listening(subscribe, findings) if subscribe else NOTHING,
+        fields=(*spec.fields, *sets),
+        conversions=conversions,
+        sets=_compiled(sets),
+        when=findings.expression(when) if when else None,
+    )
+
+
+def with_collected(part: Part, spec: ReadSpec, findings: Findings) -> ReadSpec:
+    """Return `spec` with what the message at `part` puts together out of several frames."""
+    found: dict[str, Collect] = {}
+    for name, inner in part.named("collect").items():
+        if name in spec.fields:
+            text = f"the frame gives {name!r} already"
+            hint = f"call the field _{name}, and collect that"
+            findings.error(inner, "duplicate-name", text, key=True, hint=hint)
+        begin, end = inner.get("begin"), inner.get("end")
+        if begin is None and end is None:
+            text = "nothing says where it begins or ends"
+            hint = "name what is true of its first frame (begin), or of its last one (end)"
+            findings.error(inner, "missing-key", text, key=True, hint=hint)
+        value = findings.expression(inner.must("value"), allows_bytes=True)
+        if value is not None:
+            found[name] = Collect(
+                value,
+                findings.expression(begin) if begin else None,
+                findings.expression(end) if end else None,
+                inner.integer("most") or Collect(value).most,
+            )
+    return spec._replace(fields=(*spec.fields, *found), collects=found) if found else spec
+
+
+def _listening(part: Part, findings: Findings) -> dict[str, Value]:
+    return {
+        name: findings.duration(part, name, 0.0, least=0.0)
+        if name in _DURATIONS
+        else part.scalar(name)
+        for name in part.data
+        if name != "topic"
+    }
+
+
+def _compiled(sets: dict[str, Template | None]) -> dict[str, Template]:
+    return {name: one for name, one in sets.items() if one is not None}
+
+
+def _conversion(part: Part, findings: Findings) -> Conversion:
+    conversion = parse_conversion(part, findings)
+    return conversion._replace(states=parse_states(part, "", findings))
+
+
+def parse_lines(part: Part | None, findings: Findings) -> int | Pattern | None:
+    """Return how many frames a reply is, or what the last of them matches."""
+    if part is None:
+        return None
+    if isinstance(part.data, dict):
+        return findings.pattern(part.must("until"))
+    return int(part.data)

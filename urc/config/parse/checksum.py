@@ -1,0 +1,246 @@
+"""The checksum of a framing: mapping → what it is and where, as far as it is written there.
+
+What depends on the rest of the frame (`at: end`, `over: payload`) is settled by the framing.
+"""
+
+from typing import Any, Final, NamedTuple
+
+from urc._sums import algorithm_names, algorithm_of
+from urc.config.parse.bytes import parse_bytes
+from urc.config.part import Findings, Part
+from urc.config.suggest import did_you_mean
+from urc.model.framing import (
+    PLAIN_CHECKSUMS,
+    CrcSpec,
+    FoldSpec,
+    Salt,
+    Spelling,
+    Window,
+    spelt_size,
+)
+
+__all__ = ["WrittenChecksum", "parse_checksum", "values_of"]
+
+
+_TRAIL_KEYS: Final = frozenset(("after", "each", "leading_zeros", "optional", "skip"))
+_NEEDED: Final = {
+    "after": "such as after: '*', where a mark stands before the checksum",
+    "each": "such as each: LF, where each line has a checksum",
+}
+
+
+class WrittenTrail(NamedTuple):
+    """How a checksum stands behind a text or its lines, as its author wrote it."""
+
+    mark: bytes
+    is_padded: bool
+    is_optional: bool
+    each: bytes
+    skip: int
+
+
+class WrittenChecksum(NamedTuple):
+    """A checksum as its author wrote it."""
+
+    part: Part
+    algorithm: CrcSpec | FoldSpec | str
+    bits: int
+    over: Window | str
+    """``payload``, ``frame``, or what part of the frame."""
+    at: int | None
+    """None: at the end."""
+    is_big: bool
+    spelling: Spelling
+    salt: Salt
+    is_from_hex: bool
+    closes: bool
+    before: bytes
+    trail: "WrittenTrail | None" = None
+    """Where it stands behind a text; `at` is None then."""
+
+    @property
+    def size(self) -> int:
+        """Bytes that it takes in the frame."""
+        return spelt_size(self.bits, self.spelling)
+
+
+def parse_checksum(part: Part, encoding: str, findings: Findings) -> WrittenChecksum | None:
+    """Return the checksum at `part`, or None when it was reported."""
+    algorithm = _algorithm(part.must("algorithm"), findings)
+    salt = _salt(part.get("salt"), encoding, findings)
+    over, at = part.get("over"), part.get("at")
+    window: Window | str = "payload"
+    if over is not None:
+        window = str(over.data) if isinstance(over.data, str) else _window(over, findings)
+    spelling: Any = part.text("as", "raw")
+    is_big = part.text("endian", "big") == "big"
+    is_from_hex = part.flag("from_hex", default=False)
+    closes = part.text("on_error", "drop") == "close"
+    before = parse_bytes(part.get("before"), encoding, findings)
+    trail = _trail(part, encoding, findings) if _TRAIL_KEYS & part.data.keys() else None
+    if algorithm is None or salt is None:
+        return None
+    place = None if at is None or isinstance(at.data, str) else int(at.data)
+    return WrittenChecksum(
+        part,
+        algorithm,
+        _bits(algorithm),
+        window,
+        place,
+        is_big,
+        spelling,
+        salt,
+        is_from_hex,
+        closes,
+        before or b"",
+        trail,
+    )
+
+
+def values_of(algorithm: CrcSpec | FoldSpec | str) -> frozenset[int]:
+    """Return which bytes a checksum may have in it when it is written raw."""
+    every = range(256)
+    if not isinstance(algorithm, FoldSpec) or algorithm.bits != 8:
+        return frozenset(every)
+    mask = 0xFF if algorithm.mask is None else algorithm.mask
+    return frozenset((one & mask) + algorithm.added & 0xFF | algorithm.ored for one in every)
+
+
+def _trail(part: Part, encoding: str, findings: Findings) -> WrittenTrail | None:
+    """Return how the checksum at `part` stands behind a text; None when it does not."""
+    mark = parse_bytes(part.get("after"), encoding, findings) or b""
+    each = parse_bytes(part.get("each"), encoding, findings) or b""
+    for key, bytes_found in (("after", mark), ("each", each)):
+        if key in part.data and part.data[key] in ("", []):
+            findings.error(part, "empty-mark", f"an empty '{key}' marks nothing", at=key)
+            return None
+        if bytes_found and isinstance(part.data.get("at", "end"), int):
+            text = f"'at' means nothing beside '{key}', which says where the checksum stands"
+            findings.error(part, "misplaced-key", text, at="at", key=True)
+    needs = {"optional": "after", "skip": "each", "leading_zeros": "after"}
+    for key, needed in needs.items():
+        if key in part.data and needed not in part.data:
+            text = f"'{key}' means nothing without '{needed}'"
+            hint = _NEEDED[needed]
+            findings.error(part, "misplaced-key", text, at=key, key=True, hint=hint)
+    is_padded = part.flag("leading_zeros", default=True)
+    if not is_padded and part.text("as", "raw") == "raw":
+        text = "raw bytes have no leading zeros"
+        hint = "add 'as: dec', or 'as: hex'"
+        findings.error(part, "misplaced-key", text, at="leading_zeros", key=True, hint=hint)
+    if not mark and not each:
+        return None
+    return WrittenTrail(
+        mark, is_padded, part.flag("optional", default=False), each, part.integer("skip") or 0
+    )
+
+
+def _bits(algorithm: CrcSpec | FoldSpec | str) -> int:
+    if isinstance(algorithm, str):
+        return PLAIN_CHECKSUMS[algorithm]
+    return algorithm.width if isinstance(algorithm, CrcSpec) else algorithm.bits
+
+
+def _algorithm(part: Part, findings: Findings) -> CrcSpec | FoldSpec | str | None:
+    if isinstance(part.data, str):
+        return _named(part, findings)
+    return _fold(part, findings) if "fold" in part.data else _crc(part, findings)
+
+
+def _named(part: Part, findings: Findings) -> CrcSpec | FoldSpec | str | None:
+    name: str = part.data
+    algorithm = algorithm_of(name)
+    if algorithm is not None:
+        return algorithm
+    hint = did_you_mean(name, algorithm_names())
+    if not hint.startswith("did you mean"):
+        hint = "for example crc16-modbus, crc32, sum8, xor8, lrc; or give 'width' and 'poly'"
+    findings.error(part, "unknown-checksum", f"there is no checksum {name!r}", hint=hint)
+    return None
+
+
+def _crc(part: Part, findings: Findings) -> CrcSpec | None:
+    width = part.integer("width") or 8
+    numbers = {name: part.integer(name) or 0 for name in ("poly", "init", "xorout")}
+    refin, refout = part.flag("refin", default=False), part.flag("refout", default=False)
+    is_good = True
+    for name, number in numbers.items():
+        if number >> width:
+            is_good = False
+            findings.error(
+                part,
+                "too-wide",
+                f"0x{number:X} has more than {width} bits",
+                at=name,
+                hint="the highest bit of the polynomial is not written" if name == "poly" else "",
+            )
+    if not is_good:
+        return None
+    return CrcSpec(width, numbers["poly"], numbers["init"], refin, refout, numbers["xorout"])
+
+
+def _fold(part: Part, findings: Findings) -> FoldSpec | None:
+    operation, complement = part.text("fold"), part.text("complement", "none")
+    bits, of = part.integer("bits") or 8, part.integer("of") or 8
+    mask, ored = part.integer("mask"), part.integer("or") or 0
+    added = part.integer("add") or 0
+    is_good = True
+    for name, number in (("mask", mask or 0), ("add", added), ("or", ored)):
+        if number >> bits:
+            is_good = False
+            text = f"0x{number:X} has more than {bits} bits"
+            findings.error(part, "too-wide", text, at=name)
+    if operation == "xor" and of > bits:
+        is_good = False
+        text = f"numbers of {of} bits do not fit a result of {bits}"
+        findings.error(part, "too-wide", text, at="of")
+    is_odd_xored = part.text("odd", "zeros") == "xor"
+    if "odd" in part.data and of == 8:
+        is_good = False
+        text = "'odd' means nothing where single bytes are put together"
+        findings.error(part, "misplaced-key", text, at="odd", key=True, hint="add 'of: 16'")
+    if not is_good:
+        return None
+    return FoldSpec(
+        "sum" if operation == "sum" else "xor",
+        bits,
+        of,
+        "ones" if complement == "ones" else "twos" if complement == "twos" else "none",
+        mask,
+        added,
+        ored,
+        is_odd_xored,
+    )
+
+
+def _window(part: Part, findings: Findings) -> Window | str:
+    start, stop = part.integer("from") or 0, part.integer("to")
+    if stop is not None and (start < 0) == (stop < 0) and start >= stop:
+        findings.error(
+            part,
+            "empty-window",
+            f"from {start} to {stop} there is nothing",
+            hint="places count from 0; negative ones count back from the end of the frame",
+        )
+        return "payload"
+    return Window(start, stop)
+
+
+def _salt(part: Part | None, encoding: str, findings: Findings) -> Salt | None:
+    if part is None:
+        return Salt()
+    if not isinstance(part.data, dict):
+        constant = parse_bytes(part, encoding, findings)
+        return None if constant is None else Salt(constant)
+    rows: dict[int, bytes] = {}
+    is_good = True
+    for name, inner in part.must("table").entries().items():
+        row = parse_bytes(inner, encoding, findings)
+        if row is None:
+            is_good = False
+        else:
+            rows[int(name, 0)] = row
+    offset, size = part.integer("offset") or 0, part.integer("size") or 1
+    is_big = part.text("endian", "big") == "big"
+    otherwise: Any = part.text("else", "fault")
+    return Salt(b"", offset, size, is_big, rows, otherwise) if is_good else None

@@ -1,0 +1,248 @@
+"""A driver: mapping → `Driver`, patterns and templates compiled."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from urc.config.moving import with_moving_steps
+from urc.config.parse.beside_form import with_collected
+from urc.config.parse.flow import (
+    NOTHING_SENT,
+    aged_by_lines,
+    command_with_flow,
+    line_with_flow,
+    parse_choice_questions,
+    parse_sequence,
+    poll_with_flow,
+)
+from urc.config.parse.form import FormContext, parse_read, parse_write
+from urc.config.parse.line import parse_transport
+from urc.config.parse.reply import implied_reply, parse_reply
+from urc.config.parse.signal import parse_signal, with_ages
+from urc.config.part import Findings, Part
+from urc.config.values import check_range, check_within, element_of, fit, fit_hint, shown
+from urc.model.driver import Argument, Command, Driver, Message, Poll, Reply, TransportSpec
+from urc.model.values import NOTHING, Reading, Value
+from urc.registry import Catalog
+
+__all__ = ["parse_driver", "spoken_name"]
+
+
+def parse_driver(part: Part, findings: Findings, catalog: Catalog) -> Driver:
+    """Return the driver in the mapping at `part`; what was reported is left at a default."""
+    transports = {
+        name: parse_transport(inner, findings, catalog)
+        for name, inner in part.named("transports").items()
+    }
+    # Where a message comes from and a command goes to may be left out when there is one line only.
+    types, enums = _types(part, findings)
+    lines = _Lines(transports, FormContext("", _set_by_frames(part), types, enums, catalog))
+    transports = {
+        name: line_with_flow(
+            spec, part.must("transports").must(name), lines.context(name), findings
+        )
+        for name, spec in transports.items()
+    }
+    commands = {
+        name: _command(inner, lines, findings) for name, inner in part.named("commands").items()
+    }
+    messages = {
+        name: _message(inner, lines, findings) for name, inner in part.named("messages").items()
+    }
+    polls = tuple(_poll(inner, lines, commands, findings) for inner in part.listed("polls"))
+    signals = {
+        name: parse_signal(inner, spoken_name(name), findings)
+        for name, inner in part.named("signals").items()
+    }
+    return Driver(
+        transports=transports,
+        signals=with_ages(aged_by_lines(signals, transports, messages, polls), polls),
+        # A sequence that is called like a command is reported with the names.
+        commands=with_moving_steps({**_sequences(part, lines, findings), **commands}),
+        messages=messages,
+        polls=polls,
+        discovery=_discovery(part.get("discovery")),
+    )
+
+
+def _discovery(part: Part | None) -> tuple[str, ...]:
+    """Return the types of services."""
+    return () if part is None else tuple(str(one.data) for one in part.listed("mdns"))
+
+
+def _set_by_frames(part: Part) -> frozenset[str]:
+    """Return the signals that are not computed."""
+    signals = part.named("signals").items()
+    return frozenset(name for name, inner in signals if "value" not in inner.data)
+
+
+def _sequences(part: Part, lines: "_Lines", findings: Findings) -> dict[str, Command]:
+    context = lines.context(lines.only)
+    return {
+        name: parse_sequence(inner, spoken_name(name), lines.only, context, findings)
+        for name, inner in part.named("sequences").items()
+    }
+
+
+def _types(part: Part, findings: Findings) -> tuple[Mapping[str, Any], Mapping[str, Any]]:
+    """Return the driver's ``types:`` and ``enums:``; most have none, and need none of the code."""
+    if "types" not in part.data and "enums" not in part.data:
+        return NOTHING, NOTHING
+    from urc.config.parse.struct.numbers import parse_enums
+    from urc.config.parse.types import parse_types
+
+    enums = parse_enums(part, findings)
+    return parse_types(part, enums, findings), enums
+
+
+class _Lines:
+    """The transports, for those who name one, or may leave it out because there is only one.
+
+    A line that only carries others does not count.
+    """
+
+    def __init__(self, transports: Mapping[str, TransportSpec], context: FormContext) -> None:
+        self._transports = transports
+        self._context = context
+        own = [one.name for one in transports.values() if one.options.get("mode") != "forward"]
+        own = own or list(transports)
+        self.only = own[0] if len(own) == 1 else ""
+
+    def name(self, part: Part, key: str) -> str:
+        """Return the transport that `part` names under `key`."""
+        return part.text(key, self.only)
+
+    def context(self, name: str) -> FormContext:
+        """Return what forms must know of the transport `name`, which may not exist."""
+        spec = self._transports.get(name)
+        encoding = spec.encoding if spec else FormContext().encoding
+        return self._context._replace(encoding=encoding, framing=spec.framing if spec else None)
+
+
+def spoken_name(name: str) -> str:
+    """Return ``joint_1`` as people read it: ``Joint 1``."""
+    words = name.replace("_", " ").replace("-", " ").strip()
+    return words[:1].upper() + words[1:]
+
+
+def reply_timeout_s(reply: Reply, transport: TransportSpec | None) -> float:
+    """Return how long the answer may take."""
+    if reply.timeout_s is not None:
+        return reply.timeout_s
+    return transport.timeouts.reply_s if transport else 2.0
+
+
+def _message(part: Part, lines: _Lines, findings: Findings) -> Message:
+    transport = lines.name(part, "from")
+    context, answer = lines.context(transport), part.get("answer")
+    read = with_collected(part, parse_read(part, findings, context), findings)
+    sent = None if answer is None else parse_write(answer, findings, context)
+    return Message(part.name, transport, read, sent)
+
+
+def _poll(part: Part, lines: _Lines, commands: dict[str, Command], findings: Findings) -> Poll:
+    transport = lines.name(part, "to")
+    context = lines.context(transport)
+    send = part.get("send")
+    asked = parse_write(send, findings, context) if send else NOTHING_SENT
+    poll = Poll(
+        name=part.text("name", f"polls.{part.name}"),
+        transport=transport,
+        every_s=findings.duration(part, "every", 1.0, least=0.005),
+        send=asked,
+        reply=parse_reply(part.get("reply"), findings, context) or implied_reply(asked),
+        phase_s=findings.duration(part, "phase", 0.0, least=0.0, most=3600),
+    )
+    return poll_with_flow(poll, part, commands, findings)
+
+
+def _command(part: Part, lines: _Lines, findings: Findings) -> Command:
+    transport = lines.name(part, "to")
+    context = lines.context(transport)
+    send = parse_write(part.must("send"), findings, context)
+    command = Command(
+        name=part.name,
+        transport=transport,
+        send=send,
+        arguments={name: _argument(inner, findings) for name, inner in part.named("args").items()},
+        reply=parse_reply(part.get("reply"), findings, context) or implied_reply(send),
+        title=part.text("title", spoken_name(part.name)),
+        description=part.text("description"),
+    )
+    return command_with_flow(command, part, findings)
+
+
+def _argument(part: Part, findings: Findings) -> Argument:
+    kind = part.text("type", "number")
+    of = element_of(part, kind, findings)
+    low, high = check_range(part, of, findings)
+    choices = [_fitting(inner, of, findings) for inner in part.listed("choices")]
+    default_part = part.get("default")
+    default: Reading = None
+    if default_part is not None:
+        default = _default(default_part, part, kind, findings)
+        for one in default if isinstance(default, tuple) else (default,):
+            check_within(one, low, high, default_part, findings)
+            if choices and one not in choices:
+                text = "the default is not one of the choices"
+                findings.error(default_part, "unknown-word", text)
+    _check_argument(part, kind, of, findings)
+    argument = Argument(
+        name=part.name,
+        type=kind,  # type: ignore[arg-type]  # the schema's enum is this Literal
+        title=part.text("title", spoken_name(part.name)),
+        unit=part.text("unit"),
+        min=low,
+        max=high,
+        choices=tuple(choices),
+        default=default,
+        is_required=part.flag("required", default=default is None),
+        allows_control=part.flag("allow_control", default=False),
+        description=part.text("description"),
+        of=of,  # type: ignore[arg-type]  # as above
+        size=part.integer("size"),
+    )
+    return parse_choice_questions(part, argument, findings)
+
+
+def _check_argument(part: Part, kind: str, of: str, findings: Findings) -> None:
+    """Report a name that templates have already, and what means nothing for its type."""
+    if part.name in ("settings", "pi"):
+        what = "the settings" if part.name == "settings" else "the number"
+        findings.error(
+            part,
+            "bad-name",
+            f"an argument cannot be called {part.name!r}",
+            key=True,
+            hint=f"templates find {what} under that name",
+        )
+    if of != "string" and "allow_control" in part.data:
+        findings.error(
+            part,
+            "misplaced-key",
+            f"'allow_control' means nothing for {kind}",
+            at="allow_control",
+            key=True,
+        )
+
+
+def _default(inner: Part, argument: Part, kind: str, findings: Findings) -> Reading:
+    """Return the default; of an array, a list of as many elements as it has."""
+    if kind != "array":
+        return _fitting(inner, kind, findings)
+    if not isinstance(inner.data, list):
+        text = f"expected a list, found {shown(inner.data)}"
+        findings.error(inner, "wrong-type", text, hint="such as [0, 0, 0]")
+        return None
+    size = argument.integer("size")
+    if size is not None and len(inner.data) != size:
+        text = f"expected {size} elements, found {len(inner.data)}"
+        findings.error(inner, "wrong-size", text)
+    return tuple(_fitting(one, argument.text("of", "number"), findings) for one in inner.items())
+
+
+def _fitting(part: Part, kind: str, findings: Findings) -> Value:
+    try:
+        return fit(part.data, kind)
+    except ValueError as error:
+        findings.error(part, "wrong-type", str(error), hint=fit_hint(part.data, kind))
+        return None

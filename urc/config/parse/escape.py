@@ -1,0 +1,140 @@
+"""Byte stuffing of a framing: mapping → which bytes are hidden, and how."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from urc.config.parse.bytes import parse_bytes
+from urc.config.part import Findings, Part
+from urc.model.framing import EscapeSpec, FrameLayout
+
+__all__ = ["parse_escape"]
+
+
+def parse_escape(
+    part: Part, layout: FrameLayout, options: Mapping[str, Any], encoding: str, findings: Findings
+) -> EscapeSpec | None:
+    """Return ``escape`` of the framing at `part`; None when there is none, or it was reported."""
+    if "escape" not in part.data:
+        return None
+    inner = part.must("escape")
+    given = [key for key in ("xor", "table", "double", "after") if key in inner.data]
+    if len(given) != 1:
+        text = "'xor', 'table', 'double' or 'after' is missing"
+        if given:
+            text = f"'{given[0]}' and '{given[1]}' both say how bytes are hidden"
+        where = {"at": given[1]} if given else {}
+        findings.error(inner, "two-forms" if given else "missing-key", text, key=True, **where)
+        return None
+    before = len(findings.problems)
+    is_of_payload = inner.text("of", "frame") == "payload"
+    if given[0] == "after":
+        spec = _inserted(inner, encoding, findings)
+    else:
+        marks = () if is_of_payload else _marks(part, layout, options)
+        spec = _escaped(inner, given[0], marks, encoding, findings)
+    if spec is None or len(findings.problems) > before:
+        return None
+    return spec._replace(is_of_payload=is_of_payload)
+
+
+def _marks(part: Part, layout: FrameLayout, options: Mapping[str, Any]) -> tuple[bytes, ...]:
+    ends = (options.get("tx", layout.end), options.get("rx", layout.end))
+    is_measured = part.text("type") == "length"
+    return (layout.start, *(() if is_measured else ends))
+
+
+def _one(part: Part, encoding: str, findings: Findings) -> int | None:
+    """Return the byte at `part`."""
+    found = parse_bytes(part, encoding, findings)
+    if found is None or len(found) == 1:
+        return None if found is None else found[0]
+    findings.error(part, "wrong-size", f"one byte is expected, found {len(found)}")
+    return None
+
+
+def _inserted(part: Part, encoding: str, findings: Findings) -> EscapeSpec | None:
+    after = parse_bytes(part.must("after"), encoding, findings)
+    insert_part = part.get("insert")
+    if after == b"":
+        findings.error(part, "empty-mark", "nothing cannot be looked for", at="after")
+    if insert_part is None:
+        text = "'insert' is missing: the byte that is put in behind the sequence"
+        findings.error(part, "missing-key", text, at="after", key=True)
+        return None
+    insert = _one(insert_part, encoding, findings)
+    for key in ("byte", "bytes"):
+        if key in part.data:
+            text = f"'{key}' means nothing beside 'after'"
+            findings.error(part, "misplaced-key", text, at=key, key=True)
+    return None if after is None or insert is None else EscapeSpec(after=after, insert=insert)
+
+
+def _escaped(
+    part: Part, way: str, marks: tuple[bytes, ...], encoding: str, findings: Findings
+) -> EscapeSpec | None:
+    byte_part = part.get("byte")
+    if byte_part is None:
+        text = "'byte' is missing: the one that stands before a hidden byte"
+        findings.error(part, "missing-key", text, at=way, key=True)
+        return None
+    byte = _one(byte_part, encoding, findings)
+    if "insert" in part.data:
+        text = f"'insert' means nothing beside '{way}'"
+        findings.error(part, "misplaced-key", text, at="insert", key=True)
+    if byte is None:
+        return None
+    if way == "double" and part.flag("double", default=False):
+        _check_doubled(part, byte, marks, findings)
+        return EscapeSpec(byte, {byte: byte})
+    if way == "table":
+        return _table(part, byte, marks, encoding, findings)
+    xor = part.integer("xor") or 0
+    others = part.get("bytes")
+    more = parse_bytes(others, encoding, findings) if others is not None else b""
+    hidden = {byte, *(one for mark in marks for one in mark), *(more or b"")}
+    table = {one: one ^ xor for one in sorted(hidden)}
+    _check_hidden(part, "xor", table, findings)
+    return EscapeSpec(byte, table, xor)
+
+
+def _table(
+    part: Part, byte: int, marks: tuple[bytes, ...], encoding: str, findings: Findings
+) -> EscapeSpec | None:
+    table: dict[int, int] = {}
+    for key, inner in part.must("table").entries().items():
+        second = _one(inner, encoding, findings)
+        if second is not None:
+            table[int(key, 0)] = second
+    needed = {byte, *(one for mark in marks for one in mark[:1])}
+    missing = sorted(needed - table.keys())
+    if missing:
+        text = f"{missing[0]:02X} is not in the table, and would not be hidden"
+        findings.error(part, "missing-key", text, at="table")
+        return None
+    if len(set(table.values())) < len(table):
+        text = "two bytes of the table are hidden by the same one"
+        findings.error(part, "duplicate-name", text, at="table")
+        return None
+    _check_hidden(part, "table", table, findings)
+    return EscapeSpec(byte, table)
+
+
+def _check_hidden(part: Part, at: str, table: Mapping[int, int], findings: Findings) -> None:
+    """Report what stands for a hidden byte and would have to be hidden itself."""
+    wrong = next((one for one in table.values() if one in table), None)
+    if wrong is not None:
+        text = f"{wrong:02X} stands for a hidden byte, and is hidden itself"
+        findings.error(part, "overlap", text, at=at)
+
+
+def _check_doubled(part: Part, byte: int, marks: tuple[bytes, ...], findings: Findings) -> None:
+    for mark in marks:
+        if mark and mark[0] != byte:
+            shown = mark.hex(" ")
+            text = f"the mark {shown} does not begin with {byte:02X}, and would not be hidden"
+            findings.error(part, "does-not-fit", text, at="byte")
+            return
+        if len(mark) > 1 and mark[1] == byte:
+            text = f"the mark {mark.hex(' ')} looks like a byte that is doubled"
+            findings.error(part, "overlap", text, at="double")
+            return

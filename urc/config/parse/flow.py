@@ -1,0 +1,401 @@
+"""How talk flows: queues, rates, conditions, what is held and what is kept alive."""
+
+import math
+from collections.abc import Iterable, Mapping
+from typing import Final, Literal, cast
+
+from urc.config.messaging import MESSAGING
+from urc.config.moving import parse_moves
+from urc.config.parse.form import FormContext, parse_write
+from urc.config.parse.reply import parse_errors, refuse
+from urc.config.parse.steps import StepContext, parse_steps
+from urc.config.part import Findings, Part
+from urc.config.suggest import did_you_mean
+from urc.config.values import given
+from urc.expressions import compile_template
+from urc.model.codec import WriteSpec
+from urc.model.driver import Argument, Command, Message, Poll, TransportSpec
+from urc.model.flow import (
+    MAX_STEP_S,
+    Confirm,
+    ExpectStep,
+    Hold,
+    Keepalive,
+    Offline,
+    Priority,
+    PromptStep,
+    Queue,
+    Requirement,
+    Retry,
+    SendStep,
+    Verify,
+    all_steps,
+)
+from urc.model.values import Reading, Signal, Value
+
+__all__ = [
+    "NOTHING_SENT",
+    "command_with_flow",
+    "line_with_flow",
+    "parse_choice_questions",
+    "parse_sequence",
+    "poll_with_flow",
+]
+
+_PER_S: Final = {"s": 1.0, "m": 60.0, "h": 3600.0}
+NOTHING_SENT: Final = WriteSpec("text", {"template": compile_template("")})
+"""What a sequence sends by itself."""
+
+
+def line_with_flow(
+    spec: TransportSpec, part: Part, context: FormContext, findings: Findings
+) -> TransportSpec:
+    """Return the transport with what it does by itself."""
+    queue = part.get("queue")
+    if spec.connection == "per_request":
+        refuse(part, ("keepalive",), "means nothing where each request connects anew", findings)
+        if queue is not None:
+            refuse(queue, ("in_flight",), "is 1 where each request connects anew", findings)
+    if spec.is_half_duplex and queue is not None:
+        refuse(queue, ("in_flight",), "is 1 where one side talks at a time", findings)
+    timeouts = part.get("timeouts")
+    if timeouts is not None and "on_connect" not in part.data:
+        refuse(timeouts, ("on_connect",), "limits nothing: there are no steps", findings)
+    steps = StepContext(spec.name, is_named=False, forms=context)
+    on_connect, on_close = part.get("on_connect"), part.get("on_close")
+    errors, faults = parse_errors(part, findings, context)
+    if queue is not None and spec.type in MESSAGING:
+        refuse(queue, ("bytes",), "counts bytes, and this line carries messages", findings)
+    return spec._replace(
+        errors=errors,
+        faults=faults,
+        queue=_queue(queue, spec.type),
+        keepalive=_keepalive(part.get("keepalive"), context, findings),
+        on_connect=parse_steps(on_connect, steps, findings) if on_connect else (),
+        on_close=parse_steps(on_close, steps, findings) if on_close else (),
+        stale_after_s=findings.duration(part, "stale_after", 0.0, least=0.05) or None,
+    )
+
+
+def aged_by_lines(
+    signals: Mapping[str, Signal],
+    transports: Mapping[str, TransportSpec],
+    messages: Mapping[str, Message],
+    polls: Iterable[Poll],
+) -> dict[str, Signal]:
+    """Return the signals, as old as the silence of the line that they come over.
+
+    Where a line says nothing of its silence, and for a signal with an age of its own, nothing is
+    changed.
+    """
+    ages: dict[str, list[float]] = {}
+    frames = [(one.transport, one.read) for one in messages.values()]
+    frames += [(one.transport, one.reply.read) for one in polls if one.reply is not None]
+    for transport, read in frames:
+        spec = transports.get(transport)
+        if spec is not None and spec.stale_after_s is not None:
+            for name in read.fields:
+                ages.setdefault(name, []).append(spec.stale_after_s)
+    return {
+        name: one._replace(stale_after_s=min(ages[name]))
+        if name in ages and not one.stale_after_s
+        else one
+        for name, one in signals.items()
+    }
+
+
+def command_with_flow(command: Command, part: Part, findings: Findings) -> Command:
+    """Return the command with when it may be sent, and how."""
+    hold, confirm, verify = part.get("hold"), part.get("confirm"), part.get("verify")
+    retries, retry = _retries(part.get("retries"), findings)
+    is_idempotent = part.flag("idempotent", default=False)
+    is_asked_again = command.reply is not None and command.reply.is_asked_again
+    if retries and not (is_idempotent or is_asked_again):
+        findings.error(
+            part,
+            "not-idempotent",
+            "it may be done twice when its answer is lost",
+            at="retries",
+            hint="write idempotent: true when twice is the same as once, or take 'retries' away",
+        )
+    if retries and command.reply is None:
+        findings.error(
+            part, "misplaced-key", "'retries' without 'reply': nothing tells of a failure",
+            at="retries", key=True,
+        )  # fmt: skip
+    if part.text("priority") == "realtime":
+        refuse(part, ("coalesce", "rate_limit"), "means nothing for what never waits", findings)
+    if hold is not None:
+        refuse(part, ("moves", "stop"), "means nothing beside 'hold': a hand moves it", findings)
+        _refuse_asides(part.get("reply"), findings)
+    stops = part.flag("stop", default=False)
+    if stops:
+        _check_stop(command, part, findings)
+    moves, moves_if = parse_moves(part, findings)
+    return command._replace(
+        priority=cast("Priority", part.text("priority", "realtime" if stops else "normal")),
+        is_latest_only=part.text("coalesce") == "latest",
+        rate_per_s=_rate(part.get("rate_limit"), findings),
+        retries=retries,
+        retry=retry,
+        is_idempotent=is_idempotent,
+        hold=_hold(hold, findings) if hold else None,
+        moves=moves,
+        moves_if=moves_if,
+        stops=stops,
+        confirm=_confirm(confirm) if confirm else None,
+        requires=_requires(part, findings),
+        verify=_verify(verify, findings) if verify else None,
+    )
+
+
+def _refuse_asides(reply: Part | None, findings: Findings) -> None:
+    """Report what a robot asks for about motion: the newest values go out all the time."""
+    for inner in [reply, *reply.listed("stages")] if reply is not None else ():
+        why = "means nothing beside 'hold': the next value goes out anyway"
+        refuse(inner, ("resend", "extend"), why, findings)
+
+
+def _check_stop(command: Command, part: Part, findings: Findings) -> None:
+    """Report what would keep back a command that STOP gives, or make it wait."""
+    moves = () if part.data.get("moves") is False else ("moves",)  # false only says so once more
+    hindering = (*moves, "confirm", "requires", "coalesce", "rate_limit")
+    refuse(part, hindering, "means nothing beside 'stop': nothing may keep it back", findings)
+    for name, one in command.arguments.items():
+        if one.confirm or (one.is_required and one.default is None):
+            what = "asks people" if one.confirm else "has no default"
+            findings.error(
+                part,
+                "missing-argument",
+                f"STOP gives it without arguments, and {name!r} {what}",
+                at="stop",
+                key=True,
+                hint="give a command that stops, and takes nothing",
+            )
+
+
+def poll_with_flow(
+    poll: Poll, part: Part, commands: dict[str, Command], findings: Findings
+) -> Poll:
+    """Return the poll with the command that it runs, and when it is asked."""
+    offline, when = part.get("offline"), part.get("when")
+    poll = poll._replace(
+        when=findings.expression(when) if when else None,
+        priority=cast("Priority", part.text("priority", "low")),
+        offline=_offline(offline, findings) if offline else None,
+    )
+    run = part.get("run")
+    if run is None:
+        if "send" not in part.data:
+            findings.error(
+                part, "missing-key", "'send' or 'run' is missing: it asks nothing", key=True
+            )
+        refuse(part, ("args",), "belongs to 'run'", findings)
+        return poll
+    refuse(part, ("send", "reply", "to"), "means nothing beside 'run'", findings)
+    poll = poll._replace(run=str(run.data), arguments=_arguments(part))
+    command = commands.get(poll.run)
+    if command is None:
+        return poll  # reported with the names
+    defaults = {name: one.default for name, one in command.arguments.items()}
+    return poll._replace(
+        transport=command.transport,
+        send=command.send,
+        reply=command.reply,
+        arguments={**defaults, **poll.arguments},
+    )
+
+
+def parse_sequence(
+    part: Part, title: str, only: str, context: FormContext, findings: Findings
+) -> Command:
+    """Return the command that stands for a sequence.
+
+    Args:
+        part: the list of steps, or a mapping with it.
+        title: as people read its name.
+        only: the only transport there is, or "".
+        context: of forms.
+        findings: takes what is wrong.
+    """
+    inner = part.must("steps") if isinstance(part.data, dict) else part
+    steps = parse_steps(inner, StepContext(only, is_named=True, forms=context), findings)
+    named = [
+        step.transport
+        for step in all_steps(steps)
+        if isinstance(step, (SendStep, ExpectStep, PromptStep)) and step.transport
+    ]
+    sequence = Command(
+        name=part.name,
+        transport=named[0] if named else only,
+        send=NOTHING_SENT,
+        title=title,
+        steps=steps,
+    )
+    if not isinstance(part.data, dict):
+        return sequence
+    confirm = part.get("confirm")
+    return sequence._replace(
+        title=part.text("title", title),
+        description=part.text("description"),
+        moves=part.flag("moves", default=False),
+        confirm=_confirm(confirm) if confirm else None,
+        requires=_requires(part, findings),
+    )
+
+
+def _arguments(part: Part) -> dict[str, Reading]:
+    return {name: given(inner.data) for name, inner in part.named("args").items()}
+
+
+_NUMBERED_IN_FLIGHT: Final = 16
+"""Where answers say whose they are, nothing needs to wait for them."""
+
+
+def _queue(part: Part | None, kind: str) -> Queue:
+    default = Queue(in_flight=_NUMBERED_IN_FLIGHT if kind in MESSAGING else 1)
+    if part is None:
+        return default
+    return Queue(
+        part.integer("in_flight") or default.in_flight,
+        part.integer("depth") or default.depth,
+        part.integer("bytes"),
+    )
+
+
+def _keepalive(part: Part | None, context: FormContext, findings: Findings) -> Keepalive | None:
+    if part is None:
+        return None
+    given = [key for key in ("send", "run") if key in part.data]
+    if len(given) != 1:
+        text = "'send' and 'run' both say it" if given else "'send' or 'run' is missing"
+        where = {"at": "run"} if given else {}
+        findings.error(part, "two-forms" if given else "missing-key", text, key=True, **where)
+        return None
+    send = part.get("send")
+    return Keepalive(
+        every_s=findings.duration(part, "every", 1.0, least=0.05),
+        run=part.text("run"),
+        send=parse_write(send, findings, context) if send else None,
+        watchdog_s=findings.duration(part, "watchdog", 0.0) or None,
+        after=tuple(str(inner.data) for inner in part.listed("after")),
+    )
+
+
+def _rate(part: Part | None, findings: Findings) -> float | None:
+    if part is None:
+        return None
+    number, _, unit = str(part.data).partition("/")
+    rate = float(number) / _PER_S[unit]
+    if not 1 / 3600 <= rate <= 1000:
+        findings.error(part, "out-of-range", f"expected 1/h to 1000/s, found {part.data}")
+        return None
+    return rate
+
+
+def _hold(part: Part, findings: Findings) -> Hold:
+    repeat_s = findings.duration(part, "repeat", 0.05, least=0.01, most=10)
+    lease_s = findings.duration(part, "lease", 0.25, least=0.1, most=1.0)
+    release, step = part.get("release"), part.get("step")
+    step_s = findings.duration(part, "step", 0.0, least=0.001, most=10) if step else None
+    if step is not None:
+        text = "means nothing beside 'step': the robot stops by itself after each"
+        refuse(part, ("release", "watchdog"), text, findings)
+    elif release is None:
+        findings.error(
+            part,
+            "missing-release",
+            "nothing says how the motion stops when it is let go",
+            key=True,
+            hint="write release: { … } with the arguments that mean standstill, or step: with the"
+            " time of a step after which the robot stops by itself",
+        )
+        return Hold(repeat_s)
+    entries = release.entries() if release is not None else {}
+    values = {name: given(inner.data) for name, inner in entries.items()}
+    slew = {name: float(inner.data) for name, inner in part.named("slew").items()}
+    on_stall = cast("Literal['abort', 'wait'] | None", part.text("on_stall") or None)
+    return Hold(repeat_s, values, lease_s, _watchdog_s(part, findings), slew, on_stall, step_s)
+
+
+def _watchdog_s(part: Part, findings: Findings) -> float | None:
+    if part.text("watchdog") == "none":
+        return math.inf
+    return findings.duration(part, "watchdog", 0.0) or None
+
+
+def _confirm(part: Part) -> Confirm:
+    level = cast("Literal['normal', 'hazardous']", part.text("level", "normal"))
+    return Confirm(level, part.must("text").data, part.flag("two_person", default=False))
+
+
+def parse_choice_questions(part: Part, argument: Argument, findings: Findings) -> Argument:
+    """Return the argument with the questions before some of its values."""
+    asked = part.named("confirm")
+    if not asked:
+        return argument
+    kind = argument.of if argument.type == "array" else argument.type
+    words = ["true", "false"] if kind == "boolean" else [_written(one) for one in argument.choices]
+    if not words:
+        findings.error(
+            part,
+            "misplaced-key",
+            "'confirm' is about some of its choices, and there are none",
+            at="confirm",
+            key=True,
+            hint="write choices: […], or 'confirm' beside 'send' to ask every time",
+        )
+    for name, inner in asked.items():
+        if words and name not in words:
+            findings.error(
+                inner,
+                "unknown-word",
+                f"{name!r} is not one of the choices",
+                key=True,
+                hint=did_you_mean(name, words, "choices"),
+            )
+    return argument._replace(confirm={name: _confirm(inner) for name, inner in asked.items()})
+
+
+def _written(value: Value) -> str:
+    """Return a choice as a document writes it as a key."""
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def _retries(part: Part | None, findings: Findings) -> tuple[int, Retry]:
+    """Return how often a request is sent again, and after which waits."""
+    if part is None:
+        return 0, Retry()
+    if not isinstance(part.data, dict):
+        return int(part.data), Retry()
+    initial_s = findings.duration(part, "initial", 0.0, most=MAX_STEP_S)
+    max_s = findings.duration(part, "max", initial_s, most=MAX_STEP_S)
+    if max_s < initial_s:
+        findings.error(
+            part,
+            "wrong-order",
+            "the first wait is longer than the longest one",
+            at="initial",
+            hint="'initial' is the first wait, 'max' the longest",
+        )
+    return part.integer("count") or 0, Retry(initial_s, max_s)
+
+
+def _requires(part: Part, findings: Findings) -> tuple[Requirement, ...]:
+    found = []
+    for inner in part.listed("requires"):
+        condition = findings.expression(inner.must("expr"))
+        if condition is not None:
+            found.append(Requirement(condition, inner.must("else").data))
+    return tuple(found)
+
+
+def _verify(part: Part, findings: Findings) -> Verify | None:
+    condition = findings.expression(part.must("expr"))
+    within_s = findings.duration(part, "within", 1.0, most=MAX_STEP_S)
+    return None if condition is None else Verify(condition, within_s)
+
+
+def _offline(part: Part, findings: Findings) -> Offline:
+    after = part.integer("after") or 1
+    return Offline(after, findings.duration(part, "retry", 10.0, least=0.05))

@@ -1,0 +1,160 @@
+"""Forms of frames: which there are, and which one a document uses at a place.
+
+A form is a module of this package with two functions. For reading:
+
+    parse_read(part, findings, context) -> ReadSpec | None
+    place_of(part, field) -> (part, where), so that a finding about a field can point at it
+
+and for writing:
+
+    parse_write(part, findings, context) -> WriteSpec | None
+    templates(part, spec) -> iterable of (part, template), for the names used in them
+
+`part` is what stands under the form's key; None means that it was reported.
+"""
+
+from collections.abc import Iterable, Mapping
+from importlib import import_module
+from typing import Any, NamedTuple, Protocol, cast
+
+from urc.config.parse.beside_form import beside_form
+from urc.config.part import Findings, Part
+from urc.expressions import Template
+from urc.model.binary import Item
+from urc.model.codec import ReadSpec, WriteSpec
+from urc.model.driver import FramingSpec
+from urc.model.values import NOTHING
+from urc.registry import Catalog
+
+__all__ = [
+    "READ_FORMS",
+    "WRITE_FORMS",
+    "FormContext",
+    "ReadForm",
+    "WriteForm",
+    "body_form",
+    "parse_read",
+    "parse_write",
+    "read_form",
+    "write_form",
+]
+
+READ_FORMS = {
+    "regex": "urc.config.parse.forms.regex",
+    "pattern": "urc.config.parse.forms.pattern",
+    "split": "urc.config.parse.forms.split",
+    "keyvalue": "urc.config.parse.forms.keyvalue",
+    "json": "urc.config.parse.forms.json",
+    "xml": "urc.config.parse.forms.xml",
+    "equals": "urc.config.parse.forms.equals",
+    "raw": "urc.config.parse.forms.raw",
+    "struct": "urc.config.parse.forms.struct",
+}
+WRITE_FORMS = {
+    "text": "urc.config.parse.forms.text",
+    "hex": "urc.config.parse.forms.hex",
+    "bytes": "urc.config.parse.forms.bytes",
+    "json": "urc.config.parse.forms.json_text",
+    "struct": "urc.config.parse.forms.struct",
+    "publish": "urc.config.parse.forms.envelope",
+    "call": "urc.config.parse.forms.envelope",
+    "goal": "urc.config.parse.forms.envelope",
+    "cancel": "urc.config.parse.forms.envelope",
+    "request": "urc.config.parse.forms.envelope",
+}
+_BODIES = ("json", "text", "hex", "bytes", "struct")
+"""Forms that may be the body of an envelope."""
+_NO_READ = ReadSpec("regex")
+_NO_WRITE = WriteSpec("text")
+
+
+class FormContext(NamedTuple):
+    """What a form may need to know of its surroundings."""
+
+    encoding: str = "utf-8"
+    """Of the line that the frame comes from or goes to."""
+    signals: frozenset[str] = frozenset()
+    """Names of the driver's signals."""
+    types: Mapping[str, tuple[Item, ...]] = NOTHING
+    """The driver's reusable structs."""
+    enums: Mapping[str, tuple[tuple[int, str], ...]] = NOTHING
+    """The driver's lists of words for numbers."""
+    catalog: Catalog | None = None
+    """Which framings there are, for a frame that brings its own."""
+    framing: FramingSpec | None = None
+    """Of that line; None where the frame brings its own."""
+
+
+class ReadForm(Protocol):
+    """A module that parses one way of reading a frame."""
+
+    def parse_read(self, part: Part, findings: Findings, context: FormContext) -> ReadSpec | None:
+        """Return what `part` declares, or None when a fault was reported."""
+
+    def place_of(self, part: Part, field: str) -> tuple[Part, dict[str, Any]]:
+        """Return where `field` is named, as `Findings.error` takes it."""
+
+
+class WriteForm(Protocol):
+    """A module that parses one way of writing a frame."""
+
+    def parse_write(self, part: Part, findings: Findings, context: FormContext) -> WriteSpec | None:
+        """Return what `part` declares, or None when a fault was reported."""
+
+    def templates(self, part: Part, spec: WriteSpec) -> Iterable[tuple[Part, Template]]:
+        """Return every template in it, with its place."""
+
+
+def read_form(part: Part) -> tuple[Part, ReadForm] | None:
+    """Return what stands under the form's key of a reply or message, and the form's module."""
+    for key in READ_FORMS:
+        inner = part.get(key)
+        if inner is not None:
+            return inner, cast("ReadForm", import_module(READ_FORMS[key]))
+    return None
+
+
+def write_form(part: Part) -> tuple[Part, WriteForm]:
+    """Return what stands under ``send:``, or under the form's key in it, and the form's module."""
+    if isinstance(part.data, dict):
+        for key in part.data:
+            if key in WRITE_FORMS:
+                return part.must(key), cast("WriteForm", import_module(WRITE_FORMS[key]))
+    module = "urc.config.parse.forms.frames" if isinstance(part.data, list) else WRITE_FORMS["text"]
+    return part, cast("WriteForm", import_module(module))
+
+
+def body_form(part: Part) -> tuple[Part, WriteForm] | None:
+    """Return what stands under a form's key inside an envelope, and the form's module."""
+    for key in part.data:
+        if key in _BODIES:
+            return part.must(key), cast("WriteForm", import_module(WRITE_FORMS[key]))
+    return None
+
+
+def parse_read(part: Part, findings: Findings, context: FormContext) -> ReadSpec:
+    """Return how the frame of a reply or message is read."""
+    given = [key for key in READ_FORMS if key in part.data]
+    if len(given) != 1:
+        found = " and ".join(f"'{key}'" for key in given)
+        findings.error(
+            part,
+            "two-forms" if given else "missing-form",
+            f"{found} both say how the frame is read" if given else "nothing says how it is read",
+            at=given[1] if given else "",
+            key=True,
+            hint=f"use exactly one of: {', '.join(READ_FORMS)}",
+        )
+        return _NO_READ
+    found_form = read_form(part)
+    if found_form is None:
+        return _NO_READ
+    inner, form = found_form
+    spec = form.parse_read(inner, findings, context) or _NO_READ
+    return beside_form(part, spec, findings)
+
+
+def parse_write(part: Part, findings: Findings, context: FormContext) -> WriteSpec:
+    """Return how the frame under ``send:`` is written."""
+    inner, form = write_form(part)
+    return form.parse_write(inner, findings, context) or _NO_WRITE

@@ -1,0 +1,1 @@
+"""Forms of frames, one module each; `urc.config.parse.form` has the table."""

@@ -1,0 +1,53 @@
+"""The form ``bytes``: a list of bytes, names of control characters, texts and expressions."""
+
+from collections.abc import Iterable
+
+from urc.config.parse.bytes import parse_bytes
+from urc.config.parse.form import FormContext
+from urc.config.parse.forms.byte_pieces import Piece, Placed, spec_of, templates_at
+from urc.config.part import Findings, Part
+from urc.expressions import ExpressionError, Template, compile_expression, split_template
+from urc.model.codec import WriteSpec
+
+__all__ = ["parse_write", "templates"]
+
+
+def parse_write(part: Part, findings: Findings, context: FormContext) -> WriteSpec | None:
+    """Return the bytes of the list at `part`."""
+    pieces: list[Placed] = []
+    for place, inner in enumerate(part.items()):
+        if isinstance(inner.data, str) and "{{" in inner.data:
+            piece: Piece | None = _expression(inner, findings)
+        else:
+            piece = parse_bytes(inner, context.encoding, findings)
+        if piece is None:
+            return None
+        offset = inner.data.find("{{") + 2 if isinstance(piece, Template) else 0
+        pieces.append(Placed(piece, (place,), offset))
+    return spec_of("bytes", pieces)
+
+
+def templates(part: Part, spec: WriteSpec) -> Iterable[tuple[Part, Template]]:
+    """Return every expression in it."""
+    return templates_at(part, spec)
+
+
+def _expression(part: Part, findings: Findings) -> Template | None:
+    try:
+        split = list(split_template(part.data))
+        if len(split) != 1 or split[0][2] is None:
+            findings.error(
+                part,
+                "bad-template",
+                "an expression stands alone in its item of the list",
+                hint='write the text and the expression as two items: ["SET ", "{{ x }}"]',
+            )
+            return None
+        offset, _, text = split[0]
+        try:
+            return compile_expression(text or "", allows_bytes=True)
+        except ExpressionError as error:
+            findings.error(part, "bad-template", str(error), offset=offset + error.offset)
+    except ExpressionError as error:
+        findings.error(part, "bad-template", str(error), offset=error.offset)
+    return None

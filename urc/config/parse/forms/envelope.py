@@ -1,0 +1,120 @@
+"""The forms of what goes over a transport that carries messages: publish, call, goal, request.
+
+An envelope has an address, whose values may be templates, and a body in one of the other forms.
+``stamped`` makes a message of ROS into its stamped kind here, so the engine knows nothing of it.
+"""
+
+from collections.abc import Iterable
+from typing import Final
+
+from urc.config.parse.form import FormContext, body_form
+from urc.config.parse.forms.json_text import compiled_tree, placed_templates, templates_in
+from urc.config.parse.headers import check_headers
+from urc.config.part import Findings, Part
+from urc.expressions import Template
+from urc.model.codec import WriteSpec
+
+__all__ = ["parse_write", "templates"]
+
+_BODY: Final = "body"
+_STAMPED: Final = {
+    "Accel": "accel",
+    "AccelWithCovariance": "accel",
+    "Inertia": "inertia",
+    "Point": "point",
+    "Polygon": "polygon",
+    "Pose": "pose",
+    "PoseWithCovariance": "pose",
+    "Quaternion": "quaternion",
+    "Twist": "twist",
+    "TwistWithCovariance": "twist",
+    "Vector3": "vector",
+    "Wrench": "wrench",
+}
+"""Type of geometry_msgs → field that has it in its stamped kind (common_interfaces)."""
+
+
+def parse_write(part: Part, findings: Findings, context: FormContext) -> WriteSpec | None:
+    """Return the envelope at `part`, whose key is its verb."""
+    body = body_form(part)
+    spec = body[1].parse_write(body[0], findings, context) if body else None
+    before = len(findings.problems)
+    check_headers(part, findings)
+    attributes = {
+        name: compiled_tree(inner, findings)
+        for name, inner in part.entries().items()
+        if body is None or inner.path != body[0].path
+    }
+    if (body and spec is None) or len(findings.problems) > before:
+        return None
+    if part.name == "request" and ("url" in part.data) == ("path" in part.data):
+        both = "url" in part.data
+        text = "'path' and 'url' both say where" if both else "'path' is missing"
+        hint = "write 'path', or 'url' for what the robot itself has named"
+        findings.error(part, "two-forms" if both else "missing-key", text, key=True, hint=hint)
+        return None
+    url = attributes.get("url")
+    if isinstance(url, Template) and any(not name.startswith("_") for name in url.names):
+        text = "'url' is what the robot has named, a field such as _next, and nothing else"
+        hint = "put arguments and settings into 'path' or 'query', which keep to this server's part"
+        findings.error(part.must("url"), "wrong-form", text, hint=hint)
+        return None
+    stamped = part.get("stamped") if part.name == "publish" else None
+    if stamped is not None and attributes.pop("stamped"):
+        kind = _stamped_type(part, attributes.get("type"), findings)
+        if kind is None or spec is None:
+            return None
+        attributes["type"], spec = f"{kind}Stamped", _stamped(kind, spec)
+    if part.name == "request":
+        attributes.setdefault("method", "GET" if spec is None else "POST")
+    found = list(templates_in(attributes))
+    names = [one.names for one in found] + ([spec.names] if spec else [])
+    settings = [one.settings for one in found] + ([spec.settings] if spec else [])
+    return WriteSpec(
+        "envelope",
+        {"verb": part.name, "attributes": attributes, _BODY: spec},
+        frozenset[str]().union(*names),
+        frozenset[str]().union(*settings),
+    )
+
+
+def _stamped_type(part: Part, kind: object, findings: Findings) -> str | None:
+    """Return the type at `part` if it has a stamped kind; else report it."""
+    package, _, name = str(kind).replace("/msg/", "/").partition("/")
+    if package == "geometry_msgs" and name in _STAMPED and "json" in part.data:
+        return str(kind)
+    findings.error(
+        part,
+        "bad-value",
+        f"{kind!r} has no stamped kind that is known, or no json",
+        at="stamped",
+        hint=f"types of geometry_msgs with json: {', '.join(_STAMPED)}; others are written out",
+    )
+    return None
+
+
+def _stamped(kind: str, spec: WriteSpec) -> WriteSpec:
+    """Return the body in its stamped kind; rosbridge writes its own time in place of ``now``."""
+    header = {"stamp": "now", "frame_id": ""}
+    tree = {"header": header, _STAMPED[kind.rpartition("/")[2]]: spec.options["tree"]}
+    return spec._replace(options={"tree": tree})
+
+
+def _unstamped(part: Part, spec: WriteSpec) -> WriteSpec:
+    """Return the body as it is written in the document."""
+    tree = spec.options.get("tree")
+    if not part.data.get("stamped") or not isinstance(tree, dict):
+        return spec
+    return spec._replace(options={"tree": next(reversed(tree.values()))})
+
+
+def templates(part: Part, spec: WriteSpec) -> Iterable[tuple[Part, Template]]:
+    """Return every template in it, with its place."""
+    attributes = spec.options.get("attributes")
+    if isinstance(attributes, dict):
+        for name, tree in attributes.items():
+            if name in part.data:
+                yield from placed_templates(part.must(name), tree)
+    body, written = body_form(part), spec.options.get(_BODY)
+    if body and isinstance(written, WriteSpec):
+        yield from body[1].templates(body[0], _unstamped(part, written))

@@ -1,0 +1,26 @@
+"""The form ``equals``: the frame is exactly one text."""
+
+from typing import Any
+
+from urc.config.parse.form import FormContext
+from urc.config.part import Findings, Part
+from urc.model.codec import ReadSpec
+
+__all__ = ["parse_read", "place_of"]
+
+
+def parse_read(part: Part, findings: Findings, context: FormContext) -> ReadSpec | None:
+    """Return the text."""
+    try:
+        part.data.encode(context.encoding)
+    except UnicodeEncodeError as error:
+        wrong = error.object[error.start]
+        text = f"{wrong!r} does not exist in the encoding {context.encoding}"
+        findings.error(part, "not-in-encoding", text, offset=error.start)
+        return None
+    return ReadSpec("equals", {"text": part.data})
+
+
+def place_of(part: Part, field: str) -> tuple[Part, dict[str, Any]]:
+    """Return the text: there is no field in it."""
+    return part, {}

@@ -1,0 +1,49 @@
+"""Several frames of one command: a list under ``send:``, each item in a form of its own."""
+
+from collections.abc import Iterable
+
+from urc.config.parse.form import FormContext, write_form
+from urc.config.part import Findings, Part
+from urc.expressions import COUNTERS, Template
+from urc.model.codec import WriteSpec, each_of
+
+__all__ = ["parse_write", "templates"]
+
+
+def parse_write(part: Part, findings: Findings, context: FormContext) -> WriteSpec | None:
+    """Return the frames at `part`, in their order."""
+    if context.framing is not None and context.framing.type == "datagram":
+        findings.error(
+            part,
+            "many-frames",
+            "several frames of one command go out together, and on this line each is a message of"
+            " its own",
+            hint="write a command for each, or a 'framing' where the line is a stream",
+        )
+        return None
+    frames: list[WriteSpec] = []
+    for item in part.items():
+        inner, form = write_form(item)
+        found = form.parse_write(inner, findings, context)
+        if found is None:
+            return None
+        if found.form == "envelope":
+            text = "it is a message of its own, and cannot go out together with others"
+            findings.error(item, "many-frames", text, hint="write a command for each")
+        elif COUNTERS in found.names:
+            text = "a counter counts frames that are sent, and these are sent as one"
+            findings.error(item, "many-frames", text, hint="write a command for each")
+        frames.append(found)
+    return WriteSpec(
+        "frames",
+        {"frames": tuple(frames)},
+        frozenset[str]().union(*(one.names for one in frames)),
+        frozenset[str]().union(*(one.settings for one in frames)),
+    )
+
+
+def templates(part: Part, spec: WriteSpec) -> Iterable[tuple[Part, Template]]:
+    """Return every template in all frames, with its place."""
+    for item, one in zip(part.items(), each_of(spec), strict=True):
+        inner, form = write_form(item)
+        yield from form.templates(inner, one)

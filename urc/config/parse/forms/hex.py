@@ -1,0 +1,85 @@
+"""The form ``hex``: bytes as pairs of hex digits, with expressions that say their width."""
+
+import re
+from collections.abc import Iterable
+
+from urc.config.parse.form import FormContext
+from urc.config.parse.forms.byte_pieces import Piece, Placed, spec_of, templates_at
+from urc.config.part import Findings, Part
+from urc.expressions import (
+    ExpressionError,
+    Template,
+    compile_expression,
+    is_byte_filter,
+    is_nonce,
+    last_filter,
+    split_template,
+)
+from urc.model.codec import WriteSpec
+
+__all__ = ["parse_write", "templates"]
+
+_NOT_HEX = re.compile(r"[^0-9A-Fa-f\s]")
+_ODD = re.compile(r"(?<![0-9A-Fa-f])(?:[0-9A-Fa-f]{2})*[0-9A-Fa-f](?![0-9A-Fa-f])")
+
+
+def parse_write(part: Part, findings: Findings, context: FormContext) -> WriteSpec | None:
+    """Return the bytes at `part`."""
+    pieces: list[Placed] = []
+    try:
+        for offset, literal, expression in split_template(part.data):
+            if expression is None:
+                piece: Piece | None = _digits(part, literal, offset, findings)
+            else:
+                piece = _expression(part, expression, offset, findings)
+            if piece is None:
+                return None
+            pieces.append(Placed(piece, offset=offset))
+    except ExpressionError as error:
+        findings.error(part, "bad-template", str(error), offset=error.offset)
+        return None
+    return spec_of("hex", pieces)
+
+
+def templates(part: Part, spec: WriteSpec) -> Iterable[tuple[Part, Template]]:
+    """Return every expression in it."""
+    return templates_at(part, spec)
+
+
+def _digits(part: Part, literal: str, offset: int, findings: Findings) -> bytes | None:
+    wrong = _NOT_HEX.search(literal)
+    if wrong is not None:
+        text = f"{wrong[0]!r} is no hex digit"
+        hint = "write bytes as 02 FF 0D, and values as {{ x | u8 }}"
+        findings.error(part, "not-hex", text, offset=offset + wrong.start(), hint=hint)
+        return None
+    odd = _ODD.search(literal)
+    if odd is not None:
+        text = f"{odd[0]!r} is half a byte too much or too little"
+        at = offset + odd.start()
+        hint = "two digits make a byte"
+        findings.error(part, "not-hex", text, offset=at, length=len(odd[0]), hint=hint)
+        return None
+    return bytes.fromhex(literal)
+
+
+def _expression(part: Part, text: str, offset: int, findings: Findings) -> Template | None:
+    try:
+        template = compile_expression(text, allows_bytes=True)
+    except ExpressionError as error:
+        findings.error(part, "bad-template", str(error), offset=offset + error.offset)
+        return None
+    if not (is_byte_filter(last_filter(template)) or is_nonce(template)):
+        shown = text.strip()
+        value = shown.rpartition("|")[0].strip() or shown
+        plain = f"({value})" if re.search(r"\W", value) else value
+        findings.error(
+            part,
+            "no-width",
+            f"{shown!r} does not say which bytes it becomes",
+            offset=offset + len(text) - len(text.lstrip()),
+            length=len(shown),
+            hint=f"end it in a filter: {{{{ {plain} | u8 }}}}, u16be, f32le, hexbytes, utf8 …",
+        )
+        return None
+    return template

@@ -1,0 +1,60 @@
+"""The form ``json``: fields out of a JSON document, by JMESPath.
+
+Plain paths (``a.b[0].c``) become tuples, which the engine compiles; only others need the library.
+"""
+
+import re
+from typing import Any
+
+from urc.config.parse.form import FormContext
+from urc.config.part import Findings, Part
+from urc.model.codec import ReadSpec
+from urc.model.text import JsonPath
+
+__all__ = ["parse_read", "place_of"]
+
+_NAME = r'(?:[A-Za-z_][A-Za-z0-9_]*|"[^"\\]+")'
+_PLAIN = re.compile(rf"{_NAME}(?:\.{_NAME}|\[[0-9]{{1,5}}\])*")
+_STEP = re.compile(r'([A-Za-z_][A-Za-z0-9_]*)|"([^"\\]+)"|\[([0-9]+)\]')
+
+
+def parse_read(part: Part, findings: Findings, context: FormContext) -> ReadSpec | None:
+    """Return where each field is: a plain path, or a compiled expression."""
+    paths: dict[str, object] = {}
+    is_good = True
+    for name, inner in part.entries().items():
+        path = _path(inner, findings)
+        is_good = is_good and path is not None
+        paths[name] = path
+    return ReadSpec("json", {"paths": paths}, tuple(paths)) if is_good else None
+
+
+def place_of(part: Part, field: str) -> tuple[Part, dict[str, Any]]:
+    """Return where the field is named."""
+    return part.must(field), {"key": True}
+
+
+def _path(part: Part, findings: Findings) -> object:
+    text = part.data.strip()
+    if _PLAIN.fullmatch(text):
+        return _plain(text)
+    import jmespath  # 20 ms that most drivers do without
+    from jmespath.exceptions import JMESPathError
+
+    try:
+        return jmespath.compile(text)
+    except JMESPathError as error:
+        offset = getattr(error, "lex_position", None) or 0
+        hint = "it starts at the top, without '$': battery.level" if text.startswith("$") else ""
+        findings.error(
+            part, "bad-path", f"{text!r} is no JMESPath expression", offset=offset, hint=hint
+        )
+    except RecursionError:
+        findings.error(part, "bad-path", "the expression is nested too deeply")
+    return None
+
+
+def _plain(text: str) -> JsonPath:
+    return tuple(
+        int(found[3]) if found[3] else found[1] or found[2] for found in _STEP.finditer(text)
+    )

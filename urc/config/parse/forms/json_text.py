@@ -1,0 +1,64 @@
+"""The form ``json`` of what is sent: any value, with templates in its leaves."""
+
+from collections.abc import Iterable, Iterator
+from typing import Any
+
+from urc.config.parse.form import FormContext
+from urc.config.part import Findings, Part
+from urc.expressions import Template
+from urc.model.codec import WriteSpec
+
+__all__ = ["compiled_tree", "parse_write", "placed_templates", "templates", "templates_in"]
+
+
+def parse_write(part: Part, findings: Findings, context: FormContext) -> WriteSpec | None:
+    """Return the value at `part`, its templates compiled."""
+    before = len(findings.problems)
+    tree = compiled_tree(part, findings)
+    if len(findings.problems) > before:
+        return None
+    found = list(templates_in(tree))
+    names = frozenset[str]().union(*(one.names for one in found))
+    settings = frozenset[str]().union(*(one.settings for one in found))
+    return WriteSpec("json", {"tree": tree}, names, settings)
+
+
+def templates(part: Part, spec: WriteSpec) -> Iterable[tuple[Part, Template]]:
+    """Return every template in it, with its place."""
+    return placed_templates(part, spec.options.get("tree"))
+
+
+def compiled_tree(part: Part, findings: Findings) -> Any:
+    """Return what stands at `part`, with each text that has braces as a template."""
+    if isinstance(part.data, dict):
+        for name, inner in part.entries().items():
+            if "{{" in name:
+                text = "templates stand in values, not in names"
+                findings.error(inner, "bad-template", text, key=True)
+        return {name: compiled_tree(inner, findings) for name, inner in part.entries().items()}
+    if isinstance(part.data, list):
+        return [compiled_tree(inner, findings) for inner in part.items()]
+    if isinstance(part.data, str) and "{{" in part.data:
+        return findings.template(part)
+    return part.data
+
+
+def templates_in(tree: Any) -> Iterator[Template]:
+    """Yield every template in a tree."""
+    if isinstance(tree, Template):
+        yield tree
+    elif isinstance(tree, (dict, list)):
+        for inner in tree.values() if isinstance(tree, dict) else tree:
+            yield from templates_in(inner)
+
+
+def placed_templates(part: Part, tree: Any) -> Iterator[tuple[Part, Template]]:
+    """Yield every template in a tree, with its place."""
+    if isinstance(tree, Template):
+        yield part, tree
+    elif isinstance(tree, dict):
+        for name, inner in tree.items():
+            yield from placed_templates(part.must(name), inner)
+    elif isinstance(tree, list):
+        for inner_part, inner in zip(part.items(), tree, strict=True):
+            yield from placed_templates(inner_part, inner)

@@ -1,0 +1,54 @@
+"""The form ``keyvalue``: values by their keys, in any order."""
+
+from typing import Any
+
+from urc.config.parse.form import FormContext
+from urc.config.part import Findings, Part
+from urc.model.codec import ReadSpec
+
+__all__ = ["parse_read", "place_of"]
+
+
+def parse_read(part: Part, findings: Findings, context: FormContext) -> ReadSpec | None:
+    """Return the separators, and the field of each key."""
+    pairs, separator = part.must("pairs"), part.must("separator")
+    if pairs.data == separator.data:
+        findings.error(
+            separator, "same-separator", "what separates pairs also separates a key from its value"
+        )
+        return None
+    named = part.named("fields")
+    seen: set[str] = set()
+    for inner in named.values():
+        if inner.data in seen:
+            text = f"two keys set the field {inner.data!r}"
+            findings.error(inner, "duplicate-name", text)
+            return None
+        seen.add(inner.data)
+    if part.get("fields") is None:
+        keys = {name: name for name in sorted(context.signals)}
+    else:
+        keys = {key: str(inner.data) for key, inner in named.items()}
+    bare = tuple(inner.data or "" for inner in part.listed("first"))
+    for place, inner in enumerate(part.listed("first")):
+        if inner.data and (inner.data in bare[:place] or inner.data in keys.values()):
+            text = f"the field {inner.data!r} stands here twice"
+            findings.error(inner, "duplicate-name", text)
+            return None
+    strip = part.get("strip")
+    options = {
+        "pairs": pairs.data,
+        "separator": separator.data,
+        "keys": keys,
+        "first": bare,
+        "strip": str(strip.data) if strip else None,
+    }
+    return ReadSpec("keyvalue", options, (*filter(None, bare), *keys.values()))
+
+
+def place_of(part: Part, field: str) -> tuple[Part, dict[str, Any]]:
+    """Return where the field is named."""
+    for inner in [*part.listed("first"), *part.named("fields").values()]:
+        if inner.data == field:
+            return inner, {}
+    return part, {}

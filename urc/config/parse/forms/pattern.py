@@ -1,0 +1,107 @@
+"""The form ``pattern``: the frame as it is written, with {name:kind} in the places of fields."""
+
+import re
+from typing import Any, Final, cast, get_args
+
+from urc.config.parse.form import FormContext
+from urc.config.part import Findings, Part
+from urc.config.suggest import did_you_mean
+from urc.model.codec import ReadSpec
+from urc.model.text import FieldKind, Hole
+
+__all__ = ["parse_read", "place_of"]
+
+_KINDS: Final = get_args(FieldKind)
+_PIECE = re.compile(r"\{\{|\}\}|\{([^{}]*)\}|[{}]")
+_FIELD = re.compile(r"(_?[A-Za-z][A-Za-z0-9_]*)?:([a-z]+)(?::([1-9][0-9]{0,3}))?")
+_EATS: Final = {"integer": "0123456789", "number": "0123456789.eE", "hex": "0123456789abcdefABCDEF"}
+"""Characters that a field may end with, so that what follows it cannot begin with one."""
+
+
+class _Fault(Exception):
+    """What is wrong with a pattern, and where."""
+
+    def __init__(self, message: str, offset: int, length: int = 1, hint: str = "") -> None:
+        super().__init__(message)
+        self.place: dict[str, Any] = {"offset": offset, "length": length, "hint": hint}
+
+
+def parse_read(part: Part, findings: Findings, context: FormContext) -> ReadSpec | None:
+    """Return the pattern at `part` with its fields."""
+    try:
+        holes, tail = _parse(str(part.data))
+    except _Fault as fault:
+        findings.error(part, "bad-pattern", str(fault), **fault.place)
+        return None
+    names = tuple(hole.name for hole in holes if hole.name)
+    return ReadSpec("pattern", {"holes": holes, "tail": tail}, names)
+
+
+def place_of(part: Part, field: str) -> tuple[Part, dict[str, Any]]:
+    """Return where the field stands in the pattern."""
+    return part, {"offset": str(part.data).find("{" + field + ":") + 1, "length": len(field)}
+
+
+def _parse(text: str) -> tuple[tuple[Hole, ...], str]:
+    """Return the fields with the literal before each, and the literal after the last."""
+    holes: list[Hole] = []
+    literal, position = "", 0
+    last = (0, 0)
+    for piece in _PIECE.finditer(text):
+        literal += text[position : piece.start()]
+        position = piece.end()
+        if piece[0] in ("{{", "}}"):
+            literal += piece[0][0]
+        elif piece[1] is None:
+            hint = "write {{ or }} for a brace of the frame"
+            raise _Fault(f"{piece[0]!r} has no partner", piece.start(), hint=hint)
+        else:
+            # Before a field of fixed width, every blank is a place of its own.
+            is_fixed = piece[1].rpartition(":")[2].isdecimal()
+            before = literal if is_fixed else _blanks(literal)
+            _check_after(holes, before, last)
+            holes.append(_hole(piece[1], before, piece.start() + 1, holes))
+            literal, last = "", piece.span()
+    tail = _blanks(literal + text[position:])
+    if tail.strip():
+        _check_after(holes, tail, last)
+    return tuple(holes), tail.rstrip()
+
+
+def _blanks(literal: str) -> str:
+    return re.sub(r"\s+", " ", literal)
+
+
+def _hole(inside: str, before: str, offset: int, holes: list[Hole]) -> Hole:
+    found = _FIELD.fullmatch(inside)
+    if found is None:
+        text = f"'{{{inside}}}' is no field"
+        hint = f"write {{name:kind}}; kinds are {', '.join(_KINDS)}"
+        raise _Fault(text, offset - 1, len(inside) + 2, hint)
+    name, kind = found[1] or "", found[2]
+    if kind not in _KINDS:
+        hint = did_you_mean(kind, _KINDS, "kinds")
+        text = f"there is no kind of field {kind!r}"
+        raise _Fault(text, offset + found.start(2), len(kind), hint)
+    if name and any(hole.name == name for hole in holes):
+        raise _Fault(f"the field {name!r} stands here twice", offset, len(name))
+    if found[3] and kind == "rest":
+        text = "the rest has no width: it is everything to the end"
+        raise _Fault(text, offset + found.start(3), len(found[3]))
+    return Hole(before, name, cast("FieldKind", kind), int(found[3] or 0))
+
+
+def _check_after(holes: list[Hole], literal: str, last: tuple[int, int]) -> None:
+    """Complain when it cannot be told where the last field ends."""
+    if not holes or holes[-1].width:
+        return
+    kind, (start, end) = holes[-1].kind, last
+    if kind == "rest":
+        raise _Fault("nothing can follow a field of kind 'rest'", start, end - start)
+    if not literal:
+        hint = "put what stands between them, or say a width: {name:number:6}"
+        text = "there is nothing between this field and the next one"
+        raise _Fault(text, start, end - start, hint)
+    if literal[0] in _EATS.get(kind, ""):
+        text = f"{literal[0]!r} after it could belong to the {kind}"
+        raise _Fault(text, start, end - start, "use a regex")

@@ -1,0 +1,22 @@
+"""The form ``regex``: named groups of a pattern are the fields."""
+
+from typing import Any
+
+from urc.config.parse.form import FormContext
+from urc.config.part import Findings, Part
+from urc.model.codec import ReadSpec
+
+__all__ = ["parse_read", "place_of"]
+
+
+def parse_read(part: Part, findings: Findings, context: FormContext) -> ReadSpec | None:
+    """Return the pattern at `part` with its groups."""
+    pattern = findings.pattern(part)
+    if pattern is None:
+        return None
+    return ReadSpec("regex", {"pattern": pattern}, pattern.groups)
+
+
+def place_of(part: Part, field: str) -> tuple[Part, dict[str, Any]]:
+    """Return where the group `field` stands in the pattern."""
+    return part, {"offset": str(part.data).find(f"<{field}>") + 1, "length": len(field)}

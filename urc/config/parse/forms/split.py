@@ -1,0 +1,49 @@
+"""The form ``split``: parts of the frame between separators are the fields."""
+
+from typing import Any
+
+from urc.config.parse.form import FormContext
+from urc.config.part import Findings, Part
+from urc.model.codec import ReadSpec
+
+__all__ = ["parse_read", "place_of"]
+
+_MORE = "..."
+
+
+def parse_read(part: Part, findings: Findings, context: FormContext) -> ReadSpec | None:
+    """Return the separator and the names of the parts."""
+    names: list[str] = []
+    has_more = is_good = True
+    tail = ""
+    items = part.listed("fields")
+    has_more = items[-1].data == _MORE
+    for inner in items[:-1] if has_more else items:
+        name = inner.data or ""
+        if name.endswith(_MORE) and name != _MORE and inner is items[-1]:
+            name, tail = name.removesuffix(_MORE), name.removesuffix(_MORE)
+        if name.endswith(_MORE):
+            text = "'...' can only stand at the end"
+            findings.error(inner, "bad-name", text)
+            is_good = False
+        elif name in names and name:
+            findings.error(inner, "duplicate-name", f"the field {name!r} stands here twice")
+            is_good = False
+        names.append(name)
+    strip = part.get("strip")
+    options = {
+        "by": part.text("by"),
+        "names": tuple(names),
+        "has_more": has_more,
+        "tail": tail,
+        "strip": str(strip.data) if strip else None,
+    }
+    return ReadSpec("split", options, tuple(filter(None, names))) if is_good else None
+
+
+def place_of(part: Part, field: str) -> tuple[Part, dict[str, Any]]:
+    """Return where the field is named."""
+    for inner in part.listed("fields"):
+        if inner.data in (field, field + _MORE):
+            return inner, {}
+    return part, {}

@@ -1,0 +1,139 @@
+"""The form ``struct``: binary items, both when reading and when sending."""
+
+from collections.abc import Iterable, Iterator
+from typing import Any, cast
+
+from urc.config.parse.form import FormContext
+from urc.config.parse.struct.items import ItemParser
+from urc.config.part import Findings, Part
+from urc.expressions import Template
+from urc.model.binary import (
+    FRAME_NAMES,
+    Item,
+    derived_sizes,
+    fixed_size,
+    joined_name,
+    least_size,
+    names_of,
+)
+from urc.model.codec import ReadSpec, WriteSpec
+from urc.model.driver import FramingSpec
+from urc.model.framing import FrameLayout
+
+__all__ = ["parse_read", "parse_write", "place_of", "templates"]
+
+Uses = tuple[tuple[tuple[str | int, ...], Template], ...]
+
+
+def parse_read(part: Part, findings: Findings, context: FormContext) -> ReadSpec | None:
+    """Return the items at `part`, and their ids as fields."""
+    before = len(findings.problems)
+    parser = ItemParser(findings, context.types, context.enums, "read", context.encoding)
+    items = parser.items(part)
+    _check_size(part, items, context.framing, findings)
+    if len(findings.problems) > before:
+        return None
+    return ReadSpec("struct", {"items": items}, tuple(dict.fromkeys(names_of(items))))
+
+
+def parse_write(part: Part, findings: Findings, context: FormContext) -> WriteSpec | None:
+    """Return the items at `part`, whose ids are arguments unless they are computed."""
+    before = len(findings.problems)
+    parser = ItemParser(findings, context.types, context.enums, "send", context.encoding)
+    items = parser.items(part)
+    framing = context.framing
+    _check_size(part, items, framing and (framing.sent or framing), findings)
+    if len(findings.problems) > before:
+        return None
+    derived = derived_sizes(items).keys()
+    given = set(names_of(items, sent=True)) - derived
+    own = (set(names_of(items)) | FRAME_NAMES) - given
+    uses: list[tuple[tuple[str | int, ...], Template]] = []
+    for place, template in parser.scope.uses:
+        names = template.names - own
+        if names:
+            path = place.path[len(part.path) :]
+            used = Template(template.source, template.python, names, template.settings)
+            uses.append((path, used))
+    names = frozenset().union(*(template.names for _, template in uses))
+    settings = frozenset().union(*(template.settings for _, template in uses))
+    return WriteSpec("struct", {"items": items, "uses": tuple(uses)}, names, settings)
+
+
+def _check_size(
+    part: Part, items: tuple[Item, ...], framing: FramingSpec | None, findings: Findings
+) -> None:
+    """Report items that no frame of the line can hold."""
+    if framing is None:
+        return
+    layout = framing.options.get("layout")
+    least, size = least_size(items), fixed_size(items)
+    around = layout.head + layout.tail if isinstance(layout, FrameLayout) else 0
+    if isinstance(layout, FrameLayout) and layout.size is not None:
+        room = layout.size - around
+        if least > room or (size is not None and size < room):
+            over = f"write {{ size: {room - least} }} for what means nothing"
+            hint = over if least < room else ""
+            text = f"the items take {least} bytes, and a frame of this line holds {room}"
+            findings.error(part, "does-not-fit", text, hint=hint)
+    elif least + around > framing.max_bytes:
+        text = f"the items take {least} bytes, and a frame of this line has {framing.max_bytes}"
+        findings.error(part, "does-not-fit", text + " at most", hint="raise 'max' of the framing")
+
+
+def templates(part: Part, spec: WriteSpec) -> Iterable[tuple[Part, Template]]:
+    """Return every argument and expression with its place."""
+    for path, template in cast("Uses", spec.options.get("uses", ())):
+        inner = part
+        for step in path:
+            inner = Part(inner.document, (*inner.path, step), inner.data[step])
+        if isinstance(inner.data, dict):
+            inner = inner.must("id") if "id" in inner.data else inner
+        yield inner, template
+
+
+def place_of(part: Part, field: str) -> tuple[Part, dict[str, Any]]:
+    """Return where the item that gives `field` is named."""
+    nearest = part
+    for place, name in _named(part, ""):
+        if name == field:
+            return place, _inside(place, name)
+        if not name or field.startswith(joined_name(name, "")):
+            nearest = place
+    return nearest, _inside(nearest, "")
+
+
+def _inside(place: Part, name: str) -> dict[str, Any]:
+    if isinstance(place.data, str) and name and " " in place.data:
+        return {"offset": place.data.rfind(name), "length": len(name)}
+    return {}
+
+
+def _named(part: Part, outer: str) -> Iterator[tuple[Part, str]]:
+    """Yield the place and the name of every item that has one, and nameless types with ""."""
+    for item in part.items():
+        if isinstance(item.data, str):
+            _, _, name = item.data.strip().partition(" ")
+            yield item, joined_name(outer, name.strip()) if name else ""
+            continue
+        name = joined_name(outer, item.data["id"]) if "id" in item.data else ""
+        if name or "type" in item.data:
+            yield item.get("id") or item, name
+        if "bits" in item.data:
+            yield from _bits(item.must("bits"), name or outer)
+        switch = item.get("switch")
+        branches = list(switch.must("cases").entries().values()) if switch else []
+        branches += [switch.must("else")] if switch and "else" in switch.data else []
+        for branch in branches:
+            if isinstance(branch.data, list):
+                yield from _named(branch, outer)
+            else:
+                yield branch, ""
+
+
+def _bits(part: Part, outer: str) -> Iterator[tuple[Part, str]]:
+    for item in part.items():
+        if isinstance(item.data, str):
+            yield item, joined_name(outer, item.data)
+        elif "id" in item.data:
+            yield item.must("id"), joined_name(outer, item.data["id"])

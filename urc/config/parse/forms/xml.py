@@ -1,0 +1,83 @@
+"""The form ``xml``: fields out of an XML document, by the elements that lead to them."""
+
+import re
+from typing import Any
+
+from urc.config.parse.form import FormContext
+from urc.config.part import Findings, Part
+from urc.model.codec import ReadSpec
+from urc.model.text import XmlPath, XmlStep
+
+__all__ = ["parse_read", "place_of"]
+
+_NAME = r"[A-Za-z_][\w.-]*"
+_STEP = re.compile(
+    rf"""({_NAME})((?:\[@{_NAME}=(?:'[^'\[\]]*'|"[^"\[\]]*")\])*)(?:\[([1-9][0-9]{{0,4}})\])?"""
+)
+_TEST = re.compile(rf"""\[@({_NAME})=(?:'([^']*)'|"([^"]*)")\]""")
+_ATTRIBUTE = re.compile(r"@([A-Za-z_][\w.:-]*)")
+_PIECE = re.compile(r"(?:\[[^\]]*\]|[^/\[])*")
+"""Up to the next stroke that is not in brackets."""
+
+
+def parse_read(part: Part, findings: Findings, context: FormContext) -> ReadSpec | None:
+    """Return where each field is."""
+    paths: dict[str, XmlPath | None] = {}
+    root: XmlStep | None = None
+    for name, inner in part.entries().items():
+        path = paths[name] = _path(inner, findings)
+        if path is not None:
+            root = root or path.steps[0]
+            if path.steps[0] != root:
+                start, other = _spelt(path.steps[0]), _spelt(root)
+                text = f"this path starts at {start!r}, another one at {other!r}"
+                hint = "a document has one root element: give each its own message"
+                findings.error(inner, "bad-path", text, hint=hint)
+                paths[name] = None
+    if None in paths.values():
+        return None
+    return ReadSpec("xml", {"paths": paths}, tuple(paths))
+
+
+def place_of(part: Part, field: str) -> tuple[Part, dict[str, Any]]:
+    """Return where the field is named."""
+    return part.must(field), {"key": True}
+
+
+def _path(part: Part, findings: Findings) -> XmlPath | None:
+    steps: list[XmlStep] = []
+    offset = 0
+    while True:
+        piece = _piece(part.data, offset)
+        is_last = offset + len(piece) >= len(part.data)
+        attribute = _ATTRIBUTE.fullmatch(piece)
+        if attribute and is_last and steps:
+            return XmlPath(tuple(steps), attribute[1])
+        step = _STEP.fullmatch(piece)
+        if step is None:
+            findings.error(
+                part,
+                "bad-path",
+                f"{piece!r} is no step of a path",
+                offset=offset,
+                length=max(1, len(piece)),
+                hint="write root/element/@attribute, root/element[2] or root/element[@name='x']",
+            )
+            return None
+        tests = tuple((one[1], one[2] or one[3] or "") for one in _TEST.finditer(step[2]))
+        steps.append(XmlStep(step[1], int(step[3] or 1), tests))
+        if is_last and not part.data.endswith("/"):
+            return XmlPath(tuple(steps))
+        offset += len(piece) + 1
+
+
+def _piece(path: str, offset: int) -> str:
+    """Return the step that begins at `offset`, brackets and all."""
+    found = _PIECE.match(path, offset)
+    end = found.end() if found else offset
+    # An open bracket ends nothing: the rest is the step, and is reported.
+    return path[offset:end] if path[end : end + 1] in ("", "/") else path[offset:]
+
+
+def _spelt(step: XmlStep) -> str:
+    return step.tag + "".join(f"[@{name}={value!r}]" for name, value in step.attributes)

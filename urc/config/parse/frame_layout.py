@@ -1,0 +1,285 @@
+"""Where everything is in a frame: start, length field, payload, checksum and end fit together.
+
+A frame is seen whole here: with its start and end bytes, without a delimiter or byte stuffing.
+"""
+
+from typing import Any, Final, NamedTuple
+
+from urc.config.parse.bytes import parse_bytes
+from urc.config.parse.checksum import WrittenChecksum, parse_checksum
+from urc.config.parse.length import check_length, check_loose, parse_length
+from urc.config.part import Findings, Part
+from urc.model.framing import (
+    ChecksumSpec,
+    Digits,
+    FrameLayout,
+    LengthSpec,
+    TrailSpec,
+    Window,
+)
+
+__all__ = ["MARKED", "checksums_of", "parse_layout"]
+
+MARKED: Final = ("fixed", "length", "brackets")
+"""Framings whose frames carry bytes of their own."""
+_SPELT: Final = ("delimiter", "brackets", "idle", "datagram")
+"""Framings whose frames may be spelt in digits."""
+
+
+class _Frame(NamedTuple):
+    """What is known of a frame before its checksum is placed."""
+
+    start: bytes
+    end: bytes
+    size: int | None
+    length: LengthSpec | None
+
+
+def parse_layout(part: Part, encoding: str, findings: Findings, longest: int) -> FrameLayout:
+    """Return the layout of the framing at `part`; what was reported is left at a default."""
+    kind = part.text("type")
+    start = end = b""
+    if kind in MARKED:
+        start_key, end_key = ("open", "close") if kind == "brackets" else ("start", "end")
+        start = parse_bytes(part.get(start_key), encoding, findings) or b""
+        end = parse_bytes(part.get(end_key), encoding, findings) or b""
+        if kind == "brackets":
+            _check_marks(part, findings)
+    size = part.integer("size") if kind == "fixed" else None
+    length = parse_length(part.must("length"), encoding, findings) if kind == "length" else None
+    frame = _Frame(start, end, size, length)
+    if length is not None:
+        check_length(part.must("length"), start, length, findings)
+        if length.is_loose:
+            check_loose(part, findings)
+    found = [parse_checksum(one, encoding, findings) for one in checksums_of(part)]
+    written = [one for one in found if one is not None]
+    trailing = [one for one in written if one.trail is not None]
+    digits = _digits(part, findings)
+    if trailing:
+        _check_trail(part, trailing[0], len(written), findings)
+        layout = FrameLayout(start, end, len(start), len(end), trail=_trail_of(trailing[0], start))
+    else:
+        layout = _placed(part, frame, written, findings)
+    _check_size(part, layout, longest, findings)
+    return layout._replace(digits=digits)
+
+
+def _digits(part: Part, findings: Findings) -> Digits:
+    """Return how the framing at `part` spells its bytes."""
+    digits: Any = part.text("decode") if part.text("type") in _SPELT else ""
+    if digits and "escape" in part.data:
+        text = "'escape' means nothing beside 'decode': digits hide nothing"
+        findings.error(part, "misplaced-key", text, at="escape", key=True)
+    return digits  # type: ignore[no-any-return]  # the schema has the words
+
+
+def _check_trail(part: Part, written: WrittenChecksum, count: int, findings: Findings) -> None:
+    key = "after" if "after" in written.part.data else "each"
+    kind = part.text("type")
+    if kind in ("fixed", "length"):
+        findings.error(
+            written.part,
+            "misplaced-key",
+            f"'{key}' is for frames of text; one of type {kind!r} has fixed places",
+            at=key,
+            key=True,
+            hint="say by 'at' where the checksum stands",
+        )
+    elif count > 1:
+        text = f"a checksum with '{key}' is the only one of its frame"
+        findings.error(written.part, "misplaced-key", text, at=key, key=True)
+
+
+def _trail_of(written: WrittenChecksum, start: bytes) -> TrailSpec:
+    trail = written.trail
+    if trail is None:
+        raise AssertionError("a checksum in a fixed place is no trail")
+    over = written.over
+    if not isinstance(over, Window):
+        over = Window(len(start) if over == "payload" and not trail.each else 0)
+    checksum = _spec_of(written, over, -written.size)
+    return TrailSpec(
+        checksum, trail.mark, trail.is_padded, trail.is_optional, trail.each, trail.skip
+    )
+
+
+def checksums_of(part: Part) -> list[Part]:
+    """Return the checksums of the framing at `part`: there may be one, or a list of them."""
+    inner = part.get("checksum") if part.text("type") != "xml" else None
+    if inner is None:
+        return []
+    return inner.items() if isinstance(inner.data, list) else [inner]
+
+
+def _check_marks(part: Part, findings: Findings) -> None:
+    for key in ("open", "close"):
+        inner = part.must(key)
+        if inner.data in ("", []):
+            findings.error(
+                inner,
+                "empty-mark",
+                f"an empty '{key}' marks no frame",
+                hint="name the bytes that stand there, such as '<' or STX",
+            )
+
+
+def _placed(
+    part: Part, frame: _Frame, written: list[WrittenChecksum], findings: Findings
+) -> FrameLayout:
+    """Return the layout with the places that follow from each other."""
+    start, end, size, length = frame
+    head, tail = len(start), len(end)
+    if length is not None and length.is_loose:
+        head = length.offset
+    elif length is not None and length.offset == head:
+        head = length.offset + length.size
+    places: list[int] = []
+    lasts: list[bool] = []
+    for one in written:
+        # Those at the end stand in their order: what comes later lies further back.
+        behind = [other.size for other in written[len(places) + 1 :] if other.at is None]
+        last = -len(end) - one.size - sum(behind)
+        at = last if one.at is None else one.at
+        if size is not None and 0 <= at == size + last:
+            at = last
+        if at == head:
+            head += one.size
+        if at == last:
+            tail += one.size
+        places.append(at)
+        lasts.append(at == last)
+    payload = part.get("payload") if part.text("type") == "length" else None
+    if payload is not None:
+        head, tail = _payload(payload, frame, head, tail, findings)
+    layout = FrameLayout(start, end, head, tail, size, length)
+    specs = []
+    for one, at, is_last in zip(written, places, lasts, strict=True):
+        spec = _checksum(one, at, is_last, layout)
+        _check_checksum(one.part, spec, layout, findings)
+        specs.append(spec)
+    if not specs:
+        return layout
+    return layout._replace(checksum=specs[-1], checksums=tuple(specs[:-1]))
+
+
+def _checksum(
+    written: WrittenChecksum, at: int, is_last: bool, layout: FrameLayout
+) -> ChecksumSpec:
+    # A window without an end goes up to a checksum that stands at the end, or to the end bytes.
+    behind = len(layout.end)
+    if is_last:
+        behind = -at if at < 0 else behind + written.size
+    return _spec_of(written, _over(written, behind, layout), at)
+
+
+def _spec_of(written: WrittenChecksum, over: Window, at: int) -> ChecksumSpec:
+    return ChecksumSpec(
+        written.algorithm, written.bits, over, at, written.is_big, written.spelling,
+        written.salt, written.is_from_hex, written.closes, written.before,
+    )  # fmt: skip
+
+
+def _payload(
+    part: Part, frame: _Frame, head: int, tail: int, findings: Findings
+) -> tuple[int, int]:
+    start, stop = part.integer("from"), part.integer("to")
+    head = head if start is None else start
+    tail = tail if stop is None else -stop
+    if head < len(frame.start):
+        findings.error(
+            part,
+            "overlap",
+            f"the payload begins at {head}, inside the start bytes",
+            at="from",
+        )
+    if tail < len(frame.end):
+        findings.error(
+            part,
+            "overlap",
+            f"the payload ends {tail} bytes before the frame does, inside the end bytes",
+            at="to",
+        )
+    return head, tail
+
+
+def _over(written: WrittenChecksum, behind: int, layout: FrameLayout) -> Window:
+    stop = -behind or None
+    if isinstance(written.over, Window):
+        return written.over if written.over.stop is not None else Window(written.over.start, stop)
+    if written.over == "frame":
+        return Window(0, stop)
+    return Window(layout.head, -layout.tail or None)
+
+
+def _check_checksum(
+    part: Part, checksum: ChecksumSpec, layout: FrameLayout, findings: Findings
+) -> None:
+    """Report a checksum or window outside the frame, or on top of something else."""
+    at, size, frame_size = checksum.at, checksum.size, layout.size
+    if at < 0 and at + size > 0:
+        text = f"a checksum of {size} bytes at {at} runs over the end of the frame"
+        findings.error(part, "outside-frame", text, at="at", hint=f"the last place is {-size}")
+        return
+    if frame_size is not None and not -frame_size <= at <= frame_size - size:
+        text = f"a checksum of {size} bytes at {at} is not inside a frame of {frame_size}"
+        findings.error(part, "outside-frame", text, at="at" if "at" in part.data else "")
+        return
+    if at < 0 and at + size > -len(layout.end):
+        text = f"the checksum at {at} lies on the end bytes"
+        findings.error(
+            part, "overlap", text, at="at", hint=f"the last place is {-size - len(layout.end)}"
+        )
+    if 0 <= at < len(layout.start):
+        text = f"the checksum at {at} lies on the start bytes"
+        findings.error(part, "overlap", text, at="at")
+    length = layout.length
+    if length and at >= 0 and at < length.offset + length.size and length.offset < at + size:
+        findings.error(part, "overlap", f"the checksum at {at} lies on the length field", at="at")
+    _check_window(part, checksum, layout, findings)
+
+
+def _check_window(
+    part: Part, checksum: ChecksumSpec, layout: FrameLayout, findings: Findings
+) -> None:
+    size, over = layout.size, checksum.over
+    where = "over" if "over" in part.data else ""
+    if size is None:
+        least = layout.head + layout.tail
+        if layout.length is None or over.start >= 0 or "over" not in part.data:
+            return
+        if -over.start > least:
+            text = f"the window begins {-over.start} bytes before the end; a frame may have {least}"
+            findings.warn(part, "outside-frame", text, at=where)
+        return
+    if size < layout.head + layout.tail:
+        return  # which is reported
+    start = over.start if over.start >= 0 else size + over.start
+    stop = size if over.stop is None else over.stop if over.stop >= 0 else size + over.stop
+    if not 0 <= start <= size or not 0 <= stop <= size:
+        text = f"the window of the checksum is not inside a frame of {size} bytes"
+        findings.error(part, "outside-frame", text, at=where)
+    elif start >= stop:
+        findings.error(
+            part, "empty-window", "there is nothing that the checksum is taken over", at=where
+        )
+
+
+def _check_size(part: Part, layout: FrameLayout, longest: int, findings: Findings) -> None:
+    """Report frames that cannot hold their own parts, or are longer than any may be."""
+    least = layout.head + layout.tail
+    if layout.size is not None and layout.size < least:
+        findings.error(
+            part,
+            "frame-too-small",
+            f"{layout.size} bytes cannot hold the start, end and checksum, which take {least}",
+            at="size",
+        )
+    elif max(least, layout.size or 0) > longest:
+        findings.error(
+            part,
+            "frame-too-small",
+            f"a frame has at least {max(least, layout.size or 0)} bytes, and none may be longer"
+            f" than {longest}",
+            at="max" if "max" in part.data else "",
+        )

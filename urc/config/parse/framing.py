@@ -1,0 +1,201 @@
+"""The framing of a transport or of one reply: mapping → `FramingSpec`."""
+
+from collections.abc import Callable
+from typing import Any, Final
+
+from urc.config.parse.bytes import parse_bytes
+from urc.config.parse.checksum import values_of
+from urc.config.parse.escape import parse_escape
+from urc.config.parse.frame_layout import MARKED, parse_layout
+from urc.config.parse.frame_pattern import check_frame_pattern
+from urc.config.part import Findings, Part
+from urc.config.suggest import did_you_mean, listed
+from urc.model.driver import FramingSpec
+from urc.model.framing import FrameLayout
+from urc.registry import Catalog
+
+__all__ = ["parse_framing"]
+
+_SWITCHABLE: Final = (
+    "delimiter", "fixed", "length", "slip", "cobs", "regex", "brackets", "json", "xml",
+)  # fmt: skip
+"""Framings that find the end of a frame in its bytes, so that another may go on behind it."""
+
+
+def parse_framing(part: Part, encoding: str, findings: Findings, catalog: Catalog) -> FramingSpec:
+    """Return the framing at `part`; what was reported is left at a default."""
+    kind = part.must("type")
+    if kind.data == "switch" and catalog.framings.get(kind.data) is not None:
+        return _switch(part, encoding, findings, catalog)
+    longest = part.integer("max") or FramingSpec().max_bytes
+    if catalog.framings.get(kind.data) is None:
+        findings.error(
+            kind,
+            "unknown-framing",
+            f"there is no framing of type {kind.data!r}",
+            hint=did_you_mean(kind.data, catalog.framings, "types"),
+        )
+        return FramingSpec(max_bytes=longest)
+    parse = _PARSERS.get(kind.data)
+    if parse is None:
+        options = {name: item for name, item in part.data.items() if name not in ("type", "max")}
+        return FramingSpec(kind.data, options, longest)
+    options = parse(part, encoding, findings)
+    layout = parse_layout(part, encoding, findings, longest)
+    if kind.data == "delimiter" and "escape" not in part.data:
+        _check_raw(part, layout, options, findings)
+    escape = parse_escape(part, layout, options, encoding, findings)
+    if escape is not None and escape.is_of_payload:
+        layout = layout._replace(escape=escape)
+    elif escape is not None:
+        options["escape"] = escape
+    if layout != FrameLayout() or kind.data in MARKED:
+        options["layout"] = layout
+    return _with_patience(part, FramingSpec(kind.data, options, longest), findings)
+
+
+def _with_patience(part: Part, spec: FramingSpec, findings: Findings) -> FramingSpec:
+    """Return the framing with what any may have besides."""
+    if "timeout" not in part.data and "strip_ansi" not in part.data:
+        return spec
+    timeout_s = findings.duration(part, "timeout", 0.0, least=0.001, most=60) or None
+    strips = "strip_ansi" in part.data and part.flag("strip_ansi", default=False)
+    return spec._replace(timeout_s=timeout_s, strips_ansi=strips)
+
+
+def _delimiter(part: Part, encoding: str, findings: Findings) -> dict[str, Any]:
+    tx = parse_bytes(part.must("tx"), encoding, findings)
+    rx_part = part.must("rx")
+    rx = parse_bytes(rx_part, encoding, findings)
+    if rx == b"":
+        findings.error(
+            rx_part,
+            "empty-delimiter",
+            "an empty delimiter cannot end a frame",
+            hint="name what the robot sends after each answer, such as LF or CRLF",
+        )
+    return {"tx": tx or b"", "rx": rx or b"\n"}
+
+
+def _check_raw(
+    part: Part, layout: FrameLayout, options: dict[str, Any], findings: Findings
+) -> None:
+    """Warn of a checksum of raw bytes among which a delimiter may be."""
+    specs = () if layout.digits else (*layout.checksums, layout.checksum)
+    trailing = layout.trail.checksum if layout.trail else None
+    ends = options["tx"] + options["rx"]
+    for spec in (*specs, trailing):
+        if spec is not None and spec.spelling == "raw" and values_of(spec.algorithm) & {*ends}:
+            findings.warn(
+                part.must("checksum"),
+                "raw-checksum",
+                "a checksum of raw bytes may contain the delimiter and cut its own frame",
+                hint="write 'as: hex', or use a framing that knows the size of its frames",
+            )
+            return
+
+
+def _regex(part: Part, encoding: str, findings: Findings) -> dict[str, Any]:
+    inner = part.must("pattern")
+    if findings.pattern(inner, is_over_bytes=True) is not None:
+        check_frame_pattern(inner, findings)
+    return {"pattern": inner.data} | _tx(part, encoding, findings)
+
+
+def _tx(part: Part, encoding: str, findings: Findings) -> dict[str, Any]:
+    tx = parse_bytes(part.get("tx"), encoding, findings)
+    return {"tx": tx} if tx else {}
+
+
+def _idle(part: Part, encoding: str, findings: Findings) -> dict[str, Any]:
+    return {"gap_s": findings.duration(part, "gap", 0.02, least=0.001, most=60)}
+
+
+def _plain(part: Part, encoding: str, findings: Findings) -> dict[str, Any]:
+    return {}
+
+
+_PARSERS: Final[dict[str, Callable[[Part, str, Findings], dict[str, Any]]]] = {
+    "delimiter": _delimiter,
+    "fixed": _plain,
+    "length": _plain,
+    "slip": _plain,
+    "cobs": _plain,
+    "idle": _idle,
+    "regex": _regex,
+    "brackets": _plain,
+    "json": _tx,
+    "xml": _tx,
+    "datagram": _plain,
+}
+
+
+def _switch(part: Part, encoding: str, findings: Findings, catalog: Catalog) -> FramingSpec:
+    cases: list[tuple[bytes, FramingSpec]] = []
+    for case in part.listed("cases"):
+        first_part, inner = case.must("first"), case.must("framing")
+        first = parse_bytes(first_part, encoding, findings)
+        if not _is_switchable(inner.must("type"), findings):
+            continue
+        for key in ("timeout", "strip_ansi"):
+            if key in inner.data:
+                text = f"'{key}' belongs to the 'switch' itself"
+                findings.error(inner, "misplaced-key", text, at=key, key=True)
+        spec = parse_framing(inner, encoding, findings, catalog)._replace(
+            timeout_s=None, strips_ansi=False
+        )
+        if first is None:
+            continue
+        if not first:
+            findings.error(
+                first_part, "empty-mark", "no bytes cannot tell one framing from another"
+            )
+            continue
+        _check_case(first_part, first, spec, cases, findings)
+        cases.append((first, spec))
+    options: dict[str, Any] = {"cases": tuple(cases)}
+    longest = max((spec.max_bytes for _, spec in cases), default=FramingSpec().max_bytes)
+    other = part.get("else")
+    if other is not None and _is_switchable(other.must("type"), findings):
+        options["otherwise"] = parse_framing(other, encoding, findings, catalog)
+        longest = max(longest, options["otherwise"].max_bytes)
+    return _with_patience(part, FramingSpec("switch", options, longest), findings)
+
+
+def _is_switchable(kind: Part, findings: Findings) -> bool:
+    if kind.data in _SWITCHABLE:
+        return True
+    findings.error(
+        kind,
+        "misplaced-framing",
+        f"a case of 'switch' cannot be of type {kind.data!r}",
+        hint=f"its framing must find the end of a frame by itself: {listed(_SWITCHABLE)}",
+    )
+    return False
+
+
+def _check_case(
+    part: Part,
+    first: bytes,
+    spec: FramingSpec,
+    before: list[tuple[bytes, FramingSpec]],
+    findings: Findings,
+) -> None:
+    """Report a case that is never reached, or whose frames begin with other bytes."""
+    for other, _ in before:
+        if first.startswith(other):
+            findings.error(
+                part,
+                "unreachable-case",
+                f"frames that begin with {first.hex(' ')} are taken by the case of"
+                f" {other.hex(' ')} before it",
+                hint="put the longer one first",
+            )
+            return
+    start = getattr(spec.options.get("layout"), "start", b"")
+    if start and not (start.startswith(first) or first.startswith(start)):
+        findings.error(
+            part,
+            "never-matches",
+            f"its frames begin with {start.hex(' ')}, not with {first.hex(' ')}",
+        )

@@ -1,0 +1,218 @@
+"""A layout: the picture of a grid → slots, each checked to be a rectangle."""
+
+import re
+from typing import Final
+
+from urc.config.parse.driver import spoken_name
+from urc.config.part import Findings, Part
+from urc.model.interface import DEBUG, Grid, Interface, Slot, Tab
+
+__all__ = ["check_names", "parse_interface"]
+
+_MOST: Final = 48
+"""Rows or columns of one grid."""
+_NAME = re.compile(r"[a-z][a-z0-9_-]{0,63}")
+_EMPTY = re.compile(r"\.+")
+_Cell = tuple[str, int]
+"""What a cell says, and its character in the text."""
+
+
+def parse_interface(part: Part, name: str, findings: Findings) -> Interface:
+    """Return the layout at `part`, without what its slots are filled with."""
+    title = part.text("title", spoken_name(name))
+    pages = part.named("tabs")
+    tabs = {key: _tab(inner, findings, part) for key, inner in pages.items()}
+    only = Tab()
+    if pages:
+        _check_beside_tabs(part, findings)
+    else:
+        only = _tab(part, findings)
+    background = part.text("background")
+    interface = Interface(
+        name=name,
+        title=title,
+        grids=only.grids,
+        summary=part.text("summary"),
+        licence=part.text("licence"),
+        author=part.text("author"),
+        left=only.left,
+        is_mirrored=only.is_mirrored,
+        tabs=tabs,
+    )
+    if background in interface.shown:
+        findings.error(
+            part,
+            "misplaced-key",
+            f"{background!r} is in the grid too",
+            at="background",
+            hint="a background lies behind the grid",
+        )
+    return interface._replace(background=background)
+
+
+def check_names(root: Part, findings: Findings) -> None:
+    """Report an interface that has the name of the one that is made."""
+    if DEBUG in root.named("interfaces"):
+        findings.error(
+            root.must("interfaces"),
+            "bad-name",
+            f"{DEBUG!r} is the interface that every robot has by itself",
+            at=DEBUG,
+            key=True,
+            hint="give yours another name",
+        )
+
+
+def _check_beside_tabs(part: Part, findings: Findings) -> None:
+    for key in ("grid", "grids", "left"):
+        if part.get(key) is not None:
+            findings.error(
+                part,
+                "misplaced-key",
+                f"'{key}' and 'tabs' exclude each other",
+                at=key,
+                key=True,
+                hint="each of the tabs has its own pictures",
+            )
+
+
+def _tab(part: Part, findings: Findings, around: Part | None = None) -> Tab:
+    """Return one page; what `around` says of mirroring holds for each of its tabs."""
+    is_mirrored = around.flag("mirror", default=True) if around is not None else True
+    left = part.get("left")
+    return Tab(
+        name=part.name if around is not None else "",
+        title=part.text("title", spoken_name(part.name)) if around is not None else "",
+        grids=_pictures(part, findings, is_tab=around is not None),
+        left=_by_screen(left, findings) if left is not None else {},
+        is_mirrored=part.flag("mirror", default=is_mirrored),
+    )
+
+
+def _pictures(part: Part, findings: Findings, *, is_tab: bool) -> dict[str, Grid]:
+    one, several = part.get("grid"), part.get("grids")
+    if one is None and several is None:
+        findings.error(
+            part,
+            "missing-key",
+            f"'grid' is missing from {'a tab' if is_tab else 'an interface'}",
+            key=True,
+            hint="draw it: a line for each row, a word for each cell, '.' for none",
+        )
+    if one is not None and several is not None:
+        findings.error(
+            several,
+            "misplaced-key",
+            "'grid' and 'grids' exclude each other",
+            key=True,
+            hint="put the picture of 'grid' into 'grids' as 'wide'",
+        )
+    found = {"wide": _grid(one, findings)} if one is not None else {}
+    return found | (_by_screen(several, findings) if several is not None else {})
+
+
+def _by_screen(several: Part, findings: Findings) -> dict[str, Grid]:
+    pictures = {screen: several.get(screen) for screen in ("wide", "tall", "phone", "low")}
+    return {
+        screen: _grid(picture, findings)
+        for screen, picture in pictures.items()
+        if picture is not None
+    }
+
+
+def _grid(part: Part, findings: Findings) -> Grid:
+    rows = _rows(part.data)
+    if not rows:
+        findings.error(part, "empty-grid", "this grid has no row")
+        return Grid(1, 1, ())
+    if len(rows) > _MOST or len(rows[0]) > _MOST:
+        findings.error(part, "wrong-size", f"a grid has at most {_MOST} rows and columns")
+        return Grid(1, 1, ())
+    width = len(rows[0])
+    is_sound = True
+    for number, row in enumerate(rows, 1):
+        if len(row) != width:
+            is_sound = False
+            findings.error(
+                part,
+                "uneven-rows",
+                f"row {number} has {_cells(len(row))}, the first row has {width}",
+                offset=row[0][1],
+                length=row[-1][1] + len(row[-1][0]) - row[0][1],
+                hint="every row has the same number of cells; '.' is an empty one",
+            )
+        for text, offset in row:
+            if not _NAME.fullmatch(text) and not _EMPTY.fullmatch(text):
+                is_sound = False
+                findings.error(
+                    part,
+                    "bad-name",
+                    f"{text!r} cannot be the name of a slot",
+                    offset=offset,
+                    length=len(text),
+                    hint="lower-case letters, digits, '-' and '_'; '.' is empty",
+                )
+    if not is_sound:
+        return Grid(1, 1, ())
+    slots = _slots(part, rows, findings)
+    return Grid(len(rows), width, tuple(slots))
+
+
+def _cells(count: int) -> str:
+    return "1 cell" if count == 1 else f"{count} cells"
+
+
+def _rows(text: str) -> list[list[_Cell]]:
+    rows = []
+    position = 0
+    for line in text.split("\n"):
+        row = [(found[0], position + found.start()) for found in re.finditer(r"\S+", line)]
+        if row:
+            rows.append(row)
+        position += len(line) + 1
+    return rows
+
+
+def _slots(part: Part, rows: list[list[_Cell]], findings: Findings) -> list[Slot]:
+    places: dict[str, list[tuple[int, int]]] = {}
+    for row_number, row in enumerate(rows):
+        for column, (text, _) in enumerate(row):
+            if not _EMPTY.fullmatch(text):
+                places.setdefault(text, []).append((row_number, column))
+    slots = []
+    for name, cells in places.items():
+        top, bottom = cells[0][0], cells[-1][0]
+        columns = [column for _, column in cells]
+        left, right = min(columns), max(columns)
+        slot = Slot(name, top, left, bottom - top + 1, right - left + 1)
+        _check_rectangle(slot, part, rows, findings)
+        slots.append(slot)
+    return slots
+
+
+def _check_rectangle(slot: Slot, part: Part, rows: list[list[_Cell]], findings: Findings) -> None:
+    bottom, right = slot.row + slot.row_span, slot.column + slot.column_span
+    wrong = [
+        (row, column)
+        for row in range(slot.row, bottom)
+        for column in range(slot.column, right)
+        if rows[row][column][0] != slot.name
+    ]
+    if not wrong:
+        return
+    told = [
+        f"row {row + 1} column {column + 1} "
+        + ("is empty" if _EMPTY.fullmatch(rows[row][column][0]) else f"is {rows[row][column][0]!r}")
+        for row, column in wrong[:4]
+    ]
+    more = f" and {len(wrong) - 4} more" if len(wrong) > 4 else ""
+    text, offset = rows[wrong[0][0]][wrong[0][1]]
+    findings.error(
+        part,
+        "not-a-rectangle",
+        f"slot {slot.name!r} is not a rectangle: it reaches from row {slot.row + 1} column"
+        f" {slot.column + 1} to row {bottom} column {right}, but {', '.join(told)}{more}",
+        offset=offset,
+        length=len(text),
+        hint="give another name to cells that stand apart, or fill the gap",
+    )

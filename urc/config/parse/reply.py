@@ -1,0 +1,173 @@
+"""What answers a request: mapping → `Reply`, with its stages, its errors and its correlation."""
+
+from urc.config.parse.beside_form import parse_lines
+from urc.config.parse.form import READ_FORMS, FormContext, parse_read
+from urc.config.parse.framing import parse_framing
+from urc.config.part import Findings, Part
+from urc.model.codec import NUMBERED, ReadSpec, WriteSpec
+from urc.model.driver import FramingSpec, Reply
+from urc.model.flow import Asides, ErrorReply, Stage
+from urc.patterns import Pattern
+
+__all__ = [
+    "implied_reply",
+    "parse_errors",
+    "parse_own_framing",
+    "parse_reply",
+    "parse_stage",
+    "refuse",
+]
+
+_OF_THE_WHOLE = ("match", "stages", "framing")
+"""Keys that belong to the reply, not to one of its stages."""
+_BESIDE_SILENCE = (
+    "fields", "head", "set", "when", "lines", "match", "timeout", "framing", "resend", "extend",
+)  # fmt: skip
+_MOST_BUSY_S = 600.0
+"""How long a robot may be busy in all where ``within`` does not say it."""
+
+
+def parse_reply(part: Part | None, findings: Findings, context: FormContext) -> Reply | None:
+    """Return the reply at `part`; None when there is none."""
+    if part is None:
+        return None
+    own, context = parse_own_framing(part, findings, context)
+    stages = part.listed("stages")
+    for inner in stages:
+        refuse(inner, _OF_THE_WHOLE, "belongs to the whole reply", findings)
+    if stages:
+        beside = (
+            *READ_FORMS,
+            "fields",
+            "set",
+            "when",
+            "lines",
+            "timeout",
+            "silence",
+            "resend",
+            "extend",
+        )
+        refuse(part, beside, "belongs to one of the stages", findings)
+    first, *others = [parse_stage(inner, findings, context) for inner in stages or [part]]
+    errors, faults = parse_errors(part, findings, context) if stages else ((), ())
+    match = part.get("match")
+    return Reply(
+        read=first.read,
+        errors=first.errors,
+        faults=first.faults,
+        timeout_s=first.timeout_s,
+        match=findings.expression(match) if match else None,
+        stages=tuple(others),
+        framing=own,
+        asides=first.asides,
+    ).with_errors(errors, faults)
+
+
+def implied_reply(send: WriteSpec) -> Reply | None:
+    """Return the answer of a request that has one whether or not the driver looks at it.
+
+    So a request that the robot refuses fails, and is not taken for done once it is sent.
+    """
+    return Reply(ReadSpec("any")) if send.options.get("verb") in NUMBERED else None
+
+
+def parse_stage(part: Part, findings: Findings, context: FormContext) -> Stage:
+    """Return one answer, whatever it belongs to."""
+    errors, faults = parse_errors(part, findings, context)
+    if "silence" in part.data:
+        return _silence(part, errors, faults, findings)
+    return Stage(
+        read=_read(part, findings, context),
+        errors=errors,
+        faults=faults,
+        timeout_s=findings.duration(part, "timeout", 0.0, most=3600) or None,
+        asides=_asides(part, findings, context),
+    )
+
+
+def _silence(
+    part: Part,
+    errors: tuple[Pattern, ...],
+    faults: tuple[ErrorReply, ...],
+    findings: Findings,
+) -> Stage:
+    """Return the answer of a robot that says nothing when it does what was asked."""
+    beside = (*READ_FORMS, *_BESIDE_SILENCE)
+    refuse(part, beside, "means nothing beside 'silence', which is the answer", findings)
+    read, within_s = ReadSpec("silence"), findings.duration(part, "silence", 0.3, most=60)
+    return Stage(read=read, errors=errors, faults=faults, timeout_s=within_s)
+
+
+def _asides(part: Part, findings: Findings, context: FormContext) -> Asides:
+    """Return what the robot may say under ``resend:`` and ``extend:``."""
+    extend, extend_s = part.get("extend"), _MOST_BUSY_S
+    if extend is not None and isinstance(extend.data, dict):
+        extend_s = findings.duration(extend, "within", _MOST_BUSY_S, most=3600)
+        if extend_s < findings.duration(part, "timeout", 0.0, most=3600):
+            findings.error(
+                extend,
+                "wrong-order",
+                "the robot may be busy for less time than its answer may take anyway",
+                at="within",
+                hint="'timeout' is the longest wait for each of its words, 'within' for all",
+            )
+    resend = part.get("resend")
+    if resend is not None and isinstance(resend.data, dict):
+        refuse(resend, ("within",), "belongs to 'extend'", findings)
+    return Asides(_aside(resend, findings, context), _aside(extend, findings, context), extend_s)
+
+
+def _aside(part: Part | None, findings: Findings, context: FormContext) -> ReadSpec | None:
+    """Return a frame in any form; a text is a pattern."""
+    if part is None:
+        return None
+    if isinstance(part.data, dict):
+        return parse_read(part, findings, context)
+    pattern = findings.pattern(part)
+    return ReadSpec("regex", {"pattern": pattern}, pattern.groups) if pattern else None
+
+
+def parse_errors(
+    part: Part, findings: Findings, context: FormContext
+) -> tuple[tuple[Pattern, ...], tuple[ErrorReply, ...]]:
+    """Return the answers under ``errors:``: patterns, and those of any form."""
+    patterns: list[Pattern] = []
+    faults: list[ErrorReply] = []
+    for inner in part.listed("errors"):
+        if isinstance(inner.data, dict):
+            text = inner.get("text")
+            read = parse_read(inner, findings, context)
+            faults.append(ErrorReply(read, findings.template(text) if text else None))
+        else:
+            pattern = findings.pattern(inner)
+            if pattern is not None:
+                patterns.append(pattern)
+    return tuple(patterns), tuple(faults)
+
+
+def refuse(part: Part, keys: tuple[str, ...], why: str, findings: Findings) -> None:
+    """Report each of `keys` that stands in `part`."""
+    for key in keys:
+        if key in part.data:
+            findings.error(part, "misplaced-key", f"'{key}' {why}", at=key, key=True)
+
+
+def parse_own_framing(
+    part: Part, findings: Findings, context: FormContext
+) -> tuple[FramingSpec | None, FormContext]:
+    """Return the framing that an answer brings, and what its forms must know: it is not the line's.
+
+    It is None where it brings none.
+    """
+    inner = part.get("framing")
+    if inner is None:
+        return None, context
+    if context.catalog is None:
+        return None, context  # in a document that has no transports, which was reported
+    spec = parse_framing(inner, context.encoding, findings, context.catalog)
+    return spec, context._replace(framing=None)
+
+
+def _read(part: Part, findings: Findings, context: FormContext) -> ReadSpec:
+    lines = parse_lines(part.get("lines"), findings)
+    return parse_read(part, findings, context)._replace(lines=lines)

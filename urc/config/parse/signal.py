@@ -1,0 +1,238 @@
+"""A signal: mapping → `Signal`, with its conversion, limits, axes and formula."""
+
+from collections.abc import Mapping
+from itertools import pairwise
+from typing import Final
+
+from urc.config.parse.conversion import CONVERSION_KEYS, parse_conversion, parse_states
+from urc.config.part import Findings, Part
+from urc.config.values import check_range, check_within
+from urc.expressions import Template
+from urc.model.axes import ANGLE_UNITS
+from urc.model.driver import Poll
+from urc.model.values import Limits, Signal
+
+__all__ = ["parse_signal", "with_ages"]
+
+_NUMBERS: Final = ("integer", "number")
+_ROTATIONS: Final = ("roll", "pitch", "yaw")
+_BYTES: Final = ("image", "blob")
+
+
+def parse_signal(part: Part, title: str, findings: Findings) -> Signal:
+    """Return the signal at `part`; `title` is what it is called when it says nothing itself."""
+    kind = part.text("type", "number")
+    element = part.text("of", "number") if kind == "array" else kind
+    _check_vector(part, kind, findings)
+    low, high = check_range(part, element, findings)
+    if part.name == "pi":
+        text, hint = "a signal cannot be called 'pi'", "expressions find the number under that name"
+        findings.error(part, "bad-name", text, key=True, hint=hint)
+    precision = part.integer("precision")
+    if precision is not None and element != "number":
+        findings.error(
+            part, "misplaced-key", f"'precision' means nothing for {kind}", at="precision", key=True
+        )
+    axes = _axes(part, kind, findings)
+    return Signal(
+        name=part.name,
+        type=kind,  # type: ignore[arg-type]  # the schema's enum is this Literal
+        title=part.text("title", title),
+        unit=part.text("unit"),
+        min=low,
+        max=high,
+        precision=precision,
+        states=parse_states(part, element, findings),
+        limits=_limits(part, element, (low, high), findings),
+        stale_after_s=findings.duration(part, "stale_after", 0.0, least=0.05),
+        description=part.text("description"),
+        conversion=parse_conversion(part, findings, element),
+        of=element if kind == "array" else "number",  # type: ignore[arg-type]  # as above
+        size=part.integer("size"),
+        axes=axes,  # type: ignore[arg-type]  # as above
+        formula=_formula(part, findings),
+        deadband=_deadband(part, element, (low, high), findings),
+        debounce_s=_debounce_s(part, kind, findings),
+    )
+
+
+def with_ages(signals: Mapping[str, Signal], polls: tuple[Poll, ...]) -> dict[str, Signal]:
+    """Return the signals, each with the age at which it is old.
+
+    Three periods of its fastest poll; of a computed one, the shortest age among its inputs.
+    """
+    aged = {name: _with_age(one, polls) for name, one in signals.items()}
+    for name, one in signals.items():
+        if one.formula is not None and not one.stale_after_s:
+            ages = [aged[base].stale_after_s for base in sorted(_bases(name, signals))]
+            aged[name] = one._replace(stale_after_s=min(ages, default=5.0))
+    return aged
+
+
+def _bases(name: str, signals: Mapping[str, Signal]) -> set[str]:
+    """Return the signals out of frames that a computed one rests on; cycles end the walk."""
+    found: set[str] = set()
+    seen: set[str] = set()
+    waiting = [name]
+    while waiting:
+        one = signals.get(waiting.pop())
+        if one is None or one.name in seen:
+            continue
+        seen.add(one.name)
+        if one.formula is None:
+            found.add(one.name)
+        else:
+            waiting += one.formula.names
+    return found
+
+
+def _with_age(signal: Signal, polls: tuple[Poll, ...]) -> Signal:
+    if signal.stale_after_s:
+        return signal
+    periods = [
+        poll.every_s for poll in polls if poll.reply and signal.name in poll.reply.read.fields
+    ]
+    return signal._replace(stale_after_s=max(1.0, 3 * min(periods)) if periods else 5.0)
+
+
+def _check_vector(part: Part, kind: str, findings: Findings) -> None:
+    for key, kinds in (("of", ("array",)), ("size", ("array", *_BYTES))):
+        if part.get(key) is not None and kind not in kinds:
+            findings.error(
+                part,
+                "misplaced-key",
+                f"'{key}' means nothing for {kind}",
+                at=key,
+                key=True,
+                hint=f"it belongs to 'type: {kinds[0]}'",
+            )
+
+
+def _check_rotation(part: Part, kind: str, findings: Findings) -> None:
+    """Warn of a rotation that does not say which way it turns; a computed one is as its inputs."""
+    is_named = not {*part.name.split("_")}.isdisjoint(_ROTATIONS)
+    is_angle = kind in _NUMBERS and part.text("unit") in ANGLE_UNITS
+    if is_named and is_angle and "value" not in part.data:
+        findings.warn(
+            part,
+            "no-axes",
+            f"nothing says which way {part.name!r} turns",
+            key=True,
+            hint="write axes: FLU (x forward, y left, z up) or axes: FRD (z down), as the robot's"
+            " document has it",
+        )
+
+
+def _axes(part: Part, kind: str, findings: Findings) -> str:
+    inner = part.get("axes")
+    if inner is None:
+        _check_rotation(part, kind, findings)
+        return ""
+    axes = str(inner.data)
+    size = part.integer("size")
+    if axes == "bearing":
+        fits = kind in _NUMBERS and part.text("unit") in ANGLE_UNITS
+        wanted = f"a bearing is a number in one of the units {', '.join(ANGLE_UNITS)}"
+    elif kind in _NUMBERS:
+        fits = part.text("unit") != ""
+        wanted = "a number that has axes has a unit"
+    else:
+        fits = kind == "object" or (kind == "array" and size in (2, 3, 4))
+        wanted = "a vector is an array of size 2 or 3, a quaternion one of size 4, or an object"
+    if not fits:
+        findings.error(inner, "wrong-axes", f"axes {axes} do not fit this signal", hint=wanted)
+    return axes
+
+
+def _deadband(
+    part: Part, element: str, bounds: tuple[float | None, float | None], findings: Findings
+) -> float:
+    band = part.number("deadband") or 0.0
+    if not band:
+        return 0.0
+    low, high = bounds
+    if element not in _NUMBERS:
+        text = f"'deadband' means nothing for {element}"
+        findings.error(part, "misplaced-key", text, at="deadband", key=True)
+    elif low is not None and high is not None and band > high - low:
+        findings.error(
+            part,
+            "out-of-range",
+            f"no change between {low:g} and {high:g} is as large as {band:g}: none would be told",
+            at="deadband",
+        )
+    return band
+
+
+def _debounce_s(part: Part, kind: str, findings: Findings) -> float:
+    if kind not in (*_NUMBERS, "boolean", "string") and "debounce" in part.data:
+        text = f"'debounce' means nothing for {kind}"
+        findings.error(part, "misplaced-key", text, at="debounce", key=True)
+    return findings.duration(part, "debounce", 0.0, most=3600)
+
+
+def _formula(part: Part, findings: Findings) -> Template | None:
+    inner = part.get("value")
+    if inner is None:
+        return None
+    for key in CONVERSION_KEYS:
+        if key in part.data:
+            findings.error(
+                part,
+                "misplaced-key",
+                f"'{key}' means nothing for a signal that is computed",
+                at=key,
+                key=True,
+                hint="write it into 'value'",
+            )
+    return findings.expression(inner)
+
+
+def _check_hysteresis(part: Part, values: Mapping[str, float | None], findings: Findings) -> None:
+    """Warn of an alarm that ends only where the next one has begun."""
+    width = part.number("hysteresis") or 0.0
+    low = values["low"] if values["low"] is not None else values["lolo"]
+    high = values["high"] if values["high"] is not None else values["hihi"]
+    if low is not None and high is not None and width >= high - low > 0:
+        findings.warn(
+            part,
+            "wide-hysteresis",
+            f"the alarm at {low:g} would end only at {low + width:g}, where the one at {high:g} has"
+            " begun",
+            at="hysteresis",
+            hint=f"make it smaller than {high - low:g}, the way between the two",
+        )
+
+
+def _limits(
+    part: Part, kind: str, bounds: tuple[float | None, float | None], findings: Findings
+) -> Limits:
+    inner = part.get("limits")
+    if inner is None:
+        return Limits()
+    if kind not in _NUMBERS:
+        findings.error(inner, "misplaced-key", f"'limits' mean nothing for {kind}", key=True)
+        return Limits()
+    names = ("lolo", "low", "high", "hihi")
+    values = {name: inner.number(name) for name in names}
+    given = [(name, value) for name, value in values.items() if value is not None]
+    for (name, value), (after, more) in pairwise(given):
+        if value >= more:
+            findings.error(
+                inner,
+                "wrong-order",
+                f"{after} {more:g} is not above {name} {value:g}",
+                at=after,
+                hint="the order is lolo < low < high < hihi",
+            )
+    for name, value in given:
+        check_within(value, *bounds, inner.must(name), findings)
+    _check_hysteresis(inner, values, findings)
+    return Limits(
+        lolo=values["lolo"],
+        low=values["low"],
+        high=values["high"],
+        hihi=values["hihi"],
+        hysteresis=inner.number("hysteresis") or 0.0,
+        for_s=findings.duration(inner, "for", 0.0, least=0.0),
+    )

@@ -1,0 +1,372 @@
+"""The items of a ``struct:``, or of an entry of ``types:``: list → `Item`s.
+
+One `ItemParser` reads one scope: the ids that its expressions can name. What a key means for which
+kind of item stands in `_KEYS`; numbers, constants and enums are checked by `struct_numbers`.
+"""
+
+from collections.abc import Mapping
+from typing import Final, Literal
+
+from urc.config.parse.struct.leaves import LeafParser, kind_of
+from urc.config.parse.struct.numbers import check_fits, unknown_type, written_constant
+from urc.config.parse.struct.scope import Scope
+from urc.config.parse.struct.text import parse_content
+from urc.config.part import Findings, Part
+from urc.model.binary import (
+    FRAME_NAMES,
+    Extent,
+    Item,
+    Switch,
+    case_key,
+    fixed_size,
+    least_size,
+    number_of,
+    width_of,
+)
+
+__all__ = ["ItemParser", "Purpose"]
+
+Purpose = Literal["read", "send", "type"]
+Items = tuple[Item, ...]
+
+MOST_ITEMS: Final = 2000
+"""Items of one frame, those of its types included."""
+DEEPEST: Final = 16
+"""Types and switches in each other."""
+_NUMBER: Final = ("id", "type", "count", "if", "enum", "const", "valid", "scale", "offset", "value")
+_KEYS: Final[Mapping[str, tuple[str, ...]]] = {
+    "number": _NUMBER,
+    "coded": _NUMBER,
+    "packed": ("id", "type", "count", "if", "enum", "valid", "scale", "offset", "order"),
+    "bits": ("id", "type", "bits", "order", "if"),
+    "bytes": ("id", "type", "size", "count", "if", "const", "pad", "until", "value"),
+    "text": ("id", "type", "size", "count", "if", "const", "pad", "until", "value", "encoding"),
+    "padding": ("size", "pad", "if"),
+    "struct": ("id", "type", "size", "count", "if", "trim", "value"),
+    "switch": ("switch", "if"),
+}
+
+
+class ItemParser:
+    """Reads the items of one scope."""
+
+    def __init__(
+        self,
+        findings: Findings,
+        types: Mapping[str, Items],
+        enums: Mapping[str, tuple[tuple[int, str], ...]],
+        purpose: Purpose,
+        encoding: str,
+    ) -> None:
+        self.findings = findings
+        self.types = types
+        self.enums = enums
+        self.purpose = purpose
+        self.encoding = encoding
+        self.scope = Scope(findings, purpose)
+        self.leaves = LeafParser(findings, enums, self.scope)
+
+    def items(self, part: Part) -> Items:
+        """Return the items of the list at `part`; what was reported is left out."""
+        found: list[Item | None] = []
+        total = 0
+        for inner in part.items():
+            item = self._item(inner)
+            found.append(item)
+            total += weight_of(item)
+            if total > MOST_ITEMS:
+                text = f"with its types it has more than {MOST_ITEMS} items"
+                self.findings.error(inner, "wrong-size", text)
+                return ()
+        self._check_rest(part, found)
+        return tuple(item for item in found if item is not None)
+
+    def _check_rest(self, part: Part, found: list[Item | None]) -> None:
+        """Report an item behind one that takes all the rest."""
+        for place, item in enumerate(found[:-1]):
+            extents = (item.size, item.times) if item is not None else ()
+            if any(extent is not None and extent.kind == "rest" for extent in extents):
+                self.findings.error(
+                    part.items()[place + 1],
+                    "after-rest",
+                    "the item before takes all the rest of the frame",
+                    hint="say its size, or put it last",
+                )
+
+    def _item(self, part: Part) -> Item | None:
+        item = self._short(part) if isinstance(part.data, str) else self._long(part)
+        if item is None:
+            return None
+        if depth_of(item) > DEEPEST:
+            text = f"types and switches are nested more than {DEEPEST} deep"
+            self.findings.error(part, "too-deep", text)
+            return None
+        self._check_sent(part, item)
+        self.scope.add(part, item)
+        return item
+
+    def _short(self, part: Part) -> Item | None:
+        """Return an item such as ``u8 8``, ``i32be rpm`` or ``header``."""
+        word, _, rest = part.data.strip().partition(" ")
+        rest = rest.strip()
+        items = self.types.get(word)
+        if items is not None:
+            self.scope.check_name(part, rest)
+            return Item("struct", rest, items=items)
+        number = number_of(word)
+        if number is None:
+            unknown_type(part, word, self.types, self.findings)
+            return None
+        if not rest:
+            self.findings.error(
+                part,
+                "bad-item",
+                f"a name or a constant is expected behind {word!r}",
+                hint=f"write '{word} speed', '{word} 8', or {{ size: {number.size} }} to skip it",
+            )
+            return None
+        constant = written_constant(rest)
+        if constant is None:
+            self.scope.check_name(part, rest)
+            return Item(kind_of(number), rest, number)
+        check_fits(part, number, constant, self.findings)
+        return Item(kind_of(number), "", number, const=constant)
+
+    def _long(self, part: Part) -> Item | None:
+        """Return an item that is a mapping."""
+        kind = self._kind(part)
+        if kind is None:
+            return None
+        for key in part.data:
+            if key not in _KEYS[kind]:
+                self.findings.error(
+                    part, "misplaced-key", f"'{key}' means nothing for {_NOUNS[kind]}",
+                    at=key, key=True,
+                )  # fmt: skip
+                return None
+        condition = part.get("if")
+        is_there = self.scope.expression(condition) if condition else None
+        item = self._of_kind(kind, part)
+        if item is None:
+            return None
+        item = item._replace(condition=is_there)
+        return item if item.times is None else self._array(part, item)
+
+    def _kind(self, part: Part) -> str | None:
+        if "switch" in part.data:
+            return "switch"
+        named = part.get("type")
+        if named is None:
+            if "size" in part.data and "id" not in part.data and "bits" not in part.data:
+                return "padding"
+            text = "'type' is missing from an item"
+            self.findings.error(part, "missing-key", text, key=True, hint="for example 'type: u8'")
+            return None
+        if "bits" in part.data:
+            return "bits"
+        if named.data in ("bytes", "text"):
+            return str(named.data)
+        if named.data in self.types:
+            return "struct"
+        number = number_of(named.data)
+        if number is None:
+            if "count" in part.data and width_of(named.data) is not None:
+                return "packed"
+            unknown_type(named, named.data, self.types, self.findings)
+            return None
+        return kind_of(number)
+
+    def _of_kind(self, kind: str, part: Part) -> Item | None:
+        name = part.text("id")
+        self.scope.check_name(part.get("id") or part, name)
+        if kind == "switch":
+            return self._switch(part.must("switch"))
+        if kind == "bits":
+            return self.leaves.bits(part, name)
+        if kind in ("number", "coded"):
+            return self.leaves.number(part, name, self._extent(part.get("count")))
+        if kind == "packed":
+            return self.leaves.packed(part, name, self._extent(part.get("count")))
+        size = self._extent(part.get("size"))
+        times = self._extent(part.get("count"))
+        if kind == "padding":
+            if size is not None and size.kind == "prefix":
+                text = "what is skipped has no size in front of it"
+                self.findings.error(part.must("size"), "bad-item", text)
+                return None
+            return Item("padding", size=size, pad=part.integer("pad") or 0)
+        value = self.scope.value(part.get("value"))
+        if kind == "struct":
+            return self._struct(part, Item("struct", name, size=size, times=times, value=value))
+        start = Item("text" if kind == "text" else "bytes", name, size=size, times=times)
+        return parse_content(part, start._replace(value=value), self.encoding, self.findings)
+
+    def _struct(self, part: Part, item: Item) -> Item | None:
+        items = self.types[part.text("type")]
+        trim = part.integer("trim")
+        if trim is not None:
+            size_is_free = item.size is not None and item.size.kind != "fixed"
+            if not size_is_free or fixed_size(_without_rest(items)) is None:
+                self.findings.error(
+                    part, "misplaced-key", "'trim' is for a fixed type in a window of another size",
+                    at="trim", key=True, hint="say 'size: rest', or an item that is the size",
+                )  # fmt: skip
+                return None
+        if item.value is not None and item.times is None:
+            text = "'value' means nothing for a struct that is no array"
+            self.findings.error(part, "misplaced-key", text, at="value", key=True)
+        return item._replace(items=items, trim=trim)
+
+    def _array(self, part: Part, item: Item) -> Item | None:
+        if not item.id and item.kind not in ("struct", "packed"):
+            text = "an array needs an 'id'"
+            self.findings.error(part, "missing-key", text, key=True, hint="{ size: … } skips bytes")
+            return None
+        if item.const is not None:
+            text = "'const' means nothing for an array"
+            self.findings.error(part, "misplaced-key", text, at="const", key=True)
+            return None
+        if item.kind == "packed":
+            return item
+        if least_size((item._replace(times=None, condition=None),)) == 0:
+            text = "each of its items has to take a byte at least"
+            self.findings.error(part, "bad-item", text, at="count")
+            return None
+        return item
+
+    def _extent(self, part: Part | None) -> Extent | None:
+        """Return a size or count: a number, ``rest``, a type in front of it, or an expression."""
+        if part is None:
+            return None
+        if not isinstance(part.data, str):
+            return Extent("fixed", int(part.data))
+        if part.data == "rest":
+            return Extent("rest")
+        prefix = number_of(part.data)
+        if prefix is not None:
+            if prefix.kind in ("integer", "varint") and not prefix.is_signed:
+                return Extent("prefix", prefix=prefix)
+            text = f"a size has no sign and no fraction, {part.data!r} has"
+            self.findings.error(part, "bad-item", text)
+            return None
+        expression = self.scope.expression(part)
+        return None if expression is None else Extent("expression", expression=expression)
+
+    def _switch(self, part: Part) -> Item | None:
+        by = self.scope.expression(part.must("by"))
+        cases: list[tuple[int | str, Items]] = []
+        subject = self.scope.get(part.text("by"))
+        branches = [*part.must("cases").entries().values()]
+        default_part = part.get("else")
+        before, after = self.scope.known, dict(self.scope.known)
+        default: Items | None = None
+        for inner in [*branches, *([default_part] if default_part else [])]:
+            self.scope.known = dict(before)
+            items = self._branch(inner)
+            after |= self.scope.known
+            if inner is default_part:
+                default = items
+                continue
+            cases.append((case_key(inner.name), items))
+            self._check_case(inner, subject)
+        self.scope.known = after
+        return None if by is None else Item("switch", switch=Switch(by, tuple(cases), default))
+
+    def _branch(self, part: Part) -> Items:
+        if isinstance(part.data, list):
+            return self.items(part)
+        items = self.types.get(part.data)
+        if items is None:
+            unknown_type(part, part.data, self.types, self.findings, only_types=True)
+            return ()
+        for name in Scope.names(Item("struct", items=items)):
+            self.scope.know(part, name, None)
+        return items
+
+    def _check_case(self, part: Part, subject: Item | None) -> None:
+        """Report a case that the item can never choose."""
+        key = case_key(part.name)
+        if subject is None or subject.kind not in ("number", "coded"):
+            return
+        words = [word for _, word in subject.enum]
+        if isinstance(key, str) and subject.number.kind == "integer" and key not in words:
+            text = f"{key!r} is no value of {subject.id!r}"
+            hint = f"its words: {', '.join(words)}" if words else "it has numbers only"
+            self.findings.error(part, "unknown-word", text, key=True, hint=hint)
+        elif isinstance(key, int) and key in dict(subject.enum):
+            word = dict(subject.enum)[key]
+            text = f"{subject.id!r} is read as the word {word!r}, never as {key}"
+            self.findings.error(part, "unknown-word", text, key=True, hint=f"write {word}:")
+        elif isinstance(key, int) and subject.number.kind == "integer":
+            check_fits(part, subject.number, key, self.findings, key=True)
+
+    def _check_sent(self, part: Part, item: Item) -> None:
+        """Report what would be sent and has no value."""
+        if self.purpose == "send" and asks_for_the_end(item):
+            self.findings.error(
+                part,
+                "nothing-to-send",
+                "what is sent has no end yet: '_left' and '_size' cannot say how it goes on",
+                hint="write 'rest' for all that is left, or let an item before say the size",
+            )
+        if self.purpose != "send" or item.kind not in (
+            "number",
+            "coded",
+            "packed",
+            "bytes",
+            "text",
+        ):
+            return
+        if not item.id and item.const is None and item.value is None:
+            self.findings.error(
+                part, "nothing-to-send", "it has neither 'id' nor 'const' nor 'value'",
+                hint="name the argument, or write { size: … } for bytes that mean nothing",
+            )  # fmt: skip
+
+
+def _without_rest(items: Items) -> Items:
+    """Return the items but for a last one that takes whatever a longer window has."""
+    is_rest = bool(items) and items[-1].size is not None and items[-1].size.kind == "rest"
+    return items[:-1] if is_rest and items[-1].kind == "padding" else items
+
+
+_NOUNS: Final = {
+    "number": "a number",
+    "coded": "a number",
+    "packed": "an array of bits",
+    "bits": "bits",
+    "bytes": "bytes",
+    "text": "text",
+    "padding": "bytes that are skipped",
+    "struct": "a struct",
+    "switch": "a switch",
+}
+
+
+def _inner(item: Item) -> list[Items]:
+    """Return the lists of items inside of an item."""
+    if item.switch is None:
+        return [item.items]
+    return [*(case for _, case in item.switch.cases), item.switch.default or ()]
+
+
+def asks_for_the_end(item: Item) -> bool:
+    """Return whether the size of the whole frame says how large an item is, or which it is."""
+    by = None if item.switch is None else item.switch.by
+    extents = [extent.expression for extent in (item.size, item.times) if extent is not None]
+    if any(one is not None and one.names & FRAME_NAMES for one in (by, *extents)):
+        return True
+    return any(asks_for_the_end(one) for items in _inner(item) for one in items)
+
+
+def weight_of(item: Item | None) -> int:
+    """Return how many items an item is; each type in it was found small enough before."""
+    if item is None:
+        return 0
+    return 1 + sum(weight_of(one) for items in _inner(item) for one in items)
+
+
+def depth_of(item: Item) -> int:
+    """Return how many types and switches are nested in an item."""
+    depths = [depth_of(one) for items in _inner(item) for one in items]
+    return max(depths, default=0) + (item.kind in ("struct", "switch"))

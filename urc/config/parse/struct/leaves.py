@@ -1,0 +1,110 @@
+"""The items of a ``struct:`` that have no items in them: numbers, their bits, packed arrays."""
+
+from collections.abc import Mapping
+from typing import Literal
+
+from urc.config.parse.struct.numbers import NumberParser, parse_enum, parse_valid
+from urc.config.parse.struct.scope import Scope
+from urc.config.part import Findings, Part
+from urc.model.binary import Extent, Item, Number, number_of, width_of
+
+__all__ = ["LeafParser", "kind_of"]
+
+
+def kind_of(number: Number) -> Literal["number", "coded"]:
+    """Return the kind of item that such a number is."""
+    return "coded" if number.is_coded else "number"
+
+
+class LeafParser:
+    """Reads numbers, for the parser of all items."""
+
+    def __init__(
+        self, findings: Findings, enums: Mapping[str, tuple[tuple[int, str], ...]], scope: Scope
+    ) -> None:
+        self.findings = findings
+        self.enums = enums
+        self.scope = scope
+
+    def number(self, part: Part, name: str, times: Extent | None) -> Item:
+        """Return a number, or an array of them."""
+        parser = NumberParser(part, self.findings)
+        number = number_of(part.text("type"))
+        assert number is not None  # noqa: S101  # `_kind` has looked
+        return Item(
+            kind_of(number),
+            name,
+            number,
+            times=times,
+            const=parser.constant(number),
+            scale=parser.scale(),
+            offset=part.number("offset") or 0,
+            enum=parse_enum(part, number, self.enums, self.findings),
+            valid=parse_valid(part, self.findings),
+            value=self.scope.value(part.get("value")),
+        )
+
+    def packed(self, part: Part, name: str, times: Extent | None) -> Item | None:
+        """Return an array of numbers that are no whole bytes, such as ``u11``."""
+        parser, number, count = (
+            NumberParser(part, self.findings),
+            width_of(part.text("type")),
+            part.must("count"),
+        )
+        assert number is not None  # noqa: S101  # `_kind` has looked
+        if times is None or times.kind != "fixed" or number.bits * times.number % 8:
+            text = f"numbers of {number.bits} bits need a count with which they fill whole bytes"
+            self.findings.error(count, "wrong-size", text, hint="such as 8, 16 or 24")
+            return None
+        return Item(
+            "packed",
+            name,
+            number,
+            times=times,
+            scale=parser.scale(),
+            offset=part.number("offset") or 0,
+            enum=parse_enum(part, number, self.enums, self.findings),
+            valid=parse_valid(part, self.findings),
+            is_lsb_first=part.text("order", "msb") == "lsb",
+        )
+
+    def bits(self, part: Part, name: str) -> Item | None:
+        """Return the parts of a whole number."""
+        named = part.must("type")
+        number = number_of(named.data)
+        if number is None or number.kind != "integer" or number.is_signed or number.is_coded:
+            text = f"bits lie in a whole number without a sign, not in {named.data!r}"
+            self.findings.error(named, "bad-item", text, hint="such as u8 or u16be")
+            return None
+        parts = [self._bit(inner) for inner in part.listed("bits")]
+        widths = sum(one.number.bits for one in parts)
+        if widths != number.bits:
+            self.findings.error(
+                part.must("bits"),
+                "wrong-size",
+                f"they take {widths} bits, and {named.data} has {number.bits}",
+                hint="give what is reserved its own { width: … }" if widths < number.bits else "",
+            )
+            return None
+        is_lsb_first = part.text("order", "msb") == "lsb"
+        return Item("bits", name, number, is_lsb_first=is_lsb_first, items=tuple(parts))
+
+    def _bit(self, part: Part) -> Item:
+        if isinstance(part.data, str):
+            self.scope.check_name(part, part.data)
+            return Item("number", part.data, Number("integer", 1))
+        parser = NumberParser(part, self.findings)
+        name = part.text("id")
+        self.scope.check_name(part.get("id") or part, name)
+        number = parser.width()
+        return Item(
+            "number",
+            name,
+            number,
+            const=parser.constant(number),
+            scale=parser.scale(),
+            offset=part.number("offset") or 0,
+            enum=parse_enum(part, number, self.enums, self.findings),
+            valid=parse_valid(part, self.findings),
+            value=self.scope.value(part.get("value")),
+        )

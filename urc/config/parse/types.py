@@ -1,0 +1,66 @@
+"""A driver's ``types:``: named structs, each read once, after those that it needs."""
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from urc.config.parse.struct.items import ItemParser
+from urc.config.part import Findings, Part
+from urc.model.binary import Item, number_of
+
+__all__ = ["parse_types"]
+
+Items = tuple[Item, ...]
+
+
+def parse_types(
+    part: Part, enums: Mapping[str, tuple[tuple[int, str], ...]], findings: Findings
+) -> Mapping[str, Items]:
+    """Return every type of the driver at `part`; what was reported is empty."""
+    parts = part.named("types")
+    types: dict[str, Items] = {}
+    needed = {name: set(_names(inner.data)) & parts.keys() for name, inner in parts.items()}
+    for name, inner in parts.items():
+        if number_of(name) is not None or name in ("bytes", "text", "rest"):
+            findings.error(inner, "bad-name", f"{name!r} is a type already", key=True)
+            needed[name] = set()
+    for name in parts:
+        _parse(name, parts, needed, (), types, enums, findings)
+    return types
+
+
+def _parse(
+    name: str,
+    parts: Mapping[str, Part],
+    needed: Mapping[str, set[str]],
+    above: tuple[str, ...],
+    types: dict[str, Items],
+    enums: Mapping[str, tuple[tuple[int, str], ...]],
+    findings: Findings,
+) -> None:
+    """Read the types that `name` needs, then itself."""
+    if name in types:
+        return
+    types_above = (*above, name)
+    for other in sorted(needed[name]):
+        if other in types_above:
+            circle = " → ".join((*types_above[types_above.index(other) :], other))
+            findings.error(
+                parts[name], "recursion", f"a type cannot contain itself: {circle}", key=True
+            )
+            types[other] = types.get(other, ())
+            continue
+        _parse(other, parts, needed, types_above, types, enums, findings)
+    if name not in types:
+        types[name] = ItemParser(findings, types, enums, "type", "").items(parts[name])
+
+
+def _names(data: Any) -> Iterator[str]:
+    """Yield every word of a type's items that may be another type."""
+    for item in data if isinstance(data, list) else ():
+        if isinstance(item, str):
+            yield item.strip().partition(" ")[0]
+            continue
+        yield str(item.get("type", ""))
+        switch = item.get("switch", {})
+        for branch in [*switch.get("cases", {}).values(), switch.get("else", [])]:
+            yield from [branch] if isinstance(branch, str) else _names(branch)

@@ -1,0 +1,196 @@
+"""A widget's manifest → `Widget`, and the shelf that reads manifests by name."""
+
+import re
+from collections.abc import Iterable
+from pathlib import Path as FilePath
+
+from urc.config.part import Findings, Part
+from urc.config.shape.check import check_options, check_shape, kind_of
+from urc.config.suggest import did_you_mean
+from urc.model.widget import Port, Widget
+from urc.problems import Problem, ProblemsError, has_errors
+from urc.source import Document, read_document
+
+__all__ = ["Shelf", "parse_widget"]
+
+_NAME = re.compile(r"[a-z][a-z0-9-]{0,63}")
+
+
+def parse_widget(document: Document, findings: Findings) -> Widget:
+    """Return the widget that a manifest declares."""
+    part = Part(document, (), document.data)
+    folder = FilePath(document.file).parent
+    name = part.text("name")
+    if folder.absolute().name != name:
+        findings.error(
+            part,
+            "wrong-name",
+            f"the folder is called {folder.absolute().name!r}, the widget {name!r}",
+            at="name",
+            hint="they must be the same",
+        )
+    size = part.get("size")
+    smallest = [int(inner.data) for inner in size.listed("min")] if size else []
+    options = part.get("options")
+    if options is not None:
+        _check_defaults(options, findings)
+    widget = Widget(
+        name=name,
+        title=part.text("title"),
+        folder=folder,
+        inputs={key: _input(inner) for key, inner in part.named("inputs").items()},
+        outputs={key: _output(inner) for key, inner in part.named("outputs").items()},
+        options={key: inner.data for key, inner in part.named("options").items()},
+        min_cells=(smallest[0], smallest[1]) if smallest else (1, 1),
+        is_gate=part.flag("gate", default=False),
+        summary=part.text("summary"),
+        licence=part.text("licence"),
+        author=part.text("author"),
+        needs=tuple(str(inner.data) for inner in part.listed("needs")),
+        together=tuple(tuple(map(str, inner.data)) for inner in part.listed("together")),
+    )
+    _check_names(part, widget, findings)
+    return widget
+
+
+def _check_names(part: Part, widget: Widget, findings: Findings) -> None:
+    """Report each name of a port or an option that the manifest does not have."""
+    ports, options = {**widget.inputs, **widget.outputs}, widget.options
+    told: list[tuple[Part, Iterable[str]]] = []
+    told += [(inner, (*ports, *options)) for inner in part.listed("needs")]
+    told += [(inner, ports) for group in part.listed("together") for inner in group.items()]
+    for inner in (*part.named("inputs").values(), *part.named("outputs").values()):
+        if "unit_of" in inner.data:
+            told.append((inner.must("unit_of"), ports))
+    for inner in part.named("inputs").values():
+        told += [(one, (*widget.inputs, *options)) for one in inner.listed("instead_of")]
+    for inner in part.named("options").values():
+        if "below" in inner.data:
+            told.append((inner.must("below"), options))
+        for one in (inner, inner.get("items")):
+            if one is not None and "gives" in one.data:
+                told.append((one.must("gives"), widget.outputs))
+    for inner, known in told:
+        if inner.data not in known:
+            findings.error(
+                inner,
+                "unknown-input",
+                f"this widget has no {inner.data!r}",
+                hint=did_you_mean(inner.data, known, "names"),
+            )
+
+
+def _port(part: Part) -> Port:
+    return Port(
+        name=part.name,
+        types=_one_or_more(part.get("type")),
+        unit=part.text("unit"),
+        unit_of=part.text("unit_of"),
+        is_required=part.flag("required", default=True),
+        description=part.text("description"),
+    )
+
+
+def _input(part: Part) -> Port:
+    size = part.get("size")
+    return _port(part)._replace(
+        of=_one_or_more(part.get("of")),
+        size=None if size is None else int(size.data),
+        is_many=part.flag("many", default=False),
+        is_each=part.flag("each", default=False),
+        quantity=part.text("quantity"),
+        instead_of=tuple(str(inner.data) for inner in part.listed("instead_of")),
+    )
+
+
+def _one_or_more(part: Part | None) -> tuple[str, ...]:
+    if part is None:
+        return ()
+    return (part.data,) if isinstance(part.data, str) else tuple(part.data)
+
+
+def _output(part: Part) -> Port:
+    return _port(part)._replace(
+        is_held=part.flag("hold", default=False), arguments=tuple(part.named("arguments"))
+    )
+
+
+def _check_defaults(options: Part, findings: Findings) -> None:
+    """Report each default that its own schema would refuse."""
+    for name, inner in options.entries().items():
+        default = inner.get("default")
+        if default is None:
+            continue
+        for problem in check_options(
+            options.document, options.path, {name: default.data}, options.data
+        ):
+            findings.error(default, problem.code, problem.message, hint=problem.hint)
+
+
+def _nearby(file: FilePath) -> str:
+    """Return a path as a person in the current folder would write it."""
+    try:
+        return str(file.relative_to(FilePath.cwd()))
+    except (OSError, ValueError):
+        return str(file)
+
+
+class Shelf:
+    """The widgets of one folder; each manifest is read once, when it is first asked for."""
+
+    def __init__(self, folder: FilePath) -> None:
+        self.folder = folder
+        self.problems: list[Problem] = []
+        """What is wrong with the manifests read so far."""
+        self._widgets: dict[str, Widget | None] = {}
+
+    @property
+    def files(self) -> tuple[str, ...]:
+        """Every manifest that was asked for, whether there is one or not."""
+        return tuple(str(self.folder / name / "widget.yaml") for name in self._widgets)
+
+    def names(self) -> list[str]:
+        """Return the names of all widgets there are."""
+        try:
+            return sorted(entry.parent.name for entry in self.folder.glob("*/widget.yaml"))
+        except OSError:
+            return []
+
+    def get(self, name: str) -> Widget | None:
+        """Return a widget, or None when there is none or its manifest is broken."""
+        if name not in self._widgets:
+            self._widgets[name] = self._read(name) if self.has(name) else None
+        return self._widgets[name]
+
+    def has(self, name: str) -> bool:
+        """Return whether there is a widget of that name, broken or not."""
+        return bool(_NAME.fullmatch(name)) and (self.folder / name / "widget.yaml").is_file()
+
+    def place(self, name: str) -> FilePath:
+        """Return the folder of the widget of that name."""
+        return self.folder / name
+
+    def hint(self, name: str) -> str:
+        """Return what may have been meant by a name that there is not."""
+        return did_you_mean(name, self.names(), "widgets")
+
+    def _read(self, name: str) -> Widget | None:
+        try:
+            document = read_document(_nearby(self.folder / name / "widget.yaml"))
+        except ProblemsError as error:
+            self.problems += error.problems
+            return None
+        problems = check_shape(document)
+        if not problems and kind_of(document) != "widget":
+            problems = [
+                document.problem(
+                    ("kind",),
+                    "wrong-kind",
+                    "a widget's manifest is expected here",
+                    hint="write 'kind: widget'",
+                )
+            ]
+        findings = Findings()
+        widget = None if has_errors(problems) else parse_widget(document, findings)
+        self.problems += [*document.findings, *problems, *findings]
+        return None if has_errors(findings) else widget

@@ -1,0 +1,97 @@
+"""Rules about robots that say nothing: on a line by design, or when they do what was asked."""
+
+from typing import Final
+
+from urc.config.link.steps import steps_of
+from urc.config.part import Findings, Part
+from urc.model.driver import Driver, Reply, TransportSpec
+from urc.model.flow import ExpectStep, PromptStep, Step, all_steps
+
+__all__ = ["check_answers"]
+
+_HINT: Final = "leave out 'answers: never', or leave out whatever waits for the robot there"
+
+
+def check_answers(part: Part, driver: Driver, findings: Findings) -> None:
+    """Report whatever waits for a line that never answers, and silence that nothing can break.
+
+    Args:
+        part: the driver's mapping.
+        driver: as loaded, without errors.
+        findings: takes the errors.
+    """
+    for name, inner in part.named("commands").items():
+        one = driver.commands[name]
+        _check_silence(inner, one.reply, driver.transports.get(one.transport), findings)
+    for inner, poll in zip(part.listed("polls"), driver.polls, strict=True):
+        _check_silence(inner, poll.reply, driver.transports.get(poll.transport), findings)
+    mute = {name for name, spec in driver.transports.items() if spec.never_answers}
+    if not mute:
+        return
+    for name, inner in part.named("transports").items():
+        if name in mute:
+            _check_line(inner, driver.transports[name], findings)
+    for name, inner in part.named("commands").items():
+        command = driver.commands[name]
+        if command.transport in mute and command.reply is not None:
+            _refuse(inner, "reply" if "reply" in inner.data else "send", name, findings)
+    for inner, poll in zip(part.listed("polls"), driver.polls, strict=True):
+        if poll.transport in mute and poll.reply is not None and "send" in inner.data:
+            _refuse(inner, "reply" if "reply" in inner.data else "send", poll.name, findings)
+    for name, inner in part.named("messages").items():
+        if driver.messages[name].transport in mute:
+            findings.error(
+                inner,
+                "never-answers",
+                f"nothing ever comes from {driver.messages[name].transport!r}, which never answers",
+                key=True,
+                hint=_HINT,
+            )
+    for name, inner in part.named("sequences").items():
+        _check_steps(steps_of(inner), driver.commands[name].steps, mute, findings)
+
+
+def _check_silence(
+    part: Part, reply: Reply | None, spec: TransportSpec | None, findings: Findings
+) -> None:
+    """Report an answer that is silence where nothing could break it."""
+    place = part.get("reply")
+    if reply is None or place is None or (spec is not None and (spec.errors or spec.faults)):
+        return
+    answers = [(reply.read, reply.errors, reply.faults)]
+    answers += [(one.read, one.errors, one.faults) for one in reply.stages]
+    inners = place.listed("stages") or [place]
+    for inner, (read, errors, faults) in zip(inners, answers, strict=True):
+        if read.form == "silence" and not (errors or faults):
+            findings.error(
+                inner,
+                "nothing-refuses",
+                "silence is the answer, and nothing says how the robot refuses",
+                at="silence",
+                key=True,
+                hint="write errors: with what it says then, or leave 'reply' out",
+            )
+
+
+def _refuse(part: Part, key: str, name: str, findings: Findings) -> None:
+    text = f"{name!r} waits for an answer, and its line never answers"
+    findings.error(part, "never-answers", text, at=key, key=True, hint=_HINT)
+
+
+def _check_line(part: Part, spec: TransportSpec, findings: Findings) -> None:
+    timeouts = part.get("timeouts")
+    for place, key in ((part, "stale_after"), (timeouts, "idle")):
+        if place is not None and key in place.data:
+            text = f"{key!r} waits for the robot, and the line never answers"
+            findings.error(place, "never-answers", text, at=key, key=True, hint=_HINT)
+    for key, steps in (("on_connect", spec.on_connect), ("on_close", spec.on_close)):
+        if steps:
+            _check_steps(part.must(key), steps, {spec.name}, findings)
+
+
+def _check_steps(part: Part, steps: tuple[Step, ...], mute: set[str], findings: Findings) -> None:
+    for step in all_steps(steps):
+        if isinstance(step, (ExpectStep, PromptStep)) and step.transport in mute:
+            text = f"a step waits for {step.transport!r}, which never answers"
+            findings.error(part, "never-answers", text, key=True, hint=_HINT)
+            return

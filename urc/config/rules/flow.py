@@ -1,0 +1,221 @@
+"""Rules about traffic and safety: what cannot keep up, and what moves too easily. All are warnings.
+
+A rule speaks only where somebody has decided something: never about a default.
+"""
+
+from collections.abc import Iterator
+
+from urc.config.link.steps import steps_of
+from urc.config.parse.form import write_form
+from urc.config.part import Findings, Part, shown_duration
+from urc.config.rules.answers import check_answers
+from urc.config.rules.frames import check_frames_apart
+from urc.config.rules.motion import check_motion
+from urc.config.rules.traffic import check_traffic
+from urc.config.rules.unmarked import check_unguarded, check_unmarked
+from urc.expressions import digested_settings, split_template
+from urc.model.codec import WriteSpec
+from urc.model.driver import Driver, Poll, Reply, TransportSpec
+from urc.model.flow import SendStep, Step, UntilStep, WaitStep, all_steps
+
+__all__ = ["check_flow"]
+
+_GOOD_BYE_S = 2.0
+"""What ``on_close`` may take, see `urc.protocol.engine`."""
+_BITS_OF_A_BYTE = 10
+"""On a serial line: start and stop bit included."""
+
+
+def check_flow(part: Part, driver: Driver, secrets: frozenset[str], findings: Findings) -> None:
+    """Add the warnings about the driver at `part`.
+
+    Args:
+        part: the driver's mapping.
+        driver: as loaded, without errors.
+        secrets: settings that nobody may see.
+        findings: takes the warnings.
+    """
+    for name, inner in part.named("transports").items():
+        _check_line(inner, driver.transports[name], findings)
+        _check_baud(inner, driver, driver.transports[name], findings)
+    for name, inner in part.named("commands").items():
+        command = driver.commands[name]
+        if command.reply is not None and "reply" in inner.data:
+            _check_stages(inner.must("reply"), command.reply, command.transport, driver, findings)
+        if command.verify is not None:
+            _check_haste(inner.must("verify"), driver, name, findings)
+    for inner, poll in zip(part.listed("polls"), driver.polls, strict=True):
+        _check_poll(inner, poll, findings)
+    _check_secrets(part, driver, secrets, findings)
+    check_answers(part, driver, findings)
+    check_traffic(part, driver, findings)
+    check_motion(part, driver, findings)
+    check_unguarded(part, driver, findings)
+    check_unmarked(part, driver, findings)
+    check_frames_apart(part, driver, findings)
+
+
+def _check_line(part: Part, spec: TransportSpec, findings: Findings) -> None:
+    keepalive = spec.keepalive
+    watchdog_s = keepalive.watchdog_s if keepalive is not None else None
+    if keepalive is not None and watchdog_s is not None and keepalive.every_s >= watchdog_s:
+        findings.warn(
+            part.must("keepalive").must("every"),
+            "slow-keepalive",
+            f"the robot gives up after {shown_duration(watchdog_s)}, before it hears of this",
+            hint="half of that leaves room for one that is lost",
+        )
+    waits_s = sum(_wait_s(step) for step in all_steps(spec.on_close))
+    if waits_s > _GOOD_BYE_S:
+        findings.warn(
+            part.must("on_close"),
+            "long-good-bye",
+            f"its waits take {shown_duration(waits_s)}, and it has"
+            f" {shown_duration(_GOOD_BYE_S)} in all",
+            key=True,
+        )
+
+
+def _wait_s(step: Step) -> float:
+    if isinstance(step, UntilStep):
+        return step.timeout_s
+    return step.seconds if isinstance(step, WaitStep) else 0.0
+
+
+def _check_baud(part: Part, driver: Driver, spec: TransportSpec, findings: Findings) -> None:
+    """Warn of polls that need more bytes than a serial line carries, at the very least."""
+    baud = spec.options.get("baud")
+    if isinstance(baud, bool) or not isinstance(baud, (int, float)) or baud <= 0:
+        return
+    polls = [poll for poll in driver.polls if poll.transport == spec.name]
+    bytes_per_s = sum(_least_bytes(poll) / poll.every_s for poll in polls)
+    if bytes_per_s * _BITS_OF_A_BYTE > baud:
+        findings.warn(
+            part,
+            "too-many-polls",
+            f"the polls need {bytes_per_s * _BITS_OF_A_BYTE:.0f} bit/s at the least, and the line"
+            f" carries {baud:g}",
+            at="baud",
+        )
+
+
+def _least_bytes(poll: Poll) -> int:
+    """Return the bytes of a request and its answer, as far as they are written out."""
+    template = poll.send.options.get("template")
+    source = getattr(template, "source", "")
+    literal = sum(len(text) for _, text, _ in split_template(source))
+    return max(1, literal) + (1 if poll.reply is not None else 0)
+
+
+def _check_stages(
+    part: Part, reply: Reply, transport: str, driver: Driver, findings: Findings
+) -> None:
+    """Warn of a long second answer that holds up the polls of a line with one request in flight."""
+    if not reply.stages or driver.transports[transport].queue.in_flight > 1:
+        return
+    periods = [poll.every_s for poll in driver.polls if poll.transport == transport]
+    longest_s = max((one.timeout_s or 0.0 for one in reply.stages), default=0.0)
+    if periods and longest_s > min(periods):
+        findings.warn(
+            part.must("stages"),
+            "stages-block-line",
+            f"while it waits up to {shown_duration(longest_s)} to be done, the poll of every"
+            f" {shown_duration(min(periods))} waits, too",
+            key=True,
+            hint="write queue: { in_flight: 2 } when the robot can answer in between",
+        )
+
+
+def _check_haste(part: Part, driver: Driver, name: str, findings: Findings) -> None:
+    """Warn when what is to come true is read less often than that may take."""
+    verify = driver.commands[name].verify
+    if verify is None:
+        return
+    for signal in sorted(verify.condition.names & driver.signals.keys()):
+        periods = [poll.every_s for poll in driver.polls if signal in _fields(poll.reply)]
+        told = any(signal in one.read.fields for one in driver.messages.values())
+        if periods and not told and min(periods) > verify.within_s:
+            findings.warn(
+                part.must("within"),
+                "hasty-verify",
+                f"{signal!r} is read every {shown_duration(min(periods))} only",
+                hint="give it longer than a period, or ask more often",
+            )
+
+
+def _fields(reply: Reply | None) -> tuple[str, ...]:
+    return () if reply is None else reply.read.fields
+
+
+def _check_poll(part: Part, poll: Poll, findings: Findings) -> None:
+    if poll.offline is not None and poll.offline.retry_s < poll.every_s:
+        findings.warn(
+            part.must("offline").must("retry"),
+            "eager-retry",
+            f"a part that does not answer is asked more often than one that does"
+            f" (every {shown_duration(poll.every_s)})",
+            hint="make it longer than 'every'",
+        )
+
+
+def _digested(part: Part, send: WriteSpec) -> set[str]:
+    """Return the settings that show in no frame, but as part of a hash that is new each time."""
+    inner, form = write_form(part)
+    found = [template for _, template in form.templates(inner, send)]
+    digested = {name for one in found for name in digested_settings(one)}
+    return digested - {name for one in found for name in one.settings - digested_settings(one)}
+
+
+def _check_secrets(part: Part, driver: Driver, secrets: frozenset[str], findings: Findings) -> None:
+    """Warn of whatever sends a secret and does not keep it out of messages."""
+    asked = [
+        (inner.must("send"), driver.commands[name].send)
+        for name, inner in part.named("commands").items()
+    ]
+    asked += [
+        (inner.must("send"), poll.send)
+        for inner, poll in zip(part.listed("polls"), driver.polls, strict=True)
+        if "send" in inner.data
+    ]
+    for place, send in asked:
+        used = sorted((send.settings & secrets) - _digested(place, send))
+        if used:
+            findings.warn(
+                place,
+                "secret-not-redacted",
+                f"the secret {used[0]!r} shows in the traffic of every request",
+                hint="send it once, in a step of 'on_connect' or of a sequence, with redact: true",
+            )
+    for inner, step in _sends(part, driver):
+        used = sorted((step.send.settings & secrets) - _digested(inner.must("send"), step.send))
+        if used and not step.is_secret:
+            findings.warn(
+                inner.must("send"),
+                "secret-not-redacted",
+                f"the secret {used[0]!r} may show up in messages and logs",
+                hint="write redact: true beside it",
+            )
+
+
+def _sends(part: Part, driver: Driver) -> Iterator[tuple[Part, SendStep]]:
+    for name, inner in part.named("sequences").items():
+        yield from _sends_in(steps_of(inner), driver.commands[name].steps)
+    for name, inner in part.named("transports").items():
+        spec = driver.transports[name]
+        for key, steps in (("on_connect", spec.on_connect), ("on_close", spec.on_close)):
+            if steps:
+                yield from _sends_in(inner.must(key), steps)
+
+
+def _sends_in(part: Part, steps: tuple[Step, ...]) -> Iterator[tuple[Part, SendStep]]:
+    for inner, step in zip(part.items(), steps, strict=True):
+        if isinstance(step, SendStep):
+            yield inner, step
+        for key, branch in (
+            ("repeat", getattr(step, "body", None)),
+            ("then", getattr(step, "then", None)),
+            ("else", getattr(step, "otherwise", None)),
+        ):
+            place = inner.get(key)
+            if branch and place is not None:
+                yield from _sends_in(place, branch)

@@ -1,0 +1,360 @@
+"""Rules about how frames are told apart: patterns that fit too much, and words that nobody uses.
+
+All are warnings. A frame that two declarations take is only told of where one is at hand to show.
+"""
+
+import re
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from functools import cached_property
+from typing import Any, Final, cast
+
+from urc.config.parse.form import read_form
+from urc.config.part import Findings, Part
+from urc.model.binary import Item, fixed_size
+from urc.model.codec import ReadSpec
+from urc.model.driver import Driver, Reply
+from urc.model.flow import Asides
+from urc.model.values import Signal
+from urc.patterns import Pattern, can_be_empty, example
+
+__all__ = ["check_frames_apart"]
+
+_FILLINGS: Final = ("0", "7", "-1.5", "q", "Zq", "a b", "~", "A5", "F", "+12", "x_1", "")
+"""What may stand in a field; only those that its pattern takes are tried."""
+_VARIANTS: Final = 6
+_SHOWN: Final = 40
+_WORD: Final = re.compile(r"\w+")
+_LETTERS: Final = re.compile(r"\^([A-Za-z0-9 :,=/_-]*)")
+_GROUP: Final = re.compile(r"\(\?(?:P<\w+>|:)")
+_MAY_BE_LESS: Final = re.compile(r"[*?|{]|\(\)")
+"""What a group that may be empty has in it."""
+
+
+def check_frames_apart(part: Part, driver: Driver, findings: Findings) -> None:
+    """Add the warnings about the frames of the driver at `part`."""
+    _check_messages(part, driver, findings)
+    for inner, reply in _replies(part, driver):
+        _check_refusals(inner, reply, findings)
+        for stage, read in _stages(inner, reply):
+            _check_empty(stage, read, driver.signals, findings)
+    _check_shared_refusals(part, driver, findings)
+    for name, inner in part.named("messages").items():
+        _check_empty(inner, driver.messages[name].read, driver.signals, findings)
+    for inner in _prompts(part):
+        pattern = findings.pattern(inner)
+        if pattern is not None and _finds(pattern, ""):
+            findings.warn(
+                inner,
+                "matches-empty",
+                "this fits an empty text, and so the first byte of anything is the prompt",
+                hint="say what the prompt ends with: 'login: $'",
+            )
+    _check_words(part, findings)
+
+
+def _prompts(part: Part) -> Iterator[Part]:
+    """Yield the pattern of every prompt in the steps of the driver at `part`."""
+    for inner in part.named("sequences").values():
+        yield from _prompts_in(inner)
+    for inner in part.named("transports").values():
+        for key in ("on_connect", "on_close"):
+            steps = inner.get(key)
+            if steps is not None:
+                yield from _prompts_in(steps)
+
+
+def _prompts_in(part: Part) -> Iterator[Part]:
+    if isinstance(part.data, dict):
+        for key, inner in part.entries().items():
+            if key == "prompt":
+                yield inner
+            else:
+                yield from _prompts_in(inner)
+    elif isinstance(part.data, list):
+        for inner in part.items():
+            yield from _prompts_in(inner)
+
+
+def _replies(part: Part, driver: Driver) -> Iterator[tuple[Part, Reply]]:
+    for name, inner in part.named("commands").items():
+        reply = driver.commands[name].reply
+        if reply is not None and "reply" in inner.data:
+            yield inner.must("reply"), reply
+    for inner, poll in zip(part.listed("polls"), driver.polls, strict=True):
+        if poll.reply is not None and "reply" in inner.data:
+            yield inner.must("reply"), poll.reply
+
+
+def _stages(part: Part, reply: Reply) -> Iterator[tuple[Part, ReadSpec]]:
+    reads = [reply.read, *(one.read for one in reply.stages)]
+    yield from zip(part.listed("stages") or [part], reads, strict=True)
+
+
+# -- frames that two declarations take
+
+
+class _Text:
+    """A declaration of text frames: how to tell whether it takes one, and some that it takes."""
+
+    def __init__(self, pattern: Pattern | None, text: str = "") -> None:
+        self._pattern = pattern
+        self._text = text
+        self.head = text if pattern is None else _head(pattern.source)
+        """What its frames begin with, as far as that is easily told."""
+
+    def takes(self, text: str) -> bool:
+        return text == self._text if self._pattern is None else bool(_finds(self._pattern, text))
+
+    @cached_property
+    def samples(self) -> tuple[str, ...]:
+        """Some frames that it takes."""
+        if self._pattern is None:
+            return (self._text,)
+        groups = self._pattern.groups
+        made = [example(self._pattern, {}, variant) for variant in range(_VARIANTS)]
+        made += [example(self._pattern, dict.fromkeys(groups, one)) for one in _FILLINGS]
+        return tuple(dict.fromkeys(one for one in made if _finds(self._pattern, one)))
+
+    def takes_all_of(self, other: "_Text") -> bool:
+        """Return whether it takes every frame of `other` that comes to mind."""
+        if not (self.head.startswith(other.head) or other.head.startswith(self.head)):
+            return False
+        return bool(other.samples) and all(map(self.takes, other.samples))
+
+
+def _finds(pattern: Pattern, text: str) -> bool:
+    return pattern.search(text) is not None
+
+
+def _head(source: str) -> str:
+    """Return the letters that a pattern begins with; "" where that takes more than a look."""
+    found = _LETTERS.match(source)
+    if found is None or "|" in source:
+        return ""
+    return found[1][:-1] if source[found.end() : found.end() + 1] in ("*", "?", "{") else found[1]
+
+
+def _check_messages(part: Part, driver: Driver, findings: Findings) -> None:
+    """Warn of a message whose frames an earlier one takes: the first one has them."""
+    seen: list[tuple[str, str, ReadSpec, _Text | None]] = []
+    for name, inner in part.named("messages").items():
+        message = driver.messages[name]
+        text = _text_of(message.read)
+        for other, transport, read, earlier in seen:
+            if transport != message.transport or read.topic != message.read.topic:
+                continue
+            shown = _shared(read, earlier, message.read, text)
+            if shown is not None:
+                findings.warn(
+                    inner,
+                    "ambiguous-frame",
+                    f"{other!r}, above, takes the same frames{shown}, so that this one gets none"
+                    " of them",
+                    key=True,
+                    hint="put the more special one first, or tell them apart by 'when'",
+                )
+                break
+        seen.append((name, message.transport, message.read, text))
+
+
+def _shared(
+    first: ReadSpec, earlier: _Text | None, second: ReadSpec, later: _Text | None
+) -> str | None:
+    """Return how to show a frame of `second` that `first` takes; None when none is known."""
+    if first.topic != second.topic:
+        return None
+    if first.when is not None or first.lines is not None or second.lines is not None:
+        return None
+    if earlier is not None and later is not None:
+        if earlier.takes_all_of(later):
+            return f", such as {later.samples[0][:_SHOWN]!r}"
+        return None
+    if first.form == second.form == "struct":
+        return "" if _covers(_items(first), _items(second)) else None
+    return None
+
+
+def _text_of(read: ReadSpec) -> _Text | None:
+    if read.form == "equals":
+        return _Text(None, cast("str", read.options["text"]))
+    pattern = read.options.get("pattern")
+    if read.form != "regex" or not isinstance(pattern, Pattern):
+        return None
+    return _Text(pattern)
+
+
+def _items(read: ReadSpec) -> tuple[Item, ...]:
+    return cast("tuple[Item, ...]", read.options.get("items", ()))
+
+
+def _covers(first: tuple[Item, ...], second: tuple[Item, ...]) -> bool:
+    """Return whether every frame of `second` is one of `first`, as far as that can be proven."""
+    size = fixed_size(first)
+    if size is None or size != fixed_size(second):
+        return False
+    asked = _asked(first)
+    return asked is not None and asked.items() <= (_asked(second) or {}).items()
+
+
+def _asked(items: tuple[Item, ...]) -> dict[tuple[int, int], object] | None:
+    """Return what must stand where: (offset, size) → value; None when more is asked than that."""
+    found: dict[tuple[int, int], object] = {}
+    offset = 0
+    for item in items:
+        size = fixed_size((item,)) or 0
+        if item.valid is not None or any(one.const is not None for one in item.items):
+            return None
+        if item.kind == "struct" or item.kind == "text":
+            return None
+        if item.const is not None:
+            found[offset, size] = (item.const, item.number if item.kind == "number" else None)
+        offset += size
+    return found
+
+
+def _check_refusals(part: Part, reply: Reply, findings: Findings) -> None:
+    """Warn of a refusal that takes the good answer: refusals are looked at first."""
+    good = _text_of(reply.read) if reply.read.when is None and reply.read.lines is None else None
+    errors = [(inner, "a refusal", "refusals") for inner in part.listed("errors")]
+    asides = [("resend", "a request for the frame"), ("extend", "being busy")]
+    errors += [(part.must(key), what, f"{key!r}") for key, what in asides if key in part.data]
+    patterns = (*reply.errors, *_patterns_of(reply.asides))
+    for inner, what, whose in errors:
+        pattern = next((one for one in patterns if one.source == inner.data), None)
+        if pattern is None:
+            continue
+        if _finds(pattern, ""):
+            findings.warn(
+                inner,
+                "matches-empty",
+                f"this fits an empty text, and so every answer counts as {what}"
+                if _finds(pattern, "~ no such answer ~")
+                else "this fits an empty answer, too",
+                hint=f"say what {what} begins with: '^ERR'"
+                if what == "a refusal"
+                else "say what such a frame begins with",
+            )
+        elif good is not None and _Text(pattern).takes_all_of(good):
+            findings.warn(
+                inner,
+                "ambiguous-frame",
+                f"the good answer fits this, too, such as {good.samples[0][:_SHOWN]!r}: it would"
+                f" count as {what}",
+                hint=f"make it fit {whose} only; they are looked at first",
+            )
+    _check_struct_refusals(part, reply, findings)
+
+
+def _check_shared_refusals(part: Part, driver: Driver, findings: Findings) -> None:
+    """Warn of a refusal of a whole line that takes the good answer of some request."""
+    for name, inner in part.named("transports").items():
+        spec = driver.transports[name]
+        requests = [(one.transport, one.reply) for one in driver.commands.values()]
+        requests += [(one.transport, one.reply) for one in driver.polls]
+        for transport, reply in requests:
+            if transport != name or reply is None or reply.read.lines is not None:
+                continue
+            alone = Reply(reply.read, spec.errors, faults=spec.faults)
+            told = len(findings.problems)
+            _check_refusals(inner, alone, findings)
+            if len(findings.problems) > told:
+                break  # one is enough to mend it
+
+
+def _patterns_of(asides: Asides) -> Iterator[Pattern]:
+    for read in (asides.resend, asides.extend):
+        pattern = read.options.get("pattern") if read is not None else None
+        if isinstance(pattern, Pattern):
+            yield pattern
+
+
+def _check_struct_refusals(part: Part, reply: Reply, findings: Findings) -> None:
+    """Warn of a refusal in bytes that differs from the good answer by nothing but a field."""
+    given = [inner for inner in part.listed("errors") if isinstance(inner.data, dict)]
+    if len(given) != len(reply.faults) or reply.read.form != "struct":
+        return
+    for inner, fault in zip(given, reply.faults, strict=True):
+        is_plain = fault.read.form == "struct" and fault.read.when is None
+        if is_plain and _covers(_items(fault.read), _items(reply.read)):
+            findings.warn(
+                inner,
+                "ambiguous-frame",
+                "the good answer fits this, too: it would count as a refusal",
+                hint="say by 'when' what is true of refusals only; they are looked at first",
+            )
+
+
+# -- numbers out of nothing
+
+
+def _check_empty(
+    part: Part, read: ReadSpec, signals: Mapping[str, Signal], findings: Findings
+) -> None:
+    """Warn of a number that is read from a group which may hold no character at all."""
+    pattern = read.options.get("pattern")
+    if read.form != "regex" or not isinstance(pattern, Pattern):
+        return
+    if not _MAY_BE_LESS.search(_GROUP.sub("(", pattern.source)):
+        return
+    for name in pattern.groups:
+        signal = signals.get(name)
+        if signal is None or name in read.conversions or not _is_plain_number(signal):
+            continue
+        if can_be_empty(pattern, name):
+            found = read_form(part)
+            place, where = found[1].place_of(found[0], name) if found else (part, {})
+            findings.warn(
+                place,
+                "matches-empty",
+                f"{name!r} may be empty here, and nothing is no number",
+                hint="write + in place of *, or not_available: [''] where it means 'not known'",
+                **where,
+            )
+
+
+def _is_plain_number(signal: Signal) -> bool:
+    conversion = signal.conversion
+    return (
+        signal.type in ("integer", "number")
+        and not signal.states
+        and not conversion.states
+        and "" not in conversion.not_available
+    )
+
+
+# -- types and enums
+
+
+def _check_words(part: Part, findings: Findings) -> None:
+    """Warn of types and enums whose name stands nowhere else."""
+    if "types" not in part.data and "enums" not in part.data:
+        return
+    everywhere = _words(part.data)
+    for key, noun, code in (("types", "type", "unused-type"), ("enums", "enum", "unused-enum")):
+        for name, inner in part.named(key).items():
+            if everywhere[name] == _words(inner.data)[name]:
+                findings.warn(
+                    inner,
+                    code,
+                    f"nothing uses the {noun} {name!r}",
+                    key=True,
+                    hint="name it in a struct, or take it away",
+                )
+
+
+def _words(data: Any) -> Counter[str]:
+    """Return how often each word stands in the texts of a part."""
+    return Counter(word for text in _texts(data) for word in _WORD.findall(text))
+
+
+def _texts(data: Any) -> Iterator[str]:
+    """Yield every text value."""
+    if isinstance(data, str):
+        yield data
+    elif isinstance(data, dict):
+        for value in data.values():
+            yield from _texts(value)
+    elif isinstance(data, list):
+        for value in data:
+            yield from _texts(value)

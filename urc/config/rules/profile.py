@@ -1,0 +1,191 @@
+"""The last pass: rules over a whole profile. None of them is an error; all are worth a look."""
+
+import re
+from pathlib import PurePath
+from typing import Final
+
+from urc.config.compose.gather import Sources
+from urc.config.link.driver import Uses
+from urc.config.part import Findings, Part, shown_duration
+from urc.config.rules.flow import check_flow
+from urc.config.suggest import did_you_mean
+from urc.model.driver import Driver, Poll, Timeouts
+from urc.model.interface import Interface
+
+__all__ = ["check_profile"]
+
+_ENDINGS: Final = (".yaml", ".yml")
+"""Of files; text that comes by another way has no name of its own."""
+
+
+def check_profile(
+    sources: Sources,
+    driver: Driver,
+    interfaces: dict[str, Interface],
+    uses: Uses,
+    findings: Findings,
+) -> None:
+    """Add a warning for each thing that is declared to no purpose, or cannot keep up."""
+    _check_name(sources, findings)
+    _check_unused(sources, driver, uses, findings)
+    _check_slots(sources, interfaces, findings)
+    _check_unfilled(sources, interfaces, findings)
+    for part, poll in zip(sources.driver.listed("polls"), driver.polls, strict=True):
+        _check_pace(part, poll, sources.driver, findings)
+    _check_rate(sources.driver, driver, findings)
+    secrets = {name for name, one in sources.settings.items() if one.flag("secret", default=False)}
+    check_flow(sources.driver, driver, frozenset(secrets), findings)
+
+
+def _check_name(sources: Sources, findings: Findings) -> None:
+    """Warn of a robot that is started by one name and shown by another."""
+    file = PurePath(sources.root.document.file)
+    name = sources.root.text("name")
+    # In a package the folder has the robot's name, and the file is always called the same.
+    is_of_package = file.name == "robot.yaml" and file.parent.name == name
+    is_other = file.suffix in _ENDINGS and name != file.stem and not is_of_package
+    if sources.kind == "robot" and is_other:
+        findings.warn(
+            sources.root,
+            "other-name",
+            f"the robot is called {name!r}, its file {file.name!r}",
+            at="name",
+            hint=f"write name: {file.stem}, or call the file {name}{file.suffix}",
+        )
+
+
+def _check_unused(sources: Sources, driver: Driver, uses: Uses, findings: Findings) -> None:
+    for name, part in sources.driver.named("signals").items():
+        if name not in uses.signals and driver.signals[name].formula is None:
+            findings.warn(
+                part,
+                "never-set",
+                f"nothing ever sets the signal {name!r}",
+                key=True,
+                hint=f"give that name to a field of a reply or message, such as (?P<{name}>…) in a"
+                f" 'regex', {{{name}}} in a 'pattern', or 'u16be {name}' in a 'struct'; or compute"
+                " it with 'value'",
+            )
+    for name, part in sources.driver.named("transports").items():
+        if name not in uses.transports:
+            findings.warn(
+                part, "unused-transport", f"nothing uses the transport {name!r}", key=True
+            )
+    for name, part in sources.settings.items():
+        if name not in uses.settings:
+            findings.warn(
+                part,
+                "unused-setting",
+                f"nothing uses the setting {name!r}",
+                key=True,
+                hint=f"write {{{{ settings.{name} }}}} where it belongs",
+            )
+
+
+def _check_slots(sources: Sources, interfaces: dict[str, Interface], findings: Findings) -> None:
+    """Warn of a slot that this document fills and no interface shows.
+
+    A driver's own document fills slots for every interface, so that only the robot's are looked at.
+    """
+    if not sources.interfaces:
+        return
+    shown = {name for interface in interfaces.values() for name in interface.shown}
+    for name, parts in sources.slots.items():
+        part = parts[-1]
+        if name not in shown and part.document is sources.root.document:
+            findings.warn(
+                part,
+                "slot-not-shown",
+                f"no interface has a slot {name!r}",
+                key=True,
+                hint=did_you_mean(name, shown, "slots"),
+            )
+
+
+def _check_unfilled(sources: Sources, interfaces: dict[str, Interface], findings: Findings) -> None:
+    """Warn of a slot in a robot's own picture that nothing fills.
+
+    An interface in a document of its own serves several drivers, and leaves out what one lacks.
+    """
+    for name, interface in interfaces.items():
+        part = sources.interfaces[name]
+        filled = {*sources.slots, *interface.widgets}
+        free = filled - {*interface.shown}
+        empty = {*interface.shown} - filled - {interface.background}
+        for slot in sorted(empty) if part.path else ():
+            found = _drawn(part, slot)
+            if found is not None:
+                picture, offset = found
+                findings.warn(
+                    picture,
+                    "slot-not-filled",
+                    f"no widget fills the slot {slot!r}",
+                    offset=offset,
+                    length=len(slot),
+                    hint=did_you_mean(slot, free, "slots that are not shown")
+                    if free
+                    else f"write widgets: {{ {slot}: {{ use: … }} }}, or a '.' in its place",
+                )
+
+
+def _drawn(part: Part, slot: str) -> tuple[Part, int] | None:
+    """Return the first picture of an interface that shows a slot, and where in its text."""
+    for page in (part, *part.named("tabs").values()):
+        one = page.get("grid")
+        several = [*page.named("grids").values(), *page.named("left").values()]
+        for picture in (*([one] if one is not None else []), *several):
+            found = re.search(rf"(?<!\S){re.escape(slot)}(?!\S)", picture.data)
+            if found is not None:
+                return picture, found.start()
+    return None
+
+
+def _check_pace(part: Part, poll: Poll, driver: Part, findings: Findings) -> None:
+    """Warn of a request whose lost answer is waited for while the next ones are due.
+
+    A written timeout up to the default is no worse than the default, of which nobody is warned.
+    """
+    if poll.reply is None:
+        return
+    asked = driver.must("commands").must(poll.run) if poll.run else part
+    reply = asked.get("reply")
+    where: Part | None = reply.get("timeout") if reply else None
+    seconds = poll.reply.timeout_s
+    if where is None:
+        timeouts = driver.must("transports").must(poll.transport).get("timeouts")
+        where = timeouts.get("reply") if timeouts else None
+        if where is None:
+            return  # the default is nobody's decision
+        seconds = Findings().duration(timeouts, "reply", 2.0) if timeouts else None
+    if seconds is not None and seconds > max(poll.every_s, Timeouts().reply_s):
+        findings.warn(
+            part.must("every"),
+            "impatient-poll",
+            f"the next request is due after {shown_duration(poll.every_s)}, but an answer may take"
+            f" {shown_duration(seconds)}",
+            hint=f"shorten the timeout in {_place(where, part)}, or poll more slowly",
+        )
+
+
+def _place(part: Part, near: Part) -> str:
+    """Return where `part` stands, seen from `near`."""
+    mark = part.document.at(part.path)
+    file = part.document.source_of(part.path).file
+    line = f"line {mark.span.line if mark else 1}"
+    return line if file == near.document.source_of(near.path).file else f"{line} of {file}"
+
+
+def _check_rate(part: Part, driver: Driver, findings: Findings) -> None:
+    """Warn of polls that together want more requests than the line's shortest gap lets through."""
+    for name, transport in driver.transports.items():
+        if not transport.min_gap_s:
+            continue
+        rate = sum(1 / poll.every_s for poll in driver.polls if poll.transport == name)
+        if rate * transport.min_gap_s > 1:
+            findings.warn(
+                part.must("transports").must(name),
+                "too-many-polls",
+                f"the polls want {rate:g} requests a second, but a gap of"
+                f" {shown_duration(transport.min_gap_s)} lets {1 / transport.min_gap_s:g} through",
+                at="min_gap",
+            )

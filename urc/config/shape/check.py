@@ -1,0 +1,205 @@
+"""The shape pass: does a document fit the schema of its kind?
+
+A quick verdict comes first; `jsonschema` is imported only for documents that it does not clear, and
+`urc.config.shape.report` tells its errors in words of our own.
+"""
+
+import json
+import math
+from collections.abc import Iterator, Mapping
+from functools import cache
+from typing import Any, Final
+
+from urc.config.shape.quick import QuickCheck
+from urc.config.suggest import did_you_mean
+from urc.problems import Problem
+from urc.shipped import shipped
+from urc.source import Document, Path
+
+__all__ = [
+    "KINDS",
+    "check_inline",
+    "check_options",
+    "check_shape",
+    "check_source",
+    "fits",
+    "kind_of",
+    "read_schema",
+]
+
+KINDS: Final = ("robot", "driver", "interface", "widget")
+
+
+@cache  # the schemas ship with URC and do not change while it runs
+def read_schema(name: str) -> Mapping[str, Any]:
+    """Return a shipped schema by its file name."""
+    schema: Mapping[str, Any] = json.loads((shipped("schemas") / name).read_text("utf-8"))
+    return schema
+
+
+@cache
+def _quick() -> QuickCheck:
+    return QuickCheck(read_schema)
+
+
+def kind_of(document: Document) -> str:
+    """Return the document's kind, or "" when it names none that there is."""
+    data = document.data
+    kind = data.get("kind") if isinstance(data, dict) else None
+    return kind if isinstance(kind, str) and kind in KINDS else ""
+
+
+def check_shape(document: Document) -> list[Problem]:
+    """Return every difference between a document and the schema of its kind."""
+    kind = kind_of(document)
+    if not kind:
+        return [_without_kind(document)]
+    problems = [
+        document.problem(
+            path,
+            "not-finite",
+            f"expected a number, found {number}",
+            hint="no number of the language is infinite or undefined",
+        )
+        for path, number in _not_finite(document.data, ())
+    ]
+    file = f"{kind}.schema.json"
+    if not _quick().is_valid(file, document.data):
+        from urc.config.shape.report import report
+
+        problems += report(document, read_schema(file), read_schema)
+    return problems
+
+
+def fits(reference: str, value: object) -> bool:
+    """Return whether a value certainly fits the schema at ``file#/pointer``."""
+    return _quick().is_valid_at(reference, value)
+
+
+def check_source(document: Document) -> list[Problem]:
+    """Return what is wrong with one of several documents that are merged, whatever the others say.
+
+    That is: keys that the language does not have, and how it refers to the others. What is missing
+    here may stand there, so all else is looked at when they are one.
+    """
+    data = _without_nothing(document.data)
+    if isinstance(document.data, dict) and isinstance(data, dict):
+        data |= {key: None for key in _OWN_KEYS if document.data.get(key, "") is None}
+    file = f"{kind_of(document)}.schema.json"
+    if _quick_source().is_valid(file, data):
+        return []
+    from urc.config.shape.report import report
+
+    pruned = Document(document.file, document.text, document.lines, data, document.mark)
+    return [
+        problem
+        for problem in report(pruned, _source_schema(file), _source_schema)
+        if problem.code == "unknown-key" or problem.path.partition(".")[0] in _OWN_KEYS
+    ]
+
+
+_OWN_KEYS: Final = ("urc", "extends", "include", "partial")
+"""What is never taken from another document."""
+
+
+@cache
+def _quick_source() -> QuickCheck:
+    return QuickCheck(_source_schema)
+
+
+@cache
+def _source_schema(name: str) -> Mapping[str, Any]:
+    schema: Mapping[str, Any] = _optional(read_schema(name))
+    return schema
+
+
+def _optional(schema: Any) -> Any:
+    """Return a schema that requires nothing; what chooses between kinds is left as it is."""
+    if isinstance(schema, list):
+        return [_optional(item) for item in schema]
+    if not isinstance(schema, dict):
+        return schema
+    return {
+        key: item if key == "if" else _optional(item)
+        for key, item in schema.items()
+        if key not in ("required", "minProperties") or isinstance(item, dict)
+    }
+
+
+def _without_nothing(value: object) -> object:
+    """Return data without the keys whose value is null: they take something away."""
+    if isinstance(value, dict):
+        return {key: _without_nothing(item) for key, item in value.items() if item is not None}
+    if isinstance(value, list):
+        return [_without_nothing(item) for item in value]
+    return value
+
+
+def check_options(
+    document: Document, path: Path, value: object, options: Mapping[str, object]
+) -> list[Problem]:
+    """Return every difference between a slot's options and what the widget's manifest declares.
+
+    Args:
+        document: where the options stand.
+        path: where in it.
+        value: the options as written.
+        options: JSON Schema of each option.
+    """
+    schema = {
+        "title": "the options of this widget",
+        "type": "object",
+        "properties": options,
+        "additionalProperties": False,
+    }
+    return check_inline(document, path, value, schema)
+
+
+def check_inline(
+    document: Document, path: Path, value: object, schema: Mapping[str, Any]
+) -> list[Problem]:
+    """Return every difference between a part of a document and a schema that refers to no file."""
+    if _quick().is_valid_inline(schema, value):
+        return []
+    from urc.config.shape.report import report
+
+    return report(document, schema, read_schema, path, value)
+
+
+def _without_kind(document: Document) -> Problem:
+    data = document.data
+    if not isinstance(data, dict):
+        return document.problem(
+            (),
+            "wrong-type",
+            "a document is a mapping of keys to values",
+            hint="it starts with 'urc: 1' and 'kind: robot'",
+        )
+    if "kind" not in data:
+        near = {"knd", "type", "kinds"} & data.keys()
+        instead = f"instead of '{near.pop()}', " if near else ""
+        return document.problem(
+            (),
+            "missing-key",
+            "'kind' is missing: what is this document?",
+            hint=f"{instead}write one of: " + ", ".join(f"'kind: {kind}'" for kind in KINDS),
+        )
+    kind = data["kind"]
+    return document.problem(
+        ("kind",),
+        "unknown-kind",
+        f"there is no kind of document {kind!r}",
+        hint=did_you_mean(str(kind), KINDS, "kinds"),
+    )
+
+
+def _not_finite(value: object, path: Path) -> Iterator[tuple[Path, float]]:
+    if isinstance(value, float):
+        if not math.isfinite(value):
+            yield path, value
+    elif isinstance(value, dict):
+        for key, item in value.items():
+            yield from _not_finite(item, (*path, key))
+    elif isinstance(value, list):
+        for place, item in enumerate(value):
+            yield from _not_finite(item, (*path, place))

@@ -1,0 +1,182 @@
+"""What to do about a document of the wrong shape: the hint behind a finding's message.
+
+Floor 3. Only for `urc.config.shape.report`.
+"""
+
+import re
+from collections.abc import Mapping, Sequence
+from typing import Any, Final
+
+from urc.config.suggest import did_you_mean
+from urc.source import Document, Path
+
+__all__ = ["example_of", "key_hint", "mapping_hint", "type_hint", "word_hint"]
+
+_DELIMITERS: Final = ("LF", "CR", "CRLF", "NUL", "ETX")
+_OTHER_WORDS: Final = {
+    "interval": ("every",),
+    "period": ("every",),
+    "rate": ("every",),
+    "on": ("from", "to"),
+    "transport": ("from", "to"),
+    "widget": ("use",),
+    "arguments": ("args",),
+    "terminator": ("tx", "rx"),
+    "delimiter": ("tx", "rx"),
+    "pattern": ("regex", "match"),
+    "value": ("default",),
+    "start": ("first",),
+    "begin": ("first", "start"),
+    "loop": ("repeat",),
+    "count": ("times",),
+    "sleep": ("wait",),
+    "delay": ("wait",),
+    "description": ("text",),
+    "message": ("text",),
+    "license": ("licence",),
+}
+"""What other tools call a key → what it is called here."""
+_SAME_TYPES: Final = {
+    "float": "number",
+    "double": "number",
+    "real": "number",
+    "decimal": "number",
+    "str": "string",
+    "text": "string",
+    "flag": "boolean",
+    "list": "array",
+    "dict": "object",
+    "map": "object",
+    "picture": "image",
+    "bytes": "blob",
+}
+"""What other tools call a type → what it is called here."""
+_URL: Final = re.compile(r"[a-z]+://(?P<host>[^/:?#]+)(?::(?P<port>[0-9]+))?(?P<path>/[^?#]+)?")
+_FRAMING: Final = "framing: { type: delimiter, tx: LF, rx: LF }"
+_ELSEWHERE: Final = {
+    ("reply_to", "leaves"): "polls are asked at their times here, and 'feed' answers them",
+    ("signal", "command"): "an input is bound to the name of a signal alone, as level: battery;"
+    " only an output takes 'command'",
+}
+"""A key that has no place here, and one that tells where here is → what to write instead."""
+
+
+def key_hint(key: str, known: Mapping[str, Any], value: object = None) -> str:
+    """Return what a key that is unknown may have been meant to be, with its value."""
+    name, colon, _ = key.partition(":")
+    if colon and name in known:
+        return f"put a space behind the colon: '{name}: '"
+    for (other, beside), hint in _ELSEWHERE.items():
+        if key == other and beside in known:
+            return hint
+    if key in ("url", "uri", "address") and {"host", "port"} <= known.keys():
+        return _place_hint(value, known)
+    others = [word for word in _OTHER_WORDS.get(key, ()) if word in known]
+    if others:
+        return f"it is called '{others[0]}' here"
+    return did_you_mean(key, known, "keys")
+
+
+def _place_hint(value: object, known: Mapping[str, Any]) -> str:
+    """Return how a URL is written by the keys of a transport."""
+    found = _URL.match(value) if isinstance(value, str) else None
+    if found is None:
+        return "it takes 'host' and 'port', such as host: robot.local, port: 9090"
+    written = [f"host: {found['host']}"]
+    written += [f"port: {found['port']}"] if found["port"] else []
+    written += [f"path: {found['path']}"] if found["path"] and "path" in known else []
+    return f"it takes 'host' and 'port': write {', '.join(written)}"
+
+
+def word_hint(word: str, words: Sequence[str]) -> str:
+    """Return which of `words` is meant by one that is not among them; "" when none comes near."""
+    other = _SAME_TYPES.get(word.lower(), "")
+    if other in words:
+        return f"it is called '{other}' here"
+    near = did_you_mean(word, words)
+    return near if near.startswith("did you") else ""
+
+
+def example_of(schema: Mapping[str, Any], key: str) -> str:
+    """Return how a key that is missing could be written; "" where the schema shows nothing."""
+    inner = schema.get("properties", {}).get(key, {})
+    examples = inner.get("examples") or ()
+    if key == "framing":
+        return f"most text protocols: {_FRAMING}"
+    if not examples or isinstance(examples[0], (dict, list)):
+        return ""
+    text = str(examples[0])
+    return f"for example '{key}: " + (f'"{text}"' if "{" in text else text) + "'"
+
+
+def mapping_hint(document: Document, path: Path, value: object, schema: Mapping[str, Any]) -> str:
+    """Return the first example of a mapping, with `value` in it where it is a delimiter."""
+    if _is_filled_in(document, path):
+        return ""
+    example = next((one for one in schema.get("examples", ()) if isinstance(one, dict)), None)
+    if example is None or any(isinstance(one, list) for one in example.values()):
+        return ""
+    text = value.upper() if isinstance(value, str) else ""
+    if {"tx", "rx"} <= example.keys() and text in _DELIMITERS:
+        example = {**example, "tx": text, "rx": text}
+    return f"write its keys, such as {_flow(example)}"
+
+
+def _flow(example: Mapping[str, Any]) -> str:
+    pairs = (
+        f"{key}: {_flow(one) if isinstance(one, dict) else _quoted(one)}"
+        for key, one in example.items()
+    )
+    return f"{{ {', '.join(pairs)} }}"
+
+
+def _quoted(value: object) -> str:
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    return f'"{value}"' if isinstance(value, str) and not value.isalnum() else str(value)
+
+
+def type_hint(
+    document: Document, path: Path, value: object, types: Sequence[str], *, is_duration: bool
+) -> str:
+    """Return how a value of a wrong type could be one of `types`; "" where nobody can tell."""
+    if value is None:
+        return "give it a value, or leave the key out"
+    if is_duration and isinstance(value, (int, float)) and not isinstance(value, bool):
+        return f"write the unit: {value}s, or {value}ms"
+    if "string" in types and isinstance(value, (bool, int, float)):
+        return f'quote it: "{_written(document, path) or value}"'
+    if isinstance(value, str):
+        if _is_filled_in(document, path):
+            return 'a text with names in braces becomes a value only when it is one name: "{i}"'
+        if {"integer", "number"} & set(types) and _looks_like_number(value):
+            return f"take the quotes away: {value}"
+        if "boolean" in types:
+            return "yes, no, on and off are text in YAML 1.2; write true or false"
+        if "object" in types:
+            return "indent its keys below it, or write { key: value }"
+    if "array" in types:
+        return "write a list: '- ' before each item, or [a, b]"
+    return ""
+
+
+def _written(document: Document, path: Path) -> str:
+    """Return a scalar as it stands in the text."""
+    mark = document.at(path)
+    if mark is None or mark.span.line != mark.span.end_line:
+        return ""
+    lines = document.source_of(path).lines
+    return lines[mark.span.line - 1][mark.span.column - 1 : mark.span.end_column - 1]
+
+
+def _is_filled_in(document: Document, path: Path) -> bool:
+    mark = document.at(path)
+    return mark is not None and mark.written is not None
+
+
+def _looks_like_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
