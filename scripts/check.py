@@ -1,5 +1,6 @@
 """What `./dev test` does: lint, types and every test, always in this order, told in one summary.
 
+`./dev test quick` leaves out the tests with real servers and browsers; it needs Node alone.
 A failing step does not stop the ones after it. Exit code 0 when all passed, 1 otherwise. A test
 whose program could not be brought is left out by name; with ``CI=true`` that is a failure.
 """
@@ -18,7 +19,7 @@ from tempfile import TemporaryFile
 from typing import IO
 
 from hatch_build import NPM_TIMEOUT_S, VendorError, npm_command
-from scripts.needs import Brought, bring
+from scripts.needs import NEEDS, Brought, bring
 from scripts.node import node_executable
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -68,7 +69,7 @@ def halves(tests: str, *half: str, timeout_s: float) -> Step:
     return Step(name, (*PYTEST, *half), timeout_s, beside=others)
 
 
-TESTS = (
+QUICK = (
     halves(
         "tests/unit",
         *("protocol", "runtime", "guard", "simulator", "motion", "config"),
@@ -80,6 +81,10 @@ TESTS = (
         *("test_schemas.py", "test_codes.py", "test_house.py"),
         timeout_s=420,
     ),
+)
+QUICK_NEEDS = tuple(need for need in NEEDS if need.name == "node")
+TESTS = (
+    *QUICK,
     # Most of them wait for a server or for silence, so a few at a time take no more processor.
     Step(
         "tests e2e",
@@ -96,15 +101,16 @@ TESTS = (
 
 def main() -> int:
     """Run every step; print the summary; return the exit code."""
-    if len(sys.argv) > 1:
-        print("usage: ./dev test", file=sys.stderr)
+    if sys.argv[1:] not in ([], ["quick"]):
+        print("usage: ./dev test [quick]", file=sys.stderr)
         return 2
+    is_quick = bool(sys.argv[1:])
     outcomes: list[Outcome] = []
-    brought = bring()
+    brought = bring(QUICK_NEEDS if is_quick else NEEDS)
     javascript, not_checked = javascript_step()
     brought.look_again()  # npm brings a language server, too
     environment = os.environ | brought.environment
-    steps = (*STATIC, *([javascript] if javascript else []), *TESTS)
+    steps = (*STATIC, *([javascript] if javascript else []), *(QUICK if is_quick else TESTS))
     try:
         for step in steps:
             outcomes.append(run(step, environment))

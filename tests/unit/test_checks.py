@@ -62,6 +62,42 @@ def test_the_verdict(
     assert ("LEFT OUT" in shown) == bool(brought.left_out or not_checked)
 
 
+@pytest.mark.parametrize(
+    ("arguments", "code", "tests", "needs_browser"),
+    [
+        ([], 0, ["tests unit", "tests contract", "tests e2e", "tests motion"], True),
+        (["quick"], 0, ["tests unit", "tests contract"], False),
+        (["fast"], 2, [], False),
+    ],
+)
+def test_the_quick_check_has_no_servers(
+    monkeypatch: pytest.MonkeyPatch,
+    arguments: list[str],
+    code: int,
+    tests: list[str],
+    needs_browser: bool,
+) -> None:
+    """Lint and types are in both; what only the long one needs is not installed for the quick."""
+    ran: list[str] = []
+    wanted: list[str] = []
+
+    def bring(names: tuple[Need, ...]) -> Brought:
+        wanted.extend(need.name for need in names)
+        return Brought()
+
+    def run(step: check.Step, environment: object) -> check.Outcome:
+        ran.append(step.name)
+        return check.Outcome(step.name, "", 0.1)
+
+    monkeypatch.setattr(check, "bring", bring)
+    monkeypatch.setattr(check, "javascript_step", lambda: (None, ""))
+    monkeypatch.setattr(check, "run", run)
+    monkeypatch.setattr("sys.argv", ["check", *arguments])
+    assert check.main() == code
+    assert ran == ([step.name for step in check.STATIC] + tests if tests else [])
+    assert ("chromium" in wanted) == needs_browser
+
+
 def test_the_summary_names_the_command_that_brings_what_is_missing(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
