@@ -79,3 +79,14 @@ def test_git_ignores_what_the_tools_make() -> None:
     """Nothing that a tool makes in the tree can be committed by accident."""
     ignored = (ROOT / ".gitignore").read_text("utf-8").split()
     assert [name for name in NOT_OURS - {".git"} if f"{name}/" not in ignored] == []
+
+
+def test_the_changelog_stays_short() -> None:
+    """A user reads the first version in a minute, and every later entry in a breath."""
+    text = (ROOT / "CHANGELOG.md").read_text("utf-8")
+    unreleased, _, first = text.partition("\n## [0.1.0]")
+    assert len(re.findall(r"^- ", first, re.MULTILINE)) <= 60
+    sections = re.findall(r"^### (.+)", unreleased, re.MULTILINE)
+    assert sections == ["Added", "Changed", "Fixed", "Security"]
+    entries = re.findall(r"^- (.+)", text, re.MULTILINE)
+    assert [entry for entry in entries if len(entry.split()) > 25] == []
