@@ -15,7 +15,7 @@ TOGETHER = {
     "test_ssh_login": "shell",
     "test_chain": "shell",
     "test_trust": "shell",
-    "test_shell_doors": "shell",
+    "test_shell_servers": "shell",
     "test_serial": "serial",
     "test_hostile_serial": "serial",
     "test_manager_pages": "manager pages",

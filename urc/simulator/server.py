@@ -1,6 +1,6 @@
-"""Puts an emulated robot on real lines, for people, tests and ``urc demo``.
+"""Serves an emulated robot over real connections, for people, tests and ``urc demo``.
 
-How a client gets in is the matter of a door (`urc.simulator.doors`), one a kind of transport.
+`urc.simulator.servers` has one server for each kind of transport.
 """
 
 import asyncio
@@ -16,14 +16,21 @@ from urc.model.values import Value
 from urc.problems import UrcError
 from urc.protocol.json_text_form import filled
 from urc.protocol.topics import listened
-from urc.simulator.doors.base import DOORS, Caller, Door, Listening, Place, shown_place
+from urc.simulator.servers.base import (
+    SERVERS,
+    Endpoint,
+    LastPeer,
+    ServerContext,
+    SimulatedServer,
+    host_and_port,
+)
 from urc.simulator.twin import Twin
 
 __all__ = ["serve"]
 
 _LOOPBACK = "127.0.0.1"
 _PORTS = {"ssh": 22, "telnet": 23, "rosbridge": 9090}
-"""Ports of kinds of transport that need not be told one."""
+"""Default ports of transports whose option `port` may be left out."""
 
 
 @asynccontextmanager
@@ -35,7 +42,7 @@ async def serve(
     now: Callable[[], float] = time.time,
     is_anywhere: bool = False,
     twin: Twin | None = None,
-) -> AsyncIterator[Mapping[str, Listening]]:
+) -> AsyncIterator[Mapping[str, Endpoint]]:
     """Emulate the robot of `profile` until the context ends.
 
     Args:
@@ -43,87 +50,87 @@ async def serve(
         settings: for ports and templates; a port of 0 lets the system choose.
         host: address to listen on; the default can be reached from this machine only.
         now: seconds since the epoch, the templates' ``now``.
-        is_anywhere: listen where it is free, whatever the profile says about ports and paths.
-        twin: the emulated robot, for who wants to look at it; made from the profile by default.
+        is_anywhere: listen on free ports, and ignore the profile's own ports and paths.
+        twin: the emulated robot; made from the profile by default.
 
     Returns:
         Transport → where it listens.
 
     Raises:
-        UrcError: a transport that cannot be emulated, or a place that cannot be had.
+        UrcError: a transport cannot be emulated, or an address is not available.
     """
     robot = twin or Twin(profile, settings)
     transports = profile.driver.transports
-    inside: dict[str, dict[tuple[str, int], Listening]] = {name: {} for name in transports}
-    caller = Caller()
-    doors: list[Door] = []
-    listening: dict[str, Listening] = {}
+    inside: dict[str, dict[tuple[str, int], Endpoint]] = {name: {} for name in transports}
+    last_peer = LastPeer()
+    servers: list[SimulatedServer] = []
+    listening: dict[str, Endpoint] = {}
     ready = asyncio.create_task(asyncio.to_thread(robot.prepare))
     try:
         for name in sorted(transports, key=lambda name: -_depth(transports, name)):
             spec = transports[name]
-            place = Place(
+            context = ServerContext(
                 name=name,
                 spec=spec,
                 options=_options_of(spec, settings),
-                # What is reached through another line is known inside the robot alone.
+                # Only the robot itself reaches a transport that goes through another one.
                 host=_LOOPBACK if spec.via else host,
                 line=lambda name=name: robot.line(name),  # type: ignore[misc] # of this turn
                 now=now,
                 topics=listened(profile.driver, name, settings),
                 is_anywhere=is_anywhere or bool(spec.via),
                 picture=lambda topics, name=name: robot.picture(name, topics, now()),  # type: ignore[misc] # of this turn
-                caller=caller,
+                last_peer=last_peer,
                 carried=inside[name],
             )
-            door = _door(place)
-            doors.append(door)
-            listening[name] = await door.open()
+            server = _server(context)
+            servers.append(server)
+            listening[name] = await server.open()
             if spec.via:
-                listening[name] = _put_inside(inside[spec.via], place, listening[name])
+                listening[name] = _put_inside(inside[spec.via], context, listening[name])
         yield {name: listening[name] for name in transports}
     finally:
-        for door in reversed(doors):
-            await door.close()
+        for server in reversed(servers):
+            await server.close()
         await asyncio.gather(ready, return_exceptions=True)
 
 
-def _door(place: Place) -> Door:
-    row = DOORS.get(place.spec.type)
+def _server(context: ServerContext) -> SimulatedServer:
+    row = SERVERS.get(context.spec.type)
     if row is None:
-        known = ", ".join(sorted(DOORS))
-        message = f"{place.spec.type} cannot be emulated; these can: {known}"
-        raise UrcError(f"transports.{place.name}: {message}")
-    door: Door = row.load()(place)
-    return door
+        known = ", ".join(sorted(SERVERS))
+        message = f"{context.spec.type} cannot be emulated; these can: {known}"
+        raise UrcError(f"transports.{context.name}: {message}")
+    server: SimulatedServer = row.load()(context)
+    return server
 
 
 def _depth(transports: Mapping[str, TransportSpec], name: str) -> int:
-    """Return how many others a transport goes through."""
+    """Return the number of transports that this one goes through."""
     via = transports[name].via
     return 1 + _depth(transports, via) if via else 0
 
 
 def _put_inside(
-    inside: dict[tuple[str, int], Listening], place: Place, found: Listening
-) -> Listening:
-    """Let a line be reached through another one as the driver says; return how it looks outside."""
-    host, port, url = _known_as(place)
+    inside: dict[tuple[str, int], Endpoint], context: ServerContext, found: Endpoint
+) -> Endpoint:
+    """Let clients reach a transport through another one; return the endpoint as they see it."""
+    host, port, url = _known_as(context)
     if not isinstance(host, str) or not isinstance(port, int):
-        message = f"{place.spec.type} cannot be emulated behind another transport"
-        raise UrcError(f"transports.{place.name}: {message}")
+        message = f"{context.spec.type} cannot be emulated behind another transport"
+        raise UrcError(f"transports.{context.name}: {message}")
     inside[host.strip(), port] = found
-    text = f"{place.spec.type} {shown_place(host, port)} through {place.spec.via}"
+    text = f"{context.spec.type} {host_and_port(host, port)} through {context.spec.via}"
     options = {key: value for key, value in found.options.items() if key not in ("host", "port")}
     return found._replace(text=text, options=options | ({"url": url} if url else {}))
 
 
-def _known_as(place: Place) -> tuple[object, object, str]:
-    """Return host and port by which the driver knows a line, and its URL without TLS, if any."""
-    url = place.options.get("url")
+def _known_as(context: ServerContext) -> tuple[object, object, str]:
+    """Return the driver's host and port of a transport, and its URL without TLS, if any."""
+    url = context.options.get("url")
     if not isinstance(url, str):
-        host, port = place.options.get("host"), place.options.get("port")
-        return host, _PORTS.get(place.spec.type) if port is None else port, ""
+        host, port = context.options.get("host"), context.options.get("port")
+        return host, _PORTS.get(context.spec.type) if port is None else port, ""
     try:
         parts = urlsplit(url)
         port = parts.port
@@ -133,7 +140,7 @@ def _known_as(place: Place) -> tuple[object, object, str]:
     if port is None:
         port = 80 if plain == parts.scheme else 443
     host = parts.hostname or ""
-    return host, port, parts._replace(scheme=plain, netloc=shown_place(host, port)).geturl()
+    return host, port, parts._replace(scheme=plain, netloc=host_and_port(host, port)).geturl()
 
 
 def _options_of(spec: TransportSpec, settings: Mapping[str, Value]) -> dict[str, object]:

@@ -18,7 +18,7 @@ __all__ = ["stand_in"]
 async def stand_in(
     profile: Profile, settings: Mapping[str, Value], twin: Twin | None = None
 ) -> AsyncIterator[Profile]:
-    """Emulate `profile` for as long as the context lasts; give the profile that leads there.
+    """Emulate `profile` until the context ends; return the profile that connects to it.
 
     Args:
         profile: of the robot.
@@ -29,7 +29,7 @@ async def stand_in(
         UrcError: a transport that cannot be emulated.
     """
     async with serve(profile, settings, is_anywhere=True, twin=twin) as listening:
-        places = {name: place.options for name, place in listening.items()}
+        places = {name: endpoint.options for name, endpoint in listening.items()}
         yield _redirected(profile, places)
 
 

@@ -238,7 +238,7 @@ class TwinLine:
         return self._flawed(self._heard(data, now_s, limit, self._answer_or_lose), now_s)
 
     def ask(self, data: Payload, now_s: float) -> list[Payload]:
-        """Return what `receive` does, at once and whole: for doors that answer each by itself."""
+        """Return the replies at once, for servers that reply to each message separately."""
         return self._heard(data, now_s, None, self._answer)
 
     def _heard(

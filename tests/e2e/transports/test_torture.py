@@ -167,7 +167,7 @@ class Ear:
             self.greetings += said.count("hello")
             return hear(line, data, *more)
 
-        # What every door hands its frames to, whether it answers in a stream or each by itself.
+        # Every server passes its frames here, as a stream or one at a time.
         patch.setattr(TwinLine, "_heard", heard)
 
     async def hears_more(self) -> None:

@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from urc.model.driver import FramingSpec, TransportSpec
-from urc.simulator.doors.terminal import Keys, echo_of
+from urc.simulator.servers.terminal import Keys, echo_of
 
 
 def keys(tx: bytes, *, kind: str = "delimiter") -> Keys:

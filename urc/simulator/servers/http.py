@@ -1,8 +1,8 @@
 """The emulated robot behind a web server: requests, and streams of pictures, events and lines.
 
-Requests go to the robot's rules as envelopes. What the driver listens to is served as a stream by
-its path: what the robot says on that topic or, for a camera, what it sees in its world; without a
-world, one colour that wanders.
+Requests go to the robot's rules as envelopes. Each subscription of the driver is a stream under its
+path: the robot's messages on that topic or, for a camera, images of its world. Without a world,
+images have one changing colour.
 """
 
 import asyncio
@@ -15,24 +15,14 @@ import h11
 import msgspec
 
 from urc.model.codec import Envelope, Payload
-from urc.problems import UrcError
-from urc.simulator.doors.base import (
-    READ_BYTES,
-    TAKEN_WITHIN_S,
-    Crowd,
-    Guest,
-    Listening,
-    Place,
-    converse,
-    keep_alive,
-    reason,
-    shown_place,
-)
-from urc.simulator.doors.http_guard import Guard
-from urc.simulator.doors.http_picture import picture
+from urc.simulator.servers.base import ServerContext
+from urc.simulator.servers.clients import READ_BYTES, TAKEN_WITHIN_S, ClientConnection, converse
+from urc.simulator.servers.http_auth import HttpAuth
+from urc.simulator.servers.jpeg import picture
+from urc.simulator.servers.listening import StreamServer, UrlServer
 from urc.simulator.twin import TwinLine
 
-__all__ = ["HttpDoor", "listen_url"]
+__all__ = ["HttpServer"]
 
 MAX_BODY_BYTES = 1_048_576
 PICTURE_EVERY_S = 0.1
@@ -69,67 +59,24 @@ class Asked(NamedTuple):
         return [Envelope("request", {**attributes, **one}, self.body) for one in (pairs, whole)]
 
 
-class HttpDoor:
-    """One listening port and whoever came in through it."""
+class HttpServer(UrlServer, StreamServer):
+    """A web server."""
 
-    def __init__(self, place: Place) -> None:
-        """Prepare the door; `open` listens."""
-        self._place = place
-        self._crowd = Crowd(place)
-        self._server: asyncio.Server | None = None
-        self._base = ""
-        self._guard = Guard(place.options.get("auth"))
+    SCHEME = "http"
 
-    async def open(self) -> Listening:
-        """Listen on the port of the option `url`, or on any."""
-        place = self._place
-        port, path = listen_url(place, "http")
-        self._base = path.rstrip("/")
-        try:
-            self._server = await asyncio.start_server(
-                self._let_in, place.host, port, limit=READ_BYTES
-            )
-        except OSError as fault:
-            where = shown_place(place.host, port)
-            message = f"transports.{place.name}: cannot listen on {where} ({reason(fault)})"
-            raise UrcError(message) from fault
-        host, port = self._server.sockets[0].getsockname()[:2]
-        url = f"http://{shown_place(host, port)}{path}"
-        return Listening(host, port, f"http {url}", {"url": url, "tls": None})
+    def __init__(self, context: ServerContext) -> None:
+        """Prepare the server; `open` listens."""
+        super().__init__(context)
+        self._auth = HttpAuth(context.options.get("auth"))
 
-    async def close(self) -> None:
-        """Stop listening and cut every connection."""
-        if self._server is None:
-            return
-        self._server.close()
-        await self._crowd.close()
-        await self._server.wait_closed()
-
-    def _let_in(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        keep_alive(writer.get_extra_info("socket"))
-        writer.transport.set_write_buffer_limits(high=READ_BYTES)
-        talk = _Talk(self._place, self._guard, self._base, reader, writer)
-        self._crowd.welcome(talk.run, writer.transport.abort)
-
-
-def listen_url(place: Place, scheme: str) -> tuple[int, str]:
-    """Return the port and path of the option `url`; port 0 lets the system choose.
-
-    Raises:
-        UrcError: it is no URL that can be listened on.
-    """
-    url = str(place.options.get("url"))
-    try:
-        parts = urlsplit(url)
-        port = 80 if parts.port is None else parts.port
-    except ValueError as fault:
-        raise UrcError(f"transports.{place.name}.url: {url!r} is no url to listen on") from fault
-    if place.is_anywhere:
-        return 0, parts.path or "/"
-    if parts.scheme != scheme:
-        message = f"transports.{place.name}.url: {scheme} can be emulated, not {parts.scheme!r}"
-        raise UrcError(message)
-    return port, parts.path or "/"
+    async def _talk(
+        self,
+        client: ClientConnection,
+        reader: asyncio.StreamReader,
+        writer: asyncio.StreamWriter,
+    ) -> None:
+        base = self._path.rstrip("/")
+        await _Talk(self._context, self._auth, base, reader, writer).run(client)
 
 
 class _Talk:
@@ -137,23 +84,23 @@ class _Talk:
 
     def __init__(
         self,
-        place: Place,
-        guard: Guard,
+        context: ServerContext,
+        auth: HttpAuth,
         base: str,
         reader: asyncio.StreamReader,
         writer: asyncio.StreamWriter,
     ) -> None:
-        self._place = place
-        self._guard = guard
+        self._context = context
+        self._auth = auth
         self._base = base
         self._reader = reader
         self._writer = writer
         self._http = h11.Connection(h11.SERVER)
 
-    async def run(self, guest: Guest) -> None:
+    async def run(self, client: ClientConnection) -> None:
         try:
-            while (asked := await self._next(guest)) is not None:
-                await self._serve(guest, asked)
+            while (asked := await self._next(client)) is not None:
+                await self._serve(client, asked)
                 if self._http.our_state is not h11.DONE:
                     break
                 self._http.start_next_cycle()
@@ -163,7 +110,7 @@ class _Talk:
         async with asyncio.timeout(TAKEN_WITHIN_S):
             await self._writer.wait_closed()
 
-    async def _next(self, guest: Guest) -> Asked | None:
+    async def _next(self, client: ClientConnection) -> Asked | None:
         """Return the next request, None at the end of the connection."""
         head: h11.Request | None = None
         body = bytearray()
@@ -173,7 +120,7 @@ class _Talk:
                 if self._http.they_are_waiting_for_100_continue:
                     await self._say(h11.InformationalResponse(status_code=100, headers=[]))
                 self._http.receive_data(await self._reader.read(READ_BYTES))
-                guest.heard_s = asyncio.get_running_loop().time()
+                client.active_s = asyncio.get_running_loop().time()
             elif isinstance(event, h11.Request):
                 head = event
             elif isinstance(event, h11.Data):
@@ -191,14 +138,14 @@ class _Talk:
         headers = {name.decode(): value.decode("latin-1") for name, value in head.headers}
         return Asked(head.method.decode(), target, path, headers, body)
 
-    async def _serve(self, guest: Guest, asked: Asked) -> None:
+    async def _serve(self, client: ClientConnection, asked: Asked) -> None:
         given = asked.headers.get("authorization", "")
-        challenge = self._guard.challenge(asked.method, asked.target, given)
+        challenge = self._auth.challenge(asked.method, asked.target, given)
         if challenge is not None:
             await self._answer(401, [("WWW-Authenticate", challenge)], b"who are you?\n", asked)
             return
         kind = self._kind(asked)
-        await self._suffer(guest.line)
+        await self._suffer(client.line)
         if kind == "stills":
             taken = self._picture(asked)
             if not taken:
@@ -206,22 +153,22 @@ class _Talk:
                 return
             await self._answer(200, [("Content-Type", "image/jpeg")], taken, asked)
         elif kind:
-            await self._stream(guest, asked, kind)
+            await self._stream(client, asked, kind)
         else:
-            await self._answer(*_written(self._asks(guest.line, asked)), asked)
+            await self._answer(*_written(self._asks(client.line, asked)), asked)
 
     async def _suffer(self, line: TwinLine) -> None:
-        """Be late, or lost: what is wrong with the robot on demand."""
+        """Delay or lose the reply: faults that were switched on."""
         if line.loses:
             raise ConnectionResetError("lost on demand")
         if line.delay_s:
             await asyncio.sleep(line.delay_s)
 
     def _asks(self, line: TwinLine, asked: Asked) -> Envelope:
-        """Return the robot's answer; one that it takes without a word is answered as well."""
+        """Return the robot's reply, or a status for a request without one."""
         for envelope in asked.ways:
             before = line.faults
-            for one in line.ask(envelope, self._place.now()):
+            for one in line.ask(envelope, self._context.now()):
                 if isinstance(one, Envelope) and one.verb == "response":
                     return one
             if line.faults == before and line.is_incomplete:
@@ -232,20 +179,20 @@ class _Talk:
         return Envelope("response", {"ok": False, "status": 404, "reason": reason})
 
     def _kind(self, asked: Asked) -> str:
-        """Return how the driver listens to that path, "" when it does not."""
+        """Return the kind of stream of the driver's subscription to that path, "" without one."""
         if asked.method != "GET":
             return ""
-        ways = self._place.topics.items()
+        ways = self._context.topics.items()
         target = asked.target.removeprefix(self._base)
         names = (asked.path, target)
         kinds = [how.get("stream") for topic, how in ways if topic.partition("#")[0] in names]
         return str(kinds[0]) if kinds else ""
 
     def _picture(self, asked: Asked) -> bytes:
-        """Return what the robot sees in its world, else one of a wandering colour."""
-        place, target = self._place, asked.target.removeprefix(self._base)
-        seen = place.picture((asked.path, target))
-        return picture(place.now()) if seen is None else seen
+        """Return the camera image of the robot's world, or one of a changing colour."""
+        context, target = self._context, asked.target.removeprefix(self._base)
+        seen = context.picture((asked.path, target))
+        return picture(context.now()) if seen is None else seen
 
     async def _answer(
         self, status: int, headers: Sequence[tuple[str, str]], body: bytes, asked: Asked
@@ -256,7 +203,7 @@ class _Talk:
             if "content-length" not in given
             else [*headers]
         )
-        if self._place.spec.connection == "per_request":
+        if self._context.spec.connection == "per_request":
             sent.append(("Connection", "close"))
         reason = http.client.responses.get(status, "")
         await self._say(h11.Response(status_code=status, headers=sent, reason=reason.encode()))
@@ -264,8 +211,8 @@ class _Talk:
             await self._say(h11.Data(data=body))
         await self._say(h11.EndOfMessage())
 
-    async def _stream(self, guest: Guest, asked: Asked, kind: str) -> None:
-        """Send what the robot says on a topic, until the client goes."""
+    async def _stream(self, client: ClientConnection, asked: Asked, kind: str) -> None:
+        """Stream the robot's messages on a topic, until the client leaves."""
         headers = [("Content-Type", _TYPES[kind]), ("Cache-Control", "no-store")]
         await self._say(h11.Response(status_code=200, headers=headers))
         if kind == "mjpeg":
@@ -280,7 +227,7 @@ class _Talk:
                     if topic == path:
                         await self._say(h11.Data(data=_piece(kind, event, _bytes(one.body))))
 
-        await converse(self._place, guest, self._gone, put)
+        await converse(self._context, client, self._gone, put)
 
     async def _pictures(self, asked: Asked) -> None:
         gone = asyncio.ensure_future(self._gone())
@@ -297,7 +244,7 @@ class _Talk:
             gone.cancel()
 
     async def _gone(self) -> None:
-        """Wait until the client closes; what it says meanwhile is nobody's."""
+        """Wait until the client closes; discard its data."""
         while await self._reader.read(READ_BYTES):
             pass
 
@@ -309,7 +256,7 @@ class _Talk:
                 await self._writer.drain()
 
     async def _refuse(self, fault: h11.RemoteProtocolError) -> None:
-        """Tell a client that does not speak HTTP, if it can still be told."""
+        """Reply to a malformed request, if a reply is still possible."""
         if self._http.our_state in (h11.IDLE, h11.SEND_RESPONSE):
             headers = [("Content-Length", "0"), ("Connection", "close")]
             await self._say(h11.Response(status_code=fault.error_status_hint, headers=headers))

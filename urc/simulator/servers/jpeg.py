@@ -1,7 +1,7 @@
-"""Pictures of an emulated camera: one colour that wanders, as JPEG (ITU T.81, baseline), by hand.
+"""Images of an emulated camera: one changing colour, as baseline JPEG (ITU T.81).
 
-A picture of one colour needs none of JPEG's arithmetic: of each block only the mean is written,
-and every mean after the first is "as before".
+An image of one colour needs no JPEG arithmetic: each block consists of its mean alone, and every
+mean after the first is written as "unchanged".
 """
 
 import colorsys

@@ -1,8 +1,8 @@
-"""What a rosbridge server does with the operations of its clients, without any connection.
+"""The operations of a rosbridge server, without any connection.
 
-Topics are passed on between clients as the real bridge does, a client's own included. What a client
-publishes, calls or starts also goes to the emulated robot, and what that says goes to the client.
-As with the real bridge, nearly all errors are silence; only a failed call answers.
+Like the real bridge, it forwards topics between clients, and to the publisher itself. The emulated
+robot receives all publications, calls and goals, and its replies go to the client. As with the
+real bridge, nearly all errors are silent; only a failed call has a reply.
 """
 
 import base64
@@ -15,7 +15,7 @@ import msgspec
 
 from urc.model.codec import Envelope, Payload
 
-__all__ = ["Desk", "Seat"]
+__all__ = ["Bridge", "BridgeClient"]
 
 MAX_TOPICS = 512
 """Topics, services and subscriptions that one client may name."""
@@ -34,42 +34,42 @@ class _Wanted(NamedTuple):
     fragment_bytes: int
 
 
-class Desk:
-    """What the clients of one bridge share."""
+class Bridge:
+    """The state that all clients of one bridge share."""
 
     def __init__(self, declared: Mapping[str, str]) -> None:
-        """Start with the robot's own topics: name → type, "" where it is not known."""
+        """Start with the robot's own topics: name → type, or "" for an unknown type."""
         self.types = dict(declared)
-        self.seats: list[Seat] = []
-        self.servers: dict[str, Seat] = {}
+        self.clients: list[BridgeClient] = []
+        self.servers: dict[str, BridgeClient] = {}
         """Service → the client that offers it."""
-        self.asked: dict[str, tuple[Seat, object]] = {}
-        """Id of a call passed on → who asked, and under which id."""
+        self.asked: dict[str, tuple[BridgeClient, object]] = {}
+        """Id of a forwarded call → the caller and its id."""
         self._count = 0
 
-    def passed_on(self, service: str, seat: "Seat", number: object, args: object) -> None:
+    def passed_on(self, service: str, client: "BridgeClient", number: object, args: object) -> None:
         """Let the client that offers a service answer another one's call."""
         self._count += 1
         key = f"call_service:{service}:{self._count}"
         while len(self.asked) >= MAX_TOPICS:
             del self.asked[next(iter(self.asked))]
-        self.asked[key] = seat, number
+        self.asked[key] = client, number
         self.servers[service].write(
             {"op": "call_service", "id": key, "service": service, "args": args}
         )
 
     def publish(self, topic: str, message: object, now_s: float) -> None:
-        """Give a message to every client that listens."""
-        for seat in self.seats:
-            seat.show(topic, message, now_s)
+        """Send a message to every subscriber."""
+        for client in self.clients:
+            client.show(topic, message, now_s)
 
 
-class Seat:
-    """One client at the desk."""
+class BridgeClient:
+    """One client of the bridge."""
 
-    def __init__(self, desk: Desk, send: Callable[[str | bytes], None]) -> None:
-        """Join `desk`; `send` takes one frame, text or binary."""
-        self._desk = desk
+    def __init__(self, bridge: Bridge, send: Callable[[str | bytes], None]) -> None:
+        """Join `bridge`; `send` takes one frame, text or binary."""
+        self._bridge = bridge
         self._send = send
         self.wanted: dict[str, _Wanted] = {}
         """Topics that it subscribes to."""
@@ -79,28 +79,30 @@ class Seat:
         self._goals: dict[object, str] = {}
         """Id of a running goal → its action."""
         self._fragments = 0
-        desk.seats.append(self)
+        bridge.clients.append(self)
 
     def leave(self) -> None:
-        """Be gone, with everything that was offered."""
-        desk = self._desk
-        desk.seats.remove(self)
-        desk.servers = {name: seat for name, seat in desk.servers.items() if seat is not self}
-        desk.asked = {key: who for key, who in desk.asked.items() if who[0] is not self}
+        """Remove the client and the services that it offered."""
+        bridge = self._bridge
+        bridge.clients.remove(self)
+        bridge.servers = {
+            name: client for name, client in bridge.servers.items() if client is not self
+        }
+        bridge.asked = {key: who for key, who in bridge.asked.items() if who[0] is not self}
 
     def hears(self, text: str | bytes, now_s: float) -> Envelope | None:
-        """Take one frame of the client; return what the emulated robot is to be told of it."""
+        """Handle one frame of the client; return the message for the emulated robot, if any."""
         try:
             operation = _decode(text)
         except (msgspec.DecodeError, UnicodeDecodeError):
-            return None  # as the real one: nothing tells the client
+            return None  # silent, as in the real bridge
         if not isinstance(operation, dict):
             return None
         work = _WORK.get(str(operation.get("op")))
         return None if work is None else work(self, operation, now_s)
 
     def says(self, payload: Payload, now_s: float) -> None:
-        """Tell the client what the emulated robot said."""
+        """Send a message of the emulated robot to the client."""
         if not isinstance(payload, Envelope):
             return
         payload = payload._replace(body=_fields(payload.body))
@@ -108,7 +110,7 @@ class Seat:
         match payload.verb:
             case "message":
                 topic = str(payload.attributes.get("topic"))
-                self._desk.types.setdefault(topic, "")
+                self._bridge.types.setdefault(topic, "")
                 self.show(topic, body, now_s)
             case "feedback" if number in self._goals:
                 self._feedback(number, body)
@@ -118,7 +120,7 @@ class Seat:
                 self._finish(self._goals.pop(number), number, payload)
 
     def refuses(self, asked: Envelope) -> None:
-        """Tell that the emulated robot knows nothing of what was asked for."""
+        """Report that the emulated robot has no such service or action."""
         number = asked.attributes.get("id")
         if number in self._calls:
             service = self._calls.pop(number)
@@ -130,7 +132,7 @@ class Seat:
             )
 
     def show(self, topic: str, message: object, now_s: float) -> None:
-        """Give a message to the client if it listens, and not more often than it wants."""
+        """Send a message to the client if it subscribed, at most at its throttle rate."""
         wanted = self.wanted.get(topic)
         if wanted is None:
             return
@@ -167,7 +169,7 @@ class Seat:
                 }
             )
 
-    # -- what the robot answers
+    # -- replies of the robot
 
     def answer(self, service: str, number: object, values: object, is_ok: bool) -> None:
         """Answer a call of this client."""
@@ -201,7 +203,7 @@ class Seat:
     # -- the client's operations
 
     def subscribe(self, operation: Mapping[str, Any], now_s: float) -> None:
-        """A second subscription to a topic takes the first one's place, throttle and all."""
+        """Subscribe; a second subscription to a topic replaces the first, throttle included."""
         topic = _text(operation, "topic")
         if not topic or len(self.wanted) >= MAX_TOPICS:
             return
@@ -218,29 +220,29 @@ class Seat:
         self.wanted.pop(_text(operation, "topic"), None)
 
     def advertise(self, operation: Mapping[str, Any], now_s: float) -> None:
-        """Take note of the type of a topic."""
+        """Note the type of a topic."""
         self._learn(_text(operation, "topic"), operation)
 
     def publish(self, operation: Mapping[str, Any], now_s: float) -> Envelope | None:
-        """Give a message to all who listen, and to the robot; without a known type to nobody."""
+        """Send a message to all subscribers and to the robot; drop it if its type is unknown."""
         topic, message = _text(operation, "topic"), operation.get("msg")
-        if topic not in self._desk.types or not isinstance(message, dict):
+        if topic not in self._bridge.types or not isinstance(message, dict):
             return None
-        self._desk.publish(topic, message, now_s)
-        kind = self._desk.types[topic]
+        self._bridge.publish(topic, message, now_s)
+        kind = self._bridge.types[topic]
         attributes = {"topic": topic, "type": kind} if kind else {"topic": topic}
         return Envelope("publish", attributes, message)
 
     def call(self, operation: Mapping[str, Any], now_s: float) -> Envelope | None:
-        """Answer a call of rosapi, or give it to the client or robot that offers the service."""
+        """Answer a call of rosapi, or forward it to the client or robot that offers the service."""
         service, number = _text(operation, "service"), operation.get("id")
         args = operation.get("args")
         args = {} if args is None else args
         known = self._rosapi(service, args)
         if known is not None:
             self.answer(service, number, known, True)
-        elif service in self._desk.servers:
-            self._desk.passed_on(service, self, number, args)
+        elif service in self._bridge.servers:
+            self._bridge.passed_on(service, self, number, args)
         else:
             self._keep(self._calls, number, service)
             attributes = {"service": service, "id": number}
@@ -248,27 +250,27 @@ class Seat:
         return None
 
     def offer(self, operation: Mapping[str, Any], now_s: float) -> None:
-        """Let this client answer the calls of a service."""
-        if len(self._desk.servers) < MAX_TOPICS:
-            self._desk.servers[_text(operation, "service")] = self
+        """Register this client as the server of a service."""
+        if len(self._bridge.servers) < MAX_TOPICS:
+            self._bridge.servers[_text(operation, "service")] = self
 
     def withdraw(self, operation: Mapping[str, Any], now_s: float) -> None:
-        """Offer a service no longer."""
+        """Remove a service."""
         name = _text(operation, "service")
-        if self._desk.servers.get(name) is self:
-            del self._desk.servers[name]
+        if self._bridge.servers.get(name) is self:
+            del self._bridge.servers[name]
 
     def respond(self, operation: Mapping[str, Any], now_s: float) -> None:
-        """Pass an answer on to the client that asked."""
-        asked = self._desk.asked.pop(str(operation.get("id")), None)
+        """Forward a reply to the caller."""
+        asked = self._bridge.asked.pop(str(operation.get("id")), None)
         if asked is not None:
-            seat, number = asked
+            client, number = asked
             values = operation.get("values")
             is_ok = operation.get("result") is not False
-            seat.answer(_text(operation, "service"), number, values, is_ok)
+            client.answer(_text(operation, "service"), number, values, is_ok)
 
     def start(self, operation: Mapping[str, Any], now_s: float) -> Envelope:
-        """Give a goal to the robot."""
+        """Send a goal to the robot."""
         action, number = _text(operation, "action"), operation.get("id")
         self._keep(self._goals, number, action)
         attributes = {
@@ -286,23 +288,23 @@ class Seat:
 
     def _learn(self, topic: str, operation: Mapping[str, Any]) -> None:
         kind = _text(operation, "type")
-        if topic and kind and len(self._desk.types) < MAX_TOPICS:
-            self._desk.types[topic] = self._desk.types.get(topic) or kind
+        if topic and kind and len(self._bridge.types) < MAX_TOPICS:
+            self._bridge.types[topic] = self._bridge.types.get(topic) or kind
 
     def _keep(self, table: dict[object, str], number: object, name: str) -> None:
         if not isinstance(number, str | int):
-            return  # nobody could tell the answers apart
+            return  # replies could not be matched
         while len(table) >= MAX_TOPICS:
             del table[next(iter(table))]
         table[number] = name
 
     def _rosapi(self, service: str, args: object) -> dict[str, object] | None:
-        """Return what the real bridge's companion node says, or None when it is not asked."""
+        """Return the reply of the node rosapi, or None for another service."""
         folder, _, question = service.rpartition("/")
         if folder not in ("/rosapi", "rosapi"):
             return None
         given = args if isinstance(args, dict) else {}
-        types = dict(sorted(self._desk.types.items()))
+        types = dict(sorted(self._bridge.types.items()))
         match question:
             case "topics":
                 return {"topics": list(types), "types": list(types.values())}
@@ -314,26 +316,26 @@ class Seat:
             case "subscribers":
                 topic = str(given.get("topic"))
                 nodes = ["/robot"] if topic in types else []
-                if any(topic in seat.wanted for seat in self._desk.seats):
+                if any(topic in client.wanted for client in self._bridge.clients):
                     nodes.append("/rosbridge_websocket")
                 return {"subscribers": nodes}
             case "services":
-                return {"services": sorted(self._desk.servers)}
+                return {"services": sorted(self._bridge.servers)}
         return None
 
 
-_Work = Callable[[Seat, Mapping[str, Any], float], Envelope | None]
+_Work = Callable[[BridgeClient, Mapping[str, Any], float], Envelope | None]
 _WORK: Mapping[str, _Work] = {
-    "subscribe": Seat.subscribe,
-    "unsubscribe": Seat.unsubscribe,
-    "advertise": Seat.advertise,
-    "publish": Seat.publish,
-    "call_service": Seat.call,
-    "advertise_service": Seat.offer,
-    "unadvertise_service": Seat.withdraw,
-    "service_response": Seat.respond,
-    "send_action_goal": Seat.start,
-    "cancel_action_goal": Seat.cancel,
+    "subscribe": BridgeClient.subscribe,
+    "unsubscribe": BridgeClient.unsubscribe,
+    "advertise": BridgeClient.advertise,
+    "publish": BridgeClient.publish,
+    "call_service": BridgeClient.call,
+    "advertise_service": BridgeClient.offer,
+    "unadvertise_service": BridgeClient.withdraw,
+    "service_response": BridgeClient.respond,
+    "send_action_goal": BridgeClient.start,
+    "cancel_action_goal": BridgeClient.cancel,
 }
 
 

@@ -1,10 +1,10 @@
-"""Who may come in to an emulated web server."""
+"""Authentication of clients of a simulated web server."""
 
 from base64 import b64encode
 
 import pytest
 
-from urc.simulator.doors.http_guard import Guard
+from urc.simulator.servers.http_auth import HttpAuth
 
 BASIC = {"type": "basic", "user": "operator", "password": "s3cret"}
 
@@ -24,15 +24,15 @@ def basic(text: str) -> str:
         ({"type": "bearer", "token": "t"}, "Bearer u", "Bearer"),
     ],
 )
-def test_who_knows_the_secret_comes_in(auth: object, given: str, told: str | None) -> None:
-    """Everybody else is told what is asked for."""
-    assert Guard(auth).challenge("GET", "/", given) == told
+def test_credentials_are_checked(auth: object, given: str, told: str | None) -> None:
+    """A request without them gets the challenge."""
+    assert HttpAuth(auth).challenge("GET", "/", given) == told
 
 
-def test_digest_of_another_request_is_none() -> None:
-    """The answer to a challenge is good for the target that it names, and for this nonce."""
-    guard = Guard({"type": "digest", "user": "u", "password": "p"})
-    told = guard.challenge("GET", "/a", "")
+def test_digest_of_another_request_is_refused() -> None:
+    """A digest is valid for its target and nonce only."""
+    auth = HttpAuth({"type": "digest", "user": "u", "password": "p"})
+    told = auth.challenge("GET", "/a", "")
     assert told is not None
     nonce = told.partition('nonce="')[2].rstrip('"')
     for given in (
@@ -41,4 +41,4 @@ def test_digest_of_another_request_is_none() -> None:
         f'Digest username="u", uri="/a", nonce="{nonce}", response="x"',
         "Digest",
     ):
-        assert guard.challenge("GET", "/a", given) == told
+        assert auth.challenge("GET", "/a", given) == told

@@ -1,4 +1,4 @@
-"""The talk of an emulated robot with one client, without a line."""
+"""The dialogue of an emulated robot with one client, without a connection."""
 
 import asyncio
 from collections.abc import Sequence
@@ -7,7 +7,8 @@ import pytest
 
 from urc.model.codec import Payload
 from urc.problems import UrcError
-from urc.simulator.doors.base import Crowd, Guest, Place, converse, option_port
+from urc.simulator.servers.base import ServerContext, option_port
+from urc.simulator.servers.clients import ClientConnection, Clients, converse
 from urc.simulator.twin import Twin
 from urc.testing.profile import QUESTION, line_profile
 
@@ -16,11 +17,11 @@ pytestmark = pytest.mark.anyio
 ASK = f"{QUESTION}\n".encode()
 
 
-def place(*, is_per_request: bool = False, **options: object) -> Place:
+def context(*, is_per_request: bool = False, **options: object) -> ServerContext:
     profile = line_profile(is_per_request=is_per_request)
     twin = Twin(profile, {})
     spec = profile.driver.transports["wire"]
-    return Place("wire", spec, options, "127.0.0.1", lambda: twin.line("wire"), lambda: 7.0)
+    return ServerContext("wire", spec, options, "127.0.0.1", lambda: twin.line("wire"), lambda: 7.0)
 
 
 class Client:
@@ -40,23 +41,23 @@ class Client:
         self.heard += said
 
 
-async def talk(where: Place, client: Client) -> None:
-    guest = Guest(where.line(), lambda: None)
+async def talk(where: ServerContext, client: Client) -> None:
+    connection = ClientConnection(where.line(), lambda: None)
     async with asyncio.timeout(5):
-        await converse(where, guest, client.take, client.put)
+        await converse(where, connection, client.take, client.put)
 
 
 @pytest.mark.parametrize("end", [None, b""])
 async def test_client_is_answered_until_it_ends(end: bytes | None) -> None:
     client = Client(ASK[:5], ASK[5:] + ASK, end)
-    await talk(place(), client)
+    await talk(context(), client)
     assert client.heard == [b"7\n", b"7\n"]
 
 
 async def test_robot_that_closes_answers_once() -> None:
     """What the client would have said next is not asked for."""
     client = Client(ASK + ASK, ASK)
-    await talk(place(is_per_request=True), client)
+    await talk(context(is_per_request=True), client)
     assert client.heard == [b"7\n"]
     assert client.says == [ASK]
 
@@ -64,44 +65,44 @@ async def test_robot_that_closes_answers_once() -> None:
 async def test_client_that_the_system_gives_up_is_lost() -> None:
     """Its time-out is not the robot's own clock."""
     with pytest.raises(TimeoutError):
-        await talk(place(), Client(ASK, TimeoutError(110, "Connection timed out")))
+        await talk(context(), Client(ASK, TimeoutError(110, "Connection timed out")))
 
 
-async def test_crowd_lets_the_most_silent_go() -> None:
-    """A newcomer always finds a place, and nobody is left at the end."""
-    crowd = Crowd(place(), limit=2)
+async def test_client_that_was_silent_for_longest_makes_room() -> None:
+    """A new client is always admitted, and `close` disconnects all."""
+    clients = Clients(context(), limit=2)
     cut: list[int] = []
     talking = [asyncio.Event() for _ in range(3)]
 
     def enter(number: int) -> None:
-        async def stay(guest: Guest) -> None:
-            guest.heard_s = float(number)
+        async def stay(client: ClientConnection) -> None:
+            client.active_s = float(number)
             talking[number].set()
             await asyncio.Event().wait()
 
-        crowd.welcome(stay, lambda: cut.append(number))
+        clients.admit(stay, lambda: cut.append(number))
 
     for number in range(3):
         enter(number)
         async with asyncio.timeout(5):
             await talking[number].wait()
     assert set(cut) == {0}
-    assert len(crowd.lines) == 2
-    await crowd.close()
+    assert len(clients.lines) == 2
+    await clients.close()
     assert set(cut) == {0, 1, 2}
-    assert crowd.lines == []
+    assert clients.lines == []
 
 
 @pytest.mark.parametrize("port", [None, "7000", True, -1, 65_536])
 async def test_port_must_be_one(port: object) -> None:
     with pytest.raises(UrcError) as told:
-        option_port(place(port=port))
+        option_port(context(port=port))
     assert str(told.value) == f"transports.wire.port: {port!r} is no port to listen on"
-    assert option_port(place(port=7000)) == 7000
-    assert option_port(place(port=port)._replace(is_anywhere=True)) == 0
+    assert option_port(context(port=7000)) == 7000
+    assert option_port(context(port=port)._replace(is_anywhere=True)) == 0
 
 
 async def test_port_that_is_left_out_is_the_usual_one() -> None:
     """As it is for the transport itself."""
-    assert option_port(place(), default=9090) == 9090
-    assert option_port(place(port=7000), default=9090) == 7000
+    assert option_port(context(), default=9090) == 9090
+    assert option_port(context(port=7000), default=9090) == 7000

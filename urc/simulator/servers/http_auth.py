@@ -1,4 +1,4 @@
-"""Asks the clients of an emulated web server who they are: Basic, Bearer or Digest (RFC 7616)."""
+"""Authentication of clients of a simulated web server: Basic, Bearer or Digest (RFC 7616)."""
 
 import hashlib
 import hmac
@@ -7,22 +7,22 @@ import secrets
 from base64 import b64encode
 from collections.abc import Mapping
 
-__all__ = ["Guard"]
+__all__ = ["HttpAuth"]
 
 _REALM = "robot"
 _FIELD = re.compile(r'(\w+)=(?:"([^"]*)"|([^\s,]*))')
 
 
-class Guard:
-    """Lets in who knows what the option `auth` of the driver says."""
+class HttpAuth:
+    """Checks requests against the option `auth` of the driver."""
 
     def __init__(self, auth: object) -> None:
-        """Read the option; None lets everybody in."""
+        """Read the option; None accepts every request."""
         self._auth: Mapping[str, object] = auth if isinstance(auth, Mapping) else {}
         self._nonce = secrets.token_hex(16)
 
     def challenge(self, method: str, target: str, given: str) -> str | None:
-        """Return what a client must be told that may not come in; None when it may.
+        """Return the challenge for a request without valid credentials, None for a valid one.
 
         Args:
             method: of its request.
@@ -57,7 +57,7 @@ class Guard:
 
 
 def _hash(text: str) -> str:
-    # The one algorithm that every client has, and most cameras ask for.
+    # Every client supports this algorithm, and most cameras require it.
     return hashlib.md5(text.encode(), usedforsecurity=False).hexdigest()
 
 

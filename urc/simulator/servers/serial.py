@@ -1,8 +1,7 @@
 """The emulated robot behind a pseudo-terminal, which programs open as any serial port.
 
-Its name is the system's. Where the profile names a file that is not there, a link of that name
-leads to it, so that the profile works as it is; names in ``/dev`` are left to the system. A profile
-that says ``socket://HOST:PORT`` gets a TCP port.
+The system chooses its name. If the profile names a missing file outside ``/dev``, a link of that
+name is made, so the profile works unchanged. For ``socket://HOST:PORT`` it is a TCP port.
 """
 
 import asyncio
@@ -15,61 +14,55 @@ from pathlib import Path
 
 from urc.model.codec import Payload
 from urc.problems import UrcError
-from urc.simulator.doors.base import (
-    READ_BYTES,
-    Crowd,
-    Door,
-    Guest,
-    Listening,
-    Place,
-    converse,
-    reason,
-)
-from urc.simulator.doors.tcp import TcpDoor
+from urc.simulator.servers.base import Endpoint, ServerContext, SimulatedServer, reason
+from urc.simulator.servers.clients import READ_BYTES, ClientConnection, Clients, converse
+from urc.simulator.servers.tcp import TcpServer
 
-__all__ = ["SerialDoor"]
+__all__ = ["SerialServer"]
 
 _LOOK_S = 0.02
-"""How often a closed pseudo-terminal is looked at: the system does not tell that it was opened."""
+"""Interval for polling a closed pseudo-terminal: the system does not report its opening."""
 
 
-class SerialDoor:
-    """One port, with at most one client, as a wire has."""
+class SerialServer:
+    """One serial port, with at most one client."""
 
-    def __init__(self, place: Place) -> None:
-        """Prepare the door; `open` makes the port."""
-        port = str(place.options.get("port") or "")
-        is_address = "://" in port and not (place.is_anywhere and port.startswith("rfc2217:"))
-        self._door: Door = _SocketDoor(place, port) if is_address else _PtyDoor(place, port)
+    def __init__(self, context: ServerContext) -> None:
+        """Prepare the server; `open` makes the port."""
+        port = str(context.options.get("port") or "")
+        is_address = "://" in port and not (context.is_anywhere and port.startswith("rfc2217:"))
+        self._server: SimulatedServer = (
+            _SocketServer(context, port) if is_address else _PtyServer(context, port)
+        )
 
-    async def open(self) -> Listening:
+    async def open(self) -> Endpoint:
         """Make the port."""
-        return await self._door.open()
+        return await self._server.open()
 
     async def close(self) -> None:
         """Unplug it."""
-        await self._door.close()
+        await self._server.close()
 
 
-class _PtyDoor:
-    def __init__(self, place: Place, port: str) -> None:
-        self._place = place
+class _PtyServer:
+    def __init__(self, context: ServerContext, port: str) -> None:
+        self._context = context
         self._port = port
-        self._crowd = Crowd(place, limit=1)
+        self._clients = Clients(context, limit=1)
         self._wire = -1
         self._link: Path | None = None
         self._watch: asyncio.Task[None] | None = None
 
-    async def open(self) -> Listening:
+    async def open(self) -> Endpoint:
         if sys.platform == "win32":
-            raise UrcError(f"transports.{self._place.name}: this system has no pseudo-terminals")
+            raise UrcError(f"transports.{self._context.name}: this system has no pseudo-terminals")
         import pty
         import tty
 
         self._wire, client = pty.openpty()
         tty.setraw(client)
         path = os.ttyname(client)
-        os.close(client)  # from now on reading fails for as long as nobody has it open
+        os.close(client)  # from now on reading fails until a program opens the port
         os.set_blocking(self._wire, False)
         text = f"serial {path}"
         if self._needs_link():
@@ -79,16 +72,16 @@ class _PtyDoor:
             except OSError as fault:
                 message = f"cannot make {self._port} ({reason(fault)})"
                 await self.close()
-                raise UrcError(f"transports.{self._place.name}: {message}") from fault
+                raise UrcError(f"transports.{self._context.name}: {message}") from fault
             text += f", as {self._port}"
         self._watch = asyncio.create_task(self._await_clients())
-        return Listening("", 0, text, {"port": path}, path)
+        return Endpoint("", 0, text, {"port": path}, path)
 
     async def close(self) -> None:
         if self._watch is not None:
             self._watch.cancel()
             await asyncio.gather(self._watch, return_exceptions=True)
-        await self._crowd.close()
+        await self._clients.close()
         if self._link is not None:
             with suppress(OSError):
                 self._link.unlink()
@@ -99,14 +92,14 @@ class _PtyDoor:
     def _needs_link(self) -> bool:
         path = Path(self._port)
         return (
-            not self._place.is_anywhere
+            not self._context.is_anywhere
             and path.is_absolute()
             and not path.is_relative_to("/dev")
             and not path.exists()
         )
 
     async def _await_clients(self) -> None:
-        """Let in whoever opens the port, one after another."""
+        """Serve the programs that open the port, one after another."""
         while True:
             first = self._read()
             if first is None:
@@ -114,11 +107,11 @@ class _PtyDoor:
                 continue
             gone = asyncio.Event()
             wire = _Wire(self._wire, first)
-            self._crowd.welcome(lambda guest, wire=wire: self._talk(guest, wire), gone.set)  # type: ignore[misc] # of this turn
+            self._clients.admit(lambda client, wire=wire: self._talk(client, wire), gone.set)  # type: ignore[misc] # of this turn
             await gone.wait()
 
     def _read(self) -> bytes | None:
-        """Return what has come, None while nobody has the port open."""
+        """Return the received bytes, None while no program has the port open."""
         try:
             return os.read(self._wire, READ_BYTES)
         except BlockingIOError:
@@ -126,8 +119,8 @@ class _PtyDoor:
         except OSError:
             return None
 
-    async def _talk(self, guest: Guest, wire: "_Wire") -> None:
-        await converse(self._place, guest, wire.take, wire.put)
+    async def _talk(self, client: ClientConnection, wire: "_Wire") -> None:
+        await converse(self._context, client, wire.take, wire.put)
 
 
 class _Wire:
@@ -153,7 +146,7 @@ class _Wire:
                 raise
 
     async def put(self, said: Sequence[Payload]) -> None:
-        """Write what the robot says, waiting while the client does not read."""
+        """Write the robot's data; wait while the client does not read."""
         data = b"".join(one for one in said if isinstance(one, bytes))
         while data:
             try:
@@ -177,20 +170,20 @@ class _Wire:
                 loop.remove_reader(self._number)
 
 
-class _SocketDoor(TcpDoor):
+class _SocketServer(TcpServer):
     """A port behind ``socket://HOST:PORT``."""
 
-    def __init__(self, place: Place, port: str) -> None:
+    def __init__(self, context: ServerContext, port: str) -> None:
         scheme, _, rest = port.partition("://")
         number = rest.rpartition(":")[2]
         if scheme != "socket" or not (number.isascii() and number.isdecimal()):
             raise UrcError(
-                f"transports.{place.name}.port: {port!r} cannot be emulated; a path and "
+                f"transports.{context.name}.port: {port!r} cannot be emulated; a path and "
                 "socket://HOST:PORT can"
             )
-        super().__init__(place._replace(options={**place.options, "port": int(number)}))
+        super().__init__(context._replace(options={**context.options, "port": int(number)}))
 
-    async def open(self) -> Listening:
+    async def open(self) -> Endpoint:
         found = await super().open()
         address = f"socket://{found.text.partition(' ')[2]}"
         return found._replace(text=f"serial {address}", options={"port": address})

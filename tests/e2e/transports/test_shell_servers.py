@@ -18,8 +18,8 @@ from urc.model.profile import Profile
 from urc.model.values import Value
 from urc.runtime.catalog import built_in_catalog
 from urc.runtime.session import Session
-from urc.simulator.doors.base import Listening
 from urc.simulator.server import serve
+from urc.simulator.servers.base import Endpoint
 from urc.simulator.stand_in import stand_in
 
 pytestmark = pytest.mark.anyio
@@ -145,7 +145,7 @@ def profile_of(text: str, folder: Path) -> Profile:
 
 
 @asynccontextmanager
-async def emulated(folder: Path, key: Path | None = None) -> AsyncIterator[Mapping[str, Listening]]:
+async def emulated(folder: Path, key: Path | None = None) -> AsyncIterator[Mapping[str, Endpoint]]:
     """Run the robot with one shell, on any port."""
     said = f'key: "{key}", ' if key else ""
     profile = profile_of(ONE_SHELL.replace("KEY ", said), folder)
@@ -173,13 +173,13 @@ async def runs(*words: str, typed: str = "", **environment: str) -> str:
     return said.decode()
 
 
-def ssh_words(place: Listening, folder: Path, *more: str) -> list[str]:
+def ssh_words(endpoint: Endpoint, folder: Path, *more: str) -> list[str]:
     """Return OpenSSH's command line, which knows nothing of this machine's user."""
     options = (
         "StrictHostKeyChecking=accept-new", f"UserKnownHostsFile={folder / 'known'}",
         "GlobalKnownHostsFile=/dev/null", "NumberOfPasswordPrompts=1", "IdentitiesOnly=yes",
     )  # fmt: skip
-    words = ["ssh", "-F", "/dev/null", "-p", str(place.port)]
+    words = ["ssh", "-F", "/dev/null", "-p", str(endpoint.port)]
     for option in options:
         words += ["-o", option]
     return [*words, *more]
@@ -202,12 +202,12 @@ async def test_openssh_talks_to_the_emulated_shell(tmp_path: Path) -> None:
     async with nothing_left():
         for _ in range(2):
             async with emulated(tmp_path) as listening:
-                place = listening["shell"]
+                endpoint = listening["shell"]
                 known = tmp_path / "known"
                 if known.exists():  # the port is another one, the key is not
                     key = known.read_text("ascii").split(" ", 1)[1]
-                    known.write_text(f"[127.0.0.1]:{place.port} {key}", "ascii")
-                words = ssh_words(place, tmp_path, "-T", "root@127.0.0.1")
+                    known.write_text(f"[127.0.0.1]:{endpoint.port} {key}", "ascii")
+                words = ssh_words(endpoint, tmp_path, "-T", "root@127.0.0.1")
                 said = await runs(*words, typed="depth?\n", **asked(tmp_path, PASSWORD))
                 assert "depth 12.5\n" in said
                 assert "WARNING" not in said
@@ -268,12 +268,12 @@ async def test_debian_telnet_talks_to_the_emulated_console(tmp_path: Path) -> No
         "ssh_port": free_port(), "telnet_port": free_port(), "password": PASSWORD,
     }  # fmt: skip
     async with serve(profile, settings, is_anywhere=True) as listening:
-        place = listening["console"]
+        endpoint = listening["console"]
         # The client needs a terminal, and leaves when its input ends.
         script = (
             "import os, pty, select, sys, time\n"
             "pid, fd = pty.fork()\n"
-            f"if not pid: os.execvp('telnet', ['telnet', '127.0.0.1', '{place.port}'])\n"
+            f"if not pid: os.execvp('telnet', ['telnet', '127.0.0.1', '{endpoint.port}'])\n"
             "said, typed = b'', False\n"
             "while b'heading 270' not in said:\n"
             "    assert select.select([fd], [], [], 10)[0], said\n"

@@ -17,113 +17,101 @@ import asyncssh
 from urc._folders import data_folder
 from urc.model.codec import Payload
 from urc.problems import UrcError
-from urc.simulator.doors.base import (
+from urc.simulator.servers.base import Endpoint, ServerContext, host_and_port
+from urc.simulator.servers.clients import (
     MAX_CLIENTS,
     READ_BYTES,
     TAKEN_WITHIN_S,
-    Crowd,
-    Guest,
-    Listening,
-    Place,
+    ClientConnection,
     converse,
-    option_port,
-    reason,
-    shown_place,
 )
-from urc.simulator.doors.terminal import Keys, echo_of
+from urc.simulator.servers.listening import Listener, ListeningServer
+from urc.simulator.servers.terminal import Keys, echo_of
 
-__all__ = ["SshDoor"]
+__all__ = ["SshServer"]
 
-DEFAULT_PORT = 22
 LOGIN_WITHIN_S = 10.0
 _WINDOW = 65536
 _NOT_FOUND = 127
 """What a shell says of a command that it does not know."""
 
 
-class SshDoor:
-    """One listening port and whoever came in through it."""
+class SshServer(ListeningServer):
+    """An SSH port."""
 
-    def __init__(self, place: Place) -> None:
-        """Prepare the door; `open` listens."""
-        self._place = place._replace(options={"port": DEFAULT_PORT, **place.options})
-        self._crowd = Crowd(self._place)
-        self._acceptor: asyncssh.SSHAcceptor | None = None
+    DEFAULT_PORT = 22
+
+    def __init__(self, context: ServerContext) -> None:
+        """Prepare the server; `open` listens."""
+        super().__init__(context)
         self._connections: dict[asyncssh.SSHServerConnection, None] = {}
-        self._lock = _Lock(self._place)
+        self._lock = _Lock(context)
+        self._fingerprint = ""
 
-    async def open(self) -> Listening:
-        """Listen on the port of the options, or on any."""
-        place, port = self._place, option_port(self._place)
-        key = asyncssh.generate_private_key("ssh-ed25519") if place.is_anywhere else _own_key()
-        try:
-            self._acceptor = await asyncssh.listen(
-                place.host,
-                port,
-                server_factory=lambda: _Server(self._place, self._lock, self._connections),
-                server_host_keys=[key],
-                process_factory=self._let_in,
-                encoding=None,
-                line_editor=False,
-                window=_WINDOW,
-                login_timeout=LOGIN_WITHIN_S,
-                keepalive_interval=5,
-                agent_forwarding=False,
-                allow_scp=False,
-                gss_host=None,
-                config=None,
-            )
-        except OSError as fault:
-            where = shown_place(place.host, port)
-            message = f"transports.{place.name}: cannot listen on {where} ({reason(fault)})"
-            raise UrcError(message) from fault
-        host, port = self._acceptor.get_addresses()[0][:2]
-        shown = key.get_fingerprint("sha256")
-        text = f"ssh {shown_place(host, port)} (host key {shown})"
-        options = {"host": host, "port": port, "host_key": shown, **self._lock.options}
-        return Listening(host, port, text, options)
+    async def _listen(self, host: str, port: int) -> Listener:
+        is_anywhere = self._context.is_anywhere
+        key = asyncssh.generate_private_key("ssh-ed25519") if is_anywhere else _own_key()
+        self._fingerprint = key.get_fingerprint("sha256")
+        acceptor = await asyncssh.listen(
+            host,
+            port,
+            server_factory=lambda: _Server(self._context, self._lock, self._connections),
+            server_host_keys=[key],
+            process_factory=self._accept,
+            encoding=None,
+            line_editor=False,
+            window=_WINDOW,
+            login_timeout=LOGIN_WITHIN_S,
+            keepalive_interval=5,
+            agent_forwarding=False,
+            allow_scp=False,
+            gss_host=None,
+            config=None,
+        )
 
-    async def close(self) -> None:
-        """Stop listening and cut every connection."""
-        if self._acceptor is None:
-            return
-        self._acceptor.close()
-        await self._crowd.close()
-        for connection in list(self._connections):
-            connection.abort()
-            await connection.wait_closed()
-        await self._acceptor.wait_closed()
+        async def wait_closed() -> None:
+            for connection in list(self._connections):
+                connection.abort()
+                await connection.wait_closed()
+            await acceptor.wait_closed()
 
-    def _let_in(self, process: "asyncssh.SSHServerProcess[bytes]") -> None:
-        declared = self._place.options.get("command")
+        return Listener(acceptor.get_addresses()[0], acceptor.close, wait_closed)
+
+    def _endpoint(self, host: str, port: int) -> Endpoint:
+        text = f"ssh {host_and_port(host, port)} (host key {self._fingerprint})"
+        options = {"host": host, "port": port, "host_key": self._fingerprint}
+        return Endpoint(host, port, text, options | self._lock.options)
+
+    def _accept(self, process: "asyncssh.SSHServerProcess[bytes]") -> None:
+        declared = self._context.options.get("command")
         if process.command is not None and process.command != declared:
             name = process.command.split(" ", 1)[0]
             process.stderr.write(f"{name}: command not found\n".encode())
             process.exit(_NOT_FOUND)
             return
         process.stdout.channel.set_write_buffer_limits(high=READ_BYTES)
-        self._crowd.welcome(
-            lambda guest: _Talk(self._place, process).run(guest), process.channel.abort
+        self._clients.admit(
+            lambda client: _Talk(self._context, process).run(client), process.channel.abort
         )
 
 
 class _Lock:
-    """Who may come in: whoever knows what the driver's options say."""
+    """The credentials that the driver's options name."""
 
-    def __init__(self, place: Place) -> None:
-        options = place.options
+    def __init__(self, context: ServerContext) -> None:
+        options = context.options
         self.username = str(options.get("username", ""))
         self.options: dict[str, Any] = {}
-        """With which the driver's own transport gets in."""
+        """Options with which the driver's transport logs in."""
         self.password = str(options.get("password") or "")
         self._key: asyncssh.SSHKey | None = None
         self._takes_any_key = options.get("agent") is True
-        if place.is_anywhere:
-            # Nobody has to have the real robot's keys to try its twin.
+        if context.is_anywhere:
+            # The emulated robot needs no key of the real one.
             self.password = secrets.token_urlsafe(16)
             self.options = {"password": self.password, "key": None, "agent": False}
         elif key := str(options.get("key") or ""):
-            self._key = _private_key(place, key, str(options.get("passphrase") or "") or None)
+            self._key = _private_key(context, key, str(options.get("passphrase") or "") or None)
 
     @property
     def is_open(self) -> bool:
@@ -147,9 +135,12 @@ class _Server(asyncssh.SSHServer):
     """One client's connection."""
 
     def __init__(
-        self, place: Place, lock: _Lock, connections: dict[asyncssh.SSHServerConnection, None]
+        self,
+        context: ServerContext,
+        lock: _Lock,
+        connections: dict[asyncssh.SSHServerConnection, None],
     ) -> None:
-        self._place = place
+        self._context = context
         self._lock = lock
         self._connections = connections
         self._connection: asyncssh.SSHServerConnection
@@ -181,7 +172,7 @@ class _Server(asyncssh.SSHServer):
     def connection_requested(
         self, dest_host: str, dest_port: int, orig_host: str, orig_port: int
     ) -> Awaitable[asyncssh.SSHTCPSession[bytes]] | bool:
-        inside = self._place.carried.get((dest_host, dest_port))
+        inside = self._context.carried.get((dest_host, dest_port))
         if inside is None:
             raise asyncssh.ChannelOpenError(
                 asyncssh.OPEN_CONNECT_FAILED, "the emulated robot has nothing there"
@@ -192,15 +183,15 @@ class _Server(asyncssh.SSHServer):
 class _Talk:
     """The conversation with one client's shell or command."""
 
-    def __init__(self, place: Place, process: "asyncssh.SSHServerProcess[bytes]") -> None:
-        self._place = place
+    def __init__(self, context: ServerContext, process: "asyncssh.SSHServerProcess[bytes]") -> None:
+        self._context = context
         self._process = process
-        self._keys = Keys(place.spec)
+        self._keys = Keys(context.spec)
         self._is_terminal = process.term_type is not None
 
-    async def run(self, guest: Guest) -> None:
+    async def run(self, client: ClientConnection) -> None:
         try:
-            await converse(self._place, guest, self._take, self._put)
+            await converse(self._context, client, self._take, self._put)
             self._process.exit(0)
             async with asyncio.timeout(TAKEN_WITHIN_S):
                 await self._process.wait_closed()
@@ -248,11 +239,13 @@ def _write(file: Path, content: bytes) -> None:
         out.write(content)
 
 
-def _private_key(place: Place, key: str, passphrase: str | None) -> asyncssh.SSHKey | None:
+def _private_key(
+    context: ServerContext, key: str, passphrase: str | None
+) -> asyncssh.SSHKey | None:
     """Return the key of the options; None when this machine does not have it."""
     try:
         if "-----BEGIN" in key:
             return asyncssh.import_private_key(key.strip() + "\n", passphrase)
         return asyncssh.read_private_key(os.path.expanduser(key), passphrase)
     except (OSError, ValueError) as fault:
-        raise UrcError(f"transports.{place.name}.key: cannot be used ({fault})") from fault
+        raise UrcError(f"transports.{context.name}.key: cannot be used ({fault})") from fault

@@ -1,6 +1,6 @@
-"""What a terminal at the far end does to bytes: any key that ends a line ends it, and it echoes.
+"""The terminal of a simulated shell: it accepts any line end, and echoes input.
 
-A person's client sends CR where a driver may say LF; a real robot's terminal takes either.
+A terminal program sends CR where a driver may send LF; a real robot's terminal accepts both.
 """
 
 from typing import Final
@@ -13,21 +13,21 @@ _LINE_ENDS: Final = (b"\r", b"\n", b"\r\n")
 
 
 class Keys:
-    """What one client types, with the line ends that the driver declares."""
+    """Input of one client, with the line ends that the driver declares."""
 
     def __init__(self, spec: TransportSpec) -> None:
-        """Read for the framing of `spec`; where that has no line ends, bytes stay what they are."""
+        """Read for the framing of `spec`; if that has no line ends, bytes stay unchanged."""
         framing = spec.framing.sent or spec.framing
         end = framing.options.get("tx") if framing.type == "delimiter" else None
         self._end = end if isinstance(end, bytes) and end in _LINE_ENDS else b""
         self._was_cr = False
 
     def read(self, data: bytes) -> bytes:
-        """Return `data` with every CR, LF or CR LF as the driver would have sent it."""
+        """Return `data` with every CR, LF or CR LF replaced by the driver's line end."""
         if not self._end or not data:
             return data
         if self._was_cr and data[:1] == b"\n":
-            data = data[1:]  # the second half of a line end that came in two pieces
+            data = data[1:]  # the second half of a split line end
             self._was_cr = False
             if not data:
                 return b""
@@ -36,5 +36,5 @@ class Keys:
 
 
 def echo_of(data: bytes) -> bytes:
-    """Return what a terminal shows of what is typed."""
+    """Return the echo of typed input."""
     return data.replace(b"\r\n", b"\n").replace(b"\r", b"\n").replace(b"\n", b"\r\n")

@@ -1,0 +1,141 @@
+"""The clients of a simulated server, and the dialogue with each.
+
+Each client talks to a `TwinLine` of its own. The number of clients, the bytes read ahead and the
+time for accepting replies are bounded. When all places are taken, the client that was silent for
+longest is disconnected, so half-open connections cannot block the server.
+"""
+
+import asyncio
+import logging
+import math
+from collections.abc import Awaitable, Callable, Coroutine, Sequence
+from typing import Any
+
+from urc.model.codec import Payload
+from urc.simulator.servers.base import ServerContext
+from urc.simulator.twin import TwinLine
+
+__all__ = ["MAX_CLIENTS", "READ_BYTES", "TAKEN_WITHIN_S", "ClientConnection", "Clients", "converse"]
+
+MAX_CLIENTS = 64
+"""Connections on one transport."""
+READ_BYTES = 4096
+TAKEN_WITHIN_S = 5.0
+"""A client that accepts no reply for this long is disconnected."""
+
+log = logging.getLogger(__name__)
+
+
+class ClientConnection:
+    """One client of a server."""
+
+    def __init__(self, line: TwinLine, abort: Callable[[], None]) -> None:
+        self.line = line
+        self.abort = abort
+        """Disconnects the client at once; a second call does nothing."""
+        self.active_s = asyncio.get_running_loop().time()
+        """Time of its last data, by the loop's clock."""
+
+
+class Clients:
+    """The clients of one server, and the tasks that talk to them."""
+
+    def __init__(self, context: ServerContext, limit: int = MAX_CLIENTS) -> None:
+        """Hold at most `limit` clients."""
+        self._context = context
+        self._limit = limit
+        self._talks: dict[ClientConnection, asyncio.Task[None]] = {}
+
+    @property
+    def lines(self) -> Sequence[TwinLine]:
+        """The robot's side of every connection."""
+        return [client.line for client in self._talks]
+
+    def admit(
+        self,
+        talk: Callable[[ClientConnection], Coroutine[Any, Any, None]],
+        abort: Callable[[], None],
+    ) -> None:
+        """Run `talk` with a new client; `abort` disconnects it, and is also called at the end.
+
+        `talk` may raise OSError or TimeoutError for a lost client.
+        """
+        if len(self._talks) >= self._limit:
+            silent = min(self._talks, key=lambda client: client.active_s)
+            silent.active_s = math.inf  # it is leaving, and must not be chosen again
+            silent.abort()
+            self._talks[silent].cancel()
+        client = ClientConnection(self._context.line(), abort)
+        self._talks[client] = asyncio.create_task(self._attend(client, talk))
+
+    async def close(self) -> None:
+        """Disconnect every client."""
+        tasks = list(self._talks.values())
+        for client, task in self._talks.items():
+            client.abort()
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
+
+    async def _attend(
+        self,
+        client: ClientConnection,
+        talk: Callable[[ClientConnection], Coroutine[Any, Any, None]],
+    ) -> None:
+        name = self._context.name
+        try:
+            await talk(client)
+        except (OSError, TimeoutError) as fault:
+            log.info("%s: a client was lost: %s", name, str(fault) or "it takes nothing")
+        finally:
+            client.abort()
+            self._talks.pop(client, None)
+            if client.line.faults:
+                text, count = client.line.last_fault, client.line.faults
+                log.info("%s: %s (%d faults in all)", name, text, count)
+
+
+async def converse(
+    context: ServerContext,
+    client: ClientConnection,
+    take: Callable[[], Awaitable[Payload | None]],
+    put: Callable[[Sequence[Payload]], Awaitable[None]],
+) -> None:
+    """Talk to one client until it closes, or the robot does (``connection: per_request``).
+
+    Args:
+        context: of the server.
+        client: its line replies.
+        take: returns the next payload of the client, None or b"" at its end. It may be cancelled
+            and called again, and must lose nothing.
+        put: sends the robot's payloads, and waits while the client accepts no more.
+
+    Raises:
+        TimeoutError: the client accepts no data.
+    """
+    clock = asyncio.get_running_loop().time
+    line, before_s = client.line, clock()
+    limit = 1 if context.spec.connection == "per_request" else None
+    while True:
+        said_by_client: Payload | None = b""
+        try:
+            async with asyncio.timeout(line.due_in_s) as wait:
+                said_by_client = await take()
+        except TimeoutError:
+            if not wait.expired():
+                raise  # the system has given the client up
+        if not said_by_client and not wait.expired():
+            return
+        now_s, was_late = clock(), line.has_late
+        said: list[Payload] = list(line.step(now_s - before_s, context.now()))
+        before_s = now_s
+        answers: list[Payload] = []
+        if said_by_client:
+            client.active_s = now_s
+            answers = list(line.receive(said_by_client, context.now(), limit))
+        if said or answers:
+            async with asyncio.timeout(TAKEN_WITHIN_S):
+                await put(said + answers)
+        is_answered = limit is not None and bool(answers or (was_late and said))
+        if (line.is_over or is_answered) and not line.has_late:
+            return
+        await asyncio.sleep(0)  # reading buffered data does not yield to other tasks

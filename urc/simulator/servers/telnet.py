@@ -1,0 +1,71 @@
+"""The emulated robot behind a Telnet server, which negotiates and echoes as real ones do."""
+
+import asyncio
+from collections.abc import Sequence
+
+from urc.model.codec import Payload
+from urc.simulator.servers.base import ServerContext
+from urc.simulator.servers.clients import READ_BYTES, TAKEN_WITHIN_S, ClientConnection, converse
+from urc.simulator.servers.listening import StreamServer
+from urc.simulator.servers.terminal import Keys, echo_of
+from urc.transports.telnet_protocol import BINARY, ECHO, NAWS, SGA, TTYPE, TelnetTalk
+
+__all__ = ["TelnetServer"]
+
+
+class TelnetServer(StreamServer):
+    """A Telnet port."""
+
+    DEFAULT_PORT = 23
+
+    async def _talk(
+        self,
+        client: ClientConnection,
+        reader: asyncio.StreamReader,
+        writer: asyncio.StreamWriter,
+    ) -> None:
+        await _Talk(self._context, reader, writer).run(client)
+
+
+class _Talk:
+    """The conversation with one client."""
+
+    def __init__(
+        self, context: ServerContext, reader: asyncio.StreamReader, writer: asyncio.StreamWriter
+    ) -> None:
+        self._context = context
+        self._reader = reader
+        self._writer = writer
+        self._keys = Keys(context.spec)
+        self._telnet = TelnetTalk(
+            ours=frozenset((ECHO, SGA, BINARY)), theirs=frozenset((SGA, BINARY, TTYPE, NAWS))
+        )
+
+    async def run(self, client: ClientConnection) -> None:
+        self._writer.write(self._telnet.ask(ours=(ECHO, SGA), theirs=(SGA, NAWS)))
+        await converse(self._context, client, self._take, self._put)
+        self._writer.close()
+        async with asyncio.timeout(TAKEN_WITHIN_S):
+            await self._writer.wait_closed()
+
+    async def _take(self) -> bytes:
+        while data := await self._reader.read(READ_BYTES):
+            typed, answers = self._telnet.receive(data)
+            if ECHO in self._telnet.ours:
+                answers += self._telnet.encode(echo_of(typed))
+            if answers:
+                self._writer.write(answers)
+            if BINARY not in self._telnet.theirs:
+                typed = self._keys.read(typed)
+            if typed:
+                return typed
+            # A client that only negotiates must take the answers, too.
+            async with asyncio.timeout(TAKEN_WITHIN_S):
+                await self._writer.drain()
+        return b""
+
+    async def _put(self, said: Sequence[Payload]) -> None:
+        for one in said:
+            if isinstance(one, bytes):
+                self._writer.write(self._telnet.encode(one))
+        await self._writer.drain()

@@ -1,0 +1,133 @@
+"""The emulated robot behind a UDP port.
+
+A client is the source address of a datagram. If the driver listens on a port (``listen``), the
+robot sends there from the start: to this machine, until one of its UDP ports receives a datagram
+from another host.
+"""
+
+import asyncio
+import socket
+from collections.abc import Sequence
+from contextlib import suppress
+
+from urc.model.codec import Payload
+from urc.simulator.servers.base import (
+    Endpoint,
+    ServerContext,
+    cannot_listen,
+    host_and_port,
+    option_port,
+)
+from urc.simulator.servers.clients import ClientConnection, Clients, converse
+
+__all__ = ["UdpServer"]
+
+FORGOTTEN_S = 300.0
+"""A client that sends nothing for this long is dropped; the driver's own port never is."""
+_WAITING = 256
+"""Datagrams of one client that wait for the robot; more are lost."""
+
+_Address = tuple[str, int]
+
+
+class UdpServer(asyncio.DatagramProtocol):
+    """One UDP port and its clients."""
+
+    def __init__(self, context: ServerContext) -> None:
+        """Prepare the server; `open` binds the port."""
+        self._context = context
+        self._clients = Clients(context)
+        self._line: asyncio.DatagramTransport | None = None
+        self._inboxes: dict[_Address, asyncio.Queue[bytes]] = {}
+        self._told: _Address | None = None
+        """Where the driver listens."""
+
+    async def open(self) -> Endpoint:
+        """Bind the port of the options, or any free port."""
+        context = self._context
+        port = option_port(context) if context.options.get("port") is not None else 0
+        options: dict[str, str | int] = {"host": context.host}
+        try:
+            self._line, _ = await asyncio.get_running_loop().create_datagram_endpoint(
+                lambda: self, local_addr=(context.host, port)
+            )
+        except OSError as fault:
+            raise cannot_listen(context, port, fault, "udp ") from fault
+        host, port = self._line.get_extra_info("sockname")[:2]
+        if context.options.get("port") is not None:
+            options["port"] = port
+        text = f"udp {host_and_port(host, port)}"
+        if context.options.get("listen") is not None:
+            own = (
+                _free_port(context.host) if context.is_anywhere else option_port(context, "listen")
+            )
+            options["listen"] = own
+            self._told = (_reachable(context.host), own)
+            text += f", talks to {host_and_port(*self._told)}"
+            self._meet(self._told)
+        return Endpoint(host, port, text, options)
+
+    async def close(self) -> None:
+        """Free the port."""
+        if self._line is not None:
+            self._line.abort()
+        await self._clients.close()
+        await asyncio.sleep(0)  # the loop closes the socket in its next turn
+
+    def datagram_received(self, data: bytes, addr: tuple[str | int, ...]) -> None:
+        """Queue the datagram of a client, and note its address."""
+        address = str(addr[0]), int(addr[1])
+        if not data:
+            return
+        if self._context.last_peer is not None:
+            self._context.last_peer.host = address[0]
+        if address not in self._inboxes:
+            self._meet(address)
+        with suppress(asyncio.QueueFull):
+            self._inboxes[address].put_nowait(data)
+
+    def _meet(self, address: _Address) -> None:
+        inbox: asyncio.Queue[bytes] = asyncio.Queue(_WAITING)
+        self._inboxes[address] = inbox
+
+        def forget() -> None:
+            if self._inboxes.get(address) is inbox:
+                del self._inboxes[address]
+
+        self._clients.admit(lambda client: self._talk(client, address, inbox), forget)
+
+    async def _talk(
+        self, client: ClientConnection, address: _Address, inbox: "asyncio.Queue[bytes]"
+    ) -> None:
+        loop = asyncio.get_running_loop()
+
+        async def put(said: Sequence[Payload]) -> None:
+            if address != self._told and loop.time() - client.active_s > FORGOTTEN_S:
+                raise TimeoutError
+            for datagram in said:
+                if self._line is not None and isinstance(datagram, bytes):
+                    self._line.sendto(datagram, self._now_at(address))
+
+        await converse(self._context, client, inbox.get, put)
+
+    def _now_at(self, address: _Address) -> _Address:
+        """Return the address to send to: unasked, the robot sends to its last peer."""
+        last_peer = self._context.last_peer
+        if address != self._told or last_peer is None or not last_peer.host:
+            return address
+        return last_peer.host, address[1]
+
+
+def _reachable(host: str) -> str:
+    """Return the loopback address where a server listens on all addresses."""
+    if host in ("0.0.0.0", ""):  # noqa: S104 - compared, not bound
+        return "127.0.0.1"
+    return "::1" if host == "::" else host
+
+
+def _free_port(host: str) -> int:
+    """Return a free port for the driver."""
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    with socket.socket(family, socket.SOCK_DGRAM) as probe:
+        probe.bind((host, 0))
+        return int(probe.getsockname()[1])
