@@ -35,7 +35,7 @@ RATE_HZ = 50
 TICKS, TICKS_IF_FULL = 50, 150
 ROUNDS, ROUNDS_IF_FULL = 5, 9
 MANY, FEW = 50, 10
-LOOP_GOAL, SINGLE_GOAL = 1.8, 0.05
+LOOP_GOAL, SINGLE_GOAL = 2.5, 0.05
 FAN_S = 60
 
 # As cheap as a reading can be: what drivers spend on them, other benchmarks say.

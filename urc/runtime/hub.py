@@ -13,11 +13,10 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
 from urc.model.codec import Envelope
-from urc.model.values import Alarm, Reading, Sample, Signal
+from urc.model.values import Reading, Sample, Signal
 from urc.runtime.blanking import Blanker
 from urc.runtime.streams import Streams
 
@@ -25,7 +24,6 @@ if TYPE_CHECKING:
     from urc.runtime.audit import Entry
 
 __all__ = [
-    "Columns",
     "Hub",
     "LinkState",
     "LinkStatus",
@@ -45,13 +43,6 @@ LinkState = Literal["idle", "connecting", "live", "silent", "lost"]
 NOTES_KEPT = 500
 TRAFFIC_KEPT = 1000
 TAP_KEPT = 10_000
-_FEW = 16
-"""Readings that are kept one by one; of more, most are older than others of the same signal."""
-_sample = partial(tuple.__new__, Sample)
-"""Of what `Columns` give row by row."""
-
-Columns = tuple[tuple[str, ...], tuple[Reading, ...], tuple[float, ...], tuple[Alarm, ...]]
-"""Readings part by part, as of `Sample`: all names, all values, all times, all alarms."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -227,16 +218,6 @@ class Hub:
         """Of which each reading counts; of none, unless somebody says so."""
         self._latest: dict[str, Sample] = {}
         self._changed: dict[str, int] = {}
-        self._last: tuple[Sample, ...] = ()
-        """What came together last if it was little, ..."""
-        self._batch: Columns | None = None
-        """... or much, each reading of another signal. That is filed by signal when somebody asks
-        for one, or when others come: a robot that tells all it has in one message does so again
-        and again."""
-        self._batch_names: tuple[str, ...] = ()
-        """Signals of the last that was much; mostly the next is of the same."""
-        self._last_revision = 0
-        """What the last made."""
         self._wakers: set[Callable[[], None]] = set()
         self._taps: set[Tap] = set()
         self._traffic_taps: set[Tap] = set()
@@ -248,42 +229,14 @@ class Hub:
             value = self._blanker.value
             taken = tuple(one._replace(value=value(one.value)) for one in taken)
         revision = self.revision = self.revision + 1
-        if len(taken) > _FEW:
-            self._put_many(taken)
-        else:
-            if self._batch is not None:
-                self._file()
-            latest, changed = self._latest, self._changed
-            for sample in taken:
-                name = sample[0]
-                latest[name] = sample
-                changed[name] = revision
-            self._last = taken
-        self._last_revision = revision
+        for sample in taken:
+            self._latest[sample.signal] = sample
+            self._changed[sample.signal] = revision
         if self.streams:
             self.streams.put(taken, revision)
         for tap in self._taps:
             tap.put(taken)
-        for wake in self._wakers:
-            wake()
-
-    def _put_many(self, taken: tuple[Sample, ...]) -> None:
-        names, values, times, alarms = zip(*taken, strict=False)
-        if names != self._batch_names:
-            self._file()
-            if len(newest := dict(zip(names, taken, strict=True))) < len(taken):
-                names, values, times, alarms = zip(*newest.values(), strict=True)
-            self._batch_names = names
-        # The names as they were: who gets the same again need not look at each of them.
-        self._batch = (self._batch_names, values, times, alarms)
-
-    def _file(self) -> None:
-        """Note of each signal what came of it last."""
-        if self._batch is not None:
-            filed = map(_sample, zip(*self._batch, strict=True))
-            self._latest.update(zip(self._batch_names, filed, strict=True))
-            self._changed.update(dict.fromkeys(self._batch_names, self._last_revision))
-            self._batch = None
+        self._wake()
 
     def set_link(self, status: LinkStatus) -> None:
         """Take the state of one transport."""
@@ -369,40 +322,20 @@ class Hub:
 
     def latest(self, name: str) -> Sample | None:
         """Return the newest reading of a signal, or None when there was none."""
-        if self._batch is not None:
-            self._file()
         return self._latest.get(name)
 
     def changed_since(self, revision: int) -> Sequence[Sample]:
         """Return the newest reading of every signal that changed after `revision`."""
-        self._file()
         changed = self._changed
         return [sample for name, sample in self._latest.items() if changed[name] > revision]
 
-    def columns_since(self, revision: int, *, joined: int = 0) -> Columns | None:
-        """Return the same part by part; None when there is nothing.
+    def readings_since(self, revision: int, *, joined: int = 0) -> Sequence[Sample]:
+        """Return the same, and every reading of the signals in `streams`, the newest last.
 
-        Of a signal of which each reading counts there are several, the newest last; but only those
-        after `joined`, where a reader began.
+        A reader gets no stream reading from before `joined`, the revision at which it began.
         """
-        samples: Sequence[Sample] = ()
-        since = max(revision, joined)
-        has_more = bool(self.streams) and self.streams.has_more(since)
-        if revision == self._last_revision - 1 == self.revision - 1 and not has_more:
-            if self._batch is not None:
-                return self._batch
-            samples = self._last
-            if len(samples) == 1:
-                name, value, time_s, alarm = samples[0]
-                return (name,), (value,), (time_s,), (alarm,)
-        if not samples or len({sample[0] for sample in samples}) < len(samples):
-            samples = self.changed_since(revision)
-        if has_more:
-            samples = self.streams.filled(samples, since)
-        if not samples:
-            return None
-        names, values, times, alarms = zip(*samples, strict=False)
-        return names, values, times, alarms
+        newest = self.changed_since(revision)
+        return self.streams.filled(newest, max(revision, joined)) if self.streams else newest
 
     @contextmanager
     def subscribe(self) -> Iterator[Subscription]:

@@ -42,10 +42,6 @@ class Streams:
                 kept.append((revision, sample))
                 self._counts[name] += 1
 
-    def has_more(self, since: int) -> bool:
-        """Return whether a signal has changed more than once after a revision."""
-        return any(len(kept) > 1 and kept[-2][0] > since for kept in self._kept.values())
-
     def filled(self, newest: Iterable[Sample], since: int) -> Sequence[Sample]:
         """Return the newest readings, and those after a revision that they have hidden."""
         found: list[Sample] = []

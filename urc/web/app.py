@@ -349,7 +349,7 @@ class _Routes:
     async def socket(self, websocket: WebSocket) -> None:
         station = await self._accepted(websocket)
         if station is not None:
-            flow = websocket.scope["state"].get("flow")
+            flow = websocket.scope["state"]["flow"]
             guest = guest_of(websocket)
             if station.robot.tape is not None:
                 guest = guest._replace(role="viewer")
@@ -359,7 +359,7 @@ class _Routes:
         """Be a second line of a page that drives."""
         station = await self._accepted(websocket)
         if station is not None:
-            flow = websocket.scope["state"].get("flow")
+            flow = websocket.scope["state"]["flow"]
             await Spare(websocket, station.controls, station.clock, flow).serve()
 
     async def _accepted(self, websocket: WebSocket) -> Station | None:

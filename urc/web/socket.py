@@ -20,8 +20,7 @@ from urc.model.values import NOTHING, Reading
 from urc.runtime.session import CommandFailed
 from urc.web.drive.controls import Seat
 from urc.web.drive.once import NotAdmitted
-from urc.web.feed.crowd import Place
-from urc.web.feed.fanout import Fanout
+from urc.web.feed.fanout import Place
 from urc.web.feed.line import Allowance, Flow, Guest, Line
 from urc.web.fleet.robots import Live, SessionFailed, Station, missing_settings
 from urc.web.wire import messages as wire
@@ -52,7 +51,7 @@ class Client:
         self,
         line: Line,
         station: Station,
-        flow: Flow | None = None,
+        flow: Flow,
         guest: Guest = Guest(),  # noqa: B008 - it cannot be changed
     ) -> None:
         self._line = line
@@ -64,40 +63,14 @@ class Client:
         self._answers: deque[str] = deque()
         self._pong = ""
         self._place = Place()
-        self._fanout: Fanout | None = None
-        self._idle: Live | None = None  # set while the writer waits for news
+        self._live: Live | None = None
+        """Set after the page was told what the indices of values mean."""
         self._is_listening = False
         self._closing: tuple[int, str] | None = None
         self._commands: set[asyncio.Task[None]] = set()
         self._allowance = Allowance(MESSAGES_PER_S, station.clock.now())
         self._ticks = Allowance(TICKS_PER_S, station.clock.now())
         self.bad_messages = 0
-
-    def wake(self) -> None:
-        """Take what is new; called by the fan-out at each flush until this is settled again.
-
-        A line that is free is written to at once: the turns of a task cost more than the frame.
-        """
-        live, flow = self._idle, self._flow
-        if live is None or flow is None or self._news.is_set() or not flow.is_free():
-            self._stir()
-            return
-        live.fanout.catch_up(self._place, flow)
-        if live.ended.is_set() or not flow.is_free():
-            self._stir()  # the end; or the newest, once the line is free
-        else:
-            self._settle(live, flow)
-
-    def _settle(self, live: Live, flow: Flow) -> None:
-        """Let the fan-out write by itself while there is nothing else to do."""
-        self._place.number, self._place.finish = flow.direct(self._stir), flow.write
-        live.fanout.settle(self._place)
-
-    def _stir(self) -> None:
-        """Let the writer look; until it has, the fan-out wakes this client and writes nothing."""
-        if self._fanout is not None:
-            self._fanout.stir(self._place)
-        self._news.set()
 
     async def serve(self) -> None:
         """Be this client from the accepted socket to its end."""
@@ -133,11 +106,10 @@ class Client:
         await self._converse(live, first)
 
     async def _converse(self, live: Live, first: Message | None) -> None:
-        self._fanout = live.fanout
-        self._place = live.fanout.join(self)
+        self._place = live.fanout.join(self._flushed)
         controls = self._station.controls
         try:
-            self._seat = controls.sit(self._guest.place, self._guest.role, self._stir)
+            self._seat = controls.sit(self._guest.place, self._guest.role, self._news.set)
             self._station.consent.welcome(self._seat)
             async with asyncio.TaskGroup() as group:
                 writing = group.create_task(self._write(live))
@@ -151,12 +123,11 @@ class Client:
             pass
         except* TimeoutError:
             log.warning("a client took nothing for %g s and was cut off", STALL_S)
-            if self._flow:
-                self._flow.abort()
+            self._flow.abort()
         finally:
             if self._seat is not None:
                 controls.rise(self._seat)
-            live.fanout.leave(self._place)
+            live.fanout.leave(self._flushed)
 
     async def _refuse(self, code: int, reason: str) -> None:
         try:
@@ -171,45 +142,44 @@ class Client:
         profile = self._station.robot.profile
         hello = wire.encode_hello(profile, live.number, self._station.clock.now())
         await self._line.send_text(hello)
+        self._live = live
         while True:
-            # Only what is taken after the line is free is the newest.
-            if self._flow:
-                async with asyncio.timeout(STALL_S):
-                    await self._flow.drained()
-            self._news.clear()
-            told = self._station.controls.take(self._seat) if self._seat else []
-            for text in (*live.fanout.take(self._place), *told, *self._take_answers()):
-                async with asyncio.timeout(STALL_S):
+            async with asyncio.timeout(STALL_S):
+                # Values taken before the line is free would be old when they leave.
+                await self._flow.drained()
+                self._news.clear()
+                self._send_shared(live)
+                told = self._station.controls.take(self._seat) if self._seat else []
+                for text in (*told, *self._take_answers()):
                     await self._line.send_text(text)
-            # One image, then whatever else is new: nothing waits behind a second one.
-            if not self._closing and await self._send_picture(live):
-                self._news.set()
             if live.ended.is_set() and not self._closing:
                 self._closing = (wire.CLOSE_FAILED, "the robot's session ended")
             if self._closing:
                 await self._line.close(*self._closing)
                 return
-            self._idle = live
-            if self._flow and self._flow.is_free() and not self._news.is_set():
-                self._settle(live, self._flow)
             await self._news.wait()
-            self._idle = None
 
-    async def _send_picture(self, live: Live) -> bool:
-        """Send the newest image that the page has not got; return whether there is one."""
-        if not self._place.looks.names:
-            return False
-        async with asyncio.timeout(STALL_S):
-            if self._flow:
-                await self._flow.drained()
+    def _flushed(self) -> None:
+        """Send a flush of the fan-out at once on a free line; leave all else to the writer.
+
+        Waking the writer for every flush would cost three times as much as the send.
+        """
+        live = self._live
+        if live is not None and self._flow.is_free() and not self._closing:
+            self._send_shared(live)
+            if self._flow.is_free() and not live.ended.is_set():
+                return
+        self._news.set()
+
+    def _send_shared(self, live: Live) -> None:
+        """Send what all clients share, and images for as long as the kernel takes them."""
+        if frames := live.fanout.take(self._place):
+            self._flow.write(frames)
+        while self._place.looks.names and self._flow.is_free():
             picture = live.fanout.shelf.take(self._place.looks)
             if picture is None:
-                return False
-            if self._flow:
-                self._flow.write(picture.frame)
-            else:
-                await self._line.send_bytes(picture.message)
-        return True
+                break
+            self._flow.write(picture.frame)
 
     def _take_answers(self) -> list[str]:
         answers = list(self._answers)
@@ -223,10 +193,9 @@ class Client:
     # Reading
 
     async def _read(self, live: Live, group: asyncio.TaskGroup, first: Message | None) -> None:
-        if self._flow:
-            self._flow.listen(self._offered)
-            if self._seat is not None:
-                self._seat.hold_back = self._flow.hold_back
+        self._flow.listen(self._offered)
+        if self._seat is not None:
+            self._seat.hold_back = self._flow.hold_back
         message = first or await self._listen()
         while message["type"] != "websocket.disconnect" and not self._closing:
             self._take(message, live, group)
@@ -270,14 +239,14 @@ class Client:
         elif isinstance(asked, Drive):
             self._hear(asked)
         elif isinstance(asked, Show):
-            self._stir()
+            self._news.set()
             self._place.looks.show(asked.signals)
         elif isinstance(asked, (Agree, Prepare, Steer)):
             self._advise(asked, live)
         elif isinstance(asked, wire.Ping):
             if math.isfinite(asked.c):
                 self._pong = wire.encode_pong(asked, now_s, time())
-                self._stir()
+                self._news.set()
         else:
             self._start(asked, live, group)
 
@@ -314,7 +283,7 @@ class Client:
 
     def _answer(self, text: str) -> None:
         self._answers.append(text)
-        self._stir()
+        self._news.set()
 
     def _start(self, asked: wire.Run, live: Live, group: asyncio.TaskGroup) -> None:
         if len(self._commands) + len(self._answers) >= COMMANDS_AT_ONCE:

@@ -70,34 +70,15 @@ def test_reader_gets_the_newest_of_each_changed_signal_once(hub: Hub) -> None:
     assert hub.latest("c") is None
 
 
-@pytest.mark.parametrize("count", [1, 3, 40])
-def test_what_came_together_is_given_part_by_part(count: int) -> None:
-    """However much it is: all that is newer, with the newest of each signal, and no more."""
-    names = tuple(f"s{place}" for place in range(count))
-    hub = Hub({name: Signal(name) for name in names})
-    assert hub.columns_since(0) is None
-    hub.put(Sample(name, place, 1.0) for place, name in enumerate(names))
-    assert hub.columns_since(0) == (names, (*range(count),), (1.0,) * count, ("",) * count)
-    assert hub.columns_since(1) is None
-    hub.put((Sample(names[0], 7, 2.0, "low"),))
-    assert hub.columns_since(1) == (names[:1], (7,), (2.0,), ("low",))
-    rest = count - 1
-    values, times = (7, *range(1, count)), (2.0, *(1.0,) * rest)
-    assert hub.columns_since(0) == (names, values, times, ("low", *("",) * rest))
-    hub.note(NOTE)
-    assert hub.columns_since(2) is None
-
-
 @pytest.mark.parametrize("count", [2, 40])
 def test_a_signal_that_came_twice_at_once_counts_once(count: int) -> None:
     """The later one is the newest."""
     names = [f"s{place}" for place in range(count - 1)]
     hub = Hub({name: Signal(name) for name in names})
-    hub.put([sample("s0", 1), *(sample(name, 2) for name in names)])
-    found = hub.columns_since(0)
-    assert found is not None
-    assert found[:2] == (tuple(names), (2,) * (count - 1))
-    assert hub.changed_since(0) == [sample(name, 2) for name in names]
+    newest = [sample(name, 2) for name in names]
+    hub.put([sample("s0", 1), *newest])
+    assert hub.readings_since(0) == hub.changed_since(0) == newest
+    assert hub.readings_since(1) == []
     assert hub.latest("s0") == sample("s0", 2)
 
 

@@ -48,7 +48,7 @@ def shown(hub: Hub, *events: Tapped) -> str:
     wire = b"".join(one.data for one in told if isinstance(one, Traffic)).decode("utf-8", "replace")
     kept = (*hub.notes, *hub.traffic, *hub.links.values(), *hub.changed_since(0))
     texts = [_text(one) for one in (*told, *kept)]
-    return "\n".join((wire, *texts, str(hub.columns_since(0))))
+    return "\n".join((wire, *texts, str(hub.readings_since(0))))
 
 
 def _text(event: Tapped) -> str:

@@ -7,6 +7,7 @@ from urc.model.values import Signal
 from urc.testing.dashboard import FakeRobot, dashboard_profile
 from urc.testing.entry import ACCESS, HERE
 from urc.web.app import build_app
+from urc.web.feed.flow import SocketFlow
 from urc.web.fleet.robots import Glimpse, Robot
 from urc.web.show.card import VALUES, small_values
 
@@ -17,7 +18,9 @@ def client_of(robot: FakeRobot, glimpse: Glimpse | str = "real") -> TestClient:
     """Return a client of a dashboard; "real": the robot is not emulated."""
     look = None if isinstance(glimpse, str) else lambda: glimpse
     app = build_app({"puppet": Robot(robot.profile, {}, robot.open, glimpse=look)}, access=ACCESS)
-    return TestClient(app, base_url="http://localhost:8080", cookies=HERE)
+    client = TestClient(app, base_url="http://localhost:8080", cookies=HERE)
+    client.app_state["flow"] = SocketFlow()
+    return client
 
 
 def test_an_emulated_robot_shows_its_picture_and_is_not_connected() -> None:

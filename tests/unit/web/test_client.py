@@ -2,7 +2,7 @@
 
 import asyncio
 import json
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import asynccontextmanager
 from typing import Any
 
@@ -18,12 +18,26 @@ from urc.runtime.session import CommandFailed
 from urc.runtime.trail import Trail
 from urc.testing.clock import FakeClock, settle
 from urc.testing.dashboard import FakeRobot, dashboard_profile
-from urc.web.feed.crowd import NO_NUMBER
 from urc.web.fleet.robots import Robot, Station
 from urc.web.socket import BAD_MESSAGES, MESSAGES_PER_S, TICKS_PER_S, Allowance, Client, Guest
 from urc.web.wire.messages import CLOSE_TOO_FAST
 
 pytestmark = pytest.mark.anyio
+
+
+TEXT = 0x81
+"""First byte of a WebSocket frame of text."""
+
+
+def frames_in(data: bytes) -> Iterator[tuple[int, bytes]]:
+    """Give the first byte and the message of each WebSocket frame."""
+    while data:
+        size, at = data[1], 2
+        if size > 125:
+            at = 4 if size == 126 else 10
+            size = int.from_bytes(data[2:at])
+        yield data[0], data[at : at + size]
+        data = data[at + size :]
 
 
 class FakeLine:
@@ -52,13 +66,11 @@ class FakeLine:
         return self.free.is_set()
 
     def write(self, frame: bytes) -> None:
-        if frame[0] == 0x81:  # a text
-            self.sent.append(json.loads(frame[frame.index(b"{") :]))
-        else:
-            self.frames.append(frame)
-
-    def direct(self, busy: Callable[[], None]) -> int:
-        return NO_NUMBER
+        for kind, body in frames_in(frame):
+            if kind == TEXT:
+                self.sent.append(json.loads(body))
+            else:
+                self.frames.append(body)
 
     async def close(self, code: int = 1000, reason: str | None = None) -> None:
         self.closed = (code, reason)
@@ -265,7 +277,7 @@ async def test_the_end_of_the_session_is_told_to_the_page() -> None:
     async with scene() as it:
         live = await it.station.live()
         live.ended.set()
-        live.fanout.end()
+        live.fanout.flush()
         await settle()
         assert it.line.closed == (4500, "the robot's session ended")
 

@@ -15,6 +15,7 @@ from urc.testing.dashboard import FakeRobot, dashboard_profile
 from urc.testing.entry import ACCESS, BEARER, HERE, KEY, OPEN
 from urc.web.app import build_app
 from urc.web.door import SAID
+from urc.web.feed.flow import SocketFlow
 from urc.web.fleet.robots import Robot
 from urc.web.serve.access import Access
 
@@ -42,6 +43,7 @@ def at(
     with TestClient(
         app, base_url=ADDRESS, cookies=dict(cookies or {}), client=(host, 50_000)
     ) as browser:
+        browser.app_state["flow"] = SocketFlow()
         yield browser
 
 

@@ -2,17 +2,28 @@
 
 import json
 from itertools import pairwise
+from typing import Any
 
 import pytest
 
+from tests.unit.web.test_client import frames_in
 from urc.model.values import Sample, Signal
 from urc.runtime.hub import Hub, Note
 from urc.runtime.streams import STREAM_KEPT
 from urc.testing.clock import FakeClock, settle
-from urc.web.feed.crowd import Known, Place
-from urc.web.feed.fanout import Fanout, Pacer
+from urc.web.feed.fanout import Fanout, Known, Pacer, Place
 
 pytestmark = pytest.mark.anyio
+
+
+def messages_in(frames: bytes) -> list[dict[str, Any]]:
+    """Return the messages in WebSocket frames."""
+    return [json.loads(body) for _, body in frames_in(frames)]
+
+
+def values_in(frames: bytes) -> list[dict[str, Any]]:
+    """Return those with values."""
+    return [message for message in messages_in(frames) if message["t"] == "v"]
 
 
 class Watcher:
@@ -20,10 +31,10 @@ class Watcher:
 
     def __init__(self, fanout: Fanout) -> None:
         self.fanout = fanout
-        self.place = fanout.join(self)
+        self.place = fanout.join(self.wake)
         self.woken = 0
         self.is_stuck = False
-        self.texts: list[str] = []
+        self.frames: list[bytes] = []
 
     def wake(self) -> None:
         self.woken += 1
@@ -31,12 +42,13 @@ class Watcher:
             self.take()
 
     def take(self) -> None:
-        self.texts += self.fanout.take(self.place)
+        if frames := self.fanout.take(self.place):
+            self.frames.append(frames)
 
     @property
     def values(self) -> list[dict[str, object]]:
         """Return name → value of each frame."""
-        frames = [json.loads(text) for text in self.texts if text.startswith('{"t":"v"')]
+        frames = values_in(b"".join(self.frames))
         names = self.fanout.hub.names
         return [
             {names[place]: value for place, value in zip(frame["i"], frame["v"], strict=True)}
@@ -62,7 +74,7 @@ def test_a_frame_is_encoded_once_for_all_at_the_same_place() -> None:
     first, second = Watcher(fanout), Watcher(fanout)
     put(hub, clock, a=1)
     fanout.flush()
-    assert first.texts[0] is second.texts[0]
+    assert first.frames[0] is second.frames[0]
     assert first.values == [{"a": 1}]
 
 
@@ -109,12 +121,12 @@ def test_a_newcomer_gets_everything_with_its_age_now() -> None:
     late = Watcher(fanout)
     late.take()
     assert late.values == [{"a": 1, "b": 2}]
-    assert json.loads(late.texts[0])["a"] == 5000
+    assert values_in(late.frames[0])[0]["a"] == 5000
 
 
 def readings(watcher: Watcher) -> list[tuple[list[object], object]]:
     """Return the values of the first signal in each frame, and the number of the first of them."""
-    frames = [json.loads(text) for text in watcher.texts if text.startswith('{"t":"v"')]
+    frames = values_in(b"".join(watcher.frames))
     return [
         ([value for place, value in zip(frame["i"], frame["v"], strict=True) if place == 0],
          frame.get("e"))
@@ -172,10 +184,35 @@ def test_lines_of_the_log_are_never_lost_silently() -> None:
     for number in range(700):
         hub.note(Note(clock.now(), "info", "wire", f"line {number}"))
     fanout.flush()
-    log = json.loads(fanout.take(place)[0])
+    log = messages_in(fanout.take(place))[0]
     assert (log["first"], len(log["lines"])) == (200, 500)
     assert log["lines"][-1]["text"] == "line 699"
     assert not fanout.take(place)
+
+
+def test_lines_of_the_log_come_while_values_stream() -> None:
+    """A client gets them with the next values, not after the stream ends."""
+    clock = FakeClock()
+    hub, fanout = robot(clock)
+    client = Watcher(fanout)
+    put(hub, clock, a=1)
+    fanout.flush()
+    for value in (2, 3):
+        hub.note(Note(clock.now(), "warning", "wire", f"line {value}"))
+        put(hub, clock, a=value)
+        fanout.flush()
+    said = [[message["t"] for message in messages_in(frames)] for frames in client.frames]
+    assert said == [["v"], ["v", "log"], ["v", "log"]]
+
+
+def test_a_client_that_left_is_not_woken() -> None:
+    clock = FakeClock()
+    hub, fanout = robot(clock)
+    client = Watcher(fanout)
+    fanout.leave(client.wake)
+    put(hub, clock, a=1)
+    fanout.flush()
+    assert client.woken == 0
 
 
 def test_a_newcomer_gets_the_last_lines_of_the_log() -> None:
@@ -184,7 +221,7 @@ def test_a_newcomer_gets_the_last_lines_of_the_log() -> None:
     hub, fanout = robot(clock)
     for number in range(80):
         hub.note(Note(clock.now(), "info", "wire", f"line {number}"))
-    log = json.loads(fanout.take(Watcher(fanout).place)[0])
+    log = messages_in(fanout.take(Watcher(fanout).place))[0]
     assert (log["first"], len(log["lines"])) == (30, 50)
 
 

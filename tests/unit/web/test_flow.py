@@ -1,26 +1,16 @@
-"""The socket below a client: when it may be written to past the transport, and when no more."""
+"""The socket below a client: whether it is free, and what may be written to it."""
 
 from typing import Any, cast
 
-import pytest
-
-from urc.web.feed.crowd import NO_NUMBER
 from urc.web.feed.flow import SocketFlow
 
 
 class Line:
     """A socket, and the transport over it."""
 
-    def __init__(self, **known: object) -> None:
-        self.known = {"socket": self, "sslcontext": None, **known}
+    def __init__(self) -> None:
         self.written: list[bytes] = []
         self.is_over = False
-
-    def fileno(self) -> int:
-        return 7
-
-    def get_extra_info(self, name: str) -> object:
-        return self.known[name]
 
     def set_write_buffer_limits(self, high: int) -> None:
         assert high == 0, "the client hears of the first byte that waits"
@@ -32,43 +22,30 @@ class Line:
         self.written.append(data)
 
 
-def made(line: Line) -> tuple[SocketFlow, list[int]]:
-    """Return the flow of a line, and a list that grows when it is not to be written to."""
-    flow, told = SocketFlow(), list[int]()
+def made(line: Line) -> SocketFlow:
+    """Return the flow of a line."""
+    flow = SocketFlow()
     flow.made(cast(Any, line))
-    flow.direct(lambda: told.append(flow.direct(lambda: None)))
-    return flow, told
+    return flow
 
 
-def test_a_plain_socket_has_a_number_and_an_encrypted_one_none() -> None:
-    """What is written past the transport would go out unencrypted."""
-    assert made(Line())[0].direct(lambda: None) == 7
-    assert made(Line(sslcontext=object()))[0].direct(lambda: None) == NO_NUMBER
-    assert made(Line(socket=None))[0].direct(lambda: None) == NO_NUMBER
-    assert SocketFlow().direct(lambda: None) == NO_NUMBER
-
-
-def test_a_full_line_is_told_at_once_and_may_be_used_again() -> None:
-    """Until the kernel has taken everything it is not free."""
-    flow, told = made(Line())
+def test_a_full_line_is_not_free_until_the_kernel_has_taken_everything() -> None:
+    """A lost one lets its writer go on, too."""
+    flow = made(Line())
+    assert flow.is_free()
     flow.pause()
-    assert (told, flow.is_free()) == ([7], False)
+    assert not flow.is_free()
     flow.resume()
     assert flow.is_free()
-
-
-@pytest.mark.parametrize("how", ["lost", "closing"])
-def test_the_number_ends_before_it_can_be_another_ones(how: str) -> None:
-    """It is told, and is none from then on."""
-    flow, told = made(Line())
-    getattr(flow, how)()
-    assert told == [NO_NUMBER]
+    flow.pause()
+    flow.lost()
+    assert flow.is_free()
 
 
 def test_nothing_is_written_after_the_goodbye() -> None:
     """The transport would only complain."""
     line = Line()
-    flow, _ = made(line)
+    flow = made(line)
     flow.write(b"one")
     line.is_over = True
     flow.write(b"two")

@@ -7,20 +7,20 @@ import struct
 import pytest
 
 from tests.unit.web.test_client import FakeLine
+from tests.unit.web.test_fanout import values_in
 from urc.images import media_type
 from urc.model.interface import WidgetUse
 from urc.model.values import Sample, Signal
 from urc.runtime.hub import Hub
 from urc.testing.clock import FakeClock, settle
 from urc.testing.dashboard import FakeRobot, dashboard_profile
-from urc.web.feed.crowd import Place
-from urc.web.feed.fanout import Fanout
+from urc.web.feed.fanout import Fanout, Place
 from urc.web.feed.picture_shelf import SHARED_FOR_S, Looks, PictureShelf
 from urc.web.fleet.robots import Robot, Station
 from urc.web.show.demos import colour_bars
 from urc.web.socket import Client
 from urc.web.wire import messages as wire
-from urc.web.wire.picture import Show, as_frame, picture_head
+from urc.web.wire.picture import Show, as_frame, encode_picture
 
 pytestmark = pytest.mark.anyio
 
@@ -46,8 +46,7 @@ def looking_at(*names: str) -> Looks:
 
 def header(index: int, age_ms: int, now_ms: int) -> bytes:
     """Return what the message of a picture begins with."""
-    head, at = picture_head(index, JPEG, age_ms, now_ms)
-    return head[at:]
+    return encode_picture(index, JPEG, age_ms, now_ms)[: -len(JPEG)]
 
 
 def test_a_picture_says_its_signal_age_time_and_type() -> None:
@@ -100,7 +99,7 @@ def test_who_was_away_gets_the_newest_and_no_other() -> None:
         hub.put([Sample("left", data, clock.now())])
     made = shelf.take(looks)
     assert made is not None
-    assert made.message.endswith(b"three")
+    assert made.frame.endswith(b"three")
     assert shelf.take(looks) is None
     hub.put([Sample("left", b"three", clock.now())])  # the same bytes are news: they are younger
     assert shelf.take(looks) is not None
@@ -117,7 +116,7 @@ async def test_an_image_is_encoded_once_for_all_who_take_it_soon() -> None:
     three = shelf.take(looking_at("left"))
     assert three is not None
     assert three.number == one.number
-    assert three.message != one.message
+    assert three.frame != one.frame
 
 
 def test_two_cameras_take_turns_however_fast_one_is() -> None:
@@ -160,11 +159,11 @@ def test_images_are_no_part_of_the_frames_of_values() -> None:
     place = Place()
     hub.put([Sample("a", 1.0, clock.now()), Sample("left", JPEG, clock.now())])
     fanout.flush()
-    (frame,) = (json.loads(text) for text in fanout.take(place) if '"t":"v"' in text)
+    (frame,) = values_in(fanout.take(place))
     assert frame["i"] == [0]
     hub.put([Sample("left", None, clock.now())])
     fanout.flush()
-    (frame,) = (json.loads(text) for text in fanout.take(place) if '"t":"v"' in text)
+    (frame,) = values_in(fanout.take(place))
     assert (frame["i"], frame["v"]) == ([1], [None])
 
 

@@ -9,20 +9,15 @@ from urc.expressions import compile_expression
 from urc.model.driver import Driver, Message, Poll, Reply
 from urc.model.profile import Profile
 from urc.model.values import Limits, Sample, Signal
-from urc.runtime.hub import Columns, LinkStatus, Note
+from urc.runtime.hub import LinkStatus, Note
 from urc.testing.codec import regex, text
 from urc.web.wire import messages as wire
-
-
-def columns(samples: list[Sample]) -> Columns:
-    names, values, times, alarms = zip(*samples, strict=True)
-    return names, values, times, alarms
 
 
 def test_a_frame_holds_indexes_values_and_ages() -> None:
     """Names are told once; frames carry indexes only, and alarms only when there are any."""
     samples = [Sample("b", 7, 9.5), Sample("a", True, 9.999)]
-    text = wire.encode_values(columns(samples), wire.Indexes({"a": 0, "b": 1}), 10.0)
+    text = wire.encode_values(samples, wire.Indexes({"a": 0, "b": 1}), 10.0)
     assert json.loads(text) == {"t": "v", "n": 10000, "i": [1, 0], "v": [7, True], "a": [500, 1]}
 
 
@@ -30,14 +25,14 @@ def test_readings_that_are_equally_old_have_one_age() -> None:
     """What came in one message mostly is; an age is never below nothing."""
     indexes = wire.Indexes({"a": 0, "b": 1})
     samples = [Sample("a", 1, 9.5), Sample("b", 2, 9.5)]
-    assert json.loads(wire.encode_values(columns(samples), indexes, 10.0))["a"] == 500
-    assert json.loads(wire.encode_values(columns(samples), indexes, 9.0))["a"] == 0
+    assert json.loads(wire.encode_values(samples, indexes, 10.0))["a"] == 500
+    assert json.loads(wire.encode_values(samples, indexes, 9.0))["a"] == 0
 
 
 def test_alarms_stand_beside_their_values() -> None:
     """One alarm in a frame brings the list for all of its values."""
     samples = [Sample("a", 1, 1.0, "low"), Sample("b", 2, 1.0)]
-    text = wire.encode_values(columns(samples), wire.Indexes({"a": 0, "b": 1}), 1.0)
+    text = wire.encode_values(samples, wire.Indexes({"a": 0, "b": 1}), 1.0)
     assert json.loads(text)["s"] == ["low", ""]
 
 
@@ -61,7 +56,7 @@ def test_alarms_stand_beside_their_values() -> None:
 def test_values_arrive_as_a_browser_can_hold_them(value: object, shown: object) -> None:
     """Integers beyond a browser's, huge texts, broken text and NaN never break a frame."""
     sample = Sample("a", value, 1.0)  # type: ignore[arg-type]
-    frame = json.loads(wire.encode_values(columns([sample]), wire.Indexes({"a": 7}), 1.0))
+    frame = json.loads(wire.encode_values([sample], wire.Indexes({"a": 7}), 1.0))
     assert frame == {"t": "v", "n": 1000, "i": [7], "v": [shown], "a": 0}
 
 
@@ -116,7 +111,7 @@ def test_values_of_many_parts() -> None:
         Sample("picture", b"\xff" * 40000, 1.0),
     ]
     index = {"cells": 0, "pose": 1, "picture": 2}
-    assert json.loads(wire.encode_values(columns(samples), wire.Indexes(index), 1.5))["v"] == [
+    assert json.loads(wire.encode_values(samples, wire.Indexes(index), 1.5))["v"] == [
         [3.9, None, str(2**60)],
         {"x": [1, {"y": {"bytes": 3}}], "3": "z"},
         {"bytes": 40000},

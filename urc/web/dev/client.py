@@ -97,7 +97,7 @@ class _Known(NamedTuple):
 class DevClient:
     """Talks to one dev page until either side is done."""
 
-    def __init__(self, line: Line, watch: ProfileWatch, flow: Flow | None = None) -> None:
+    def __init__(self, line: Line, watch: ProfileWatch, flow: Flow) -> None:
         self._line = line
         self._watch = watch
         self._station = watch.station
@@ -126,8 +126,7 @@ class DevClient:
             pass
         except* TimeoutError:
             log.warning("a dev page took nothing for %g s and was cut off", STALL_S)
-            if self._flow:
-                self._flow.abort()
+            self._flow.abort()
         finally:
             self._watch.listeners.discard(self._news.set)
 
@@ -201,8 +200,7 @@ class DevClient:
 
     async def _send(self, text: str) -> None:
         async with asyncio.timeout(STALL_S):
-            if self._flow:
-                await self._flow.drained()
+            await self._flow.drained()
             await self._line.send_text(text)
 
     def _news_of_profile(self) -> list[str]:

@@ -129,7 +129,7 @@ class Dev:
         else:
             self._open += 1
             try:
-                flow = websocket.scope["state"].get("flow")
+                flow = websocket.scope["state"]["flow"]
                 await DevClient(websocket, watch, flow).serve()
             finally:
                 self._open -= 1

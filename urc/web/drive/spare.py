@@ -35,9 +35,7 @@ _BAD = (msgspec.MsgspecError, UnicodeError, RecursionError)
 class Spare:
     """One such line."""
 
-    def __init__(
-        self, line: Line, controls: Controls, clock: Clock, flow: Flow | None = None
-    ) -> None:
+    def __init__(self, line: Line, controls: Controls, clock: Clock, flow: Flow) -> None:
         """Prepare; `line` is accepted, and `flow` is the socket below it."""
         self._line = line
         self._controls = controls
@@ -66,14 +64,13 @@ class Spare:
 
     def beat(self, number: int) -> None:
         """Tell the page a number, unless an older one is still on its way."""
-        if self._flow is not None and self._flow.is_free():
+        if self._flow.is_free():
             self._flow.write(as_frame(wire.encode_beat(number).encode(), is_text=True))
 
     def end(self) -> None:
         """Take nothing more, because its page has gone or has made another."""
         self._is_over = True
-        if self._flow is not None:
-            self._flow.abort()
+        self._flow.abort()
 
     async def _seat(self) -> Seat | None:
         try:

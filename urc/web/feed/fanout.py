@@ -1,50 +1,61 @@
-"""One robot's readings to all who watch it: flushed at once, then at most once a display frame.
+"""Sends the readings of one robot to every page that shows it, at most once a display frame.
 
-Floor 5. Nothing is queued for anybody. A flush writes the frame that all share to each client that
-waits for nothing else, and wakes the others: each of them takes, when its own line is free,
-everything newer than what it has already sent. A frame is encoded once however many watch; one that
-fell behind gets the newest values merged into one frame, and is nobody else's problem.
+Floor 5. No client has a queue. A flush wakes every client. Each client takes everything newer than
+its last frame as soon as its own line is free. A frame is encoded once for all clients at the same
+place. A client that fell behind gets the newest values in one frame, and delays no other client.
 """
 
 import asyncio
-import os
-from collections.abc import Iterable
-from dataclasses import dataclass
-from functools import partial
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
+from typing import NamedTuple
 
-from urc.model.values import NOTHING
+from urc.model.values import NOTHING, Sample
 from urc.runtime.clock import Alarm, Clock, LoopClock
-from urc.runtime.hub import Columns, Hub
-from urc.web.feed.crowd import NO_NUMBER, Crowd, Known, Listener, Place, Write
-from urc.web.feed.line import Flow
-from urc.web.feed.picture_shelf import PictureShelf, is_picture
+from urc.runtime.hub import Hub
+from urc.web.feed.picture_shelf import Looks, PictureShelf, is_picture
 from urc.web.wire.ask import encode_progress
 from urc.web.wire.messages import Indexes, encode_links, encode_log, encode_values
 from urc.web.wire.picture import as_frame
 
-__all__ = ["FRAMES_PER_SECOND", "Fanout", "Pacer"]
+__all__ = ["FRAMES_PER_SECOND", "Fanout", "Known", "Pacer", "Place"]
 
-_known = partial(tuple.__new__, Known)
-"""Of its five numbers, without a function of Python's."""
 FRAMES_PER_SECOND = 60.0
 LOG_LINES_FOR_NEWCOMERS = 50
 SHARED_FOR_S = 0.005
-"""How long an encoded frame may be handed out again: the ages in it are those of its encoding."""
+"""How long clients may share an encoded frame: its ages count from its encoding."""
+
+
+class Known(NamedTuple):
+    """How much of the robot's state a client has."""
+
+    revision: int = 0
+    """Hub revision of its newest values."""
+    links: int = 0
+    """Number of its link state."""
+    progress: int = 0
+    """Number of its state of the sequences."""
+    notes: int = 0
+    """Log lines that it got, or was told it lost."""
+    joined: int = 0
+    """Hub revision at which it joined; 0 after its first values."""
 
 
 @dataclass(slots=True)
-class _Taken:
-    """What everybody gets who knows equally much."""
+class Place:
+    """One client's progress through values and images."""
+
+    known: Known = field(default_factory=Known)
+    looks: Looks = field(default_factory=Looks)
+
+
+class _Update(NamedTuple):
+    """The news for every client with the same `Known`."""
 
     after: Known
-    messages: list[bytes]
     frames: bytes
-    """The same as WebSocket frames, one behind the other; empty when there is nothing."""
+    """WebSocket frames, one after the other."""
     time_s: float
-    has_pictures: bool
-    """Whether there is a new image as well, for those who show it."""
-    texts: tuple[str, ...] | None = None
-    """The messages once more; None until somebody wants them so."""
 
 
 class Pacer:
@@ -74,28 +85,25 @@ class Fanout:
         *,
         rate_hz: float = FRAMES_PER_SECOND,
         clock: Clock | None = None,
-        write: Write = os.write,
         each: Iterable[str] = (),
     ) -> None:
-        """Begin with nobody; of signals in `each` every reading is told, of others the newest."""
+        """Start without clients; `each` names the signals of which every reading is sent."""
         hub.streams.keep(each)
         self.hub = hub
-        self._crowds: list[Crowd] = []
-        """One for each set of images that somebody shows."""
-        self._waiting: dict[Listener, None] = {}
-        """Those in no crowd."""
-        self._write = write
+        self._wakes: set[Callable[[], None]] = set()
         self._indexes = Indexes(hub.index)
         self._clock: Clock = clock or LoopClock()
         self._pacer = Pacer(rate_hz)
         self._head = 0
-        self._taken: dict[Known, _Taken] = {}
+        """Hub revision of the last flush: newer values wait for the next one."""
+        self._updates: dict[Known, _Update] = {}
+        self._encoded_at = -1
+        """Hub revision of `_updates`."""
         self._due: Alarm | None = None
-        """The flush that is to come."""
+        """The next flush."""
         self._loop: asyncio.AbstractEventLoop | None = None
         """While this runs."""
         self._broken: asyncio.Future[None] | None = None
-        self._looked_at = -1
         self._pictures = {name for name, signal in hub.signals.items() if is_picture(signal)}
         self.shelf = PictureShelf(hub, self._clock)
 
@@ -132,170 +140,63 @@ class Fanout:
                 self._broken.set_exception(fault)
 
     def flush(self) -> None:
-        """Forget the last frame, and bring everybody up to date who is ready for it."""
-        self._head = self._looked_at = self.hub.revision
-        self._taken.clear()
-        if len(self._crowds) == 1 and not self._waiting and self._tell(self._crowds[0]):
-            return
-        waiting = tuple(self._waiting)  # who falls out of a crowd has been given what is new
-        for crowd in tuple(self._crowds):
-            known = crowd.known
-            taken = self._taken.get(known) or self._make(known, self._clock.now())
-            crowd.known = taken.after
-            if taken.frames:
-                crowd.send(taken.frames)
-            if taken.has_pictures:
-                for picture in self.shelf.take_all(crowd.looks):
-                    crowd.send(picture.frame)
-        for listener in waiting:
-            listener.wake()
+        """Release the newest values, and wake every client."""
+        self._head = self.hub.revision
+        self._updates.clear()
+        for wake in tuple(self._wakes):
+            wake()
 
-    def _tell(self, crowd: Crowd) -> bool:
-        """Write what is new to the only crowd if it came together, and return whether it did.
-
-        It mostly does. This is `flush` in few steps: in a process that has rested for some
-        milliseconds each function that is called costs microseconds more.
-        """
-        hub, known = self.hub, crowd.known
-        if known.revision != hub.revision - 1:
-            return False
-        columns = hub.columns_since(known.revision)
-        if columns is None:
-            return False
-        has_pictures = not self._pictures.isdisjoint(columns[0])
-        plain = self._plain(columns) if has_pictures else columns
-        crowd.known = _known((hub.revision, known.links, known.progress, known.notes, 0))
-        if plain is not None:
-            text = self._encoded(plain, self._clock.now())
-            crowd.send(as_frame(text, is_text=True))
-        if has_pictures:
-            for picture in self.shelf.take_all(crowd.looks):
-                crowd.send(picture.frame)
-        return True
-
-    def end(self) -> None:
-        """Wake everybody: there is nothing more to come."""
-        for crowd in tuple(self._crowds):
-            for place in crowd.places:
-                self.stir(place)
-        self.flush()
-
-    def join(self, listener: Listener) -> Place:
-        """Let somebody know of each flush; return the place of one that knows nothing yet."""
-        self._waiting[listener] = None
+    def join(self, wake: Callable[[], None]) -> Place:
+        """Call `wake` at each flush, which must return at once; return the client's place."""
+        self._wakes.add(wake)
         notes = max(0, self.hub.notes_count - LOG_LINES_FOR_NEWCOMERS)
-        known = Known(notes=notes, joined=self.hub.revision)
-        return Place(known, listener=listener)
+        return Place(Known(notes=notes, joined=self.hub.revision))
 
-    def leave(self, place: Place) -> None:
-        """Forget somebody."""
-        self.stir(place)
-        if place.listener is not None:
-            self._waiting.pop(place.listener, None)
+    def leave(self, wake: Callable[[], None]) -> None:
+        """Stop calling `wake`."""
+        self._wakes.discard(wake)
 
-    def settle(self, place: Place) -> None:
-        """Write to somebody directly from now on, who is up to date and waits for nothing else.
+    def take(self, place: Place) -> bytes:
+        """Return the frames that bring `place` up to date, and move it there; may be empty."""
+        if self._encoded_at != self.hub.revision:
+            self._encoded_at = self.hub.revision
+            self._updates.clear()
+        update, now_s = self._updates.get(place.known), self._clock.now()
+        if update is None or now_s - update.time_s > SHARED_FOR_S:
+            update = self._updates[place.known] = self._encode(place.known, now_s)
+        place.known = update.after
+        return update.frames
 
-        One that lacks what others do not is woken once more, and may settle then.
-        """
-        if place.number == NO_NUMBER or place.crowd is not None:
-            return
-        same = [crowd for crowd in self._crowds if crowd.looks.names == place.looks.names]
-        if same and not same[0].fits(place):
-            return
-        crowd = same[0] if same else Crowd(place, self._write)
-        if not same:
-            self._crowds.append(crowd)
-        crowd.add(place)
-        if place.listener is not None:
-            self._waiting.pop(place.listener, None)
-
-    def stir(self, place: Place) -> None:
-        """Wake somebody again at each flush, and write nothing to it."""
-        crowd = place.crowd
-        if crowd is None:
-            return
-        crowd.remove(place)
-        if crowd.is_empty:
-            self._crowds.remove(crowd)
-        if place.listener is not None:
-            self._waiting[place.listener] = None
-
-    def take(self, place: Place) -> tuple[str, ...]:
-        """Return the messages that bring `place` up to date, and move it there."""
-        taken = self._shared(place)
-        if taken.texts is None:
-            taken.texts = tuple(message.decode() for message in taken.messages)
-        return taken.texts
-
-    def take_frames(self, place: Place) -> bytes:
-        """Return the same as WebSocket frames, one behind the other; empty when there is nothing.
-
-        They are made once for all who know equally much.
-        """
-        return self._shared(place).frames
-
-    def catch_up(self, place: Place, flow: Flow) -> None:
-        """Write what is new on a line that is free, and images for as long as it is."""
-        frames = self.take_frames(place)
-        if frames:
-            flow.write(frames)
-        while place.looks.names and flow.is_free():
-            picture = self.shelf.take(place.looks)
-            if picture is None:
-                break
-            flow.write(picture.frame)
-
-    def _shared(self, place: Place) -> _Taken:
-        if self._looked_at != self.hub.revision:
-            self._looked_at = self.hub.revision
-            self._taken.clear()
-        taken, now_s = self._taken.get(place.known), self._clock.now()
-        if taken is None or now_s - taken.time_s > SHARED_FOR_S:
-            taken = self._make(place.known, now_s)
-        place.known = taken.after
-        return taken
-
-    def _make(self, known: Known, now_s: float) -> _Taken:
+    def _encode(self, known: Known, now_s: float) -> _Update:
         hub = self.hub
         messages: list[bytes] = []
         revision, links, progress, notes, joined = known
-        has_pictures = False
         if links != hub.links_count:
             messages.append(encode_links(hub.links.values(), now_s).encode())
-        if revision < self._head:  # what came since the last flush waits for the next one
-            columns = hub.columns_since(revision, joined=joined)
+        if revision < self._head:
+            samples = self._without_pictures(hub.readings_since(revision, joined=joined))
             revision, joined = hub.revision, 0
-            if columns is not None and not self._pictures.isdisjoint(columns[0]):
-                has_pictures, columns = True, self._plain(columns)
-            if columns is not None:
-                messages.append(self._encoded(columns, now_s))
+            if samples:
+                messages.append(self._encode_values(samples, now_s))
         if hub.notes_count > notes:
             messages.append(self._take_log(hub.notes_count - notes, now_s).encode())
         if progress != hub.progress_count:
             messages.append(encode_progress(tuple(hub.progress.values())).encode())
         after = Known(revision, hub.links_count, hub.progress_count, hub.notes_count, joined)
         frames = b"".join([as_frame(message, is_text=True) for message in messages])
-        taken = _Taken(after, messages, frames, now_s, has_pictures)
-        self._taken[known] = taken
-        return taken
+        return _Update(after, frames, now_s)
 
-    def _encoded(self, columns: Columns, now_s: float) -> bytes:
+    def _without_pictures(self, samples: Sequence[Sample]) -> Sequence[Sample]:
+        """Remove images, which go to the clients that show them; the end of one is a value."""
+        pictures = self._pictures
+        if not pictures:
+            return samples
+        return [one for one in samples if one.signal not in pictures or one.value is None]
+
+    def _encode_values(self, samples: Sequence[Sample], now_s: float) -> bytes:
         streams = self.hub.streams
-        firsts = streams.firsts(columns[0]) if streams else NOTHING
-        return encode_values(columns, self._indexes, now_s, firsts)
-
-    def _plain(self, columns: Columns) -> Columns | None:
-        """Return readings without the images in them, which only go to those who show them."""
-        pictures, values = self._pictures, columns[1]
-        if len(values) == 1 and values[0] is not None:
-            return None  # there is an image, and so nothing else
-        rows = zip(*columns, strict=True)
-        kept = [row for row in rows if row[0] not in pictures or row[1] is None]
-        if not kept:
-            return None
-        names, values, times, alarms = zip(*kept, strict=True)
-        return names, values, times, alarms
+        firsts = streams.firsts([one.signal for one in samples]) if streams else NOTHING
+        return encode_values(samples, self._indexes, now_s, firsts)
 
     def _take_log(self, wanted: int, now_s: float) -> str:
         kept = list(self.hub.notes)[-wanted:]

@@ -39,14 +39,7 @@ class Flow(Protocol):
         """Return when the kernel has taken everything written so far."""
 
     def write(self, frame: bytes) -> None:
-        """Hand over a whole WebSocket frame as it is; it must not be more than a few."""
-
-    def direct(self, busy: Callable[[], None]) -> int:
-        """Return the number of the socket, for whole frames while the line is free; -1: none.
-
-        `busy` is called when something waits, or the line is lost: nothing more may be written by
-        that number until the line is free, or ever.
-        """
+        """Write whole WebSocket frames."""
 
     def listen(self, sink: Callable[[bytes], bool]) -> None:
         """Let `sink` have each text that came whole, before `Line.receive`.

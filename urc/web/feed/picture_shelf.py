@@ -11,7 +11,7 @@ from typing import NamedTuple
 from urc.model.values import Sample, Signal
 from urc.runtime.clock import Clock
 from urc.runtime.hub import Hub
-from urc.web.wire.picture import picture_head
+from urc.web.wire.picture import as_frame, encode_picture
 
 __all__ = ["Encoded", "Looks", "PictureShelf", "is_picture"]
 
@@ -21,22 +21,14 @@ some ten kilobytes is not worth making anew for a few milliseconds."""
 
 
 class Encoded(NamedTuple):
-    """An image on its way."""
+    """An image, ready for any client."""
 
     frame: bytes
-    """A whole WebSocket frame, in one piece: joined once for all, written to each."""
-    message_at: int
-    """Where the message begins in it."""
+    """The whole WebSocket frame."""
     sample: Sample
-    """What was encoded."""
     number: int
     """Grows with each new image of any signal."""
     made_s: float
-
-    @property
-    def message(self) -> bytes:
-        """Return what the frame carries."""
-        return self.frame[self.message_at :]
 
 
 @dataclass(slots=True)
@@ -53,14 +45,6 @@ class Looks:
         """Take what the page shows from now on; what it stops showing, it has to be sent anew."""
         self.names = tuple(dict.fromkeys(names))
         self.seen = {name: number for name, number in self.seen.items() if name in self.names}
-
-    def is_like(self, other: "Looks") -> bool:
-        """Return whether another one shows the same and has the same of it."""
-        return self.names == other.names and self.seen == other.seen
-
-    def copy(self) -> "Looks":
-        """Return another one that has got as far."""
-        return Looks(self.names, dict(self.seen), self.turn)
 
 
 def is_picture(signal: Signal | None) -> bool:
@@ -89,16 +73,6 @@ class PictureShelf:
                 return made
         return None
 
-    def take_all(self, looks: Looks) -> list[Encoded]:
-        """Return every image that somebody shows and has not got; they count as sent."""
-        found: list[Encoded] = []
-        for name in looks.names:
-            made = self._newest(name)
-            if made is not None and looks.seen.get(name) != made.number:
-                looks.seen[name] = made.number
-                found.append(made)
-        return found
-
     def _newest(self, name: str) -> Encoded | None:
         sample = self._hub.latest(name)
         if sample is None or not isinstance(sample.value, bytes):
@@ -114,6 +88,6 @@ class PictureShelf:
         else:
             return known
         age_s, index = now_s - sample.time_s, self._hub.index[name]
-        head, at = picture_head(index, sample.value, round(age_s * 1000), round(now_s * 1000))
-        made = self._encoded[name] = Encoded(head + sample.value, at, sample, number, now_s)
+        message = encode_picture(index, sample.value, round(age_s * 1000), round(now_s * 1000))
+        made = self._encoded[name] = Encoded(as_frame(message), sample, number, now_s)
         return made

@@ -326,7 +326,7 @@ class Station:
             self._next = None
             self.controls.trail.attend(None, self.clock.now)
             live.ended.set()
-            live.fanout.end()
+            live.fanout.flush()  # wakes every client, and each of them sees the end
 
     async def _until_deserted(self) -> None:
         while True:

@@ -123,7 +123,7 @@ class _DashboardSocket(WebSocketsSansIOProtocol):
 
     WARNING: only asyncio's own protocol methods and the constructor's arguments are used here, the
     rest of the base class is uvicorn's business. The application finds the `SocketFlow` in
-    ``scope["state"]["flow"]`` and must do without it on another server.
+    ``scope["state"]["flow"]``.
     """
 
     def __init__(
@@ -152,16 +152,16 @@ class _DashboardSocket(WebSocketsSansIOProtocol):
         """Pass a whole text on at once, if the client takes it; all else goes its usual way."""
         if self._urc_frames is None:
             self._urc_frames = Frames()
-            self._urc_usual(data)
+            super().data_received(data)
             return
         text = self._urc_frames.whole(data)
         sink = self._urc_flow.sink
         if sink is None:
-            self._urc_usual(data)
+            super().data_received(data)
         elif text is None:
             self._urc_several(data, self._urc_frames.spans, sink)
         elif not sink(text):
-            self._urc_usual(data)
+            super().data_received(data)
 
     def _urc_several(
         self, data: bytes, spans: Iterable[tuple[int, int]], sink: Callable[[bytes], bool]
@@ -173,12 +173,7 @@ class _DashboardSocket(WebSocketsSansIOProtocol):
                 break
             at = end
         if at < len(data):
-            self._urc_usual(data[at:])
-
-    def _urc_usual(self, data: bytes) -> None:
-        super().data_received(data)
-        if self._urc_flow.is_closing():  # it was a goodbye, which was answered
-            self._urc_flow.closing()
+            super().data_received(data[at:])
 
     def pause_writing(self) -> None:
         """Tell the client that the kernel is full."""

@@ -38,8 +38,8 @@ import msgspec
 
 from urc.model.driver import Command, Driver, Poll
 from urc.model.profile import Profile
-from urc.model.values import NOTHING, Reading, Signal
-from urc.runtime.hub import Columns, LinkStatus, Note
+from urc.model.values import NOTHING, Reading, Sample, Signal
+from urc.runtime.hub import LinkStatus, Note
 from urc.web.wire.ask import Agree, Arguments, Prepare, Steer
 from urc.web.wire.drive import Drive, Release, Stop, Tick
 from urc.web.wire.picture import Show
@@ -244,11 +244,11 @@ class Indexes:
 
 
 def encode_values(
-    columns: Columns, indexes: Indexes, now_s: float, firsts: Mapping[str, int] = NOTHING
+    samples: Iterable[Sample], indexes: Indexes, now_s: float, firsts: Mapping[str, int] = NOTHING
 ) -> bytes:
-    """Return one frame with what is new; `firsts` are numbers of readings, by signal."""
+    """Return one frame of readings; `firsts` are numbers of readings, by signal."""
     values: Sequence[object]
-    names, values, times, alarms = columns
+    names, values, times, alarms = zip(*samples, strict=True)
     count, first_s = len(names), times[0]
     ages: int | list[int]
     if times.count(first_s) == count:  # what came together is equally old

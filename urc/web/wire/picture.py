@@ -17,12 +17,10 @@ import msgspec
 
 from urc.images import media_type
 
-__all__ = ["Show", "as_frame", "picture_head"]
+__all__ = ["Show", "as_frame", "encode_picture"]
 
 _PICTURE = 1
 _HEADER = struct.Struct(">BBHId")
-_MEDIUM_FRAME = struct.Struct(">BBHBBHId")
-"""The same behind the head of a frame whose length takes three bytes."""
 _OLDEST_MS = 2**32 - 1
 _FINAL_TEXT, _FINAL_BINARY = b"\x81", b"\x82"
 _SHORT, _MEDIUM = 126, 1 << 16
@@ -37,24 +35,18 @@ class Show(msgspec.Struct, tag_field="t", tag="show", forbid_unknown_fields=True
     ] = ()
 
 
-def picture_head(index: int, data: bytes, age_ms: int, now_ms: int) -> tuple[bytes, int]:
-    """Return what is before an image in one WebSocket frame, and where the message begins.
+def encode_picture(index: int, data: bytes, age_ms: int, now_ms: int) -> bytes:
+    """Return the message of an image.
 
     Args:
         index: of the signal in the names of `Hello`.
-        data: the image as it came.
-        age_ms: how old it is now.
+        data: the image, as the robot sent it.
+        age_ms: its age at `now_ms`.
         now_ms: the server's clock.
     """
     kind = media_type(data).encode("ascii")
-    age_ms = 0 if age_ms < 0 else age_ms if age_ms < _OLDEST_MS else _OLDEST_MS
-    length = len(kind)
-    size = _HEADER.size + length + len(data)
-    if _SHORT <= size < _MEDIUM:
-        head = _MEDIUM_FRAME.pack(0x82, 126, size, _PICTURE, length, index, age_ms, now_ms)
-        return head + kind, _MEDIUM_FRAME.size - _HEADER.size
-    head = _FINAL_BINARY + _length(size)
-    return head + _HEADER.pack(_PICTURE, length, index, age_ms, now_ms) + kind, len(head)
+    age_ms = min(max(age_ms, 0), _OLDEST_MS)
+    return _HEADER.pack(_PICTURE, len(kind), index, age_ms, now_ms) + kind + data
 
 
 def as_frame(message: bytes, *, is_text: bool = False) -> bytes:
