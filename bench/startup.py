@@ -51,24 +51,13 @@ def _run(profiles: list[str], *, full: bool) -> Sequence[Result]:
             versions=versions,
         ),
         compare(
-            Goal(f"startup: urc validate {PROFILES} profiles / check-jsonschema", 0.3),
+            Goal(f"startup: urc validate {PROFILES} profiles / check-jsonschema", 0.5),
             partial(process_seconds, [checker, "--schemafile", str(SCHEMA), *profiles]),
             partial(process_seconds, [urc, "validate", *profiles]),
             rounds=9 if full else 5,
             versions=versions,
         ),
-        compare(
-            Goal("startup: import of urc validate / bare interpreter", 8.0),
-            bare,
-            partial(process_seconds, [sys.executable, "-c", _IMPORTS]),
-            rounds=rounds,
-            versions=versions,
-        ),
     ]
-
-
-# What `urc validate` imports for a good document, and nothing else of its work.
-_IMPORTS = "import urc.cli.arguments, urc.cli.validate, urc.config.load, urc.runtime.selftest"
 
 
 def _beside(name: str) -> str:
