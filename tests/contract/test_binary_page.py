@@ -8,7 +8,7 @@ import pytest
 from urc.config.messaging import MESSAGING
 from urc.config.parse.form import FormContext, parse_write
 from urc.config.part import Findings, Part
-from urc.config.shape.check import read_schema
+from urc.config.schemas import read_schema
 from urc.problems import to_text
 from urc.source import parse_document
 from urc.testing.struct import reader, struct_read

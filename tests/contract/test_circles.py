@@ -108,6 +108,11 @@ def test_no_two_rooms_of_the_dashboard_need_each_other() -> None:
     assert circle_in(rooms_of(python_graph(), "urc.web")) == []
 
 
+def test_no_two_passes_over_documents_need_each_other() -> None:
+    """Text becomes the model in one direction."""
+    assert circle_in(rooms_of(python_graph(), "urc.config")) == []
+
+
 @pytest.mark.parametrize(
     ("graph", "circle"),
     [

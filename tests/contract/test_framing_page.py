@@ -8,7 +8,7 @@ import pytest
 import yaml
 
 from tests.unit.protocol.framing_samples import framing
-from urc.config.shape.check import read_schema
+from urc.config.schemas import read_schema
 from urc.model.framing import FOLDED, PLAIN_CHECKSUMS
 from urc.protocol.framing import FRAMINGS
 

@@ -7,7 +7,7 @@ import pytest
 
 from urc.config.load import check
 from urc.config.messaging import MESSAGING
-from urc.config.shape.check import read_schema
+from urc.config.schemas import read_schema
 from urc.problems import to_text
 from urc.runtime.catalog import built_in_catalog
 

@@ -13,11 +13,10 @@ from referencing import Registry, Resource
 from referencing.jsonschema import DRAFT202012
 
 from tests.effort import examples
-from urc.config.compose.gather import gather
+from urc.config.gather import gather
 from urc.config.load import Shelf, check
 from urc.config.part import Part
-from urc.config.shape.check import KINDS, read_schema
-from urc.config.shape.quick import QuickCheck
+from urc.config.schemas import KINDS, QuickCheck, read_schema
 from urc.problems import ProblemsError, to_text
 from urc.protocol.framing import FRAMINGS
 from urc.registry import Catalog, Table

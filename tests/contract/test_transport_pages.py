@@ -8,7 +8,7 @@ import yaml
 
 from tests.documentation import Block, blocks
 from urc.config.load import Shelf, check
-from urc.config.shape.check import read_schema
+from urc.config.schemas import read_schema
 from urc.runtime.catalog import built_in_catalog
 from urc.runtime.selftest import run_tests
 from urc.transports.table import TRANSPORTS

@@ -8,7 +8,7 @@ import yaml
 
 from tests.contract.test_protocols import Conversation
 from urc.config.load import check
-from urc.config.shape.check import read_schema
+from urc.config.schemas import read_schema
 from urc.model.world import INPUTS, READINGS
 from urc.problems import to_text
 from urc.runtime.catalog import built_in_catalog

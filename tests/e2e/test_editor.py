@@ -16,7 +16,7 @@ import pytest
 
 from scripts.needs import LANGUAGE_SERVER
 from scripts.node import node_executable
-from urc.config.shape.check import KINDS, read_schema
+from urc.config.schemas import KINDS, read_schema
 
 ROOT = Path(__file__).resolve().parents[2]
 TIMEOUT_S = 100.0

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
 
-from urc.config.compose.gather import gather
+from urc.config.gather import gather
 from urc.config.link.look import link_interface
 from urc.config.parse.interface import parse_interface
 from urc.config.parse.widget import Shelf

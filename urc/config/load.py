@@ -9,7 +9,7 @@ from os import PathLike, fspath
 from typing import NamedTuple
 
 from urc.config.automatic import automatic_slots
-from urc.config.compose.gather import Sources, gather
+from urc.config.gather import gather
 from urc.config.layout import default_interface
 from urc.config.link.driver import link_driver, link_simulator
 from urc.config.link.look import link_interface, link_slots
@@ -22,6 +22,7 @@ from urc.config.parse.test import parse_test
 from urc.config.parse.widget import Shelf, parse_widget
 from urc.config.part import Findings
 from urc.config.rules.profile import check_profile
+from urc.config.sources import Sources
 from urc.model.driver import Driver
 from urc.model.interface import Interface, WidgetUse
 from urc.model.profile import DocumentTest, Profile, Setting

@@ -1,6 +1,6 @@
 """The look that is made for a profile, as a document would write it."""
 
-from urc.config.compose.gather import Sources
+from urc.config.sources import Sources
 from urc.model.interface import Grid, Interface, WidgetUse
 from urc.model.profile import Profile
 

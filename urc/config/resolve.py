@@ -9,12 +9,13 @@ import re
 from collections.abc import Iterator, Mapping
 from typing import Final, NamedTuple
 
-from urc.config.compose.gather import RESERVED, Sources, gather
 from urc.config.compose.merge import Tree, merge
+from urc.config.gather import gather
 from urc.config.made_look import made_look
 from urc.config.parse.widget import Shelf
 from urc.config.part import Part
-from urc.config.shape.check import read_schema
+from urc.config.schemas import read_schema
+from urc.config.sources import RESERVED, Sources
 from urc.model.profile import Profile
 from urc.problems import Problem, has_errors, printable
 from urc.source import Document, Mark

@@ -7,8 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.unit.config.folder import SHELF, WIRE, Folder, head
-from urc.config.compose.gather import gather
 from urc.config.compose.merge import count_nodes
+from urc.config.gather import gather
 from urc.config.parse.widget import Shelf
 from urc.config.resolve import resolve, written
 from urc.source import parse_document

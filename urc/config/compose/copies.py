@@ -9,14 +9,14 @@ from itertools import product
 from math import prod
 from typing import Any, Final, NamedTuple
 
-from urc.config.compose.fill import Budget, Names, fill, fill_key
+from urc.config.compose.fill import Budget, Names, fill, fill_key, report_unquoted
 from urc.config.compose.merge import Tree, children, count_nodes, item_name, mark_inside, merge
 from urc.config.part import Findings, Part
-from urc.config.shape.check import fits
+from urc.config.schemas import fits
 from urc.config.suggest import did_you_mean
 from urc.source import Document, Mark, Path
 
-__all__ = ["Expander", "is_removal", "item_at", "report_unquoted"]
+__all__ = ["Expander", "is_removal", "item_at"]
 
 _RESERVED: Final = ("params", "settings")
 
@@ -203,16 +203,6 @@ class _Rest:
 
     def unquoted(self, path: Path, text: str) -> None:
         """Say nothing."""
-
-
-def report_unquoted(part: Part, text: str, findings: Findings) -> None:
-    """Report a name in braces that YAML takes for a mapping."""
-    findings.error(
-        part,
-        "unquoted-name",
-        "a value that starts with '{' is a mapping to YAML",
-        hint=f'quote it: "{text}"',
-    )
 
 
 def _are_alike(values: list[object]) -> bool:

@@ -10,9 +10,10 @@ from collections.abc import Mapping
 from typing import Final, Protocol
 
 from urc.config.compose.merge import Tree, mark_inside, merge
+from urc.config.part import Findings, Part
 from urc.source import Mark, Path, Written
 
-__all__ = ["Budget", "Listener", "Names", "TooMuch", "fill", "fill_key"]
+__all__ = ["Budget", "Listener", "Names", "TooMuch", "fill", "fill_key", "report_unquoted"]
 
 Names = Mapping[str, object]
 """Name → a plain value, or a mapping of plain values."""
@@ -171,6 +172,16 @@ def fill(tree: Tree, path: Path, names: Names, budget: Budget, listener: Listene
 def fill_key(key: str, names: Names, budget: Budget) -> str:
     """Return a key with every name filled in."""
     return str(_Filler(names, budget, None).text(key, ())[0])
+
+
+def report_unquoted(part: Part, text: str, findings: Findings) -> None:
+    """Report a name in braces that YAML takes for a mapping."""
+    findings.error(
+        part,
+        "unquoted-name",
+        "a value that starts with '{' is a mapping to YAML",
+        hint=f'quote it: "{text}"',
+    )
 
 
 def _written(value: object) -> str:

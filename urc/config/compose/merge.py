@@ -9,7 +9,7 @@ mark of the result says in which document it stands.
 from collections.abc import Callable
 from typing import Final, NamedTuple
 
-from urc.config.parse.form import READ_FORMS, WRITE_FORMS
+from urc.config.form_table import READ_FORMS, WRITE_FORMS
 from urc.source import Document, Mark, Path
 
 __all__ = ["Tree", "children", "count_nodes", "item_name", "mark_inside", "merge"]

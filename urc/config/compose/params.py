@@ -6,11 +6,10 @@ They are filled in while the documents are loaded. What an operator fills in are
 from collections.abc import Mapping
 from typing import Any, Final
 
-from urc.config.compose.copies import report_unquoted
-from urc.config.compose.fill import Budget, TooMuch, fill
+from urc.config.compose.fill import Budget, TooMuch, fill, report_unquoted
 from urc.config.compose.merge import Tree, count_nodes
 from urc.config.part import Findings, Part
-from urc.config.shape.check import fits
+from urc.config.schemas import fits
 from urc.config.suggest import did_you_mean
 from urc.config.values import check_range, check_within, fit, fit_hint
 from urc.model.values import Value

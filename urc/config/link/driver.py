@@ -3,7 +3,6 @@
 import re
 from collections.abc import Iterable, Mapping
 
-from urc.config.compose.gather import Sources
 from urc.config.link.flow import (
     link_command,
     link_keepalives,
@@ -21,6 +20,7 @@ from urc.config.parse.line import option_templates
 from urc.config.parse.reply import refuse
 from urc.config.parse.simulator import Simulated
 from urc.config.part import Findings, Part
+from urc.config.sources import Sources
 from urc.config.suggest import did_you_mean
 from urc.expressions import COUNTERS, NONCE, Template
 from urc.model.codec import ReadSpec, WriteSpec

@@ -3,7 +3,6 @@
 from collections.abc import Mapping
 from typing import NamedTuple, TypeVar
 
-from urc.config.compose.gather import Sources
 from urc.config.link.files import link_files
 from urc.config.link.outputs import link_output, takes
 from urc.config.link.pages import link_pages
@@ -11,6 +10,7 @@ from urc.config.link.together import link_together
 from urc.config.parse.widget import Shelf
 from urc.config.part import Findings, Part
 from urc.config.shape.check import check_options
+from urc.config.sources import Sources
 from urc.config.suggest import did_you_mean, listed
 from urc.model.driver import Driver
 from urc.model.interface import Given, Interface, WidgetUse

@@ -2,8 +2,8 @@
 
 from collections.abc import Iterator, Mapping
 
+from urc.config.form_table import WRITE_FORMS
 from urc.config.messaging import BYTE_LINES, CARRIERS, MESSAGING
-from urc.config.parse.form import WRITE_FORMS
 from urc.config.part import Findings, Part
 from urc.config.suggest import did_you_mean
 from urc.model.driver import Driver, TransportSpec

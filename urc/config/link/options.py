@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from typing import Any, Final
 
 from urc.config.part import Findings, Part
-from urc.config.shape.check import read_schema
+from urc.config.schemas import read_schema
 from urc.expressions import Template
 from urc.model.profile import Setting
 

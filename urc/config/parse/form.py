@@ -17,6 +17,7 @@ from collections.abc import Iterable, Mapping
 from importlib import import_module
 from typing import Any, NamedTuple, Protocol, cast
 
+from urc.config.form_table import READ_FORMS, WRITE_FORMS
 from urc.config.parse.beside_form import beside_form
 from urc.config.part import Findings, Part
 from urc.expressions import Template
@@ -27,8 +28,6 @@ from urc.model.values import NOTHING
 from urc.registry import Catalog
 
 __all__ = [
-    "READ_FORMS",
-    "WRITE_FORMS",
     "FormContext",
     "ReadForm",
     "WriteForm",
@@ -39,29 +38,6 @@ __all__ = [
     "write_form",
 ]
 
-READ_FORMS = {
-    "regex": "urc.config.parse.forms.regex",
-    "pattern": "urc.config.parse.forms.pattern",
-    "split": "urc.config.parse.forms.split",
-    "keyvalue": "urc.config.parse.forms.keyvalue",
-    "json": "urc.config.parse.forms.json",
-    "xml": "urc.config.parse.forms.xml",
-    "equals": "urc.config.parse.forms.equals",
-    "raw": "urc.config.parse.forms.raw",
-    "struct": "urc.config.parse.forms.struct",
-}
-WRITE_FORMS = {
-    "text": "urc.config.parse.forms.text",
-    "hex": "urc.config.parse.forms.hex",
-    "bytes": "urc.config.parse.forms.bytes",
-    "json": "urc.config.parse.forms.json_text",
-    "struct": "urc.config.parse.forms.struct",
-    "publish": "urc.config.parse.forms.envelope",
-    "call": "urc.config.parse.forms.envelope",
-    "goal": "urc.config.parse.forms.envelope",
-    "cancel": "urc.config.parse.forms.envelope",
-    "request": "urc.config.parse.forms.envelope",
-}
 _BODIES = ("json", "text", "hex", "bytes", "struct")
 """Forms that may be the body of an envelope."""
 _NO_READ = ReadSpec("regex")

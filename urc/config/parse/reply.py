@@ -1,7 +1,8 @@
 """What answers a request: mapping → `Reply`, with its stages, its errors and its correlation."""
 
+from urc.config.form_table import READ_FORMS
 from urc.config.parse.beside_form import parse_lines
-from urc.config.parse.form import READ_FORMS, FormContext, parse_read
+from urc.config.parse.form import FormContext, parse_read
 from urc.config.parse.framing import parse_framing
 from urc.config.part import Findings, Part
 from urc.model.codec import NUMBERED, ReadSpec, WriteSpec

@@ -3,10 +3,10 @@
 from collections.abc import Mapping
 from typing import Final, NamedTuple
 
-from urc.config.compose.gather import Sources
 from urc.config.parse.form import FormContext, parse_read, parse_write
 from urc.config.parse.framing import parse_framing
 from urc.config.part import Findings, Part
+from urc.config.sources import Sources
 from urc.expressions import Template
 from urc.model.codec import ReadSpec
 from urc.model.driver import Driver

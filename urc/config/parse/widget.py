@@ -5,7 +5,8 @@ from collections.abc import Iterable
 from pathlib import Path as FilePath
 
 from urc.config.part import Findings, Part
-from urc.config.shape.check import check_options, check_shape, kind_of
+from urc.config.schemas import kind_of
+from urc.config.shape.check import check_options, check_shape
 from urc.config.suggest import did_you_mean
 from urc.model.widget import Port, Widget
 from urc.problems import Problem, ProblemsError, has_errors

@@ -4,10 +4,10 @@ import re
 from pathlib import PurePath
 from typing import Final
 
-from urc.config.compose.gather import Sources
 from urc.config.link.driver import Uses
 from urc.config.part import Findings, Part, shown_duration
 from urc.config.rules.flow import check_flow
+from urc.config.sources import Sources
 from urc.config.suggest import did_you_mean
 from urc.model.driver import Driver, Poll, Timeouts
 from urc.model.interface import Interface

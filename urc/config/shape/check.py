@@ -4,49 +4,17 @@ A quick verdict comes first; `jsonschema` is imported only for documents that it
 `urc.config.shape.report` tells its errors in words of our own.
 """
 
-import json
 import math
 from collections.abc import Iterator, Mapping
 from functools import cache
 from typing import Any, Final
 
-from urc.config.shape.quick import QuickCheck
+from urc.config.schemas import KINDS, QuickCheck, kind_of, read_schema, shipped_check
 from urc.config.suggest import did_you_mean
 from urc.problems import Problem
-from urc.shipped import shipped
 from urc.source import Document, Path
 
-__all__ = [
-    "KINDS",
-    "check_inline",
-    "check_options",
-    "check_shape",
-    "check_source",
-    "fits",
-    "kind_of",
-    "read_schema",
-]
-
-KINDS: Final = ("robot", "driver", "interface", "widget")
-
-
-@cache  # the schemas ship with URC and do not change while it runs
-def read_schema(name: str) -> Mapping[str, Any]:
-    """Return a shipped schema by its file name."""
-    schema: Mapping[str, Any] = json.loads((shipped("schemas") / name).read_text("utf-8"))
-    return schema
-
-
-@cache
-def _quick() -> QuickCheck:
-    return QuickCheck(read_schema)
-
-
-def kind_of(document: Document) -> str:
-    """Return the document's kind, or "" when it names none that there is."""
-    data = document.data
-    kind = data.get("kind") if isinstance(data, dict) else None
-    return kind if isinstance(kind, str) and kind in KINDS else ""
+__all__ = ["check_inline", "check_options", "check_shape", "check_source"]
 
 
 def check_shape(document: Document) -> list[Problem]:
@@ -64,24 +32,21 @@ def check_shape(document: Document) -> list[Problem]:
         for path, number in _not_finite(document.data, ())
     ]
     file = f"{kind}.schema.json"
-    if not _quick().is_valid(file, document.data):
+    if not shipped_check().is_valid(file, document.data):
         from urc.config.shape.report import report
 
         problems += report(document, read_schema(file), read_schema)
     return problems
 
 
-def fits(reference: str, value: object) -> bool:
-    """Return whether a value certainly fits the schema at ``file#/pointer``."""
-    return _quick().is_valid_at(reference, value)
-
-
 def check_source(document: Document) -> list[Problem]:
-    """Return what is wrong with one of several documents that are merged, whatever the others say.
+    """Return the faults of one source of a merged document, whatever the others say.
 
-    That is: keys that the language does not have, and how it refers to the others. What is missing
-    here may stand there, so all else is looked at when they are one.
+    These are unknown keys, and keys of the source alone. The merge may lose both, and with them
+    the finding. A missing key may come from another source, so the merged document is checked too.
     """
+    if not kind_of(document):
+        return [_without_kind(document)]
     data = _without_nothing(document.data)
     if isinstance(document.data, dict) and isinstance(data, dict):
         data |= {key: None for key in _OWN_KEYS if document.data.get(key, "") is None}
@@ -99,7 +64,7 @@ def check_source(document: Document) -> list[Problem]:
 
 
 _OWN_KEYS: Final = ("urc", "extends", "include", "partial")
-"""What is never taken from another document."""
+"""Keys that no other document takes over."""
 
 
 @cache
@@ -159,7 +124,7 @@ def check_inline(
     document: Document, path: Path, value: object, schema: Mapping[str, Any]
 ) -> list[Problem]:
     """Return every difference between a part of a document and a schema that refers to no file."""
-    if _quick().is_valid_inline(schema, value):
+    if shipped_check().is_valid_inline(schema, value):
         return []
     from urc.config.shape.report import report
 

@@ -1,16 +1,54 @@
-"""The fast path of the shape pass: does a document certainly fit its schema?
+"""The schemas that ship with URC, and a fast verdict: does a value certainly fit?
 
 Both goals of `urc validate` fail when each good document pays for `jsonschema` (decision 4).
-This module turns the keywords of the schemas into closures. It leaves all other cases, unknown
-keywords included, to `jsonschema`; a contract test compares the two. A closure is made when data
+This module turns the keywords of the schemas into closures. All other cases, unknown keywords
+included, are left to `jsonschema`; a contract test compares the two. A closure is made when data
 first reaches its part of a schema, so a small document compiles little.
 """
 
+import json
 import re
 from collections.abc import Callable, Mapping
+from functools import cache
 from typing import Any, Final
 
-__all__ = ["QuickCheck"]
+from urc.shipped import shipped
+from urc.source import Document
+
+__all__ = ["KINDS", "QuickCheck", "fits", "kind_of", "read_schema", "shipped_check"]
+
+KINDS: Final = ("robot", "driver", "interface", "widget")
+"""Kinds of documents; each has a schema."""
+
+
+@cache  # the schemas ship with URC and do not change while it runs
+def read_schema(name: str) -> Mapping[str, Any]:
+    """Return a shipped schema by its file name."""
+    schema: Mapping[str, Any] = json.loads((shipped("schemas") / name).read_text("utf-8"))
+    return schema
+
+
+def kind_of(document: Document) -> str:
+    """Return the document's kind, or "" when it names none that there is."""
+    data = document.data
+    kind = data.get("kind") if isinstance(data, dict) else None
+    return kind if isinstance(kind, str) and kind in KINDS else ""
+
+
+@cache
+def shipped_check() -> "QuickCheck":
+    """Return the verdicts over the shipped schemas."""
+    return QuickCheck(read_schema)
+
+
+def fits(reference: str, value: object) -> bool:
+    """Return whether a value certainly fits the schema at ``file#/pointer``.
+
+    Passes before the shape pass ask this before they use a key. A value that does not fit stays in
+    the document, and the shape pass reports it.
+    """
+    return shipped_check().is_valid_at(reference, value)
+
 
 _Check = Callable[[Any], bool]
 _ANNOTATIONS: Final = frozenset(

@@ -1,0 +1,208 @@
+"""`extends` and `include`: a document merged with those that it builds on.
+
+    extends: base.yaml                  # all of the base, changed by what stands here
+    extends: generic-ros1               # the same, of a document that ships with URC
+    include: [parts/battery.yaml]       # parts of documents, put under what stands here
+
+A document's own keys go before those of its includes, and these before those of its base.
+"""
+
+import os
+from functools import reduce
+from typing import Any, Final, NamedTuple
+
+from urc.config.compose.library import Library
+from urc.config.compose.merge import Tree, children, count_nodes, merge
+from urc.config.part import Part
+from urc.config.schemas import fits, kind_of
+from urc.source import Document, Path
+
+__all__ = ["Composed", "compose", "override"]
+
+_DEEPEST: Final = 16
+"""Documents that build on each other."""
+_NODES_MOST: Final = 10_000
+_OWN: Final = ("urc", "kind", "name", "extends", "include", "partial")
+_HEADER: Final = (*_OWN, "title", "summary", "licence", "author")
+_BUILDING: Final = ("extends", "include")
+_SCHEMA: Final = "driver.schema.json#/$defs/{}"
+_INCLUDED: Final = {
+    "robot": ("robot", "driver"),
+    "driver": ("driver",),
+    "interface": ("interface",),
+}
+"""Kind of a document → kinds of the parts that it may include."""
+
+
+class Composed(NamedTuple):
+    """A document with all that it extends and includes."""
+
+    document: Document | None
+    """None: a document that it needs is missing, or cannot be used."""
+    sources: tuple[Document, ...]
+    """The documents that were merged, each as it stands in its file; none when it stands alone."""
+
+
+def compose(document: Document, library: Library) -> Composed:
+    """Return a document merged with those that it extends and includes.
+
+    The library reads them, and takes the findings about references and clashes. Nothing else is
+    checked here: the shape pass looks at the sources and at the result.
+    """
+    composer = _Composer(library)
+    whole = composer.compose(document, ())
+    return Composed(whole, tuple(composer.sources.values()))
+
+
+def override(document: Document, overrides: Part) -> Document:
+    """Return a driver with the changes under a robot's `overrides`."""
+    mark = overrides.document.at(overrides.path)
+    if mark is None:
+        return document  # a part that is there has a mark
+    over = Tree(overrides.data, mark, overrides.document.source_of(overrides.path))
+    merged = merge(Tree(document.data, document.mark, document), over)
+    mark = document.mark.copy(dict(merged.mark.children))
+    return Document(
+        document.file, document.text, document.lines, merged.value, mark, document.findings
+    )
+
+
+class _Composer:
+    """Merges one document with its sources."""
+
+    def __init__(self, library: Library) -> None:
+        self.sources: dict[str, Document] = {}
+        """File → document that is merged."""
+        self._library = library
+        self._findings = library.findings
+        self._whole: dict[str, Document | None] = {}
+
+    def compose(self, document: Document, chain: tuple[str, ...]) -> Document | None:
+        """Return the document merged with its sources; itself when it names none.
+
+        `chain` has the files that led to it.
+        """
+        data = document.data
+        if not isinstance(data, dict) or not kind_of(document):
+            return document
+        if not any(key in data for key in _BUILDING):
+            return document
+        real = os.path.realpath(document.file)
+        if real not in self._whole:
+            self._whole[real] = self._merged(document, data, (*chain, real))
+        return self._whole[real]
+
+    def _merged(
+        self, document: Document, data: dict[str, Any], chain: tuple[str, ...]
+    ) -> Document | None:
+        self.sources.setdefault(document.file, document)
+        if not all(fits(_SCHEMA.format(key), data[key]) for key in _BUILDING if key in data):
+            return None  # the shape pass reports it
+        root = Part(document, (), data)
+        base, includes = self._sources(root, chain)
+        is_sound = None not in (*base, *includes)
+        layers = [one for one in base if one is not None]
+        layers += self._merged_includes([one for one in includes if one is not None], data)
+        layers.append(_without(Tree(data, document.mark, document), _BUILDING))
+        whole = reduce(merge, layers)
+        if not is_sound:
+            return None
+        if count_nodes(whole.value) > _NODES_MOST:
+            self._findings.error(
+                root, "too-many-nodes", f"more than {_NODES_MOST} keys and values put together"
+            )
+            return None
+        mark = whole.mark.copy()
+        mark.origin, mark.span = None, document.mark.span
+        return Document(
+            document.file, document.text, document.lines, whole.value, mark, document.findings
+        )
+
+    def _sources(
+        self, root: Part, chain: tuple[str, ...]
+    ) -> tuple[list[Tree | None], list[Tree | None]]:
+        """Return the base, if any, and the includes; None where one cannot be used."""
+        kind = kind_of(root.document)
+        base = root.get("extends")
+        return (
+            [] if base is None else [self._source(base, (kind,), chain, _OWN)],
+            [
+                self._source(reference, _INCLUDED.get(kind, ()), chain, _HEADER)
+                for reference in root.listed("include")
+            ],
+        )
+
+    def _source(
+        self, reference: Part, kinds: tuple[str, ...], chain: tuple[str, ...], without: Path
+    ) -> Tree | None:
+        """Return the composed document that `reference` names, but for the keys in `without`."""
+        target = self._library.follow(reference, kinds)
+        if target is None:
+            return None
+        real = os.path.realpath(target.file)
+        if real in chain:
+            names = [os.path.basename(name) for name in (*chain[chain.index(real) :], real)]
+            self._findings.error(
+                reference, "reference-loop", f"documents build on each other: {' → '.join(names)}"
+            )
+            return None
+        if len(chain) >= _DEEPEST:
+            self._findings.error(
+                reference,
+                "too-many-files",
+                f"more than {_DEEPEST} documents build on each other",
+            )
+            return None
+        self.sources.setdefault(target.file, target)
+        if not isinstance(target.data, dict) or not kind_of(target):
+            return None
+        found = self.compose(target, chain)
+        if found is None:
+            return None
+        return _without(Tree(found.data, found.mark, found), without)
+
+    def _merged_includes(self, parts: list[Tree], settled: object) -> list[Tree]:
+        """Return the includes as one layer, or none; two that disagree clash."""
+        if not parts:
+            return []
+        clashes = _Clashes(settled)
+        merged = reduce(lambda below, above: merge(below, above, (), clashes), parts)
+        for path, first, second in clashes.found:
+            home = second.home
+            place = f"{first.home.file}:{first.mark.span.line}"
+            # A document of one value, so that the finding points at the value itself.
+            value = Document(home.file, home.text, home.lines, second.value, second.mark)
+            found = value.problem(
+                (),
+                "include-clash",
+                f"{place} says something else about it",
+                hint="say it in the document that includes both",
+            )
+            self._findings.problems.append(found._replace(path=".".join(map(str, path))))
+        return [merged]
+
+
+class _Clashes:
+    """Values on which two includes disagree, unless the including document settles them."""
+
+    def __init__(self, settled: object) -> None:
+        self._settled = settled
+        self.found: list[tuple[Path, Tree, Tree]] = []
+
+    def __call__(self, path: Path, base: Tree, over: Tree) -> None:
+        value = self._settled
+        for part in path:
+            if not isinstance(value, dict):
+                break
+            if part not in value:
+                self.found.append((path, base, over))
+                return
+            value = value[part]
+
+
+def _without(tree: Tree, keys: tuple[str | int, ...]) -> Tree:
+    inside = {key: inner for key, inner in children(tree).items() if key not in keys}
+    value = {key: inner.value for key, inner in inside.items()}
+    return Tree(
+        value, tree.mark.copy({key: inner.mark for key, inner in inside.items()}), tree.home
+    )

@@ -1,0 +1,166 @@
+"""The passes over documents: compose, expand, shape, for a robot and the documents that it names.
+
+compose merges a document with what it extends and includes; expand fills in `params` and writes
+out each `each`; shape compares the result with the schema. Each is a function of one document.
+A robot comes first, because it names its driver and its interfaces.
+"""
+
+from typing import NamedTuple
+
+from urc.config.compose.each import expand
+from urc.config.compose.inherit import compose, override
+from urc.config.compose.library import Library
+from urc.config.compose.params import fill_params
+from urc.config.part import Findings, Part
+from urc.config.schemas import kind_of, read_schema
+from urc.config.shape.check import check_shape, check_source
+from urc.config.sources import Sources
+from urc.problems import Problem, ProblemsError, has_errors
+from urc.source import Document
+
+__all__ = ["Gathered", "gather"]
+
+
+class Gathered(NamedTuple):
+    """The result of the passes over documents."""
+
+    sources: Sources | None
+    """None after an error, and for a document that is only a part of others."""
+    problems: list[Problem]
+    kind: str
+    files: tuple[str, ...]
+    """Each file that was looked for, existing or not."""
+
+
+def gather(path: str) -> Gathered:
+    """Return the parts of a document and of those that it names, or the errors."""
+    library = Library()
+    try:
+        document = library.read(path)
+    except ProblemsError as error:
+        return Gathered(None, list(error.problems), "", tuple(library.files))
+    kind = kind_of(document)
+    findings = library.findings
+    findings.problems += document.findings
+    root = _prepared(document, library)
+    sources = None
+    if root is not None and not _is_part(root):
+        sources = Sources(Part(root, (), root.data), kind)
+        if kind == "robot":
+            _gather_robot(sources, library)
+        elif kind == "driver":
+            sources.add(sources.root)
+    if has_errors(findings):
+        sources = None
+    problems = list(dict.fromkeys(findings))
+    return Gathered(sources, problems, "" if has_errors(problems) else kind, tuple(library.files))
+
+
+def _is_part(document: Document) -> bool:
+    return isinstance(document.data, dict) and document.data.get("partial") is True
+
+
+def _prepared(
+    document: Document, library: Library, given: Part | None = None, use: Part | None = None
+) -> Document | None:
+    """Return a document after the passes compose, expand and shape, or None with findings.
+
+    Args:
+        document: as it stands in its file.
+        library: reads its sources, and takes the findings.
+        given: the robot's mapping with `params` and `overrides` for the driver.
+        use: the robot's reference to the driver.
+    """
+    findings = library.findings
+    whole, sources = compose(document, library)
+    for source in sources:
+        findings.problems += check_source(source)
+    if whole is None:
+        return None
+    told = len(findings.problems)
+    if kind_of(whole) == "driver":
+        overrides = given.get("overrides") if given is not None else None
+        params = given.get("params") if given is not None else None
+        if overrides is not None:
+            whole = override(whole, overrides)
+        whole = fill_params(whole, params, use, findings)
+    whole = expand(whole, findings)
+    known = {_place(problem) for problem in findings}
+    findings.problems += [one for one in check_shape(whole) if _place(one) not in known]
+    return None if has_errors(findings.problems[told:]) else whole
+
+
+def _place(problem: Problem) -> tuple[str, str, int, int]:
+    """Return the identity of a finding: two passes may report one text."""
+    return problem.code, problem.file, problem.line, problem.column
+
+
+def _gather_robot(sources: Sources, library: Library) -> None:
+    root, findings = sources.root, library.findings
+    driver = root.get("driver")
+    if driver is not None:
+        _check_placement(root, findings)
+        sources.driver = _driver(driver, sources, library)
+    elif "transports" not in root.data:
+        findings.error(
+            root,
+            "missing-key",
+            "'driver' or 'transports' is missing from a robot",
+            key=True,
+            hint="name a driver's document, or declare the lines to the robot",
+        )
+    sources.add(root)
+    for name, inner in root.named("interfaces").items():
+        if isinstance(inner.data, str):
+            target = _follow(inner, "interface", library)
+            if target is not None:
+                sources.interfaces[name] = target
+        else:
+            sources.interfaces[name] = inner
+
+
+def _check_placement(root: Part, findings: Findings) -> None:
+    """Report keys of a driver in a robot that names its driver."""
+    for key in read_schema("robot.schema.json")["$defs"]["inlineDriver"]["properties"]:
+        if key in root.data:
+            findings.error(
+                root,
+                "misplaced-key",
+                f"'{key}' belongs to the driver",
+                at=key,
+                key=True,
+                hint="move it to where 'driver:' points, or write the whole driver here",
+            )
+
+
+def _driver(part: Part, sources: Sources, library: Library) -> Part:
+    """Return the driver at `part`: written there, or named."""
+    reference, given = part, None
+    if isinstance(part.data, dict):
+        if "use" not in part.data:
+            return part  # it stands right here
+        reference, given = part.must("use"), part
+    followed = _follow(reference, "driver", library, given)
+    if followed is None:
+        return part
+    sources.add(followed)
+    return followed
+
+
+def _follow(reference: Part, kind: str, library: Library, given: Part | None = None) -> Part | None:
+    """Return the prepared document that `reference` names, or None with findings."""
+    document = library.follow(reference, (kind,))
+    if document is None:
+        return None
+    prepared = _prepared(document, library, given, reference)
+    if prepared is None:
+        return None
+    if _is_part(prepared):
+        library.findings.error(
+            reference,
+            "partial-document",
+            f"{prepared.file} is only a part of {'an' if kind == 'interface' else 'a'} {kind}",
+            hint="name a document that includes or extends it",
+        )
+        return None
+    return Part(prepared, (), prepared.data)

@@ -1,0 +1,71 @@
+"""The parts of a profile, and the document of each.
+
+A robot may keep its driver and its interfaces in documents of their own.
+"""
+
+from typing import Final
+
+from urc.config.compose.merge import Tree, merge
+from urc.config.part import Part
+from urc.source import Document
+
+__all__ = ["RESERVED", "Sources"]
+
+_EMULATED: Final = ("signals", "state", "world")
+"""Keys of a simulator with its first values and its world."""
+RESERVED: Final = (*_EMULATED, "rules")
+"""Keys of a simulator that cannot be names of transports."""
+
+
+class Sources:
+    """The parts of a profile, each with its place."""
+
+    def __init__(self, root: Part, kind: str) -> None:
+        self.root = root
+        self.kind = kind
+        self.driver = root
+        """The mapping with transports, signals, messages, commands and polls."""
+        self.settings: dict[str, Part] = {}
+        self.slots: dict[str, list[Part]] = {}
+        """Slot → its widgets; a later one changes an earlier one."""
+        self.interfaces: dict[str, Part] = {}
+        self.tests: list[Part] = []
+        self.simulator: dict[str, Part] = {}
+        """First values and world of the emulated robot."""
+        self.rules: dict[str, Part] = {}
+        """Rules of the emulated robot by transport."""
+
+    def add(self, part: Part) -> None:
+        """Add the settings, widgets, tests and simulator of `part`, over those of earlier parts."""
+        self.settings |= part.named("settings")
+        for slot, use in part.named("widgets").items():
+            self.slots.setdefault(slot, []).append(use)
+        self.tests += part.listed("tests")
+        simulator = part.get("simulator")
+        if simulator is None:
+            return
+        for key in _EMULATED:
+            inner = simulator.get(key)
+            if inner is not None:
+                self.simulator[key] = _over(self.simulator.get(key), inner)
+        rules = {name: one for name, one in simulator.entries().items() if name not in RESERVED}
+        for name, inner in (rules | simulator.named("rules")).items():
+            self.rules[name] = _over(self.rules.get(name), inner)
+
+
+def _over(below: Part | None, part: Part) -> Part:
+    """Return a part of a simulator, merged over the same part of the driver."""
+    if below is None:
+        return part
+    merged = merge(_tree(below), _tree(part), part.path)
+    home, value, mark = merged.home, merged.value, merged.mark
+    for key in reversed(part.path):
+        value, mark = {key: value}, mark.copy({key: mark})
+    document = Document(home.file, home.text, home.lines, value, mark)
+    return Part(document, part.path, merged.value)
+
+
+def _tree(part: Part) -> Tree:
+    mark = part.document.at(part.path)
+    assert mark is not None, part.path  # noqa: S101  # what stands there has a mark
+    return Tree(part.data, mark, part.document.source_of(part.path))
