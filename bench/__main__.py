@@ -28,7 +28,6 @@ NAMES = (
     "fanout",
     "fanout_stall",
     "image_relay",
-    "packages_index",
     "gallery",
     "browser_peers",
     "browser_widgets",

@@ -17,7 +17,7 @@ from typing import Any, NoReturn
 
 from tests.unit.packages.made import assert_whole, install, package
 from urc.packages import disk
-from urc.packages.changes import HEAD, read_change, read_head
+from urc.packages.head import HEAD, read_head
 from urc.packages.index import INDEX, read_index
 from urc.packages.intake import take
 from urc.packages.keeper import make_index
@@ -222,8 +222,6 @@ def whole(lab: Path, is_new: bool) -> list[str]:
         if entry.signed is not None:
             entry.signed.check(entry.key, entry.version, entry.sha256)
     read_head((lab / HEAD).read_bytes(), HEAD)
-    for file in (lab / "index").glob("changes-*.json"):
-        read_change(file.read_bytes(), str(file))
     return [str(entry) for entry in index.packages]
 
 

@@ -9,11 +9,10 @@ import msgspec
 
 from urc.packages import disk
 from urc.packages.archive import PACKAGE, read_archive
-from urc.packages.changes import head_in, write_index
 from urc.packages.head import Seal, check_key
 from urc.packages.index import INDEX, INDEX_BYTES, Entry, entry_of, read_index
 from urc.packages.install import check_names
-from urc.packages.keeper import changing, keep, read_signature
+from urc.packages.keeper import changing, head_in, keep, read_signature, write_index
 from urc.packages.names import Key, PackageError
 from urc.packages.notes import Notes, Provenance, read_notes
 from urc.packages.package import Package, open_package

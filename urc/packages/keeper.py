@@ -4,13 +4,14 @@ DIR/drivers/puppet/package.yaml …     what the keeper writes, one folder for e
 DIR/archives/drivers/puppet/1.0.0.zip every version that was ever listed
 DIR/archives/drivers/puppet/1.0.0.sig who signed it, if anybody did
 DIR/archives/drivers/puppet/1.0.0.json where it was made, and whether it is withdrawn
-DIR/index.json, DIR/index/…           what there is, and what changed, see `changes`
+DIR/index.json                        all versions, with a number that grows with each change
+DIR/index/head.json                   its number and digest, signed by the keeper, see `head`
 DIR/drivers/puppet/urcpm.json         the same in the thesis's form
 """
 
 import shutil
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Final, NamedTuple
 
@@ -18,9 +19,8 @@ import msgspec
 
 from urc.packages import disk
 from urc.packages.archive import PACKAGE
-from urc.packages.changes import head_in, write_index
-from urc.packages.head import Seal, check_key
-from urc.packages.index import INDEX, INDEX_BYTES, Entry, Index, entry_of, read_index
+from urc.packages.head import HEAD, HEAD_BYTES, Head, Seal, check_key, next_head, read_head
+from urc.packages.index import INDEX, INDEX_BYTES, Entry, Index, entry_of, in_order, read_index
 from urc.packages.manifest import MANIFEST, Manifest
 from urc.packages.names import FOLDERS, Key, PackageError, parse_key
 from urc.packages.notes import Notes, Provenance, read_notes, write_notes
@@ -30,6 +30,7 @@ from urc.packages.signature import Signature, Signer
 __all__ = [
     "Listing",
     "changing",
+    "head_in",
     "keep",
     "make_index",
     "notes_of",
@@ -37,6 +38,7 @@ __all__ = [
     "renew",
     "urcpm",
     "withdraw",
+    "write_index",
 ]
 
 _THESIS: Final = ("driver", "interface", "widget")
@@ -189,6 +191,66 @@ def renew(folder: Path, seal: Seal) -> None:
         with open(folder / INDEX, "rb") as file:
             index = read_index(file.read(INDEX_BYTES + 1), INDEX)
         write_index(folder, index.name, index.packages, work, seal)
+
+
+def write_index(
+    folder: Path, name: str, entries: Sequence[Entry], work: Path, seal: Seal | None = None
+) -> Index:
+    """Write the index of a repository, then its head.
+
+    After an interruption every served file is complete, and the next call repairs the rest.
+
+    Args:
+        folder: the repository, which no other process changes meanwhile.
+        name: of the repository.
+        entries: all versions.
+        work: for incomplete files.
+        seal: the keeper's, which signs the head.
+
+    Raises:
+        PackageError: the index is signed with another key; nothing has changed.
+        OSError: the disk is full, for example.
+    """
+    before, number = _before(folder)
+    index = Index(1, name, in_order(entries), number)
+    is_new = before is None or (before.name, before.packages) != (index.name, index.packages)
+    if is_new:
+        number += 1
+        index = Index(1, name, index.packages, number)
+    data = index.to_bytes()
+    head = next_head(head_in(folder), number, sha256(data), seal).to_bytes()
+    if is_new:
+        disk.put_file(folder / INDEX, data, work)
+    if _content(folder / HEAD, HEAD_BYTES) != head:
+        disk.put_file(folder / HEAD, head, work)
+    return index
+
+
+def _before(folder: Path) -> tuple[Index | None, int]:
+    """Return the present index, None for a damaged one, and the last number."""
+    data = _content(folder / INDEX, INDEX_BYTES + 1)
+    with suppress(PackageError):
+        if data is not None:
+            index = read_index(data, INDEX)
+            # A number means certain bytes, so an index in another spelling gets a new number.
+            return (index if data == index.to_bytes() else None), index.number
+    head = head_in(folder)
+    return None, head.number if head is not None else 0
+
+
+def head_in(folder: Path) -> Head | None:
+    """Return the head in a repository's folder, None without a valid one."""
+    with suppress(PackageError):
+        return read_head(_content(folder / HEAD, HEAD_BYTES) or b"", HEAD)
+    return None
+
+
+def _content(file: Path, most: int) -> bytes | None:
+    try:
+        with open(file, "rb") as opened:
+            return opened.read(most)
+    except FileNotFoundError:
+        return None
 
 
 def _homes(folder: Path) -> list[Path]:

@@ -2,7 +2,7 @@
 
 import hashlib
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from typing import Annotated, Final
@@ -10,7 +10,6 @@ from typing import Annotated, Final
 import msgspec
 
 from urc.packages import disk
-from urc.packages.changes import IndexChange, applied, change_file, read_change
 from urc.packages.head import HEAD, HEAD_BYTES, Head, read_head
 from urc.packages.index import INDEX, INDEX_BYTES, Entry, Index, read_index
 from urc.packages.names import PackageError
@@ -21,8 +20,6 @@ from urc.packages.trust import Trust
 __all__ = ["Repositories", "Repository"]
 
 _MOST: Final = 32
-_STEPS_MOST: Final = 64
-"""Changes that are asked for one by one; where more is new, the whole index is."""
 _LIST_BYTES: Final = 1 << 20
 _TRIES: Final = 2
 """A repository may change between two questions."""
@@ -37,7 +34,7 @@ class _Tags(msgspec.Struct, frozen=True):
     sha256: str
     """Of the index that they belong to."""
     index: str = ""
-    """ETag of the whole index; "" when it was put together from changes."""
+    """ETag of the index."""
     head: str = ""
     said: Head | None = None
     """The head itself, once it was checked; None: there was none that fits."""
@@ -117,34 +114,11 @@ class Repository:
         if kept is not None and answer.status == 304:
             return kept[0]
         if kept is not None and head is not None:
-            new = self._grown(*kept, head, answer.etag)
-            if new is not None:
-                return new
+            index, tags = kept
+            if (head.number, head.sha256) == (index.number, tags.sha256):  # renewed, nothing else
+                self._keep(_Tags(tags.sha256, tags.index, answer.etag, head))
+                return index
         return self._whole(kept, head, answer.etag)
-
-    def _grown(self, index: Index, tags: _Tags, head: Head, etag: str) -> Index | None:
-        """Return what came of an index by what is new; None: the whole one must be asked for."""
-        if not index.number <= head.number <= index.number + _STEPS_MOST:
-            return None
-        try:
-            new = applied(index, self._changes(index.number, head.number))
-        except PackageError:  # a change is missing or damaged
-            return None
-        data = new.to_bytes()
-        if sha256(data) != head.sha256:
-            return None
-        of_whole = tags.index if head.number == index.number else ""
-        self._keep(new, data, _Tags(head.sha256, of_whole, etag, head))
-        return new
-
-    def _changes(self, first: int, last: int) -> Iterator[IndexChange]:
-        """Yield what is new, all of it together at most as large as an index may be."""
-        left = INDEX_BYTES
-        for number in range(first + 1, last + 1):
-            address = self.name + change_file(number)
-            body = ask(address, left).body
-            left -= len(body)
-            yield read_change(body, address)
 
     def _whole(
         self, kept: tuple[Index, _Tags] | None, head: Head | None, etag: str
@@ -166,7 +140,7 @@ class Repository:
         self._check_number(address, index, kept)
         if answer.status != 304:
             tags = _Tags(digest, answer.etag, etag if is_named else "", head if is_named else None)
-            self._keep(index, answer.body, tags)
+            self._keep(tags, answer.body)
         return index
 
     def _check_number(self, address: str, index: Index, kept: tuple[Index, _Tags] | None) -> None:
@@ -189,11 +163,13 @@ class Repository:
         self._tags.unlink(missing_ok=True)
         self._trust.forget()
 
-    def _keep(self, index: Index, data: bytes, tags: _Tags) -> None:
+    def _keep(self, tags: _Tags, data: bytes | None = None) -> None:
+        """Store the tags, and the index unless it is unchanged."""
         work = self._folder / "work"
         if tags.said is not None:
             self._trust.keep(tags.said, work)
-        disk.put_file(self._index, data, work)
+        if data is not None:
+            disk.put_file(self._index, data, work)
         disk.put_file(self._tags, msgspec.json.encode(tags), work)
 
     def _kept(self) -> tuple[Index, _Tags] | None:

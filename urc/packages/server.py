@@ -7,7 +7,6 @@ package needs no restart.
 import asyncio
 import mimetypes
 import os
-import re
 from collections.abc import Callable, Mapping
 from functools import lru_cache
 from pathlib import Path
@@ -22,7 +21,7 @@ from starlette.routing import Route
 from urc.packages.archive import PACKAGE
 from urc.packages.door import Door
 from urc.packages.head import HEAD, HEAD_BYTES, Head, Seal, read_head
-from urc.packages.index import INDEX, INDEX_BYTES, Entry, Index, read_index, search
+from urc.packages.index import INDEX, INDEX_BYTES, Entry, read_index, search
 from urc.packages.keeper import urcpm
 from urc.packages.manifest import MANIFEST, parse_manifest
 from urc.packages.names import FOLDERS, PackageError
@@ -38,9 +37,8 @@ _HEADERS: Final = {
     "cache-control": "no-cache",
 }
 _THESIS: Final = ("drivers", "widgets", "interfaces")
-_CHANGE: Final = re.compile(r"index/changes-[1-9][0-9]{0,15}\.json", re.ASCII)
 _LASTING: Final = "public, max-age=31536000, immutable"
-"""Of what never changes under its address: archives, and changes of the index."""
+"""Of archives, which never change under their address."""
 
 
 def repository_app(
@@ -69,7 +67,6 @@ class _Shop:
     def __init__(self, folder: Path) -> None:
         self._folder = folder
         self._seen: tuple[int, ...] = ()
-        self._index = Index(1, "", ())
         self._files: Mapping[str, Entry] = {}
         self._newest: Mapping[str, Entry] = {}
         self._lists: Mapping[str, bytes] = {}
@@ -92,8 +89,6 @@ class _Shop:
             return self._lists[path], "json"
         if path in self._files:
             return self._archive(self._files[path]), "zip"
-        if _CHANGE.fullmatch(path):
-            return self._change(path), "json"
         folder, _, rest = path.partition("/")
         name, _, file = rest.partition("/")
         entry = self._newest.get(f"{folder}/{name}")
@@ -111,17 +106,6 @@ class _Shop:
             raise PackageError(f"{entry.file}: it has changed since it was listed")
         return data
 
-    def _change(self, path: str) -> bytes | None:
-        """Return what made a number of the index; what is not in the index yet is not given out."""
-        number = int(path.rpartition("-")[2].removesuffix(".json"))
-        if not 0 < number <= self._index.number:
-            return None
-        try:
-            with open(self._folder / path, "rb") as file:
-                return file.read(INDEX_BYTES + 1)
-        except FileNotFoundError:
-            return None
-
     def _refresh(self) -> None:
         """Read the index when its file is another one than before, or its head is."""
         file = self._folder / INDEX
@@ -138,7 +122,7 @@ class _Shop:
             head = None
         index = read_index(data, str(file))
         newest = {str(entry.key): entry for entry in search(index.packages, ())}
-        self._index, self._newest = index, newest
+        self._newest = newest
         self._files = {entry.file: entry for entry in index.packages}
         head = head or Head(1, index.number, digest)
         self._lists = {**_lists(index.name, newest), INDEX: data, HEAD: head.to_bytes()}
@@ -183,8 +167,7 @@ def _respond(request: Request, body: bytes, ending: str, status: int) -> Respons
     headers = dict(_HEADERS)
     if status == 200:
         headers["etag"] = f'"{sha256(body)[:32]}"'
-        path = request.path_params["path"]
-        if path.startswith("archives/") or _CHANGE.fullmatch(path):
+        if request.path_params["path"].startswith("archives/"):
             headers["cache-control"] = _LASTING
     known = request.headers.get("if-none-match", "")
     if status == 200 and headers["etag"] in [one.strip() for one in known.split(",")]:

@@ -8,12 +8,11 @@ import pytest
 from starlette.testclient import TestClient
 
 from tests.unit.packages.made import entry, write_package
-from tests.unit.packages.test_changes import URL, Web, entries
+from tests.unit.packages.test_index_updates import URL, Web, entries
 from urc.packages import repositories
-from urc.packages.changes import change_file, write_index
 from urc.packages.head import HEAD, VALID_S, Head, Seal, read_head
 from urc.packages.index import INDEX
-from urc.packages.keeper import make_index, renew, withdraw
+from urc.packages.keeper import make_index, renew, withdraw, write_index
 from urc.packages.names import Key, PackageError
 from urc.packages.repositories import Repository
 from urc.packages.server import repository_app
@@ -103,16 +102,6 @@ def test_a_head_is_signed_anew_when_half_of_its_time_is_over(lab: Signed) -> Non
     renew(lab.folder, Seal(lab.key, VALID_S, lambda: lab.now))
     assert lab.head().number == first.number
     assert lab.head().left_s(lab.now) == VALID_S
-
-
-def test_only_what_is_new_is_taken_of_a_signed_index(lab: Signed) -> None:
-    """As of one that is not signed."""
-    lab.write(500)
-    lab.client.refresh()
-    lab.write(501)
-    lab.web.asked.clear()
-    assert len(lab.client.refresh().packages) == 501
-    assert lab.web.asked == [HEAD, change_file(2)]
 
 
 def test_nobody_goes_back_even_where_what_was_said_is_lost(lab: Signed) -> None:
