@@ -5,8 +5,10 @@ import asyncio
 import pytest
 
 from tests.unit.guard.lines import STOP, TERMS, CountedWire, Rig
-from urc.motion.hearing import SILENCE_S
-from urc.transports.base import PeerClosed
+from urc.guard.hearing import HearingWatch
+from urc.motion.hearing import ASKED_EVERY_S, SILENCE_S
+from urc.testing.clock import FakeClock, settle
+from urc.transports.base import PeerClosed, Transport
 
 pytestmark = pytest.mark.anyio
 
@@ -20,6 +22,7 @@ class ProbedWire(CountedWire):
         self.lives.set()
         self.probes = 0
         self.is_broken = False
+        self.bug: Exception | None = None
 
     async def open(self, timeout_s: float) -> None:
         if not self.lives.is_set():
@@ -31,6 +34,8 @@ class ProbedWire(CountedWire):
         self.probes += 1
         if self.is_broken:
             raise PeerClosed("the line broke")
+        if self.bug is not None:
+            raise self.bug
         await self.lives.wait()
 
 
@@ -127,3 +132,85 @@ async def test_line_that_cannot_be_asked_is_reset_when_its_robot_is_silent_for_t
     await held(rig, 0.2)
     assert robot.aborts == 1
     assert robot.written[-1] == STOP
+
+
+# -- the watch alone
+
+
+class Watched:
+    """A watch over a line on which something always moves; keeps what it says."""
+
+    def __init__(self, robot: Transport, silent_s: float | None = None) -> None:
+        self.clock = FakeClock()
+        self.said: list[str] = []
+        self.watch = HearingWatch(
+            robot,
+            self.clock,
+            silent_s=silent_s,
+            is_moving=lambda: True,
+            failed=self.said.append,
+        )
+
+    def begin(self) -> None:
+        self.watch.begin()
+        self.watch.start()
+
+
+async def test_closed_line_is_not_asked(robot: ProbedWire) -> None:
+    it = Watched(robot)
+    it.watch.start()
+    it.begin()
+    await settle()
+    it.watch.end()
+    it.watch.start()
+    await it.clock.advance(1.0)
+    assert robot.probes == 1
+    assert it.said == []
+
+
+async def test_line_that_was_opened_again_is_watched_again(robot: ProbedWire) -> None:
+    it = Watched(robot)
+    it.begin()
+    await it.clock.advance(0.02)
+    it.watch.end()
+    it.begin()
+    robot.lives.clear()
+    await it.clock.advance(SILENCE_S + ASKED_EVERY_S)
+    assert len(it.said) == 1
+    it.watch.end()
+
+
+async def test_ticks_do_not_make_questions_more_frequent(robot: ProbedWire) -> None:
+    it = Watched(robot)
+    it.begin()
+    for _ in range(5):
+        await it.clock.advance(ASKED_EVERY_S / 8)
+        it.watch.start()
+    assert robot.probes == 1
+    it.watch.end()
+
+
+@pytest.mark.parametrize(
+    ("is_asked", "silent_s", "told"),
+    [(True, None, "500 ms"), (True, 2.0, "500 ms"), (False, 2.0, "2000 ms")],
+)
+async def test_reason_names_the_length_of_the_silence(
+    robot: ProbedWire, is_asked: bool, silent_s: float | None, told: str
+) -> None:
+    robot.lives.clear()
+    it = Watched(robot if is_asked else CountedWire(), silent_s)
+    it.begin()
+    await it.clock.advance(2.1)
+    assert it.said == [f"the robot's side has said nothing for {told} while it moved"]
+    it.watch.end()
+
+
+async def test_bug_in_a_question_is_logged_and_is_no_answer(
+    robot: ProbedWire, caplog: pytest.LogCaptureFixture
+) -> None:
+    robot.bug = RuntimeError("no such handle")
+    it = Watched(robot)
+    it.begin()
+    await it.clock.advance(SILENCE_S + ASKED_EVERY_S)
+    assert len(it.said) == 1
+    assert "no such handle" in caplog.text

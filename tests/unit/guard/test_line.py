@@ -368,9 +368,9 @@ async def test_control_may_be_stopping_for_a_while_after_its_stop_was_told(rig: 
     rig.guard.arm("wire", "drive", TERMS)
     rig.tick(b"go")
     rig.guard.release("drive")
-    await rig.clock.advance(0.9)
+    await rig.clock.advance(0.875)
     assert rig.guard.is_stopping("drive")
-    await rig.clock.advance(0.2)
+    await rig.clock.advance(0.125)
     assert not rig.guard.is_stopping("drive")
 
 
@@ -391,3 +391,16 @@ async def test_tick_whose_number_was_used_up_is_made_again_whatever_else_was(rig
     rig.guard.release("turn")
     rig.guard._take(wire.Counted("wire", 1, 0, {}, [("turn", 1)]), 0)
     assert len(passed) == 1
+
+
+async def test_tick_whose_number_was_used_up_is_not_made_again_after_the_guards_stop(
+    rig: Rig,
+) -> None:
+    await rig.drive()
+    first = Numbered(b"7 go", Count({}, {"n": 7}))
+    rig.guard.tick("drive", Counted(first, lambda: first))
+    passed: list[str] = []
+    rig.guard._pass_newest = lambda slot, said: passed.append(slot)  # type: ignore[method-assign]
+    rig.guard._take(wire.Stopped("drive", "expired", 2), 0)
+    rig.guard._take(wire.Counted("wire", 1, 0, {}, [("drive", 2)]), 0)
+    assert passed == []

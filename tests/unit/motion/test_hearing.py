@@ -24,3 +24,12 @@ def test_silence_counts_without_a_question_where_the_robot_is_to_talk() -> None:
     hearing.heard(11.0)
     hearing.asked(11.1)
     assert hearing.deadline < 11.6
+
+
+def test_question_stands_until_something_comes() -> None:
+    hearing = Hearing(None)
+    assert not hearing.is_asked
+    hearing.asked(10.0)
+    assert hearing.is_asked
+    hearing.heard(10.1)
+    assert not hearing.is_asked

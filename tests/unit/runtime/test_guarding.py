@@ -6,10 +6,11 @@ from typing import Any
 import pytest
 
 from tests.unit.runtime.desks import DRIVER, held
+from urc.expressions import compile_template
 from urc.guard.client import Guard, LineSpec, LocalGuard
 from urc.guard.side import Client
-from urc.model.codec import Count, Numbered, Payload, Series
-from urc.model.driver import Driver, TransportSpec
+from urc.model.codec import Count, Numbered, Payload, ReadSpec, Series
+from urc.model.driver import Driver, Message, TransportSpec
 from urc.motion.hold import LEASE_S, Reason, Terms
 from urc.motion.stall import STALLED_S, WAITED_S
 from urc.problems import UrcError
@@ -224,6 +225,19 @@ def test_guard_is_told_how_to_make_each_line() -> None:
     assert line.transport.setup.via is other.transport
 
 
+def test_guard_is_told_the_settings_and_what_is_listened_to() -> None:
+    port = compile_template("{{ settings.port }}")
+    read = ReadSpec("json", topic=compile_template("/odom"), listen={"type": "Odometry"})
+    driver = Driver(
+        {"wire": TransportSpec("wire", "rosbridge", options={"port": port})},
+        messages={"odom": Message("odom", "wire", read)},
+    )
+    movers = take_reins(driver, {"port": 9090}, TABLE, FakeClock(), is_guarded=False)
+    make = lines_of(movers.client)[0].make
+    assert make.options == {"port": 9090}
+    assert make.subscriptions == [("/odom", {"type": "Odometry"})]
+
+
 def test_guard_is_a_process_where_the_system_can(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
@@ -236,3 +250,18 @@ def test_guard_is_a_process_where_the_system_can(
     monkeypatch.setattr(guarding, "CAN_GUARD", False)
     assert isinstance(reins(driver, is_guarded=True).client, LocalGuard)
     assert "there is no guard on this system" in caplog.text
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_connection_is_reset_a_little_before_its_robot_counts_as_silent(kind: str) -> None:
+    """A line without one keeps nothing that a reset could throw away."""
+    specs = {
+        "wire": TransportSpec("wire", kind, stale_after_s=2.0),
+        "talker": TransportSpec("talker", kind),
+    }
+    line, talker = lines_of(reins(Driver(specs)).client)
+    assert talker.make.silent_s is None
+    if kind in ("udp", "serial"):
+        assert line.make.silent_s is None
+    else:
+        assert line.make.silent_s == pytest.approx(1.8)

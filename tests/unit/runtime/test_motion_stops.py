@@ -49,3 +49,10 @@ def test_newest_stop_goes_out_when_none_can_be_made_any_more() -> None:
     it.frames.stop_frame = broken  # type: ignore[method-assign]
     it.desk.stop("ann")
     assert stops == {"drive": b"14 drive stop"}
+
+
+def test_frame_of_a_robot_without_movers_renews_no_stop() -> None:
+    it = Scene(is_attached=False)
+    it.desk.attach(it.frames, None)
+    assert it.frames.send() == 1
+    assert it.heard() == []
