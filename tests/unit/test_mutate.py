@@ -3,6 +3,7 @@
 import json
 import os
 import re
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -229,3 +230,16 @@ def test_a_kind_fits_the_whole_of_a_change() -> None:
 def test_the_explanations_that_ship_can_be_read() -> None:
     explained = explained_in(ROOT / "tests" / "mutants.toml")
     assert all(explained.reasons.values())
+
+
+def test_a_run_has_every_test_of_the_desk() -> None:
+    """A fault that only a left-out test notices counts as a survivor."""
+    told = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["tool"]["mutmut"]
+    run = told["pytest_add_cli_args_test_selection"]
+    desk = [
+        path.relative_to(ROOT).as_posix()
+        for path in (ROOT / "tests" / "unit" / "runtime").glob("test_*.py")
+        if "tests.unit.runtime.desks" in path.read_text("utf-8")
+    ]
+    assert set(desk) <= set(run)
+    assert [name for name in run if not (ROOT / name).exists()] == []

@@ -5,7 +5,7 @@ from collections.abc import AsyncIterator
 
 import pytest
 
-from tests.unit.guard.lines import CountedWire, Rig
+from tests.unit.guard.lines import Bench, CountedWire, Rig
 
 
 @pytest.fixture
@@ -22,3 +22,13 @@ async def rigs() -> AsyncIterator[list[Rig]]:
 async def rig(rigs: list[Rig]) -> Rig:
     rigs.append(Rig(CountedWire()))
     return rigs[-1]
+
+
+@pytest.fixture
+async def benches() -> AsyncIterator[list[Bench]]:
+    made: list[Bench] = []
+    yield made
+    for bench in made:
+        finishing = asyncio.ensure_future(bench.host.finish())
+        while not finishing.done():
+            await bench.clock.advance(0.1)

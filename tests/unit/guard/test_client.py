@@ -345,6 +345,18 @@ async def test_guard_that_does_not_end_is_killed(
     assert process.is_killed
 
 
+async def test_deaf_guard_is_killed(house: House, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It does not see the end of the pipe, and still has its time."""
+    monkeypatch.setattr(client, "_FINISH_S", 0.01)
+    process = house.begin()
+    house.guard.arm("wire", "drive", TERMS)
+    house.guard.tick("drive", b"go")
+    await process.hears(3)
+    process.pipe._loop.remove_reader(process.pipe._line)
+    await house.guard.finish()
+    assert process.is_killed
+
+
 class StubDoor(Door):
     """One to which a guard comes when it is told to, or never."""
 

@@ -198,6 +198,15 @@ def test_whatever_happens_numbers_are_gapless_and_the_stop_is_last(
     asyncio.run(play(steps, is_prompt=is_prompt, is_lossy=is_lossy, is_bytewise=is_bytewise))
 
 
+def test_counters_change_only_when_numbers_have_left() -> None:
+    tally = Tally()
+    assert not tally.is_changed
+    tally.left(Count({}, {"n": 7}))
+    assert tally.is_changed
+    tally.begin()
+    assert not tally.is_changed
+
+
 def test_stop_with_a_wrong_number_is_better_than_none() -> None:
     """The last one is of the newest numbers."""
     tally = Tally()

@@ -138,7 +138,7 @@ async def test_line_that_cannot_be_asked_is_reset_when_its_robot_is_silent_for_t
 
 
 class Watched:
-    """A watch over a line on which something always moves; keeps what it says."""
+    """A watch over a line with constant motion; keeps its messages."""
 
     def __init__(self, robot: Transport, silent_s: float | None = None) -> None:
         self.clock = FakeClock()
@@ -159,6 +159,8 @@ class Watched:
 async def test_closed_line_is_not_asked(robot: ProbedWire) -> None:
     it = Watched(robot)
     it.watch.start()
+    await settle()
+    assert robot.probes == 0
     it.begin()
     await settle()
     it.watch.end()

@@ -231,6 +231,23 @@ async def test_end_does_not_wait_for_a_line_that_does_not_close(
     assert ran.ended == [0]
 
 
+async def test_lines_have_their_time_to_close(ran: Ran, monkeypatch: pytest.MonkeyPatch) -> None:
+    """And a little more than that."""
+    monkeypatch.setattr(program, "FINISH_S", BOUND_S)
+    monkeypatch.setattr(program, "_GRACE_S", BOUND_S)
+    await drive(ran)
+    closed: list[bool] = []
+
+    async def slow(self: Host) -> None:
+        await settle()
+        closed.append(True)
+
+    monkeypatch.setattr(Host, "finish", slow)
+    ran.server.pipe.end()
+    await ran.over()
+    assert closed == [True]
+
+
 def test_pipe_is_inherited() -> None:
     ours, theirs = socket.socketpair()
     with ours, program._line(str(theirs.detach())) as line:

@@ -374,6 +374,37 @@ async def test_control_may_be_stopping_for_a_while_after_its_stop_was_told(rig: 
     assert not rig.guard.is_stopping("drive")
 
 
+async def test_control_that_is_armed_again_may_still_be_moving(rig: Rig) -> None:
+    await rig.drive()
+    rig.guard.arm("wire", "drive", TERMS)
+    assert rig.guard.is_stopping("drive")
+
+
+async def test_only_frames_with_counters_are_passed_on_with_what_they_count(rig: Rig) -> None:
+    await rig.drive()
+    passed: list[object] = []
+    rig.guard._pass_newest = (  # type: ignore[method-assign]
+        lambda slot, said: passed.append(said.count)  # type: ignore[union-attr]
+    )
+    count = Count({}, {"n": 7})
+    rig.guard.tick("drive", b"go")
+    rig.guard.tick("drive", Counted(Numbered(b"7 go", count), lambda: None))
+    assert passed == [None, count]
+
+
+async def test_unread_stops_are_bounded(rig: Rig) -> None:
+    """The newest are kept."""
+    for number in range(1000):
+        rig.guard._take(wire.Stopped(f"control {number}", "expired", 1), 0)
+    stops = await rig.stops()
+    assert len(stops) < 500
+    assert stops[-1] == ("control 999", "expired")
+
+
+async def test_line_has_the_address_of_its_transport_before_it_is_opened(rig: Rig) -> None:
+    assert rig.transport.address == "wire"
+
+
 async def test_tick_whose_number_was_used_up_is_made_again_whatever_else_was(rig: Rig) -> None:
     """Unless it was let go meanwhile, or a newer one is under way; it is as old as it was."""
     await rig.drive()

@@ -155,3 +155,16 @@ async def test_reset_of_the_other_side_is_its_end(ends: tuple[End, End]) -> None
     async with asyncio.timeout(WITHIN_S):
         await a.is_gone.wait()
     assert a.got == []
+
+
+async def test_reset_completes_no_message(ends: tuple[End, End]) -> None:
+    """Of a message without its last byte nothing is taken."""
+    a, b = ends
+    b.pipe._loop.remove_reader(b.pipe._line)
+    a.pipe.post("unread")
+    message = (1).to_bytes(4, "little") + b"\x01"
+    b.pipe._line.send(message[:-1])
+    b.pipe.close()
+    async with asyncio.timeout(WITHIN_S):
+        await a.is_gone.wait()
+    assert a.got == []

@@ -1,7 +1,6 @@
 """Held commands of one line: numbers, doubts, other lines than those that take all at once."""
 
 import asyncio
-from collections.abc import AsyncIterator
 
 import pytest
 
@@ -22,16 +21,6 @@ from urc.transports.base import TransportError
 pytestmark = pytest.mark.anyio
 
 TURN = TERMS._replace(stop=b"halt")
-
-
-@pytest.fixture
-async def benches() -> AsyncIterator[list[Bench]]:
-    made: list[Bench] = []
-    yield made
-    for bench in made:
-        finishing = asyncio.ensure_future(bench.host.finish())
-        while not finishing.done():
-            await bench.clock.advance(0.1)
 
 
 @pytest.fixture

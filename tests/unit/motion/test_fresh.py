@@ -3,7 +3,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from urc.motion.fresh import FirstOfTwo, Freshness, Input
+from urc.motion.fresh import OLDEST_S, FirstOfTwo, Freshness, Input
 from urc.motion.stall import StallWatch
 
 
@@ -81,3 +81,36 @@ def test_what_is_said_of_one_control_is_nothing_to_another() -> None:
     assert order.take("drive", 5)
     assert order.take("lift", 4)
     assert not order.take("drive", 4)
+
+
+def test_ticks_are_numbered_from_the_first_on() -> None:
+    assert Freshness().issue(1.0) == 1
+    fresh = Freshness(70)
+    assert [fresh.issue(1.0), fresh.issue(1.1)] == [70, 71]
+
+
+def test_control_without_a_name_is_one_control() -> None:
+    fresh = Freshness()
+    echo = fresh.issue(1.0)
+    assert fresh.refusal(Input(1, 1, echo), 1, 1.0) == ""
+    assert fresh.refusal(Input(1, 1, echo), 1, 1.0, "") == "it is not newer than the last one"
+
+
+def test_number_below_0_is_newer_than_nothing() -> None:
+    fresh = Freshness()
+    echo = fresh.issue(1.0)
+    assert fresh.refusal(Input(1, -1, echo), 1, 1.0) == "it is not newer than the last one"
+    assert fresh.refusal(Input(1, 0, echo), 1, 1.0) == ""
+
+
+def test_echo_of_a_tick_before_the_first_is_refused() -> None:
+    fresh = Freshness()
+    echo = fresh.issue(1.0)
+    assert fresh.refusal(Input(1, 1, echo - 1), 1, 1.0) == "it answers no tick of this server"
+
+
+def test_input_is_taken_up_to_its_greatest_age_and_told_how_old_it_is_beyond() -> None:
+    fresh = Freshness()
+    echo = fresh.issue(0.0)
+    assert fresh.refusal(Input(1, 1, echo), 1, OLDEST_S) == ""
+    assert fresh.refusal(Input(1, 2, echo), 1, 2.0) == "it is 2000 ms old"

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from tests.effort import examples
 from urc.model.codec import Count, Numbered, Series
-from urc.motion.hold import Mover, Terms
+from urc.motion.hold import SHORTEST_LEASE_S, STOP_EVERY_S, STOP_FOR_S, Mover, Terms
 
 STOP = b"STOP"
 
@@ -288,3 +288,32 @@ def test_stop_without_a_number_takes_the_place_of_all_that_had_one() -> None:
     counted = plain.stopped_by(Series((numbered,)))
     assert (counted.stop, counted.stops) == (b"7 halt", (numbered,))
     assert counted.stopped_by(b"halt") == plain
+
+
+def test_it_is_not_armed_at_first_and_has_never_stopped() -> None:
+    held = Mover(Terms(STOP, period_s=0.05, lease_s=SHORTEST_LEASE_S))
+    assert not held.tick(b"go", 1.0)
+    assert held.reason is None
+
+
+def test_a_tick_just_when_the_lease_is_over_comes_too_late_and_is_told_why() -> None:
+    held = mover(lease_s=0.25)
+    held.tick(b"go", 1.0)
+    assert not held.tick(b"go", 1.25)
+    assert (held.state, held.reason) == ("stopping", "expired")
+
+
+def test_the_last_repeat_of_a_stop_comes_when_its_time_is_over() -> None:
+    held = mover(is_lossy=True)
+    held.tick(b"go", 0.0)
+    held.stop("released", 0.0)
+    assert held.due(STOP_FOR_S - STOP_EVERY_S, is_clear=True) == STOP
+    assert held.due(STOP_FOR_S, is_clear=True) == STOP
+    assert held.state == "idle"
+
+
+def test_a_cut_disarms_also_what_did_not_move() -> None:
+    held = mover()
+    held.cut()
+    held.restored(2.0)
+    assert not held.tick(b"go", 2.0)

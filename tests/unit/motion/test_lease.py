@@ -180,6 +180,39 @@ def test_a_holder_who_goes_silent_gives_the_controls_back() -> None:
     assert left.state.holder is None
 
 
+def test_a_request_goes_with_the_client_that_made_it() -> None:
+    """Other clients change nothing when they go."""
+    lease = Lease()
+    lease.take(ANNA, 0.0)
+    before = lease.state
+    lease.ask(BERT, 1.0)
+    assert lease.leave("c") is None
+    assert lease.state.asked_by == BERT
+    assert lease.leave("b") == Changed(before, must_stop=False)
+    assert lease.state == before
+
+
+def test_returned_controls_are_free() -> None:
+    lease = Lease()
+    lease.take(ANNA, 0.0)
+    left = lease.leave("a")
+    assert left == Changed(LeaseState(lease.state.epoch), must_stop=True)
+
+
+def test_only_a_stop_can_be_reset_and_a_reset_stops_nothing() -> None:
+    lease = Lease()
+    assert lease.latched == ""
+    assert lease.reset(ANNA) == Refused("nothing is stopped")
+    lease.stop("Eve")
+    assert lease.latched == "stopped by Eve: reset it first"
+    assert lease.reset(ANNA) == Changed(lease.state, must_stop=False)
+    assert lease.latched == ""
+
+
+def test_the_count_of_stops_goes_on_in_the_next_lease() -> None:
+    assert Lease(LeaseState(7, stops=3)).state == LeaseState(8, stops=3)
+
+
 ROLES: list[Role] = ["viewer", "driver", "engineer", "admin"]
 
 

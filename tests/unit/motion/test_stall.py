@@ -118,3 +118,11 @@ def test_what_was_given_up_stays_as_old_as_it_was() -> None:
     watch.wrote(10, 1.15)
     watch.saw(5, 1.2)
     assert watch.age_s(1.2) == 1.2 - 1.0
+
+
+def test_first_bytes_are_as_old_as_their_write() -> None:
+    watch = StallWatch(0.25)
+    watch.wrote(10, 1.0)
+    watch.saw(10, 1.1)
+    watch.saw(1, 1.2)
+    assert watch.deadline == 1.25

@@ -6,7 +6,8 @@ import pytest
 
 from tests.unit.runtime.desks import held
 from urc.model.driver import Driver, TransportSpec
-from urc.runtime.held import control_of
+from urc.motion.stall import STALLED_S
+from urc.runtime.held import control_of, period_of
 
 
 @pytest.mark.parametrize(
@@ -26,3 +27,16 @@ def test_motion_goes_no_faster_than_its_line_and_its_rate_let_it(
     """For robots that cannot read fast; what is realtime waits for no gap."""
     driver = Driver({"wire": TransportSpec("wire", "tcp")._replace(**line)})
     assert control_of(driver, held("drive")._replace(**command)).period_s == period_s
+
+
+def test_command_that_is_not_held_has_a_shortest_time_too() -> None:
+    driver = Driver({"wire": TransportSpec("wire", "tcp")})
+    assert period_of(driver, held("beep")._replace(hold=None)) == STALLED_S
+
+
+def test_limited_argument_without_a_value_begins_at_its_default() -> None:
+    driver = Driver({"wire": TransportSpec("wire", "tcp")})
+    drive = held("drive")
+    assert drive.hold is not None
+    drive = drive._replace(hold=drive.hold._replace(slew={"speed": 1.0}))
+    assert control_of(driver, drive).defaults == {"speed": 0.0}

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 
 from tests.unit.runtime.desks import DRIVER, Scene, held
 from urc.model.codec import Payload
+from urc.model.values import Reading
 from urc.problems import UrcError
 
 
@@ -56,3 +57,38 @@ def test_frame_of_a_robot_without_movers_renews_no_stop() -> None:
     it.desk.attach(it.frames, None)
     assert it.frames.send() == 1
     assert it.heard() == []
+
+
+def test_stop_is_made_once_for_a_tick_after_all_its_numbers() -> None:
+    it = Scene()
+    it.frames.number = 10
+    whole = it.frames.motion_frame
+
+    def double(command: str, arguments: Mapping[str, Reading], now: float) -> Payload:
+        it.frames.send()
+        return whole(command, arguments, now)
+
+    it.frames.motion_frame = double  # type: ignore[method-assign]
+    it.drive("ann", "take")
+    it.tick(speed=0.5)
+    it.heard()
+    it.tick(speed=0.6)
+    assert it.heard() == ["stop is 15 drive stop", "14 drive speed=0.6"]
+
+
+def test_stopped_control_rests() -> None:
+    it = Scene()
+    it.drive("ann", "take")
+    it.tick(speed=0.5)
+    assert not it.desk.rests("drive")
+    it.desk.stop("vic")
+    assert it.desk.rests("drive")
+
+
+def test_refusal_ends_the_motion_also_without_a_listener() -> None:
+    it = Scene()
+    it.drive("ann", "take")
+    it.tick(speed=0.5)
+    it.heard()
+    it.frames.on_refused("drive", "too steep")
+    assert it.heard() == ["release drive"]
