@@ -50,6 +50,7 @@ class Outcome:
 
 STATIC = (
     Step("lint", (PYTHON, "-m", "ruff", "check", ".")),
+    Step("prose", (PYTHON, "-m", "scripts.prose")),
     Step("format", (PYTHON, "-m", "ruff", "format", "--check", ".")),
     Step("types", (PYTHON, "-m", "mypy"), timeout_s=300),
     Step("docs", (PYTHON, "-m", "scripts.docs")),
