@@ -8,9 +8,8 @@ from collections.abc import Iterable
 from os import PathLike, fspath
 from typing import NamedTuple
 
-from urc.config.automatic import automatic_slots
+from urc.config.default_look import automatic_slots, default_interface
 from urc.config.gather import gather
-from urc.config.layout import default_interface
 from urc.config.link.driver import link_driver, link_simulator
 from urc.config.link.look import link_interface, link_slots
 from urc.config.link.tests import link_test

@@ -1,6 +1,6 @@
-"""A profile as one document: all that it is made of put together, with the place of every key.
+"""A profile as one document, with the place of every key.
 
-Pure but for the reading. What comes out is a document itself: it loads, and means the same.
+The result is itself a document: it loads, and means the same.
 """
 
 import json
@@ -11,11 +11,11 @@ from typing import Final, NamedTuple
 
 from urc.config.compose.merge import Tree, merge
 from urc.config.gather import gather
-from urc.config.made_look import made_look
 from urc.config.parse.widget import Shelf
 from urc.config.part import Part
 from urc.config.schemas import read_schema
 from urc.config.sources import RESERVED, Sources
+from urc.model.interface import Grid, Interface, WidgetUse
 from urc.model.profile import Profile
 from urc.problems import Problem, has_errors, printable
 from urc.source import Document, Mark
@@ -27,14 +27,14 @@ _BUILDING: Final = ("extends", "include", "partial", "params", "driver", "interf
 _BESIDE: Final = ("settings", "widgets", "tests", "simulator")
 _PLAIN: Final = re.compile(r"[A-Za-z_](?:[\w./ -]*[\w./-])?|\d+(?:ms|s|m|h)", re.ASCII)
 _WORDS: Final = frozenset(("null", "true", "false", "yes", "no", "on", "off", "y", "n"))
-"""What some reader of YAML does not take for text."""
+"""Words that some YAML reader does not read as text."""
 _UNSAFE: Final = re.compile("[\x7f-\x9f\u2028\u2029\ud800-\udfff\ufeff\ufffe\uffff]")
 _BLOCK: Final = re.compile(r"(?:[!-~](?:[ -~]*[!-~])?\n){2,}")
 _INLINE_MOST: Final = 60
 
 
 class Resolved(NamedTuple):
-    """What came of putting a document together."""
+    """The result of `resolve`."""
 
     text: str
     """The whole document; "" when there are errors."""
@@ -42,13 +42,13 @@ class Resolved(NamedTuple):
 
 
 def resolve(path: str, shelf: Shelf, profile: Profile | None = None) -> Resolved:
-    """Return the document at `path` with everything that it is made of.
+    """Return the document at `path` merged with all its sources.
 
     Args:
         path: a robot, driver, interface or widget.
         shelf: the widgets there are.
-        profile: the same as loaded; then the look that is made, where the document says nothing of
-            it, stands in it too.
+        profile: the loaded profile; the text then has the default look as well, where the document
+            declares none.
     """
     sources, problems, _, _ = gather(path)
     if sources is None:
@@ -57,7 +57,7 @@ def resolve(path: str, shelf: Shelf, profile: Profile | None = None) -> Resolved
             problems.append(Problem("partial-document", text, path))
         return Resolved("", tuple(problems))
     lines = [f"# {path}, put together by 'urc resolve'."]
-    made = made_look(sources, profile)
+    made = _default_look(sources, profile)
     if made:
         told = " and ".join(f"'{key}'" for key in made)
         lines.append(f"# It says nothing of its look, so {told} below: URC made them.")
@@ -93,13 +93,13 @@ def _sections(sources: Sources, shelf: Shelf) -> Iterator[tuple[str, object]]:
 
 
 def _layout(part: Part) -> Mapping[str, Part]:
-    """Return what of an interface stands in a robot's document."""
+    """Return the keys of an interface that a robot's document may have."""
     keys = read_schema("interface.schema.json")["$defs"]["inlineInterface"]["properties"]
     return {key: inner for key, inner in part.entries().items() if key in keys}
 
 
 def _slot(parts: list[Part], shelf: Shelf) -> Part:
-    """Return what fills a slot, a later part over an earlier one."""
+    """Return the widget of a slot, a later part over an earlier one."""
     tree = _tree(parts[0])
     for part in parts[1:]:
         over = _tree(part)
@@ -117,7 +117,7 @@ def _tree(part: Part) -> Tree:
 
 
 def _for_widget(tree: Tree, name: str, shelf: Shelf) -> Tree:
-    """Return what another widget takes over: bindings of the same names, but no options."""
+    """Return the keys that another widget takes over: bindings of the same names, no options."""
     widget = shelf.get(name)
     ports = {**widget.inputs, **widget.outputs} if widget is not None else {}
     value = {key: item for key, item in dict(tree.value).items() if key != "options"}  # type: ignore[call-overload]
@@ -209,3 +209,46 @@ def _text(text: str) -> str:
         return f"'{text}'"  # a pattern, most likely
     quoted = json.dumps(text, ensure_ascii=False)
     return _UNSAFE.sub(lambda found: f"\\u{ord(found[0]):04x}", quoted)
+
+
+def _default_look(sources: Sources, profile: Profile | None) -> dict[str, object]:
+    """Return the default ``widgets`` and ``interfaces``, where the documents declare none."""
+    if profile is None or sources.interfaces:
+        return {}
+    made: dict[str, object] = {}
+    if not sources.slots and profile.slots:
+        made["widgets"] = {slot: _use(use) for slot, use in profile.slots.items()}
+    if sources.kind == "robot" and profile.slots:
+        made["interfaces"] = {name: _interface(one) for name, one in profile.interfaces.items()}
+    return made
+
+
+def _use(use: WidgetUse) -> dict[str, object]:
+    bind: dict[str, object] = {**use.inputs}
+    bind |= {name: list(many) for name, many in use.lists.items()}
+    bind |= {name: _output(use, name) for name in use.outputs}
+    written: dict[str, object] = {"use": use.widget, "bind": bind}
+    return written | ({"title": use.title} if use.title else {})
+
+
+def _output(use: WidgetUse, name: str) -> object:
+    given = use.given.get(name)
+    command = use.outputs[name]
+    if given is None or not given.names:
+        return command
+    return {"command": command, "args": {source: target for target, source in given.names.items()}}
+
+
+def _interface(interface: Interface) -> dict[str, object]:
+    grids = {screen: _picture(grid) for screen, grid in interface.grids.items()}
+    return {"title": interface.title, "grids": grids}
+
+
+def _picture(grid: Grid) -> str:
+    rows = [["."] * grid.columns for _ in range(grid.rows)]
+    for slot in grid.slots:
+        for row in range(slot.row, slot.row + slot.row_span):
+            for column in range(slot.column, slot.column + slot.column_span):
+                rows[row][column] = slot.name
+    width = max(len(name) for row in rows for name in row)
+    return "".join("  ".join(name.ljust(width) for name in row).rstrip() + "\n" for row in rows)

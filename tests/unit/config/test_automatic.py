@@ -6,8 +6,7 @@ from pathlib import Path
 import pytest
 
 from tests.unit.config.folder import WIRE, head
-from urc.config.automatic import MOST_PLAIN, automatic_slots
-from urc.config.layout import default_interface
+from urc.config.default_look import MOST_PLAIN, automatic_slots, default_interface
 from urc.config.load import Checked, check
 from urc.config.parse.widget import Shelf
 from urc.config.resolve import resolve

@@ -3,9 +3,8 @@
 from collections.abc import Mapping
 from typing import NamedTuple, TypeVar
 
-from urc.config.link.files import link_files
 from urc.config.link.outputs import link_output, takes
-from urc.config.link.pages import link_pages
+from urc.config.link.resources import link_files, link_pages
 from urc.config.link.together import link_together
 from urc.config.parse.widget import Shelf
 from urc.config.part import Findings, Part

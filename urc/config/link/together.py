@@ -4,7 +4,7 @@ import re
 from collections.abc import Iterator, Mapping
 from typing import Any, Final
 
-from urc.config.link.files import named_texts
+from urc.config.link.resources import named_texts
 from urc.config.part import Findings, Part
 from urc.config.suggest import did_you_mean, listed
 from urc.model.binding import targets

@@ -1,13 +1,13 @@
 """The framing of a transport or of one reply: mapping → `FramingSpec`."""
 
 from collections.abc import Callable
+from re import _constants, _parser  # type: ignore[attr-defined]  # no public door to the syntax tree
 from typing import Any, Final
 
 from urc.config.parse.bytes import parse_bytes
 from urc.config.parse.checksum import values_of
 from urc.config.parse.escape import parse_escape
 from urc.config.parse.frame_layout import MARKED, parse_layout
-from urc.config.parse.frame_pattern import check_frame_pattern
 from urc.config.part import Findings, Part
 from urc.config.suggest import did_you_mean, listed
 from urc.model.driver import FramingSpec
@@ -98,7 +98,7 @@ def _check_raw(
 def _regex(part: Part, encoding: str, findings: Findings) -> dict[str, Any]:
     inner = part.must("pattern")
     if findings.pattern(inner, is_over_bytes=True) is not None:
-        check_frame_pattern(inner, findings)
+        _check_pattern(inner, findings)
     return {"pattern": inner.data} | _tx(part, encoding, findings)
 
 
@@ -199,3 +199,70 @@ def _check_case(
             "never-matches",
             f"its frames begin with {start.hex(' ')}, not with {first.hex(' ')}",
         )
+
+
+_REPEATS = (_constants.MAX_REPEAT, _constants.MIN_REPEAT)
+
+
+def _check_pattern(part: Part, findings: Findings) -> None:
+    """Report faults of a pattern that cuts a stream; it must show where a frame ends."""
+    text: str = part.data
+    far = next((place for place, char in enumerate(text) if ord(char) > 127), None)
+    if far is not None:
+        findings.error(
+            part,
+            "bad-pattern",
+            f"{text[far]!r} is no byte: the pattern is over bytes, and sees no other characters",
+            offset=far,
+            hint="write its bytes as \\xHH",
+        )
+        return
+    tree = _parser.parse(text.removeprefix("^"))
+    if tree.getwidth()[0] == 0:
+        findings.error(
+            part,
+            "matches-nothing",
+            "the pattern also matches no bytes at all, which is no frame",
+            hint="let it ask for at least one byte",
+        )
+    elif _has_anchor(tree):
+        findings.error(
+            part,
+            "misplaced-anchor",
+            "'^', '$' and '\\b' mean nothing inside a stream",
+            hint="a frame begins where the pattern begins to match; name the bytes that end it",
+        )
+    elif _is_open(tree):
+        findings.error(
+            part,
+            "open-end",
+            "the pattern ends with something that may go on, so the end of a frame is never sure",
+            hint=f"name what ends a frame, such as '{text}\\r\\n'",
+        )
+
+
+def _parts(operation: Any, argument: Any) -> list[Any]:
+    """Return the sequences inside one node of a pattern."""
+    if operation is _constants.SUBPATTERN:
+        return [argument[3]]
+    if operation in _REPEATS:
+        return [argument[2]]
+    return list(argument[1]) if operation is _constants.BRANCH else []
+
+
+def _has_anchor(tree: Any) -> bool:
+    return any(
+        operation is _constants.AT or any(map(_has_anchor, _parts(operation, argument)))
+        for operation, argument in tree
+    )
+
+
+def _is_open(tree: Any) -> bool:
+    """Return whether the last item of a sequence may take more or fewer bytes."""
+    items = list(tree)
+    if not items:
+        return True
+    operation, argument = items[-1]
+    if operation in _REPEATS and argument[0] != argument[1]:
+        return True
+    return any(map(_is_open, _parts(operation, argument)))

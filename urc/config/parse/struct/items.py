@@ -7,10 +7,9 @@ kind of item stands in `_KEYS`; numbers, constants and enums are checked by `str
 from collections.abc import Mapping
 from typing import Final, Literal
 
-from urc.config.parse.struct.leaves import LeafParser, kind_of
+from urc.config.parse.struct.leaves import LeafParser, kind_of, parse_content
 from urc.config.parse.struct.numbers import check_fits, unknown_type, written_constant
 from urc.config.parse.struct.scope import Scope
-from urc.config.parse.struct.text import parse_content
 from urc.config.part import Findings, Part
 from urc.model.binary import (
     FRAME_NAMES,

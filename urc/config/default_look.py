@@ -1,10 +1,11 @@
-"""Which widget shows a signal or gives a command, where a profile says nothing about its look.
+"""The look of a profile that declares none: a widget for each slot, and their grid.
 
-Pure: the same driver and the same widgets give the same slots. A widget that is not there, or that
-does not take what it would be given, is passed over for a plainer one. Commands that need several
-values are left out: the interface for finding faults has a form for each.
+Pure: the same driver and the same widgets give the same look. When a widget is missing, or does not
+take its signal, a plainer one is chosen. Commands with several arguments get no widget: the dev
+page has a form for each.
 """
 
+import math
 import re
 from collections.abc import Iterator, Mapping
 from typing import Final
@@ -12,12 +13,12 @@ from typing import Final
 from urc.config.link.look import misfit
 from urc.config.parse.widget import Shelf
 from urc.model.driver import Argument, Command, Driver
-from urc.model.interface import Given, WidgetUse
+from urc.model.interface import Given, Grid, Interface, Slot, WidgetUse
 from urc.model.units import are_apart
 from urc.model.values import Signal
 from urc.model.widget import Widget
 
-__all__ = ["automatic_slots"]
+__all__ = ["automatic_slots", "default_interface"]
 
 MOST_PLAIN: Final = 24
 """Signals with a cell of their own, when a table can take the others."""
@@ -45,9 +46,23 @@ _GROUPS: Final[tuple[tuple[str, Mapping[str, tuple[str, ...]], frozenset[str]], 
 )
 """Widget, its inputs by the last words of signals' names, and the inputs that it needs at least."""
 
+_COLUMNS: Final = {"wide": 4, "phone": 2, "low": 7}
+"""Most columns of a default grid."""
+_LOW_ROWS: Final = 2
+"""Visible rows on a phone in landscape."""
+_BIG: Final = frozenset(
+    (
+        *("attitude", "camera", "depth", "dpad", "image", "joystick", "log", "map", "pano360"),
+        *("path-pad", "plot", "scan", "scene3d", "table", "terminal", "vector-pad"),
+    )
+)
+"""Widgets that get two rows and two columns."""
+_STEERED: Final = 2
+"""Rank of controls that steer."""
+
 
 def automatic_slots(driver: Driver, shelf: Shelf) -> dict[str, WidgetUse]:
-    """Return the widget for each slot: what shows the signals first, then what gives commands."""
+    """Return the widget of each slot: views of signals first, then controls."""
     slots: dict[str, WidgetUse] = {}
     left = dict(driver.signals)
     for use in _grouped(left, shelf):
@@ -255,3 +270,65 @@ def _use(widget: Widget, slot: str, inputs: Mapping[str, str], title: str) -> Wi
         if isinstance(schema, dict) and "default" in schema
     }
     return WidgetUse(slot, widget.name, dict(inputs), {}, options, title)
+
+
+def default_interface(slots: Mapping[str, WidgetUse], title: str) -> Interface:
+    """Return an interface named ``default`` that shows every slot.
+
+    Views are on top, the large before the small. Controls that steer are at the bottom right, near
+    the thumb; other controls take the free places. On a phone in landscape, controls that steer
+    come first, at the right and at the left; the page scrolls to the rest.
+    """
+    return Interface(
+        name="default",
+        title=title,
+        grids={screen: _grid(slots, screen) for screen in _COLUMNS},
+    )
+
+
+def _grid(slots: Mapping[str, WidgetUse], screen: str) -> Grid:
+    is_low = screen == "low"
+    sizes = {name: 2 if use.widget in _BIG else 1 for name, use in slots.items()}
+    area = sum(size * size for size in sizes.values())
+    wanted = math.ceil(area / _LOW_ROWS if is_low else math.sqrt(area))
+    columns = max(1, min(_COLUMNS[screen], wanted), *sizes.values())
+    taken: set[tuple[int, int]] = set()
+    placed: dict[str, Slot] = {}
+    ranks = {name: _rank(use) for name, use in slots.items()}
+    # In a narrow grid, controls that steer come last: at the bottom, with nothing below.
+    steered = -1 if is_low else _STEERED if columns > 2 else 4
+    order = {name: steered if rank == _STEERED else rank for name, rank in ranks.items()}
+    for number, name in enumerate(sorted(slots, key=lambda name: order[name])):
+        is_steered = ranks[name] == _STEERED
+        is_last = is_steered and not is_low
+        first = max((row for row, _ in taken), default=-1) + 1 if is_last else 0
+        is_right = is_steered and not (is_low and number % 2)
+        row, column = _free(taken, columns, sizes[name], first, is_from_right=is_right)
+        taken |= _cells(row, column, sizes[name])
+        placed[name] = Slot(name, row, column, sizes[name], sizes[name])
+    rows = max((row for row, _ in taken), default=0) + 1
+    return Grid(rows, columns, tuple(placed.values()))
+
+
+def _rank(use: WidgetUse) -> int:
+    """Return the place in the order: large views, small views, controls that steer, others."""
+    if use.widget in _BIG:
+        return _STEERED if use.outputs and not use.inputs else 0
+    return 3 if use.outputs else 1
+
+
+def _free(
+    taken: set[tuple[int, int]], columns: int, size: int, first: int, *, is_from_right: bool
+) -> tuple[int, int]:
+    """Return the first place at or below the row `first` where a square has room."""
+    places = range(columns - size + 1)
+    row = first
+    while True:
+        for column in reversed(places) if is_from_right else places:
+            if not taken & _cells(row, column, size):
+                return row, column
+        row += 1
+
+
+def _cells(row: int, column: int, size: int) -> set[tuple[int, int]]:
+    return {(row + down, column + right) for down in range(size) for right in range(size)}

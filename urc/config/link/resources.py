@@ -1,0 +1,148 @@
+"""Files and web pages that the options of a widget name.
+
+A dashboard serves exactly the files that a document names. A file must lie in the folder of the
+document, so that no package can publish other files of the disk.
+
+The host of a web page is written into the policy of the document that shows the page. Its URL must
+therefore be one that all browsers read alike.
+"""
+
+import ipaddress
+import re
+from collections.abc import Iterator, Mapping
+from pathlib import Path as FilePath
+from pathlib import PurePosixPath
+from typing import Final
+
+from urc.config.part import Findings, Part
+from urc.model.widget import Widget
+
+__all__ = ["FILE_TYPES", "LONGEST_URL", "MOST_BYTES", "link_files", "link_pages", "named_texts"]
+
+FILE_TYPES: Final = (
+    *(".urdf", ".stl", ".dae", ".glb", ".obj", ".mtl", ".md", ".txt", ".json", ".csv"),
+    *(".png", ".jpg", ".jpeg", ".webp", ".gif", ".svg", ".wav", ".mp3", ".ogg"),
+)
+"""File types that widgets can use; none of them runs."""
+
+MOST_BYTES: Final = 64 << 20
+"""Of one file."""
+
+LONGEST_URL: Final = 2000
+"""In characters."""
+
+_URL: Final = re.compile(
+    r"(?P<scheme>[A-Za-z][A-Za-z0-9+.-]*):(?://(?P<authority>[^/?#\\]*))?(?P<rest>.*)", re.DOTALL
+)
+_HOST: Final = re.compile(r"(?P<host>[A-Za-z0-9._-]{1,253})(?::(?P<port>[0-9]{1,5}))?", re.ASCII)
+_REST: Final = re.compile(r"[!#-;=?-\[\]_a-z~]*", re.ASCII)
+_NUMBER: Final = re.compile(r"[0-9]+|0[xX][0-9A-Fa-f]*", re.ASCII)
+_LAST_PORT: Final = 65535
+
+
+def link_files(options: Part, widget: Widget, findings: Findings) -> dict[str, str]:
+    """Return file names in the options → paths.
+
+    Args:
+        options: of one slot; their shape is right.
+        widget: its manifest marks the options that name files.
+        findings: takes the faults.
+    """
+    found = {}
+    for _, part in named_texts(options, widget.options, "file"):
+        fault = _file_fault(part.data)
+        place = FilePath(part.document.file).absolute().parent / part.data
+        if fault:
+            hint = "name a file in the folder of this document, or below it"
+            findings.error(part, "file-not-served", f"{part.data!r} {fault}", hint=hint)
+        elif not place.is_file():
+            findings.error(part, "no-such-file", f"there is no file {part.data!r}")
+        elif not _is_below(place, FilePath(part.document.file).absolute().parent):
+            findings.error(part, "file-not-served", f"{part.data!r} leads out of this folder")
+        elif place.stat().st_size > MOST_BYTES:
+            text = f"{part.data!r} is larger than {MOST_BYTES >> 20} MiB"
+            findings.error(part, "file-not-served", text)
+        else:
+            found[str(part.data)] = str(place.resolve())
+    return found
+
+
+def named_texts(
+    options: Part, schemas: Mapping[str, object], keyword: str
+) -> Iterator[tuple[str, Part]]:
+    """Yield the name and text of each option whose schema has `keyword: true`."""
+    for name, part in options.entries().items():
+        schema = schemas.get(name)
+        if not isinstance(schema, Mapping):
+            continue
+        items = schema.get("items")
+        if schema.get(keyword) and isinstance(part.data, str):
+            yield name, part
+        elif isinstance(items, Mapping) and items.get(keyword) and isinstance(part.data, list):
+            yield from ((name, each) for each in part.items() if isinstance(each.data, str))
+
+
+def _file_fault(name: str) -> str:
+    path = PurePosixPath(name)
+    if path.is_absolute() or ".." in path.parts or "\\" in name or ":" in name or "\0" in name:
+        return "is no path within this folder"
+    if path.suffix.lower() not in FILE_TYPES:
+        return f"is of a type that no page is given; types are {', '.join(FILE_TYPES)}"
+    return ""
+
+
+def _is_below(place: FilePath, folder: FilePath) -> bool:
+    return place.resolve().is_relative_to(folder.resolve())
+
+
+def link_pages(options: Part, widget: Widget, findings: Findings) -> dict[str, tuple[str, ...]]:
+    """Return options that may name pages → their URLs.
+
+    Args:
+        options: of one slot; their shape is right.
+        widget: its manifest marks the options that name pages.
+        findings: takes the faults. An empty text is right: it names no page.
+    """
+    found: dict[str, tuple[str, ...]] = {}
+    for name, part in named_texts(options, widget.options, "page"):
+        url = str(part.data)
+        fault = _page_fault(url) if url else ""
+        if fault:
+            hint = "write it as http://robot.local:8080/status"
+            findings.error(part, "page-not-shown", f"{url[:80]!r} {fault}", hint=hint)
+        found[name] = (*found.get(name, ()), *((url,) if url and not fault else ()))
+    return found
+
+
+def _page_fault(url: str) -> str:
+    parts = _URL.fullmatch(url)
+    if parts is None or parts["scheme"].lower() not in ("http", "https"):
+        return "is no http or https URL"
+    if len(url) > LONGEST_URL:
+        return f"is longer than {LONGEST_URL} characters"
+    authority = parts["authority"] or ""
+    if "@" in authority:
+        return "holds a name or password, which everybody who sees the page could read"
+    if authority.startswith("["):
+        return "names an IPv6 address, which the policy of a page cannot; give the host a name"
+    host = _HOST.fullmatch(authority)
+    if host is None or not _is_host(host["host"]):
+        return "names no host that all browsers read alike"
+    if host["port"] is not None and not 0 < int(host["port"]) <= _LAST_PORT:
+        return f"names a port that is not 1 to {_LAST_PORT}"
+    if not _REST.fullmatch(parts["rest"]):
+        return "holds a character that a URL writes as %XX"
+    return ""
+
+
+def _is_host(host: str) -> bool:
+    labels = host.removesuffix(".").split(".")
+    if not all(labels):
+        return False
+    # Browsers read `127.1` and `0x7f000001` as addresses, too. Only the usual notation is allowed.
+    if _NUMBER.fullmatch(labels[-1]):
+        try:
+            ipaddress.IPv4Address(host)
+        except ValueError:
+            return False
+    return True
