@@ -4,9 +4,9 @@ URC's page has real widgets and a real server behind it. Beside it stands the pa
 first, with as many places: a message a value, written as it comes. Both also with the page's
 processor slowed six times, as on an old telephone.
 
-Where a frame has no room for all sixty, URC's widgets take turns (``static/pace.js``): each is then
-drawn with its newest value in every twentieth frame or more often. So the time of a frame counts
-beside the number of frames: the naive page writes each value and comes to few frames.
+Where a frame has no room for all sixty, URC's widgets take turns (``static/widgets/pace.js``): each
+is then drawn with its newest value in every twentieth frame or more often. So the time of a frame
+counts beside the number of frames: the naive page writes each value and comes to few frames.
 """
 
 import asyncio

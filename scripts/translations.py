@@ -42,7 +42,7 @@ def sources() -> Iterator[tuple[str, Path]]:
         ("templates/*.j2", "jinja2"),
         ("widgets/*/*.j2", "jinja2"),
         ("widgets/*/*.js", "javascript"),
-        ("urc/web/static/*.js", "javascript"),
+        ("urc/web/static/**/*.js", "javascript"),
         ("urc/web/**/*.py", "python"),
         ("urc/runtime/permissions.py", "python"),
         ("urc/runtime/risks.py", "python"),

@@ -52,12 +52,12 @@ def script_graph() -> Graph:
     """Return module → the modules of ours that it imports, of the pages and the widgets."""
     graph: Graph = {}
     static = ROOT / "urc/web/static"
-    for path in sorted([*static.glob("*.js"), *(ROOT / "widgets").glob("*/*.js")]):
+    for path in sorted([*static.rglob("*.js"), *(ROOT / "widgets").glob("*/*.js")]):
         text = re.sub(r"/\*.*?\*/", "", path.read_text("utf-8"), flags=re.S)  # types are no imports
         wanted = re.findall(r"""(?:\bfrom|\bimport)\s*\(?\s*["']([^"']+)["']""", text)
         graph[str(path)] = {
             str(
-                static / f"{one[4:]}.js"
+                static / f"widgets/{one[4:]}.js"
                 if one.startswith("urc/")
                 else (path.parent / one).resolve()
             )

@@ -106,7 +106,9 @@ def test_a_frame_may_load_code_of_ours_and_its_own_and_reach_nothing(
     assert "puppet" not in answer.text
 
 
-@pytest.mark.parametrize("file", ["/static/kit.css", "/widgets/lamp/widget.js", "/words/de.js"])
+@pytest.mark.parametrize(
+    "file", ["/static/widgets/kit.css", "/widgets/lamp/widget.js", "/words/de.js"]
+)
 def test_code_is_open_to_frames_and_to_no_other_site(tmp_path: Path, file: str) -> None:
     """By a path of this start, which only our own pages are told; a frame has no cookies."""
     app = build_app({"puppet": Robot(lamp(tmp_path).profile, {}, lamp_session)}, access=ACCESS)

@@ -24,9 +24,11 @@ def rules(css: str) -> Iterator[tuple[str, frozenset[str]]]:
         )
 
 
-KIT = list(rules((STATIC / "kit.css").read_text("utf-8")))
+KIT = list(rules((STATIC / "widgets/kit.css").read_text("utf-8")))
 NAMED = set(
-    re.findall(r"\.(urc-[\w-]+)", "".join(file.read_text("utf-8") for file in STATIC.glob("*.css")))
+    name
+    for file in STATIC.rglob("*.css")
+    for name in re.findall(r"\.(urc-[\w-]+)", file.read_text("utf-8"))
 )
 
 

@@ -78,8 +78,8 @@ ROUTES = [
     ("GET", "/robots/puppet/?interface=nope", 404),
     ("GET", "/healthz", 200),
     ("GET", "/favicon.ico", 200),
-    ("GET", "/static/app.css", 200),
-    ("GET", "/static/main.js", 200),
+    ("GET", "/static/core/app.css", 200),
+    ("GET", "/static/live/main.js", 200),
     ("GET", "/static/nope.js", 404),
     ("GET", "/vendor/nope.js", 404),
     ("GET", "/widgets/battery/widget.js", 200),
@@ -206,10 +206,10 @@ def test_the_menu_names_the_settings_that_are_missing(client: TestClient) -> Non
 
 def test_files_are_kept_until_they_change(client: TestClient) -> None:
     """A browser asks each time, and gets no second copy."""
-    first = client.get("/static/main.js")
+    first = client.get("/static/live/main.js")
     assert first.headers["cache-control"] == "no-cache"
     assert first.headers["content-type"] == "text/javascript; charset=utf-8"
-    again = client.get("/static/main.js", headers={"if-none-match": first.headers["etag"]})
+    again = client.get("/static/live/main.js", headers={"if-none-match": first.headers["etag"]})
     assert (again.status_code, again.content) == (304, b"")
     assert client.get("/static/favicon.svg").headers["content-type"] == "image/svg+xml"
     assert client.get("/").headers["cache-control"] == "no-store"
@@ -224,8 +224,8 @@ TRAVERSALS = [
     "/static/..\\app.py",
     "/static//etc/passwd",
     "/static/%2fetc%2fpasswd",
-    "/static/main.js%00.css",
-    "/static/main.js/",
+    "/static/live/main.js%00.css",
+    "/static/live/main.js/",
     "/static/MAIN.JS",
     "/static/C:%5cWindows%5cwin.ini",
     "/static/CON",
@@ -294,11 +294,11 @@ def test_scripts_write_no_markup_and_files_stay_short() -> None:
 
     A foreign widget's template, which the server has rendered, goes into its frame as markup.
     """
-    for path in (*STATIC.glob("*.js"), *(ROOT / "widgets").glob("*/*.js")):
+    for path in (*STATIC.rglob("*.js"), *(ROOT / "widgets").glob("*/*.js")):
         text = path.read_text("utf-8")
         assert text.startswith("// @ts-check"), path
         written = re.findall(r"innerHTML|outerHTML|insertAdjacentHTML|document\.write|eval\(", text)
-        assert written == (["innerHTML"] if path == STATIC / "frame.js" else []), path
+        assert written == (["innerHTML"] if path == STATIC / "frame/frame.js" else []), path
         assert len(text.splitlines()) <= 600, path
 
 
@@ -315,7 +315,7 @@ SERIES = tuple(f"series-{number}" for number in range(1, 7))
 
 def theme_colours(name: str) -> dict[str, str]:
     """Return token → hex colour of a theme, read from the style sheet."""
-    css = (STATIC / "tokens.css").read_text("utf-8")
+    css = (STATIC / "core/tokens.css").read_text("utf-8")
     number = THEMES[name][1]
     if number is not None:
         pairs = re.findall(r"--urc-([\w-]+): light-dark\((#\w{6}), (#\w{6})\);", css)

@@ -185,7 +185,7 @@ async def test_arguments_go_to_a_command_under_its_own_names(new_page: PageMaker
         await page.goto(f"{address}empty")
         got = await page.evaluate(
             """async ([outputs, given]) => {
-              const { argumentsOf } = await import("/static/output.js");
+              const { argumentsOf } = await import("/static/widgets/output.js");
               return outputs.map(([names, fixed]) => argumentsOf({ names, fixed }, given));
             }""",
             [

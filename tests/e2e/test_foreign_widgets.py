@@ -44,7 +44,7 @@ const tries = {
   }),
   script: () => import("/widgets/battery/widget.js"),
   text: () => (0, eval)("1"),
-  worker: () => new Worker("/static/kit.js"),
+  worker: () => new Worker("/static/widgets/kit.js"),
   popup: () => { if (!open("/healthz")) throw 0; },
   socket: () => new Promise((resolve, reject) => {
     const line = new WebSocket(`ws://${location.host}/ws?robot=puppet`);

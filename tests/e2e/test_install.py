@@ -63,5 +63,5 @@ async def test_what_moves_a_robot_is_never_kept(new_page: PageMaker) -> None:
             "caches.open('urc-1').then((cache) => cache.keys())"
             ".then((all) => all.map((one) => new URL(one.url).pathname))"
         )
-        assert "/static/tokens.css" in kept
+        assert "/static/core/tokens.css" in kept
         assert "/healthz" not in kept

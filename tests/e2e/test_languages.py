@@ -58,7 +58,7 @@ CUT = """
 }
 """
 
-SAID = "(text) => import('/static/words.js').then(({ said }) => said(text))"
+SAID = "(text) => import('/static/core/words.js').then(({ said }) => said(text))"
 
 
 def english(tag: str) -> list[re.Pattern[str]]:

@@ -56,7 +56,7 @@ def installed(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
         "urc/_shipped/schemas/robot.schema.json",
         "urc/_shipped/robots/puppet.yaml",
         "urc/_shipped/widgets/battery/widget.yaml",
-        "urc/web/static/tokens.css",
+        "urc/web/static/core/tokens.css",
         "urc/py.typed",
         "urc_vendor/importmap.json",
         "urc_vendor/uplot/dist/uPlot.esm.js",

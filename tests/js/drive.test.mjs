@@ -2,7 +2,7 @@
 /** Which ticks go out: none behind others that wait, and none is kept back by one on its way. */
 import assert from "node:assert/strict";
 import test from "node:test";
-import { Drive } from "../../urc/web/static/drive.js";
+import { Drive } from "../../urc/web/static/control/drive.js";
 
 Object.assign(globalThis, { WebSocket: { OPEN: 1 }, window: globalThis });
 let nowMs = 1000;

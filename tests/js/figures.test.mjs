@@ -3,15 +3,15 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { digitsIn, format } from "../../urc/web/static/kit.js";
-import { textOf } from "../../urc/web/static/texts.js";
-import { Store } from "../../urc/web/static/store.js";
+import { digitsIn, format } from "../../urc/web/static/widgets/kit.js";
+import { textOf } from "../../urc/web/static/core/texts.js";
+import { Store } from "../../urc/web/static/live/store.js";
 
 /**
  * @param {number | number[]} value
- * @param {Partial<import("../../urc/web/static/types.js").Signal>} signal
+ * @param {Partial<import("../../urc/web/static/core/types.js").Signal>} signal
  * @param {string} [system]
- * @param {import("../../urc/web/static/types.js").Conversion} [conversion]
+ * @param {import("../../urc/web/static/core/types.js").Conversion} [conversion]
  */
 function shown(value, signal, system = "imperial", conversion) {
   const store = new Store();

@@ -13,8 +13,8 @@ Object.assign(globalThis, {
   requestAnimationFrame() {},
 });
 performance.now = () => nowMs;
-const { Input } = await import("../../urc/web/static/input.js");
-const { Control } = await import("../../urc/web/static/grip.js");
+const { Input } = await import("../../urc/web/static/control/input.js");
+const { Control } = await import("../../urc/web/static/control/grip.js");
 
 /** A control that a hand holds, and what was told of it. */
 function held() {

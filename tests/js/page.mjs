@@ -13,7 +13,7 @@ const OURS = /^urc\\/([a-z]+)$/;
 export async function resolve(name, context, next) {
   const ours = OURS.exec(name)?.[1];
   // English is the key of every text, so nothing has to be said for it.
-  const url = ours && new URL((ours === "words" ? "english" : ours) + ".js", STATIC).href;
+  const url = ours && new URL((ours === "words" ? "core/english" : "widgets/" + ours) + ".js", STATIC).href;
   const found = url ? { url, shortCircuit: true } : await next(name, context);
   return found.url.endsWith(".js") && !found.url.includes("/node_modules/")
     ? { ...found, format: "module" }

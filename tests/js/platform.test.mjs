@@ -3,13 +3,13 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { Budget } from "../../urc/web/static/budget.js";
-import { Alerts, Follows, Log } from "../../urc/web/static/follow.js";
-import { frameOf } from "../../urc/web/static/frames.js";
-import { DASH, clamp, format, many, number, numbers, t } from "../../urc/web/static/kit.js";
-import { Decoder } from "../../urc/web/static/picture.js";
-import { Store } from "../../urc/web/static/store.js";
-import { Units, converted } from "../../urc/web/static/units.js";
+import { Budget } from "../../urc/web/static/widgets/budget.js";
+import { Alerts, Follows, Log } from "../../urc/web/static/live/follow.js";
+import { frameOf } from "../../urc/web/static/live/frames.js";
+import { DASH, clamp, format, many, number, numbers, t } from "../../urc/web/static/widgets/kit.js";
+import { Decoder } from "../../urc/web/static/widgets/picture.js";
+import { Store } from "../../urc/web/static/live/store.js";
+import { Units, converted } from "../../urc/web/static/core/units.js";
 
 test("a widget that is long in twenty of sixty calls is called once a second", () => {
   const budget = new Budget();
@@ -159,7 +159,7 @@ test("lines of the log that come again are skipped, and lost ones are counted", 
   assert.deepEqual([log.lines.length, log.lines.at(-1)?.number], [500, 699]);
 });
 
-/** @param {Partial<import("../../urc/web/static/types.js").Signal>[]} signals */
+/** @param {Partial<import("../../urc/web/static/core/types.js").Signal>[]} signals */
 function storeOf(...signals) {
   const store = new Store();
   const named = signals.map((signal, index) => ({ name: `s${index}`, type: "number", ...signal }));

@@ -3,7 +3,7 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 import { Recording, field, span } from "../../widgets/recorder/rows.js";
 
-/** @typedef {import("../../urc/web/static/types.js").Reading} Reading */
+/** @typedef {import("../../urc/web/static/core/types.js").Reading} Reading */
 
 /**
  * @param {string} name

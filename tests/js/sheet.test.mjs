@@ -2,8 +2,8 @@
 import assert from "node:assert/strict";
 import { afterEach, test } from "node:test";
 
-import { board } from "../../urc/web/static/kit.js";
-import { Sheet } from "../../urc/web/static/sheet.js";
+import { board } from "../../urc/web/static/widgets/kit.js";
+import { Sheet } from "../../urc/web/static/widgets/sheet.js";
 
 /** A pen that writes down what is drawn. */
 class Pen {

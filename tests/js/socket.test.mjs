@@ -45,7 +45,7 @@ Object.assign(globalThis, {
 });
 performance.now = () => nowMs;
 
-const { Socket } = await import("../../urc/web/static/socket.js");
+const { Socket } = await import("../../urc/web/static/live/socket.js");
 
 /** Let so much time pass for a page that runs: each of its ticks comes when it is due. */
 function passes(/** @type {number} */ seconds) {

@@ -4,8 +4,8 @@ import assert from "node:assert/strict";
 import test from "node:test";
 
 Object.assign(globalThis, { addEventListener() {}, window: globalThis });
-const { StopButton } = await import("../../urc/web/static/stop.js");
-const { Giver } = await import("../../urc/web/static/giver.js");
+const { StopButton } = await import("../../urc/web/static/control/stop.js");
+const { Giver } = await import("../../urc/web/static/widgets/giver.js");
 
 /** A button of which it can be said what is known of STOP. */
 function scene() {

@@ -2,8 +2,8 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { Alerts, watched } from "../../urc/web/static/follow.js";
-import { Store } from "../../urc/web/static/store.js";
+import { Alerts, watched } from "../../urc/web/static/live/follow.js";
+import { Store } from "../../urc/web/static/live/store.js";
 
 /** @param {Store} store @param {...object} signals */
 function hello(store, ...signals) {

@@ -2,7 +2,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { Wish } from "../../urc/web/static/wish.js";
+import { Wish } from "../../urc/web/static/widgets/wish.js";
 
 const WITHIN_MS = 3000;
 

@@ -12,7 +12,7 @@ EXAMPLE = "urc new widget lamp"
 _NAME = re.compile(r"[a-z][a-z0-9-]{0,63}")
 _FILES = Path(__file__).resolve().parent / "new_widget"
 _SCHEMA = shipped("schemas") / "widget.schema.json"
-_TYPES = Path(__file__).resolve().parents[1] / "web" / "static" / "types.js"
+_TYPES = Path(__file__).resolve().parents[1] / "web" / "static" / "core/types.js"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

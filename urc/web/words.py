@@ -55,7 +55,7 @@ def table(tag: str) -> Mapping[str, str]:
 
 def address(tag: str) -> str:
     """Return where pages find the table of a language."""
-    return "/static/english.js" if tag == "en" else f"/words/{tag}.js"
+    return "/static/core/english.js" if tag == "en" else f"/words/{tag}.js"
 
 
 def module(tag: str) -> str:

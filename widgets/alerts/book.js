@@ -1,5 +1,5 @@
 // @ts-check
-/** @typedef {import("../../urc/web/static/types.js").Alert} Alert */
+/** @typedef {import("../../urc/web/static/core/types.js").Alert} Alert */
 
 /**
  * What people have done about alerts. An alert that is over is forgotten, so that the next one of

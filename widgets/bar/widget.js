@@ -1,7 +1,7 @@
 // @ts-check
-/** @typedef {import("../../urc/web/static/types.js").Context} Context */
-/** @typedef {import("../../urc/web/static/types.js").Instance} Instance */
-/** @typedef {import("../../urc/web/static/types.js").Signal} Signal */
+/** @typedef {import("../../urc/web/static/core/types.js").Context} Context */
+/** @typedef {import("../../urc/web/static/core/types.js").Instance} Instance */
+/** @typedef {import("../../urc/web/static/core/types.js").Signal} Signal */
 import { attribute, fit, format, number, part, style } from "urc/kit";
 import { Meter } from "urc/meter";
 import { bands, digitsOf, share, ticks } from "urc/scale";

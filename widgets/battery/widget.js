@@ -1,7 +1,7 @@
 // @ts-check
-/** @typedef {import("../../urc/web/static/types.js").Reading} Reading */
-/** @typedef {import("../../urc/web/static/types.js").Context} Context */
-/** @typedef {import("../../urc/web/static/types.js").Instance} Instance */
+/** @typedef {import("../../urc/web/static/core/types.js").Reading} Reading */
+/** @typedef {import("../../urc/web/static/core/types.js").Context} Context */
+/** @typedef {import("../../urc/web/static/core/types.js").Instance} Instance */
 /** @typedef {Readonly<Record<string, Reading>>} Readings */
 import { attribute, drawing, fit, format, many, noteOf, number, numbers, part, style, tell, worst, write } from "urc/kit";
 import { share } from "urc/scale";

@@ -2,7 +2,7 @@
 /**
  * Pictures of whichever camera is looked at, decoded one at a time: the newest wins, none queues.
  *
- * @typedef {import("../../urc/web/static/types.js").Picture} Picture
+ * @typedef {import("../../urc/web/static/core/types.js").Picture} Picture
  */
 
 export class Newest {

@@ -1,9 +1,9 @@
 // @ts-check
-/** @typedef {import("../../urc/web/static/types.js").Context} Context */
-/** @typedef {import("../../urc/web/static/types.js").HoldState} HoldState */
-/** @typedef {import("../../urc/web/static/types.js").Instance} Instance */
-/** @typedef {import("../../urc/web/static/types.js").Outlet} Outlet */
-/** @typedef {import("../../urc/web/static/types.js").Reading} Reading */
+/** @typedef {import("../../urc/web/static/core/types.js").Context} Context */
+/** @typedef {import("../../urc/web/static/core/types.js").HoldState} HoldState */
+/** @typedef {import("../../urc/web/static/core/types.js").Instance} Instance */
+/** @typedef {import("../../urc/web/static/core/types.js").Outlet} Outlet */
+/** @typedef {import("../../urc/web/static/core/types.js").Reading} Reading */
 /** @typedef {import("./frame.js").Fit} Fit */
 import { DASH, attribute, board, button, many, noteOf, part, write } from "urc/kit";
 import { Rate, ageText, fileName, lookOf, place } from "./frame.js";

@@ -3,8 +3,8 @@
  * Choosing a heading: by a tap on the rose or with the arrow keys, and then a button that sends it.
  * Nothing is sent by choosing.
  */
-/** @typedef {import("../../urc/web/static/types.js").Context} Context */
-/** @typedef {import("../../urc/web/static/types.js").Outlet} Outlet */
+/** @typedef {import("../../urc/web/static/core/types.js").Context} Context */
+/** @typedef {import("../../urc/web/static/core/types.js").Outlet} Outlet */
 import { attribute, drawing, part, style, write } from "urc/kit";
 import { bearing, bearingAt, figures } from "./bearing.js";
 

@@ -1,7 +1,7 @@
 // @ts-check
-/** @typedef {import("../../urc/web/static/types.js").Context} Context */
-/** @typedef {import("../../urc/web/static/types.js").Instance} Instance */
-/** @typedef {import("../../urc/web/static/types.js").Reading} Reading */
+/** @typedef {import("../../urc/web/static/core/types.js").Context} Context */
+/** @typedef {import("../../urc/web/static/core/types.js").Instance} Instance */
+/** @typedef {import("../../urc/web/static/core/types.js").Reading} Reading */
 import { attribute, clamp, drawing, noteOf, number, part, style, write } from "urc/kit";
 import { angleOf, bearing, bearingOf, figures, point, turn } from "./bearing.js";
 import { Choice } from "./choice.js";

@@ -1,7 +1,7 @@
 // @ts-check
-/** @typedef {import("../../urc/web/static/types.js").Context} Context */
-/** @typedef {import("../../urc/web/static/types.js").Hand} Hand */
-/** @typedef {import("../../urc/web/static/types.js").Instance} Instance */
+/** @typedef {import("../../urc/web/static/core/types.js").Context} Context */
+/** @typedef {import("../../urc/web/static/core/types.js").Hand} Hand */
+/** @typedef {import("../../urc/web/static/core/types.js").Instance} Instance */
 import { arrow } from "urc/curve";
 import { attribute, part } from "urc/kit";
 import { along, DIRECTIONS, Motion, pointed } from "urc/motion";

@@ -2,9 +2,9 @@
 /**
  * Where the sticks and buttons of a gamepad are: shown, and learnt by moving them.
  *
- * @typedef {import("../../urc/web/static/types.js").Context} Context
- * @typedef {import("../../urc/web/static/types.js").PadView} PadView
- * @typedef {import("../../urc/web/static/padmap.js").PadMap} PadMap
+ * @typedef {import("../../urc/web/static/core/types.js").Context} Context
+ * @typedef {import("../../urc/web/static/core/types.js").PadView} PadView
+ * @typedef {import("../../urc/web/static/widgets/padmap.js").PadMap} PadMap
  *
  * @typedef {object} Part One thing that can be learnt.
  * @property {string} text

@@ -1,7 +1,7 @@
 // @ts-check
-/** @typedef {import("../../urc/web/static/types.js").Context} Context */
-/** @typedef {import("../../urc/web/static/types.js").HoldState} HoldState */
-/** @typedef {import("../../urc/web/static/types.js").Instance} Instance */
+/** @typedef {import("../../urc/web/static/core/types.js").Context} Context */
+/** @typedef {import("../../urc/web/static/core/types.js").HoldState} HoldState */
+/** @typedef {import("../../urc/web/static/core/types.js").Instance} Instance */
 import { attribute, part, t, write } from "urc/kit";
 
 const WORDS = { idle: t("hold"), asking: "…", held: t("moving"), spent: t("let go") };

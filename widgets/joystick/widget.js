@@ -1,9 +1,9 @@
 // @ts-check
-/** @typedef {import("../../urc/web/static/types.js").Context} Context */
-/** @typedef {import("../../urc/web/static/types.js").Hand} Hand */
-/** @typedef {import("../../urc/web/static/types.js").Instance} Instance */
-/** @typedef {import("../../urc/web/static/curve.js").Gate} Gate */
-/** @typedef {import("../../urc/web/static/motion.js").Look} Look */
+/** @typedef {import("../../urc/web/static/core/types.js").Context} Context */
+/** @typedef {import("../../urc/web/static/core/types.js").Hand} Hand */
+/** @typedef {import("../../urc/web/static/core/types.js").Instance} Instance */
+/** @typedef {import("../../urc/web/static/widgets/curve.js").Gate} Gate */
+/** @typedef {import("../../urc/web/static/widgets/motion.js").Look} Look */
 import { gate, settingsOf } from "urc/curve";
 import { attribute, drawing, part, write } from "urc/kit";
 import { along, DIRECTIONS, Motion, pointed, pulled, signed, speak } from "urc/motion";

@@ -1,6 +1,6 @@
 // @ts-check
-/** @typedef {import("../../urc/web/static/types.js").Context} Context */
-/** @typedef {import("../../urc/web/static/types.js").Instance} Instance */
+/** @typedef {import("../../urc/web/static/core/types.js").Context} Context */
+/** @typedef {import("../../urc/web/static/core/types.js").Instance} Instance */
 import { Setpoint, SetpointFace } from "urc/giving";
 import { attribute, drawing } from "urc/kit";
 import { Pull, arc, ray, shareAt } from "./dial.js";

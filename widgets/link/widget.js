@@ -1,9 +1,9 @@
 // @ts-check
-/** @typedef {import("../../urc/web/static/types.js").Context} Context */
-/** @typedef {import("../../urc/web/static/types.js").Instance} Instance */
-/** @typedef {import("../../urc/web/static/types.js").Lease} Lease */
-/** @typedef {import("../../urc/web/static/types.js").Link} Link */
-/** @typedef {import("../../urc/web/static/types.js").Wish} Wish */
+/** @typedef {import("../../urc/web/static/core/types.js").Context} Context */
+/** @typedef {import("../../urc/web/static/core/types.js").Instance} Instance */
+/** @typedef {import("../../urc/web/static/core/types.js").Lease} Lease */
+/** @typedef {import("../../urc/web/static/core/types.js").Link} Link */
+/** @typedef {import("../../urc/web/static/core/types.js").Wish} Wish */
 import { attribute, DASH, part, write } from "urc/kit";
 import { quality, Trips } from "./trips.js";
 

@@ -1,5 +1,5 @@
 // @ts-check
-/** @typedef {import("../../urc/web/static/types.js").LogLine} LogLine */
+/** @typedef {import("../../urc/web/static/core/types.js").LogLine} LogLine */
 
 const RANKS = { info: 0, warning: 1, error: 2 };
 

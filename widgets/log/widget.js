@@ -1,7 +1,7 @@
 // @ts-check
-/** @typedef {import("../../urc/web/static/types.js").Context} Context */
-/** @typedef {import("../../urc/web/static/types.js").Instance} Instance */
-/** @typedef {import("../../urc/web/static/types.js").LogLine} LogLine */
+/** @typedef {import("../../urc/web/static/core/types.js").Context} Context */
+/** @typedef {import("../../urc/web/static/core/types.js").Instance} Instance */
+/** @typedef {import("../../urc/web/static/core/types.js").LogLine} LogLine */
 import { attribute, clock, part, save, write } from "urc/kit";
 import { chosen, fileOf } from "./lines.js";
 

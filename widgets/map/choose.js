@@ -3,9 +3,9 @@
  * Choosing a place or a way: asked before it is sent. Knows no Leaflet; what was chosen is drawn by
  * whoever listens.
  *
- * @typedef {import("../../urc/web/static/types.js").Context} Context
+ * @typedef {import("../../urc/web/static/core/types.js").Context} Context
  * @typedef {import("./geo.js").Place} Place
- * @typedef {import("../../urc/web/static/types.js").Outlet} Outlet
+ * @typedef {import("../../urc/web/static/core/types.js").Outlet} Outlet
  */
 import { attribute, button, write } from "urc/kit";
 import { distance, distanceText, isInside, lengthOf, placeText } from "./geo.js";

@@ -1,8 +1,8 @@
 // @ts-check
-/** @typedef {import("../../urc/web/static/types.js").Context} Context */
-/** @typedef {import("../../urc/web/static/types.js").Instance} Instance */
-/** @typedef {import("../../urc/web/static/types.js").Outlet} Outlet */
-/** @typedef {import("../../urc/web/static/types.js").Reading} Reading */
+/** @typedef {import("../../urc/web/static/core/types.js").Context} Context */
+/** @typedef {import("../../urc/web/static/core/types.js").Instance} Instance */
+/** @typedef {import("../../urc/web/static/core/types.js").Outlet} Outlet */
+/** @typedef {import("../../urc/web/static/core/types.js").Reading} Reading */
 /** @typedef {import("./geo.js").Place} Place */
 /** @typedef {typeof import("leaflet")} Leaflet */
 import { DASH, attribute, button, colours, isStill, noteOf, number, part, style, svg, write } from "urc/kit";

@@ -1,5 +1,5 @@
 // @ts-check
-/** @typedef {import("../../urc/web/static/types.js").Instance} Instance */
+/** @typedef {import("../../urc/web/static/core/types.js").Instance} Instance */
 
 /** The server has rendered all of it: nothing changes here. */
 export default {

@@ -1,6 +1,6 @@
 // @ts-check
-/** @typedef {import("../../urc/web/static/types.js").Context} Context */
-/** @typedef {import("../../urc/web/static/types.js").Instance} Instance */
+/** @typedef {import("../../urc/web/static/core/types.js").Context} Context */
+/** @typedef {import("../../urc/web/static/core/types.js").Instance} Instance */
 import { Setpoint, SetpointFace, keyed } from "urc/giving";
 import { attribute, part } from "urc/kit";
 import { numberOf } from "./typed.js";

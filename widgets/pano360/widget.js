@@ -1,8 +1,8 @@
 // @ts-check
-/** @typedef {import("../../urc/web/static/types.js").Context} Context */
-/** @typedef {import("../../urc/web/static/types.js").Instance} Instance */
-/** @typedef {import("../../urc/web/static/types.js").Outlet} Outlet */
-/** @typedef {import("../../urc/web/static/types.js").Reading} Reading */
+/** @typedef {import("../../urc/web/static/core/types.js").Context} Context */
+/** @typedef {import("../../urc/web/static/core/types.js").Instance} Instance */
+/** @typedef {import("../../urc/web/static/core/types.js").Outlet} Outlet */
+/** @typedef {import("../../urc/web/static/core/types.js").Reading} Reading */
 /** @typedef {import("./look.js").Pose} Pose */
 /** @typedef {import("./look.js").View} View */
 /** @typedef {import("./stage.js").Stage} Stage */

@@ -1,8 +1,8 @@
 // @ts-check
-/** @typedef {import("../../urc/web/static/types.js").Context} Context */
-/** @typedef {import("../../urc/web/static/types.js").Instance} Instance */
-/** @typedef {import("../../urc/web/static/types.js").Reading} Reading */
-/** @typedef {import("../../urc/web/static/stroke.js").Point} Point */
+/** @typedef {import("../../urc/web/static/core/types.js").Context} Context */
+/** @typedef {import("../../urc/web/static/core/types.js").Instance} Instance */
+/** @typedef {import("../../urc/web/static/core/types.js").Reading} Reading */
+/** @typedef {import("../../urc/web/static/widgets/stroke.js").Point} Point */
 import { grasp } from "urc/giving";
 import { attribute, clamp, drawing, format, number, part, svg, write } from "urc/kit";
 import { DIRECTIONS, pointed } from "urc/motion";

@@ -1,7 +1,7 @@
 // @ts-check
-/** @typedef {import("../../urc/web/static/types.js").Context} Context */
-/** @typedef {import("../../urc/web/static/types.js").Instance} Instance */
-/** @typedef {import("../../urc/web/static/types.js").Reading} Reading */
+/** @typedef {import("../../urc/web/static/core/types.js").Context} Context */
+/** @typedef {import("../../urc/web/static/core/types.js").Instance} Instance */
+/** @typedef {import("../../urc/web/static/core/types.js").Reading} Reading */
 /** @typedef {import("./live.js").Trace} Trace */
 import { ALARMS, DASH, attribute, clock, colours, figure, isStill, many, noteOf, number, part, save, style, write } from "urc/kit";
 import { spanOf } from "urc/scale";

@@ -2,7 +2,7 @@
 /**
  * What was recorded, and how it is written as a table (RFC 4180). Knows no page.
  *
- * @typedef {import("../../urc/web/static/types.js").Reading} Reading
+ * @typedef {import("../../urc/web/static/core/types.js").Reading} Reading
  * @typedef {readonly [number, string, string]} Row Milliseconds since 1970, signal, value.
  */
 

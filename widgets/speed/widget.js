@@ -1,6 +1,6 @@
 // @ts-check
-/** @typedef {import("../../urc/web/static/types.js").Context} Context */
-/** @typedef {import("../../urc/web/static/types.js").Instance} Instance */
+/** @typedef {import("../../urc/web/static/core/types.js").Context} Context */
+/** @typedef {import("../../urc/web/static/core/types.js").Instance} Instance */
 import { attribute, clamp, format, noteOf, number, numbers, part, style, write } from "urc/kit";
 import { ends, share } from "urc/scale";
 import { lengthOf, shownIn } from "./pace.js";

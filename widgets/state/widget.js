@@ -1,7 +1,7 @@
 // @ts-check
-/** @typedef {import("../../urc/web/static/types.js").Context} Context */
-/** @typedef {import("../../urc/web/static/types.js").Instance} Instance */
-/** @typedef {import("../../urc/web/static/types.js").Reading} Reading */
+/** @typedef {import("../../urc/web/static/core/types.js").Context} Context */
+/** @typedef {import("../../urc/web/static/core/types.js").Instance} Instance */
+/** @typedef {import("../../urc/web/static/core/types.js").Reading} Reading */
 import { attribute, clamp, keyOf, noteOf, part, style, write } from "urc/kit";
 
 /** The same shapes as everywhere: triangle, diamond and square are alarm, caution and advice. */

@@ -1,9 +1,9 @@
 // @ts-check
-/** @typedef {import("../../urc/web/static/types.js").Context} Context */
-/** @typedef {import("../../urc/web/static/types.js").Instance} Instance */
-/** @typedef {import("../../urc/web/static/types.js").Outlet} Outlet */
-/** @typedef {import("../../urc/web/static/types.js").Reading} Reading */
-/** @typedef {import("../../urc/web/static/types.js").Value} Value */
+/** @typedef {import("../../urc/web/static/core/types.js").Context} Context */
+/** @typedef {import("../../urc/web/static/core/types.js").Instance} Instance */
+/** @typedef {import("../../urc/web/static/core/types.js").Outlet} Outlet */
+/** @typedef {import("../../urc/web/static/core/types.js").Reading} Reading */
+/** @typedef {import("../../urc/web/static/core/types.js").Value} Value */
 import { Giver, Wish } from "urc/giving";
 import { attribute, noteOf, part, wordOf, write } from "urc/kit";
 

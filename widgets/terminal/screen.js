@@ -1,7 +1,7 @@
 // @ts-check
 /** Where lines are shown: a terminal where there is one, else a plain list. */
 
-/** @typedef {import("../../urc/web/static/types.js").Context} Context */
+/** @typedef {import("../../urc/web/static/core/types.js").Context} Context */
 /** @typedef {import("@xterm/xterm").Terminal} Terminal */
 
 import { attribute } from "urc/kit";

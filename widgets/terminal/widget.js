@@ -1,8 +1,8 @@
 // @ts-check
-/** @typedef {import("../../urc/web/static/types.js").Context} Context */
-/** @typedef {import("../../urc/web/static/types.js").Instance} Instance */
-/** @typedef {import("../../urc/web/static/types.js").LogLine} LogLine */
-/** @typedef {import("../../urc/web/static/types.js").Reading} Reading */
+/** @typedef {import("../../urc/web/static/core/types.js").Context} Context */
+/** @typedef {import("../../urc/web/static/core/types.js").Instance} Instance */
+/** @typedef {import("../../urc/web/static/core/types.js").LogLine} LogLine */
+/** @typedef {import("../../urc/web/static/core/types.js").Reading} Reading */
 import { Giver } from "urc/giving";
 import { attribute, noteOf, part, write } from "urc/kit";
 import { hexOf, pairsOf, plain, Typed } from "./hex.js";

@@ -1,7 +1,7 @@
 // @ts-check
-/** @typedef {import("../../urc/web/static/types.js").Context} Context */
-/** @typedef {import("../../urc/web/static/types.js").Hand} Hand */
-/** @typedef {import("../../urc/web/static/types.js").Instance} Instance */
+/** @typedef {import("../../urc/web/static/core/types.js").Context} Context */
+/** @typedef {import("../../urc/web/static/core/types.js").Hand} Hand */
+/** @typedef {import("../../urc/web/static/core/types.js").Instance} Instance */
 import { gate, settingsOf, tilted } from "urc/curve";
 import { attribute, drawing, part, write } from "urc/kit";
 import { DIRECTIONS, Motion, pointed, pulled, signed } from "urc/motion";

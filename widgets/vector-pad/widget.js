@@ -1,7 +1,7 @@
 // @ts-check
-/** @typedef {import("../../urc/web/static/types.js").Context} Context */
-/** @typedef {import("../../urc/web/static/types.js").Instance} Instance */
-/** @typedef {import("../../urc/web/static/types.js").Value} Value */
+/** @typedef {import("../../urc/web/static/core/types.js").Context} Context */
+/** @typedef {import("../../urc/web/static/core/types.js").Instance} Instance */
+/** @typedef {import("../../urc/web/static/core/types.js").Value} Value */
 import { grasp } from "urc/giving";
 import { attribute, drawing, format, part, write } from "urc/kit";
 import { DIRECTIONS, pointed } from "urc/motion";
@@ -59,7 +59,7 @@ class VectorPad {
     this.at = null;
     /** @type {[number, number] | null} */
     this.last = null;
-    /** What the pointer has hold of. @type {import("../../urc/web/static/grasp.js").Grasp | null} */
+    /** What the pointer has hold of. @type {import("../../urc/web/static/control/grasp.js").Grasp | null} */
     this.hold = null;
     /** @type {[number, number]} */
     this.start = [0, 0];

@@ -62,7 +62,7 @@ def test_a_real_robot_is_shown_while_somebody_is_connected() -> None:
 def test_the_menu_says_where_the_picture_is_and_a_tap_on_it_drives() -> None:
     page = client_of(FakeRobot(dashboard_profile()), JPEG).get("/").text
     assert 'href="/robots/puppet/" data-look="/robots/puppet/card"' in page
-    assert page.count("/static/card.js") == 1
+    assert page.count("/static/manage/card.js") == 1
 
 
 def test_values_are_the_first_few_that_fit_and_are_known() -> None:

@@ -104,7 +104,7 @@ def test_what_the_page_at_the_door_loads_is_open() -> None:
     with at(ACCESS) as browser:
         page = browser.get("/").text
         files = re.findall(r'(?:src|href)="(/(?:static|words)/[^"]+|/app\.webmanifest)"', page)
-        assert "/static/door.js" in files
+        assert "/static/control/door.js" in files
         assert {browser.get(file).status_code for file in files} == {200}
         assert browser.get("/healthz").json()["status"] == "ok"
 

@@ -147,7 +147,7 @@ def _is_hidden(part: str) -> bool:
 
 def import_map(vendor: Path | None) -> Mapping[str, object]:
     """Return the page's import map: our kit, and the third-party modules that the build brought."""
-    imports = {f"urc/{name}": f"/static/{name}.js" for name in KIT}
+    imports = {f"urc/{name}": f"/static/widgets/{name}.js" for name in KIT}
     imports["urc/words"] = "/words/en.js"
     place = vendor / "importmap.json" if vendor else None
     if place is not None and place.is_file():

@@ -33,7 +33,7 @@ __all__ = [
 
 DEBUGGING: Final = Interface(DEBUG, "Debug")
 """Stands for the interface that is made: it has no grid."""
-DEBUG_STYLES: Final = ("/static/dev.css", "/static/debug.css")
+DEBUG_STYLES: Final = ("/static/dev/dev.css", "/static/dev/debug.css")
 KEPT: Final = "urc-interface"
 """Cookie in which a device keeps which interface of a robot it showed last; its path is the robot's
 page, and ``interfaces.js`` writes it."""

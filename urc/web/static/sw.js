@@ -17,7 +17,7 @@ const worker = self;
 
 const CACHE = "urc-1";
 /** What is kept beside what was opened. */
-const FIRST = ["/", "/static/tokens.css", "/static/app.css", "/static/menu.css", "/static/theme.js", "/static/favicon.svg"];
+const FIRST = ["/", "/static/core/tokens.css", "/static/core/app.css", "/static/manage/menu.css", "/static/core/theme.js", "/static/favicon.svg"];
 const KEPT = /^\/(static|vendor|widgets|words)\/|^\/$|^\/robots\/[^/]+\/$|^\/app\.webmanifest$/;
 /** Asked again and again by who writes a widget; without the server nothing changes. */
 const NEVER = /\/stamp$/;

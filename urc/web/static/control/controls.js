@@ -1,0 +1,109 @@
+// @ts-check
+/**
+ * The bar below the widgets of a robot that moves: who drives, and STOP.
+ *
+ * @typedef {import("./drive.js").Drive} Drive
+ * @typedef {import("./drive.js").Verb} Verb
+ * @typedef {import("./stop.js").StopButton} StopButton
+ * @typedef {import("../core/types.js").StopState} StopState
+ */
+import { part } from "../live/badge.js";
+import { whenPressed } from "./press.js";
+import { inTurn } from "../core/texts.js";
+import { said, t } from "../core/words.js";
+
+/** @type {Verb[]} */
+const VERBS = ["reset", "take", "ask", "force", "yes", "no", "leave"];
+
+export class Controls {
+  /**
+   * @param {HTMLElement} el
+   * @param {Drive} drive
+   * @param {StopButton} stop
+   */
+  constructor(el, drive, stop) {
+    this.el = el;
+    this.drive = drive;
+    this.who = part(el, "[data-who]");
+    this.stop = part(el, "[data-stop-button]");
+    this.stopNote = part(el, "[data-stop-note]");
+    /** @type {[Verb, HTMLElement][]} */
+    this.buttons = VERBS.map((verb) => [verb, part(el, `[data-verb="${verb}"]`)]);
+    for (const [verb, button] of this.buttons) {
+      button.addEventListener("click", () => {
+        drive.say(verb);
+        drive.changed();
+      });
+    }
+    whenPressed(this.stop, () => stop.press());
+    stop.follow((state) => this.showStop(state));
+  }
+
+  /** @param {number} nowMs */
+  frame(nowMs) {
+    const { drive } = this;
+    const lease = drive.lease;
+    const isMine = drive.isMine;
+    const isLatched = drive.isLatched;
+    const isFree = lease !== null && !lease.holder && !isLatched;
+    const isOthers = lease !== null && lease.holder !== null && !isMine;
+    const may = lease?.drives ?? false;
+    const isAsked = isMine && lease?.asker !== null;
+    const iAsk = lease !== null && lease.asker?.id === lease.you;
+    /** @type {Record<Verb, boolean>} */
+    const shown = {
+      reset: isLatched && may,
+      take: isFree && may,
+      ask: isOthers && may && !lease.asker,
+      force: isOthers && may && lease.forces,
+      yes: isAsked,
+      no: isAsked,
+      leave: isMine && !isAsked,
+    };
+    for (const [verb, button] of this.buttons) {
+      if (button.hidden === shown[verb]) button.hidden = !shown[verb];
+    }
+    const leftS = Math.max(0, Math.ceil((drive.handedMs - nowMs) / 1000));
+    const text = drive.refusal ? `◆ ${said(drive.refusal)}` : this.words(isMine, isAsked, iAsk, leftS);
+    if (this.who.textContent !== text) this.who.textContent = text;
+    const state = isLatched ? "latched" : isMine ? "mine" : isOthers ? "others" : "free";
+    if (this.el.dataset["state"] !== state) this.el.dataset["state"] = state;
+  }
+
+  /**
+   * @param {boolean} isMine
+   * @param {boolean} isAsked
+   * @param {boolean} iAsk
+   * @param {number} leftS
+   */
+  words(isMine, isAsked, iAsk, leftS) {
+    const lease = this.drive.lease;
+    if (!lease) return t("Not connected to URC");
+    if (lease.latched === lease.name && lease.latched) return t("■ Stopped by you");
+    if (lease.latched) return t("■ Stopped by {who}", { who: said(lease.latched) });
+    const [asker, holder] = [said(lease.asker?.name ?? ""), said(lease.holder?.name ?? "")];
+    if (isAsked) return t("◆ {who} asks to drive: {seconds} s", { who: asker, seconds: leftS });
+    if (isMine) return t("● You drive");
+    if (iAsk) return t("Asked {who}: {seconds} s", { who: holder, seconds: leftS });
+    if (lease.holder) return t("{who} drives", { who: holder });
+    return lease.drives ? t("Nobody drives") : t("Nobody drives; this page only watches");
+  }
+
+  /** @param {StopState} state */
+  showStop({ phase, isLatched, isConfirmed, fault }) {
+    const isSent = phase !== "" && phase !== "sending" && phase !== "failed";
+    this.stop.dataset["phase"] = fault && !isConfirmed ? "fault" : phase;
+    const steps = [
+      isSent ? t("✓ sent") : "",
+      isConfirmed ? t("✓ confirmed") : "",
+      isLatched ? t("✓ latched") : "",
+    ].filter(Boolean);
+    let note = inTurn(steps);
+    if (phase === "sending") note = t("… sending");
+    if (phase === "failed" || (fault && !isConfirmed)) {
+      if (phase === "failed") note = t("▲ NO LINK: stop it by hand");
+      else note = isLatched ? t("▲ NO LINK, latched") : t("▲ NO LINK");
+    }
+    if (this.stopNote.textContent !== note) this.stopNote.textContent = note;
+  }
+}

@@ -1,0 +1,423 @@
+// @ts-check
+/**
+ * The page's side of a foreign widget: its frame, and what passes in and out of it.
+ *
+ * The frame has no origin, so it reaches nothing of the page; it has one port, whose messages are
+ * looked at by `border.js`. It gets the readings and outputs of its cell, and may give the commands
+ * that are bound there. When it throws, floods, goes elsewhere or stops answering, it is taken out
+ * and its cell becomes a card.
+ *
+ * @typedef {import("../widgets/cell.js").Doors} Doors
+ * @typedef {import("../live/store.js").Store} Store
+ * @typedef {import("./border.js").Said} Said
+ * @typedef {import("../core/types.js").Outlet} Outlet
+ * @typedef {import("../core/types.js").Reading} Reading
+ * @typedef {import("../core/types.js").Topics} Topics
+ */
+import { heard, MOST_COMMANDS, MOST_MESSAGES, Rate, tellable } from "./border.js";
+import { Cell } from "../widgets/cell.js";
+import { give } from "../widgets/context.js";
+import { t } from "../widgets/kit.js";
+import { memoryOf } from "../widgets/memory.js";
+import { describe } from "../widgets/output.js";
+import { TICK_MS, Watch } from "./watch.js";
+import { filesOf } from "./warden_files.js";
+import { Overlays } from "./warden_grips.js";
+
+/** A frame that has not come up by then never will. */
+const COMING_MS = 20_000;
+const LOADING_MS = 5000;
+const PADS_EVERY_MS = 50;
+/** Presses of STOP a second: one is enough. */
+const MOST_STOPS = 5;
+/** Messages a second to the page itself. Extensions of the browser may say something, widgets have a port. */
+const MOST_ASIDE = 20;
+
+/** Those whose frames may speak to the page. @type {Set<Warden>} */
+const wardens = new Set();
+// First of all listeners, and without a look at what was said: a flood costs next to nothing.
+addEventListener("message", (event) => {
+  for (const warden of wardens) {
+    if (event.source !== warden.frameEl?.contentWindow) continue;
+    event.stopImmediatePropagation();
+    warden.aside();
+    return;
+  }
+}, { capture: true });
+
+const watch = new Watch();
+setInterval(() => {
+  if (!document.hidden) watch.tick(performance.now());
+}, TICK_MS);
+
+export class Warden extends Cell {
+  /**
+   * @param {HTMLElement} el
+   * @param {Doors} doors
+   */
+  constructor(el, doors) {
+    super(el, doors);
+    this.isForeign = true;
+    /** Whether it pressed STOP by itself, and nobody has touched it since. */
+    this.hasStopped = false;
+    this.html = el.dataset["html"] ?? "";
+    this.url = el.dataset["frame"] ?? "";
+    /** @type {HTMLIFrameElement | null} */
+    this.frameEl = null;
+    /** @type {MessagePort | null} */
+    this.port = null;
+    /** Ends with this frame; the cell may get another one. */
+    this.life = new AbortController();
+    this.overlays = new Overlays(this);
+    this.memory = memoryOf(this.config.slot);
+    /** Whether it has begun what it has not ended. */
+    this.isAtWork = false;
+    this.strikes = 0;
+    /** Whether a person has brought the focus here. */
+    this.isUsed = false;
+    /** Whether what was sent last is not drawn yet. */
+    this.isFull = false;
+    /** Edition of the store whose units were told. */
+    this.toldEdition = -1;
+    this.isUp = false;
+    this.messages = new Rate(MOST_MESSAGES);
+    this.asides = new Rate(MOST_ASIDE);
+    this.commands = new Rate(MOST_COMMANDS);
+    this.stops = new Rate(MOST_STOPS);
+    /** @type {Set<string>} */
+    this.followed = new Set();
+    /** Files that its options name. @type {Record<string, Blob>} */
+    this.files = {};
+    /** @type {() => void} */
+    this.settled = () => {};
+  }
+
+  async mount() {
+    const refused = this.el.dataset["error"];
+    if (refused) {
+      this.fail(new Error(refused));
+      return;
+    }
+    const standing = new Promise((resolve) => {
+      this.settled = () => resolve(undefined);
+    });
+    this.files = await filesOf(this.config.options, this.end.signal);
+    this.enter();
+    await standing;
+  }
+
+  /** Make a frame, and let the widget come up in it. */
+  enter() {
+    if (this.end.signal.aborted) return;
+    this.life = new AbortController();
+    const { signal } = this.life;
+    const frame = document.createElement("iframe");
+    frame.className = "urc-frame";
+    frame.setAttribute("sandbox", "allow-scripts");
+    frame.setAttribute("allow", "");
+    frame.referrerPolicy = "no-referrer";
+    frame.title = this.config.title;
+    let loads = 0;
+    frame.addEventListener("load", () => {
+      loads += 1;
+      if (loads === 1) this.meet(frame);
+      else this.fail(new Error(t("it went to another page")));
+    }, { signal });
+    const late = setTimeout(() => {
+      if (!this.isMounted) this.remark(t("◌ still loading"));
+    }, LOADING_MS);
+    const never = setTimeout(() => {
+      if (!this.isUp) this.fail(new Error(t("its frame did not come up")));
+    }, COMING_MS);
+    signal.addEventListener("abort", () => {
+      clearTimeout(late);
+      clearTimeout(never);
+    });
+    addEventListener("blur", () => setTimeout(() => this.keepFocus()), { signal });
+    this.isUp = false;
+    this.frameEl = frame;
+    frame.src = this.url;
+    this.el.prepend(frame);
+    wardens.add(this);
+    watch.add(this);
+  }
+
+  /** @param {HTMLIFrameElement} frame */
+  meet(frame) {
+    const { port1, port2 } = new MessageChannel();
+    this.port = port1;
+    port1.addEventListener("message", (event) => {
+      // Counted before it is unpacked: a flood costs next to nothing.
+      if (this.messages.take(performance.now())) this.take(event.data);
+      else this.fail(new Error(t("it floods the page with messages")));
+    }, { signal: this.life.signal });
+    port1.start();
+    // A frame without an origin has no name to be addressed by; nothing secret is said here.
+    frame.contentWindow?.postMessage({ t: "port" }, "*", [port2]);
+  }
+
+  /** It said something to the page, past its port. */
+  aside() {
+    if (!this.asides.take(performance.now())) this.fail(new Error(t("it floods the page with messages")));
+  }
+
+  /** A frame may take the focus with a hand, and not by itself. */
+  keepFocus() {
+    if (document.activeElement !== this.frameEl) this.isUsed = false;
+    else if (this.isTouched()) this.isUsed = true;
+    else if (!this.isUsed) this.frameEl?.blur();
+  }
+
+  /** Whether a person has just done something in the frame. */
+  isTouched() {
+    return document.activeElement === this.frameEl && navigator.userActivation?.isActive !== false;
+  }
+
+  /** @param {object} message */
+  post(message) {
+    this.port?.postMessage(message);
+  }
+
+  /** @param {unknown} data */
+  take(data) {
+    const message = heard(data, this.config.outputs);
+    if (message === null || this.life.signal.aborted) return;
+    switch (message.t) {
+      case "ready":
+        if (!this.isUp) this.begin();
+        break;
+      case "mounted":
+        this.isMounted = true;
+        this.remark("");
+        this.settled();
+        this.doors.wake();
+        break;
+      case "failed":
+        this.fail(new Error(message.message));
+        break;
+      case "alive":
+        watch.answered(this);
+        break;
+      case "in":
+      case "out":
+        this.isAtWork = message.t === "in";
+        break;
+      case "more":
+        this.isFull = false;
+        this.doors.wake();
+        break;
+      case "slow":
+        this.remark(message.isSlow ? t("◆ slow: shown once a second") : "");
+        break;
+      default:
+        this.serve(message);
+    }
+  }
+
+  /**
+   * Do what the widget asks for.
+   *
+   * @param {Said} message
+   */
+  serve(message) {
+    const { doors, life } = this;
+    switch (message.t) {
+      case "send":
+        void this.give(message);
+        break;
+      case "steer":
+        if (this.commands.take(performance.now())) {
+          doors.steer(this.output(message.output)?.command ?? "", message.verb);
+        }
+        break;
+      case "drive":
+        if (this.isTouched()) doors.drive(message.wish);
+        break;
+      case "stop":
+        this.stop();
+        break;
+      case "space":
+        if (!message.isTaken || doors.input.isDriving()) this.stop();
+        break;
+      case "onstop":
+        doors.stop.follow((state) => this.post({ t: "stopstate", state }), life.signal);
+        break;
+      case "follow":
+        this.follow(message.what);
+        break;
+      case "look":
+        if (this.inputs.some(({ input }) => input === message.input)) this.look(message.input, message.places);
+        break;
+      case "pads":
+        this.showPads();
+        break;
+      case "memory":
+        this.keep(message.text);
+        break;
+      default:
+        this.overlays.take(message);
+    }
+  }
+
+  /** A hand may press STOP as often as it likes; the widget by itself once, so that a reset holds. */
+  stop() {
+    // Escape is no activation for browsers: the focus that a hand brought counts as one.
+    const isByHand = this.isTouched() || (this.isUsed && document.activeElement === this.frameEl);
+    if (!isByHand && this.hasStopped) return;
+    if (!this.stops.take(performance.now())) return;
+    this.hasStopped = !isByHand;
+    if (!isByHand) this.remark(t("■ this widget pressed STOP by itself"));
+    this.doors.stop.press();
+  }
+
+  /** The frame listens: hand the widget over. */
+  begin() {
+    const { config, doors } = this;
+    this.isUp = true;
+    this.follow("theme");
+    const commands = Object.entries(config.outputs).map(([name, bound]) => [name, describe(bound)]);
+    this.toldEdition = doors.store.edition;
+    this.post({
+      t: "mount",
+      title: config.title,
+      widget: config.widget,
+      html: this.html,
+      module: this.el.dataset["module"] ?? `/widgets/${encodeURIComponent(config.widget)}/widget.js`,
+      options: config.options,
+      files: this.files,
+      commands: Object.fromEntries(commands),
+      units: this.unitsTold(),
+      memory: this.memory.read(),
+      originMs: performance.timeOrigin,
+      theme: document.documentElement.dataset["theme"] ?? "",
+    });
+  }
+
+  /** In which unit people want to see each input. */
+  unitsTold() {
+    const { store } = this.doors;
+    const pairs = this.inputs.map((bound) => {
+      const { signal } = this.reading(bound, 0, store, 0);
+      return [bound.input, store.units.shown(signal.unit ?? "")];
+    });
+    return Object.fromEntries(pairs);
+  }
+
+  /** @param {number} nowMs */
+  isDue(nowMs) {
+    return !this.isFull && super.isDue(nowMs);
+  }
+
+  /**
+   * @param {number} _
+   * @param {() => void} work
+   */
+  measured(_, work) {
+    work(); // what takes time here is ours; the frame measures its own
+  }
+
+  /**
+   * @param {Record<string, Reading>} readings
+   * @param {string[]} changed
+   * @param {Record<string, Outlet>} outlets
+   * @param {boolean} isOutputNews
+   */
+  call(readings, changed, outlets, isOutputNews) {
+    this.size = null; // the frame sees its own
+    if (changed.length === 0 && !isOutputNews) return;
+    const { edition } = this.doors.store;
+    const units = edition === this.toldEdition ? null : this.unitsTold();
+    this.toldEdition = edition;
+    const news = Object.fromEntries(changed.map((input) => [input, readings[input]]));
+    this.isFull = true;
+    this.post({ t: "frame", changed, readings: news, outlets: isOutputNews ? { ...outlets } : null, units });
+  }
+
+  /** @param {Extract<Said, {t: "send"}>} message */
+  async give({ id, output, args }) {
+    try {
+      if (document.hidden) throw new Error(t("the page was hidden"));
+      if (!this.commands.take(performance.now())) {
+        throw new Error(t("too many commands: {most} a second at most", { most: MOST_COMMANDS }));
+      }
+      const values = await give(this, output, args);
+      this.post({ t: "answer", id, values });
+    } catch (error) {
+      const { name, message } = error instanceof Error ? error : new Error(String(error));
+      this.post({ t: "refused", id, name, message });
+    }
+  }
+
+  /** @param {keyof Topics} what */
+  follow(what) {
+    if (this.followed.has(what)) return;
+    this.followed.add(what);
+    const signals = new Set(this.inputs.flatMap((bound) => bound.signals));
+    const commands = new Set(this.outputs.map(([, { command }]) => command));
+    const tell = (/** @type {unknown} */ news) => {
+      this.post({ t: "topic", what, news: tellable(what, news, { signals, commands }) });
+    };
+    this.doors.follows.listen(what, tell, this.life.signal);
+  }
+
+  showPads() {
+    let seen = "";
+    const timer = setInterval(() => {
+      const views = this.isVisible ? this.doors.input.pads.views() : [];
+      const look = JSON.stringify(views);
+      if (look !== seen) this.post({ t: "pads", views });
+      seen = look;
+    }, PADS_EVERY_MS);
+    this.life.signal.addEventListener("abort", () => clearInterval(timer));
+  }
+
+  /** @param {string} text */
+  keep(text) {
+    try {
+      this.memory.write(JSON.parse(text));
+    } catch (error) {
+      console.info(`widget ${this.config.widget}:`, error); // it was told so in its frame
+    }
+  }
+
+  // -- what the watch asks for
+
+  get isBusy() {
+    return this.isAtWork || this.overlays.isOwed;
+  }
+
+  /** @param {number} n */
+  ping(n) {
+    this.keepFocus(); // no event tells that it goes from one frame to another
+    this.post({ t: "ping", n });
+  }
+
+  accuse() {
+    this.fail(new Error(t("it stopped answering")));
+  }
+
+  /** Take the frame out; what it held is let go. */
+  leave() {
+    watch.remove(this);
+    wardens.delete(this);
+    this.life.abort();
+    this.port?.close();
+    this.port = null;
+    this.frameEl?.remove();
+    this.frameEl = null;
+    this.isUp = false;
+    this.isMounted = false;
+    this.isAtWork = false;
+    this.isFull = false;
+    this.followed.clear();
+    this.edition = -1; // whoever comes back is told everything
+    this.seenOutlets = null;
+    this.remark(t("◌ begins anew: another widget had stopped it"));
+  }
+
+  unmount() {
+    super.unmount();
+    this.leave();
+    this.settled();
+  }
+}

@@ -1,0 +1,40 @@
+// @ts-check
+/**
+ * Tells a screen reader when a value passes a limit, once; never each new value.
+ *
+ * @typedef {import("../core/types.js").Alarm} Alarm
+ * @typedef {import("./store.js").Store} Store
+ */
+
+import { t } from "../core/words.js";
+
+/** @type {Record<Alarm, string>} */
+const WORDS = { "": "", lolo: t("very low"), low: t("low"), high: t("high"), hihi: t("very high") };
+
+export class Alarms {
+  /** @param {HTMLElement} el an element with role alert */
+  constructor(el) {
+    this.el = el;
+    /** @type {Map<string, Alarm>} */
+    this.told = new Map();
+    /** Whether any value was past a limit when they were looked at last. */
+    this.isAny = false;
+  }
+
+  /**
+   * @param {Store} store
+   * @param {number} nowMs
+   */
+  frame(store, nowMs) {
+    this.isAny = false;
+    for (const [name, sample] of store.samples) {
+      if (sample.alarm) this.isAny = true;
+      const before = this.told.get(name) ?? "";
+      if (before === sample.alarm) continue;
+      this.told.set(name, sample.alarm);
+      if (!sample.alarm) continue;
+      const { signal, text, unit } = store.reading(name, nowMs);
+      this.el.textContent = `${signal.title || name} ${WORDS[sample.alarm]}: ${text} ${unit}`.trim();
+    }
+  }
+}

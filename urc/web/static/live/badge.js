@@ -1,0 +1,88 @@
+// @ts-check
+/**
+ * The link badge: one word on whether what is on the screen is live, and the round trip.
+ *
+ * @typedef {import("../core/types.js").Link} Link
+ * @typedef {import("./store.js").Store} Store
+ * @typedef {import("./socket.js").Socket} Socket
+ * @typedef {"good" | "connecting" | "caution" | "bad" | "replay"} Sign
+ */
+
+import { write } from "../widgets/kit.js";
+import { t } from "../core/words.js";
+
+const CAUTION_MS = 100;
+const POOR_MS = 250;
+/** From worst to best: the worst link decides. @type {Link["state"][]} */
+const WORST_FIRST = ["lost", "silent", "connecting", "idle", "live"];
+
+export class Badge {
+  /** @param {HTMLElement} el */
+  constructor(el) {
+    this.el = el;
+    this.text = part(el, "[data-badge-text]");
+    this.trip = part(el, "[data-badge-trip]");
+    this.isReplay = "replay" in el.dataset;
+  }
+
+  /**
+   * @param {Store} store
+   * @param {Socket} socket
+   */
+  frame(store, socket) {
+    let [sign, text] = summary(store, socket.failures > 0);
+    if (this.isReplay && sign === "good") [sign, text] = ["replay", t("Replay")]; // nothing of it is live
+    if (this.el.dataset["state"] !== sign) this.el.dataset["state"] = sign;
+    write(this.text, text);
+    const [quality, figure] = tripOf(socket.tripMs);
+    if (this.trip.dataset["trip"] !== quality) this.trip.dataset["trip"] = quality;
+    write(this.trip, figure);
+  }
+}
+
+/**
+ * @param {Store} store
+ * @param {boolean} hasFailed whether an attempt has failed since the last connection
+ * @returns {[Sign, string]}
+ */
+function summary(store, hasFailed) {
+  if (!store.isUp) return hasFailed ? ["bad", t("No connection to URC")] : ["connecting", t("Connecting")];
+  const links = [...store.links.values()];
+  const worst = WORST_FIRST.find((state) => links.some((link) => link.state === state));
+  const name = links.length > 1 ? links.find((link) => link.state === worst)?.transport : t("Robot");
+  switch (worst) {
+    case "lost":
+      return ["bad", t("{name} lost", { name: name ?? "" })];
+    case "silent":
+      return ["caution", t("{name} silent", { name: name ?? "" })];
+    case "live":
+      return ["good", t("Live")];
+    case "idle":
+    case "connecting":
+    case undefined:
+      return ["connecting", t("Connecting")];
+  }
+}
+
+/**
+ * @param {number | null} tripMs
+ * @returns {[string, string]} quality and text
+ */
+function tripOf(tripMs) {
+  if (tripMs === null) return ["", ""];
+  const figure = `${Math.max(1, Math.round(tripMs))} ms`;
+  if (tripMs > POOR_MS) return ["bad", `▲ ${figure}`];
+  if (tripMs > CAUTION_MS) return ["caution", `◆ ${figure}`];
+  return ["good", figure];
+}
+
+/**
+ * @param {ParentNode} root
+ * @param {string} selector
+ * @returns {HTMLElement}
+ */
+export function part(root, selector) {
+  const found = root.querySelector(selector);
+  if (!(found instanceof HTMLElement)) throw new Error(`the page has no ${selector}`);
+  return found;
+}

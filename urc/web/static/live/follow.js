@@ -1,0 +1,168 @@
+// @ts-check
+/**
+ * What the page knows beside signals, told to whoever follows it: at once, and after every change,
+ * always in an animation frame. What nobody follows is not looked at.
+ *
+ * @typedef {import("../core/types.js").Alarm} Alarm
+ * @typedef {import("../core/types.js").Alert} Alert
+ * @typedef {import("../core/types.js").Line} Line
+ * @typedef {import("../core/types.js").LogLine} LogLine
+ * @typedef {import("../core/types.js").Topics} Topics
+ * @typedef {import("./store.js").Store} Store
+ *
+ * @typedef {{[T in keyof Topics]: () => {look: string, value: Topics[T]}}} Sources Each returns what
+ *   is known now, and a text that differs when that has changed.
+ */
+
+export class Follows {
+  /**
+   * @param {Sources} sources
+   * @param {() => void} wake asks for an animation frame
+   */
+  constructor(sources, wake) {
+    this.sources = sources;
+    this.wake = wake;
+    /** @type {Set<{what: keyof Topics, seen: string | null, tell: (news: any) => void}>} */
+    this.followers = new Set();
+  }
+
+  /**
+   * @param {keyof Topics} what
+   * @param {(news: any) => void} tell
+   * @param {AbortSignal} signal
+   */
+  listen(what, tell, signal) {
+    if (!Object.hasOwn(this.sources, what)) {
+      const known = Object.keys(this.sources).join(", ");
+      throw new Error(`there is no ${what} to follow, only ${known}`);
+    }
+    const follower = { what, seen: null, tell };
+    this.followers.add(follower);
+    signal.addEventListener("abort", () => this.followers.delete(follower));
+    this.wake();
+  }
+
+  frame() {
+    /** @type {Map<keyof Topics, {look: string, value: unknown}>} */
+    const known = new Map();
+    for (const follower of [...this.followers]) {
+      const news = known.get(follower.what) ?? this.sources[follower.what]();
+      known.set(follower.what, news);
+      if (follower.seen === news.look) continue;
+      follower.seen = news.look;
+      follower.tell(news.value);
+    }
+  }
+}
+
+const LINES_KEPT = 500;
+
+/** The newest lines of the log. */
+export class Log {
+  constructor() {
+    /** @type {LogLine[]} */
+    this.lines = [];
+    this.missing = 0;
+    this.session = "";
+    this.next = 0;
+  }
+
+  /**
+   * After a reconnect the server tells the latest again: those that are known are skipped.
+   *
+   * @param {readonly Line[]} lines
+   * @param {number} first number of the first one in its session, from 0
+   * @param {string} session
+   */
+  add(lines, first, session) {
+    if (session !== this.session) {
+      this.session = session;
+      this.next = first;
+    }
+    this.missing += Math.max(0, first - this.next);
+    const fresh = lines.slice(Math.max(0, this.next - first));
+    let number = Math.max(first, this.next);
+    for (const { age, level, source, text } of fresh) {
+      this.lines.push({ number, time: Date.now() - age, level, source, text });
+      number += 1;
+    }
+    this.next = Math.max(this.next, first + lines.length);
+    if (this.lines.length > LINES_KEPT) this.lines.splice(0, this.lines.length - LINES_KEPT);
+  }
+
+  news() {
+    return {
+      look: `${this.session} ${this.next} ${this.missing} ${this.lines.length}`,
+      value: { lines: this.lines, missing: this.missing },
+    };
+  }
+}
+
+/** @type {Record<Alarm, number>} */
+const RANKS = { "": 9, lolo: 0, hihi: 0, low: 1, high: 1 };
+
+/** Which signals are past a limit, and since when. */
+export class Alerts {
+  constructor() {
+    /** @type {Map<string, {alarm: Alarm, since: number}>} */
+    this.known = new Map();
+  }
+
+  /**
+   * @param {Store} store
+   * @param {number} nowMs
+   */
+  news(store, nowMs) {
+    /** @type {Alert[]} */
+    const found = [];
+    for (const name of this.known.keys()) {
+      if (!store.samples.has(name)) this.known.delete(name);
+    }
+    for (const name of store.samples.keys()) {
+      const { alarm, text, unit, age, signal } = store.reading(name, nowMs);
+      const before = this.known.get(name);
+      if (!alarm) this.known.delete(name);
+      else if (before?.alarm !== alarm) this.known.set(name, { alarm, since: nowMs / 1000 });
+      const since = this.known.get(name)?.since ?? 0;
+      if (alarm) found.push({ signal: name, title: signal.title || name, alarm, text, unit, age, since });
+    }
+    found.sort((one, other) => RANKS[one.alarm] - RANKS[other.alarm] || other.since - one.since);
+    return { look: JSON.stringify(found), value: found };
+  }
+}
+
+/**
+ * Return how many signals have a limit, and how many of them are known now: of the others nobody can
+ * say that they are within it.
+ *
+ * @param {Store} store
+ * @param {number} nowMs
+ */
+export function watched(store, nowMs) {
+  const limited = [...store.signals.values()].filter(({ limits }) => Object.keys(limits ?? {}).length > 0);
+  const known = limited.filter(({ name }) => store.state(name, nowMs) === "live");
+  const value = { limited: limited.length, known: known.length };
+  return { look: JSON.stringify(value), value };
+}
+
+/** Tells when the colours of the page have changed: by choice, or with the device. */
+export class Themes {
+  /** @param {() => void} wake */
+  constructor(wake) {
+    const changed = () => {
+      this.count += 1;
+      wake();
+    };
+    this.count = 0;
+    const root = document.documentElement;
+    new MutationObserver(changed).observe(root, { attributeFilter: ["data-theme"] });
+    for (const query of ["(prefers-color-scheme: dark)", "(forced-colors: active)"]) {
+      matchMedia(query).addEventListener("change", changed);
+    }
+  }
+
+  news() {
+    const name = document.documentElement.dataset["theme"] ?? "";
+    return { look: String(this.count), value: { name } };
+  }
+}

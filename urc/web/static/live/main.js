@@ -1,0 +1,335 @@
+// @ts-check
+/**
+ * Starts the live page: socket → store → one animation frame → widgets, badge, panel.
+ *
+ * @typedef {import("../core/types.js").Reply} Reply
+ * @typedef {import("../core/types.js").Value} Value
+ */
+import { Alarms } from "./alarms.js";
+import { Asks } from "../control/asks.js";
+import { backSafely } from "./back.js";
+import { Badge, part } from "./badge.js";
+import { Controls } from "../control/controls.js";
+import { Drive } from "../control/drive.js";
+import { Alerts, Follows, Log, Themes, watched } from "./follow.js";
+import { frameOf } from "./frames.js";
+import { Host } from "../widgets/host.js";
+import { Input } from "../control/input.js";
+import { Panel } from "./panel.js";
+import { FullScreen, WakeLock } from "./screen.js";
+import { Socket } from "./socket.js";
+import { Stage } from "./stage.js";
+import { StopButton } from "../control/stop.js";
+import { Store } from "./store.js";
+import { offerSystems } from "../core/units.js";
+import { said, t } from "../core/words.js";
+
+/** What the server says of a stop that nobody's hand made. @type {Record<string, string>} */
+const STOPPED = {
+  expired: t("too long without a sign of this page"),
+  revoked: t("the line to the robot was cut"),
+};
+/** So long a yes counts before the server has heard of it. */
+const MEANT_MS = 5000;
+/** How often ages are looked at when nothing arrives. */
+const AGE_EVERY_MS = 250;
+
+const root = part(document, "[data-robot]");
+const store = new Store();
+const badge = new Badge(part(root, "[data-badge]"));
+const panel = new Panel(part(root, "[data-panel]"));
+const alarms = new Alarms(part(root, "[data-alarms]"));
+
+/** @type {Map<number, {resolve: (values: Record<string, Value>) => void, reject: (error: Error) => void}>} */
+const waiting = new Map();
+/** Commands that somebody has said yes to, and that wait for their tokens. @type {Map<number, {atMs: number, said: object}>} */
+const meant = new Map();
+let lastId = 0;
+let isFrameDue = false;
+/** Whether more than widgets has to be looked at in the next frame. */
+let isAllDue = false;
+let session = "";
+
+const address = new URL(root.dataset["socket"] ?? "/ws", location.href);
+address.protocol = address.protocol === "https:" ? "wss:" : "ws:";
+const socket = new Socket(address.href, {
+  message: take,
+  picture: takePicture,
+  trip: wake,
+  state(isUp) {
+    store.setUp(isUp, performance.now());
+    if (!isUp) {
+      giveUpCommands();
+      drive.lost();
+      asks.lost();
+      input.spendAll(t("the connection to URC was lost"));
+    }
+    tellOfDoor();
+    wake();
+  },
+});
+const spare = new URL(address);
+spare.pathname += "/spare";
+const drive = new Drive(socket, root.dataset["stop"] ?? "", wake, spare.href);
+const input = new Input(drive);
+const bar = root.querySelector("[data-controls]");
+const stop = new StopButton(drive, input, store, JSON.parse(root.dataset["lines"] ?? "[]"), bar !== null);
+const asks = new Asks(part(root, ".urc-bar"), (message) => socket.send(message));
+stop.onPressed = forgetQuestions;
+/** Where sequences stand. @type {Record<string, import("../core/types.js").Progress>} */
+let sequences = {};
+const controls = bar instanceof HTMLElement ? new Controls(bar, drive, stop) : null;
+const log = new Log();
+const alerts = new Alerts();
+const themes = new Themes(wake);
+const follows = new Follows(
+  {
+    links: () => {
+      const value = { isUp: store.isUp, links: [...store.links.values()], isReplay: badge.isReplay };
+      return { look: JSON.stringify(value), value };
+    },
+    log: () => log.news(),
+    lease: () => {
+      const value = { lease: drive.lease, isMine: drive.isMine, refusal: drive.refusal };
+      return { look: JSON.stringify(value), value };
+    },
+    alarms: () => alerts.news(store, performance.now()),
+    watched: () => watched(store, performance.now()),
+    latency: () => {
+      const { isUp, tripMs, failures, skewMs, messages, bytes } = socket;
+      const value = { isUp, tripMs, failures, skewMs, messages, bytes };
+      return { look: JSON.stringify(value), value };
+    },
+    sequences: () => ({ look: JSON.stringify(sequences), value: sequences }),
+    theme: () => themes.news(),
+  },
+  wake,
+);
+const host = new Host(store, {
+  run,
+  asks,
+  steer: (command, verb) => void socket.send({ t: "steer", command, verb }),
+  drive: (wish) => {
+    drive.say(wish);
+    drive.changed();
+  },
+  wake,
+  again: wakeWidgets,
+  input,
+  stop,
+  follows,
+});
+const note = part(root, "[data-note]");
+const tell = (/** @type {string} */ text) => {
+  note.textContent = text;
+};
+const AT_THE_DOOR = t("URC was started again: open the address that it printed, then this page goes on.");
+/** Say what to do where the server knows this browser no more; STOP works all the same. */
+function tellOfDoor() {
+  if (socket.isShutOut) tell(AT_THE_DOOR);
+  else if (note.textContent === AT_THE_DOOR) tell("");
+}
+new FullScreen(root.querySelector("[data-fullscreen]"), tell);
+const wakeLock = new WakeLock(tell);
+const stage = new Stage(root, { store, run, input, asks, host, panel: panel.el, wake });
+/** Which images the server was told to send. */
+let shown = "";
+
+/** Ask for the one animation frame in which everything is drawn. */
+function wake() {
+  isAllDue = true;
+  wakeWidgets();
+}
+
+/** Ask for it where only readings are new, as most often: the page around the widgets shows none. */
+function wakeWidgets() {
+  if (isFrameDue) return;
+  isFrameDue = true;
+  requestAnimationFrame(draw);
+}
+
+function draw() {
+  isFrameDue = false;
+  const nowMs = performance.now();
+  host.frame(nowMs);
+  stage.frame(nowMs);
+  if (!isAllDue) return;
+  isAllDue = false;
+  follows.frame();
+  askPictures();
+  badge.frame(store, socket);
+  panel.frame(store, socket.reason);
+  alarms.frame(store, nowMs);
+  stop.frame();
+  controls?.frame(nowMs);
+  wakeLock.want(drive.isMine);
+}
+
+/** Ask for the images that can be seen, and for no others. */
+function askPictures() {
+  const signals = [...host.pictures(), ...stage.pictures()];
+  const wanted = JSON.stringify(signals);
+  if (wanted !== shown && socket.send({ t: "show", signals })) shown = wanted;
+}
+
+/** @param {ArrayBuffer} data */
+function takePicture(data) {
+  const frame = frameOf(data);
+  if (!frame) return;
+  store.picture(frame, performance.now());
+  wakeWidgets();
+}
+
+/** @param {any} message */
+function take(message) {
+  const nowMs = performance.now();
+  switch (message.t) {
+    case "v":
+      store.values(message, nowMs);
+      if (message.s || alarms.isAny) break; // what is past a limit is told outside of widgets too
+      wakeWidgets();
+      return;
+    case "hello":
+      store.each.begin(message.session);
+      store.hello(message, nowMs);
+      session = message.session;
+      sequences = {};
+      shown = "[]"; // a new connection sends none until it is asked
+      break;
+    case "links":
+      store.setLinks(message.links, nowMs);
+      break;
+    case "log":
+      log.add(message.lines, message.first, session);
+      panel.addLines(message.lines, message.first, session);
+      break;
+    case "ask":
+    case "asked":
+      asks.take(message);
+      break;
+    case "progress":
+      sequences = Object.fromEntries(message.sequences.map((/** @type {import("../core/types.js").Progress} */ one) => [one.command, one]));
+      break;
+    case "pong":
+      store.pong(message.n, nowMs, socket.tripMs);
+      break;
+    case "token":
+      give(message);
+      break;
+    case "reply":
+      settle(message);
+      break;
+    case "lease":
+      if (drive.setLease(message, nowMs)) {
+        input.spendAll(input.against() || t("STOP was pressed meanwhile: give it anew"));
+        stop.heard();
+      }
+      input.leaseChanged();
+      break;
+    case "beat":
+      drive.hear(message.n, nowMs);
+      return; // nothing to draw
+    case "stopped":
+      input.stopped(
+        message.command,
+        message.reason === "expired" && drive.isLossy
+          ? t("the link to URC lost or held up too much for the lease of this control")
+          : (STOPPED[message.reason] ?? message.reason),
+      );
+      break;
+    case "refused":
+      if (message.command) input.stopped(message.command, said(message.message));
+      else {
+        drive.refused(message.message);
+        input.refused(said(message.message));
+      }
+      break;
+    case "error":
+      console.warn(`URC: ${message.message}`);
+      break;
+  }
+  wake();
+}
+
+/**
+ * @param {string} command
+ * @param {Record<string, import("../core/types.js").Given>} args
+ * @param {import("../control/asks.js").Ticket} [ticket] of the question that was answered first
+ * @returns {Promise<Record<string, Value>>}
+ */
+function run(command, args, ticket) {
+  lastId += 1;
+  const id = lastId;
+  return new Promise((resolve, reject) => {
+    waiting.set(id, { resolve, reject });
+    const said = { id, command, arguments: args, stops: drive.stops };
+    ticket?.began(id);
+    if (ticket) meant.set(id, { atMs: performance.now(), said });
+    if (!socket.send({ t: ticket ? "prepare" : "run", ...said })) {
+      meant.delete(id);
+      waiting.delete(id);
+      reject(new Error(t("no connection to URC")));
+    }
+  });
+}
+
+/**
+ * Give what somebody has said yes to, unless that was too long ago.
+ *
+ * @param {{id: number, token: string}} message
+ */
+function give({ id, token }) {
+  const yes = meant.get(id);
+  meant.delete(id);
+  if (!yes) return;
+  const isLate = performance.now() - yes.atMs > MEANT_MS;
+  if (isLate || !socket.send({ t: "run", ...yes.said, token })) {
+    settle({ id, ok: false, message: t("it took too long: not sent") });
+  }
+}
+
+/** STOP was pressed: nobody says yes to what was wished before it, and no yes counts. */
+function forgetQuestions() {
+  const why = t("STOP was pressed meanwhile: give it anew");
+  asks.stopped(why);
+  for (const id of [...meant.keys()]) settle({ id, ok: false, message: why });
+  meant.clear();
+}
+
+/** @param {Reply} reply */
+function settle(reply) {
+  const asked = waiting.get(reply.id);
+  waiting.delete(reply.id);
+  if (reply.ok) asked?.resolve(reply.values ?? {});
+  else asked?.reject(new Error(said(reply.message ?? reply.code ?? t("it was not done"))));
+}
+
+/** One command, one answer: without a line there will be none. Nothing is ever sent again. */
+function giveUpCommands() {
+  for (const { reject } of waiting.values()) {
+    reject(new Error(t("the connection to URC was lost; whether it was done is not known")));
+  }
+  waiting.clear();
+  meant.clear();
+}
+
+backSafely(part(root, "[data-back]"), {
+  letGo: () => input.letGo(t("the page was left")),
+  isMine: () => drive.isMine,
+  leave: () => void drive.say("leave"),
+  close: () => socket.close(),
+});
+offerSystems((system) => store.setUnits(system));
+socket.open();
+setInterval(wake, AGE_EVERY_MS);
+
+addEventListener("pagehide", () => socket.close());
+addEventListener("pageshow", (event) => {
+  if (event.persisted) socket.open();
+});
+addEventListener("online", () => socket.hurry());
+document.addEventListener("visibilitychange", () => {
+  if (document.hidden) return;
+  socket.hurry();
+  wake();
+});

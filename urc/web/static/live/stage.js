@@ -1,0 +1,80 @@
+// @ts-check
+/**
+ * What is on the stage of the page: the cells of an interface with its tabs, or the interface for
+ * finding faults. Another interface takes its place while the page goes on.
+ *
+ * @typedef {import("../dev/debug.js").Debug} Debug
+ * @typedef {import("../dev/debug.js").Doors} DebugDoors
+ *
+ * @typedef {object} More
+ * @property {import("../widgets/host.js").Host} host
+ * @property {HTMLElement} panel a details element; it stands open beside the search for faults
+ * @property {() => void} wake
+ */
+import { part } from "./badge.js";
+import { Interfaces } from "./interfaces.js";
+import { tabsOf } from "./tabs.js";
+import { said, t } from "../core/words.js";
+
+export class Stage {
+  /**
+   * @param {HTMLElement} root
+   * @param {DebugDoors & More} doors
+   */
+  constructor(root, doors) {
+    this.doors = doors;
+    this.el = part(root, "[data-stage]");
+    /** @type {Debug | null} */
+    this.debug = null;
+    this.wasOpen = false;
+    this.enter();
+    new Interfaces(root, {
+      letGo: (reason) => doors.input.letGo(reason),
+      leave: () => this.leave(),
+      enter: () => this.enter(),
+    });
+    addEventListener("urc-let-go", (event) => {
+      if (event instanceof CustomEvent) doors.input.letGo(said(String(event.detail)));
+    });
+  }
+
+  /** Names of the images that can be seen and are no widget's. */
+  pictures() {
+    return this.debug?.pictures() ?? [];
+  }
+
+  /** @param {number} nowMs */
+  frame(nowMs) {
+    this.debug?.frame(nowMs);
+  }
+
+  /** Begin what is on the stage now. */
+  enter() {
+    const { host, input, wake } = this.doors;
+    host.mountAll(this.el);
+    tabsOf(this.el, () => input.letGo(t("another page was opened")));
+    const el = this.el.querySelector("[data-debug]");
+    if (el instanceof HTMLElement) void this.search(el);
+    wake();
+  }
+
+  /** @param {HTMLElement} el of the interface for finding faults */
+  async search(el) {
+    const { Debug } = await import("../dev/debug.js");
+    if (!el.isConnected) return; // another interface was opened meanwhile
+    const { panel, wake } = this.doors;
+    this.wasOpen = panel.hasAttribute("open");
+    panel.toggleAttribute("open", true);
+    this.debug = new Debug(el, this.doors);
+    wake();
+  }
+
+  /** End what is on the stage. */
+  leave() {
+    const { host, panel } = this.doors;
+    if (this.debug) panel.toggleAttribute("open", this.wasOpen);
+    this.debug?.end();
+    this.debug = null;
+    host.unmountAll(this.el);
+  }
+}

@@ -1,0 +1,341 @@
+// @ts-check
+/**
+ * The latest value of every signal, and how old it is. Knows no DOM and no socket.
+ *
+ * Ages are counted on the page's own clock from the moment a value was measured. The server sends
+ * the age at the moment of sending; what the way added on top of its usual time is found by
+ * comparing the two clocks with the fastest message so far, so that a value that lay in a full
+ * buffer is as old as it is.
+ *
+ * @typedef {import("../core/types.js").Alarm} Alarm
+ * @typedef {import("../core/types.js").Conversion} Conversion
+ * @typedef {import("../core/types.js").Held} Held
+ * @typedef {import("../core/types.js").Hello} Hello
+ * @typedef {import("../core/types.js").Link} Link
+ * @typedef {import("../core/types.js").Picture} Picture
+ * @typedef {import("../core/types.js").Reading} Reading
+ * @typedef {import("../core/types.js").Signal} Signal
+ * @typedef {import("../core/types.js").State} State
+ * @typedef {import("../core/types.js").Values} Values
+ *
+ * @typedef {{value: Held, alarm: Alarm, timeMs: number, serial: number, image?: Picture}} Sample
+ */
+import { Each } from "./each.js";
+import { digitsIn } from "../core/figures.js";
+import { ageText, textOf } from "../core/texts.js";
+import { converted, factorOf, Units } from "../core/units.js";
+import { t } from "../core/words.js";
+
+export { ageText, DASH } from "../core/texts.js";
+
+/** After so many times its greatest age a value is not shown any more. */
+const GONE_AFTER = 10;
+/**
+ * Nor after its line has been down for so long: nobody knows then what has become of it, however
+ * patient its signal is.
+ */
+const CUT_OFF_MS = 60_000;
+/** How fast two good clocks may run apart. */
+const DRIFT = 1e-4;
+const SHORT_TRIP_MS = 250;
+const LONG_LAG_MS = 1000;
+/** A signal of which nothing was declared. @type {Signal} */
+const UNKNOWN = { name: "", type: "string" };
+/** Types of signals that are images, or may be. */
+export const PICTURES = new Set(["image", "blob"]);
+
+export class Store {
+  constructor() {
+    /** @type {Map<string, Signal>} */
+    this.signals = new Map();
+    /** @type {string[]} */
+    this.names = [];
+    /** @type {Map<string, Sample>} */
+    this.samples = new Map();
+    /** @type {Map<string, Link>} */
+    this.links = new Map();
+    /** Since when each line that is down has been so. @type {Map<string, number>} */
+    this.downMs = new Map();
+    this.isUp = false;
+    /** Whether every line is connected: then nobody has to look at each. */
+    this.isAllUp = false;
+    /** When the connection to URC was lost. */
+    this.lostMs = 0;
+    this.serial = 0;
+    /** Grows when the server says anew what the signals mean. */
+    this.edition = 0;
+    /** Whether any of them is an image: else nobody has to look for some in each frame. */
+    this.hasPictures = false;
+    this.skewMs = Infinity;
+    this.skewSetMs = 0;
+    this.each = new Each();
+    this.units = new Units();
+    /** Signals in the unit that an input asks for. @type {WeakMap<Conversion, Signal>} */
+    this.wanted = new WeakMap();
+  }
+
+  /**
+   * Take what the server serves. Values stay: they are the last that were seen, with their age. Those
+   * of signals that there are no more go: nothing would ever make them old.
+   *
+   * @param {Hello} hello
+   * @param {number} nowMs
+   */
+  hello(hello, nowMs) {
+    this.signals = new Map(hello.signals.map((signal) => [signal.name, signal]));
+    this.names = hello.signals.map((signal) => signal.name);
+    for (const name of this.samples.keys()) {
+      if (!this.signals.has(name)) this.samples.delete(name);
+    }
+    this.hasPictures = hello.signals.some(({ type }) => PICTURES.has(type));
+    this.edition += 1;
+    this.links = new Map();
+    this.downMs = new Map();
+    this.skewMs = Infinity;
+    this.lagMs(hello.now, nowMs);
+    this.countLinks();
+  }
+
+  /**
+   * @param {boolean} isUp
+   * @param {number} nowMs
+   */
+  setUp(isUp, nowMs) {
+    if (this.isUp && !isUp) this.lostMs = nowMs;
+    this.isUp = isUp;
+    if (!isUp) this.links = new Map();
+    this.countLinks();
+  }
+
+  countLinks() {
+    this.isAllUp = this.isUp && [...this.links.values()].every(({ state }) => isConnected(state));
+  }
+
+  /**
+   * @param {Values} frame
+   * @param {number} nowMs
+   */
+  values(frame, nowMs) {
+    const sentMs = nowMs - this.lagMs(frame.n, nowMs);
+    frame.i.forEach((index, place) => {
+      const name = this.names[index];
+      if (name === undefined) return;
+      const missed = this.each.take(frame.e, index, name);
+      if (missed < 0) return;
+      this.serial += 1;
+      this.samples.set(name, {
+        value: frame.v[place] ?? null,
+        alarm: frame.s?.[place] ?? "",
+        timeMs: sentMs - (typeof frame.a === "number" ? frame.a : (frame.a[place] ?? 0)),
+        serial: this.serial,
+      });
+      this.each.tell(name, missed);
+    });
+  }
+
+  /**
+   * Take an image, or whatever bytes a signal holds.
+   *
+   * @param {import("./frames.js").BinaryFrame} frame
+   * @param {number} nowMs
+   */
+  picture({ index, sentMs, ageMs, type, bytes }, nowMs) {
+    const timeMs = nowMs - this.lagMs(sentMs, nowMs) - ageMs;
+    const name = this.names[index];
+    if (name === undefined) return;
+    this.serial += 1;
+    const image = { blob: new Blob([bytes], { type }), type, serial: this.serial };
+    const value = { bytes: bytes.byteLength };
+    this.samples.set(name, { value, alarm: "", timeMs, serial: this.serial, image });
+  }
+
+  /**
+   * Show all values to people in the units of a system.
+   *
+   * @param {string} system
+   */
+  setUnits(system) {
+    this.units.use(system);
+    this.edition += 1;
+  }
+
+  /**
+   * @param {Link[]} links
+   * @param {number} nowMs
+   */
+  setLinks(links, nowMs) {
+    this.links = new Map(links.map((link) => [link.transport, link]));
+    for (const { transport, state, since } of links) {
+      if (isConnected(state)) this.downMs.delete(transport);
+      // Lost, connecting, lost again: it has been down since the first of them.
+      else if (!this.downMs.has(transport)) this.downMs.set(transport, nowMs - since);
+    }
+    this.countLinks();
+  }
+
+  /**
+   * A quick round trip proves that nothing lies in a buffer: if messages seem late all the same,
+   * one of the clocks has jumped, as after sleep.
+   *
+   * @param {number} serverMs
+   * @param {number} nowMs
+   * @param {number | null} tripMs
+   */
+  pong(serverMs, nowMs, tripMs) {
+    const lagMs = this.lagMs(serverMs, nowMs);
+    if (tripMs !== null && tripMs < SHORT_TRIP_MS && lagMs > LONG_LAG_MS) {
+      this.skewMs = nowMs - serverMs;
+    }
+  }
+
+  /**
+   * Return what differs when a reading has to be shown anew. It is asked for each signal in each
+   * frame, so for one that is live it is only its number.
+   *
+   * @param {string} name
+   * @param {number} nowMs
+   * @returns {number | string}
+   */
+  look(name, nowMs) {
+    const sample = this.samples.get(name);
+    if (!sample) return 0;
+    const ageMs = Math.max(0, nowMs - sample.timeMs);
+    const state = this.stateOf(this.signals.get(name) ?? UNKNOWN, sample, ageMs, nowMs);
+    return state === "live" ? sample.serial : `${sample.serial} ${state} ${ageText(ageMs / 1000)}`;
+  }
+
+  /**
+   * @param {string} name
+   * @param {number} nowMs
+   */
+  state(name, nowMs) {
+    const sample = this.samples.get(name);
+    const ageMs = sample ? Math.max(0, nowMs - sample.timeMs) : 0;
+    return this.stateOf(this.signals.get(name) ?? UNKNOWN, sample, ageMs, nowMs);
+  }
+
+  /**
+   * @param {string} name
+   * @param {number} nowMs
+   * @param {Conversion} [conversion] into the unit that the input asks for
+   * @returns {Reading}
+   */
+  reading(name, nowMs, conversion) {
+    const declared = this.signals.get(name) ?? { name, type: "string" };
+    const sample = this.samples.get(name);
+    const ageMs = sample ? Math.max(0, nowMs - sample.timeMs) : 0;
+    const state = this.stateOf(declared, sample, ageMs, nowMs);
+    const isShown = sample && (state === "live" || state === "stale");
+    const signal = conversion ? this.wantedAs(declared, conversion) : declared;
+    const value = isShown ? converted(sample.value, conversion) : null;
+    const shown = this.units.shown(signal.unit ?? "");
+    return {
+      value,
+      state,
+      alarm: isShown ? sample.alarm : "",
+      // Made when somebody asks: of a scan it is a thousand numbers that nobody reads.
+      get text() {
+        return textOf(value, signal, factorOf(shown));
+      },
+      unit: shown.symbol,
+      age: state === "stale" || state === "gone" ? ageText(ageMs / 1000) : "",
+      time: (sample?.timeMs ?? 0) / 1000,
+      serial: sample?.serial ?? 0,
+      signal,
+      image: isShown ? (sample.image ?? null) : null,
+    };
+  }
+
+  /**
+   * The signal as if the robot had declared it in another unit.
+   *
+   * @param {Signal} signal
+   * @param {Conversion} conversion
+   */
+  wantedAs(signal, conversion) {
+    const known = this.wanted.get(conversion);
+    if (known?.name === signal.name && known.edition === this.edition) return known;
+    const made = { ...signal, unit: conversion.symbol, edition: this.edition };
+    const { factor, offset } = conversion;
+    if (signal.min !== undefined) made.min = signal.min * factor + offset;
+    if (signal.max !== undefined) made.max = signal.max * factor + offset;
+    const limits = Object.entries(signal.limits ?? {});
+    const precision = digitsIn(signal.precision, (value) => value * factor + offset);
+    if (precision !== undefined) made.precision = precision;
+    if (signal.limits) {
+      made.limits = Object.fromEntries(limits.map(([key, at]) => [key, at * factor + offset]));
+    }
+    this.wanted.set(conversion, made);
+    return made;
+  }
+
+  /**
+   * @param {Signal} signal
+   * @param {Sample | undefined} sample
+   * @param {number} ageMs
+   * @param {number} nowMs
+   * @returns {State}
+   */
+  stateOf(signal, sample, ageMs, nowMs) {
+    if (!sample || sample.value === null) return "none";
+    const limitMs = (signal.stale_after_s ?? 0) * 1000;
+    const cutOffMs = this.cutOffMs(signal, nowMs);
+    if (limitMs > 0 && ageMs > GONE_AFTER * limitMs) return "gone";
+    if (cutOffMs > CUT_OFF_MS) return "gone";
+    if (limitMs > 0 && ageMs > limitMs) return "stale";
+    return cutOffMs >= 0 ? "stale" : "live";
+  }
+
+  /**
+   * For how long nothing new could come, because the page or every line that brings it is cut off;
+   * -1 while something can.
+   *
+   * @param {Signal} signal
+   * @param {number} nowMs
+   */
+  cutOffMs(signal, nowMs) {
+    const [first] = signal.sources ?? [];
+    if (this.isAllUp && (first === undefined || this.links.has(first))) return -1;
+    const sources = signal.sources?.length ? signal.sources : [...this.links.keys()];
+    const states = sources.map((source) => this.links.get(source)?.state);
+    if (this.isUp && (states.length === 0 || states.some(isConnected))) return -1;
+    // The last of its lines that went down; without URC nothing is known of them any more.
+    const downMs = sources.map((source) => this.downMs.get(source) ?? Infinity);
+    const sinceMs = Math.max(-Infinity, ...downMs);
+    const isKnown = Number.isFinite(sinceMs);
+    if (!this.isUp) return nowMs - (isKnown ? Math.min(sinceMs, this.lostMs) : this.lostMs);
+    return isKnown ? Math.max(0, nowMs - sinceMs) : 0;
+  }
+
+  /**
+   * Why a command cannot be given now; "" when it can be tried.
+   *
+   * @param {string} transport the line that must not be lost; "" when one is made for each command
+   * @param {boolean} isMotion nothing waits for a line that is still being made
+   */
+  hindrance(transport, isMotion = false) {
+    if (!this.isUp) return t("no connection to URC");
+    const state = this.links.get(transport)?.state;
+    if (state === "lost") return t("the robot is not connected");
+    return isMotion && transport && !isConnected(state) ? t("the robot is not connected yet") : "";
+  }
+
+  /**
+   * How much longer than the fastest one this message took, in milliseconds.
+   *
+   * @param {number} serverMs
+   * @param {number} nowMs
+   */
+  lagMs(serverMs, nowMs) {
+    const skewMs = nowMs - serverMs;
+    const known = this.skewMs + (nowMs - this.skewSetMs) * DRIFT;
+    this.skewMs = Number.isFinite(known) ? Math.min(skewMs, known) : skewMs;
+    this.skewSetMs = nowMs;
+    return skewMs - this.skewMs;
+  }
+}
+
+/** @param {Link["state"] | undefined} state */
+function isConnected(state) {
+  return state === "live" || state === "silent";
+}

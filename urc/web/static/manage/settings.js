@@ -1,0 +1,173 @@
+// @ts-check
+/**
+ * The settings of a robot: sent as they are typed, tried by the server, and marked where they do not
+ * fit. What was not saved stays in the fields.
+ *
+ * @typedef {object} Line
+ * @property {string} transport
+ * @property {string} type
+ * @property {string} address
+ * @property {"answers" | "opens" | "fails"} verdict
+ * @property {string} text
+ * @property {string} advice
+ *
+ * @typedef {object} Answer
+ * @property {boolean} isSaved
+ * @property {string} text
+ * @property {Record<string, string>} faults
+ * @property {string[]} missing
+ * @property {Line[]} lines
+ */
+import { ask, reason } from "../core/ask_server.js";
+import { part } from "../live/badge.js";
+import { button, made, ready } from "../core/dom.js";
+import { mark, t } from "../core/words.js";
+
+const KEPT_S = 365 * 24 * 3600;
+/** @type {Record<string, [string, string]>} */
+const VERDICTS = {
+  answers: ["●", mark("answers")],
+  opens: ["◆", mark("connected, nothing heard")],
+  fails: ["▲", mark("not reached")],
+};
+
+const root = part(document, "[data-settings]");
+const form = /** @type {HTMLFormElement} */ (part(root, "[data-form]"));
+const said = part(root, "[data-said]");
+const found = part(root, "[data-found]");
+/** Secrets that are to be forgotten. @type {Set<string>} */
+const forgotten = new Set();
+
+/** @returns {Record<string, string | null>} */
+function filled() {
+  /** @type {Record<string, string | null>} */
+  const settings = {};
+  for (const field of form.querySelectorAll("[data-field] :is(input, select)")) {
+    if (!(field instanceof HTMLInputElement || field instanceof HTMLSelectElement)) continue;
+    if (field.disabled) continue;
+    const isUntouched = "secret" in field.dataset && field.value === "" && !forgotten.has(field.name);
+    settings[field.name] = isUntouched ? null : field.value;
+  }
+  return settings;
+}
+
+/** @param {string} name @returns {string} */
+function chosen(name) {
+  const field = form.elements.namedItem(name);
+  return field instanceof HTMLSelectElement ? field.value : "";
+}
+
+/** @param {boolean} isBusy */
+function lock(isBusy) {
+  for (const one of form.querySelectorAll("button")) one.disabled = isBusy;
+  form.toggleAttribute("aria-busy", isBusy);
+}
+
+/** @param {{test: boolean, anyway?: boolean}} how */
+async function send({ test, anyway = false }) {
+  lock(true);
+  tell(test ? t("trying the robot …") : t("saving …"));
+  mistakes({});
+  lines([]);
+  try {
+    /** @type {Answer} */
+    const answer = await ask(root.dataset["post"] ?? "", {
+      settings: filled(),
+      version: chosen("version"),
+      interface: chosen("interface"),
+      test,
+      anyway,
+    });
+    mistakes(answer.faults);
+    lines(answer.lines);
+    tell(`${answer.isSaved ? "✓" : "▲"} ${answer.text}`, answer.isSaved ? "" : "urc-bad");
+    if (answer.isSaved) saved();
+    else if (answer.lines.length) offerAnyway();
+  } catch (error) {
+    tell(`▲ ${reason(error)}`, "urc-bad");
+  }
+  lock(false);
+  if (!form.querySelector("[aria-invalid]")) return;
+  const first = form.querySelector("[aria-invalid='true']");
+  if (first instanceof HTMLElement) first.focus();
+}
+
+/** @param {string} text @param {string} [kind] */
+function tell(text, kind = "") {
+  said.className = `urc-said ${kind}`.trim();
+  said.replaceChildren(text);
+}
+
+function offerAnyway() {
+  const more = button(t("Save anyway"), "anyway", () => void send({ test: false }));
+  const rows = part(found, "[data-lines]");
+  found.querySelector("[data-key='anyway']")?.remove();
+  rows.after(more);
+}
+
+function saved() {
+  forgotten.clear();
+  // This device shows the interface that was chosen here, whatever it showed last.
+  const path = root.dataset["robot"] ?? "/";
+  const name = encodeURIComponent(chosen("interface"));
+  if (name) document.cookie = `urc-interface=${name}; path=${path}; max-age=${KEPT_S}; samesite=strict`;
+  for (const field of form.querySelectorAll("[data-secret]")) {
+    if (!(field instanceof HTMLInputElement)) continue;
+    if (field.value) field.placeholder = "••••••";
+    field.value = "";
+  }
+}
+
+/** @param {Record<string, string>} faults */
+function mistakes(faults) {
+  for (const box of form.querySelectorAll("[data-field]")) {
+    if (!(box instanceof HTMLElement)) continue;
+    const text = faults[box.dataset["field"] ?? ""] ?? "";
+    const told = part(box, "[data-fault]");
+    told.textContent = text && `▲ ${text}`;
+    told.hidden = !text;
+    const field = box.querySelector("input, select");
+    if (text) field?.setAttribute("aria-invalid", "true");
+    else field?.removeAttribute("aria-invalid");
+  }
+}
+
+/** @param {Line[]} some */
+function lines(some) {
+  found.hidden = some.length === 0;
+  found.querySelector("[data-key='anyway']")?.remove();
+  part(found, "[data-lines]").replaceChildren(
+    ...some.map((one) => {
+      const [sign, word] = VERDICTS[one.verdict] ?? ["", one.verdict];
+      const kind = one.verdict === "fails" ? "urc-bad" : one.verdict === "opens" && one.advice ? "urc-caution" : "";
+      return made(
+        "li",
+        { class: "urc-row", "data-line": one.transport, "data-verdict": one.verdict },
+        made("h3", { class: `urc-row-title ${kind}`.trim() }, `${sign} ${one.transport}: ${t(word)}`),
+        made("p", { class: "urc-small" }, one.address),
+        one.verdict !== "answers" && made("p", { lang: "en" }, one.text),
+        one.advice && made("p", { lang: "en" }, one.advice),
+      );
+    }),
+  );
+}
+
+form.addEventListener("submit", (event) => {
+  event.preventDefault();
+  void send({ test: true });
+});
+form.querySelector("[data-plain]")?.addEventListener("click", () => void send({ test: false }));
+for (const one of form.querySelectorAll("[data-forget]")) {
+  one.addEventListener("click", () => {
+    if (!(one instanceof HTMLElement)) return;
+    const name = one.dataset["forget"] ?? "";
+    forgotten.add(name);
+    const field = form.elements.namedItem(name);
+    if (field instanceof HTMLInputElement) {
+      field.value = "";
+      field.placeholder = t("not set");
+    }
+    tell(t("forgotten once it is saved"));
+  });
+}
+ready(root);

@@ -1,0 +1,388 @@
+// @ts-check
+/**
+ * One widget in its cell: its context, its frames, and what happens when it breaks.
+ *
+ * Whatever a widget throws costs its own cell, which then shows a card; so does one that again and
+ * again takes the page's time. A cell that cannot be seen is sent nothing.
+ *
+ * @typedef {import("../core/types.js").Conversion} Conversion
+ * @typedef {import("../core/types.js").Instance} Instance
+ * @typedef {import("../core/types.js").Outlet} Outlet
+ * @typedef {import("../core/types.js").PadDesk} PadDesk
+ * @typedef {import("../core/types.js").Reading} Reading
+ * @typedef {import("../core/types.js").Given} Given
+ * @typedef {import("../core/types.js").Value} Value
+ * @typedef {import("../core/types.js").WidgetModule} WidgetModule
+ * @typedef {import("./output.js").Output} Output
+ * @typedef {import("../live/store.js").Store} Store
+ *
+ * @typedef {object} Config
+ * @property {string} slot
+ * @property {string} widget
+ * @property {string} title
+ * @property {Record<string, string | string[]>} inputs Input → its signal, or its signals.
+ * @property {Record<string, (Conversion | null)[]>} conversions Input → for each of its signals, how
+ *   it becomes what the input asks for; left out where nothing has to be done.
+ * @property {Record<string, Output>} outputs
+ * @property {Record<string, unknown>} options
+ * @property {boolean} [gate] Whether it is a dead-man.
+ *
+ * @typedef {(command: string, args: Record<string, Given>, ticket?: import("../control/asks.js").Ticket) => Promise<Record<string, Value>>} Run
+ *
+ * @typedef {object} Doors Where what widgets do goes.
+ * @property {Run} run
+ * @property {import("../control/asks.js").Asks} asks
+ * @property {(command: string, verb: string) => void} steer
+ * @property {(wish: import("../core/types.js").Wish) => void} drive
+ * @property {() => void} wake asks for an animation frame
+ * @property {() => void} again asks for one in which widgets are drawn, and no more
+ * @property {Pick<import("../control/input.js").Input, "hold" | "gate" | "gated" | "letGo" | "refusal" | "hindrance" | "isDriving"> & {pads: PadDesk}} input
+ * @property {Pick<import("../control/stop.js").StopButton, "press" | "follow">} stop
+ * @property {Pick<import("../live/follow.js").Follows, "listen">} follows
+ * @property {Store} store
+ */
+import { Budget } from "./budget.js";
+import { contextOf } from "./context.js";
+import { t } from "./kit.js";
+import { PICTURES } from "../live/store.js";
+
+/** A widget that has not come up by then says so. */
+const LOADING_MS = 5000;
+
+/** @type {readonly string[]} */
+const NONE = Object.freeze([]);
+/** What a widget without outputs is told of them. @type {Record<string, Outlet>} */
+const NO_OUTLETS = Object.freeze(Object.create(null));
+
+/**
+ * Signals of one input, and what each was like when the widget last saw it.
+ *
+ * @typedef {{input: string, signals: string[], isMany: boolean, seen: (number | string)[], alarms: string}} Bound
+ */
+
+export class Cell {
+  /**
+   * @param {HTMLElement} el
+   * @param {Doors} doors
+   */
+  constructor(el, doors) {
+    this.el = el;
+    this.doors = doors;
+    /** @type {Config} */
+    this.config = JSON.parse(el.dataset["config"] ?? "{}");
+    /** @type {Bound[]} */
+    this.inputs = Object.entries(this.config.inputs).map(([input, bound]) => {
+      const isMany = Array.isArray(bound);
+      return { input, isMany, signals: isMany ? bound : [bound], seen: [], alarms: "" };
+    });
+    this.outputs = Object.entries(this.config.outputs);
+    this.end = new AbortController();
+    /** @type {Instance} */
+    this.instance = {};
+    this.isMounted = false;
+    this.isVisible = true;
+    this.budget = new Budget();
+    /** @type {Map<string, ((reading: Reading) => void)[]>} */
+    this.listeners = new Map();
+    /** What the outputs were like when the widget last saw them; null: it never did. @type {string | null} */
+    this.seenOutlets = null;
+    /** Edition of the store of which all was shown. */
+    this.edition = -1;
+    /** Whether the widget's code is not ours. */
+    this.isForeign = false;
+    /** Its inputs that are images. @type {{edition: number, names: readonly string[]}} */
+    this.images = { edition: -1, names: NONE };
+    /** Places of the images that the widget shows, by input; without an entry, all. @type {Map<string, ReadonlySet<number>>} */
+    this.looks = new Map();
+    /** What the context said of units. @type {Map<string, {edition: number, symbol: string, factor: (value: number) => number}>} */
+    this.shownIn = new Map();
+    /** @type {{width: number, height: number} | null} */
+    this.size = null;
+    /** Said over the widget: that it is still loading, or slow. @type {HTMLElement | null} */
+    this.note = null;
+  }
+
+  async mount() {
+    const refused = this.el.dataset["error"];
+    if (refused) {
+      this.fail(new Error(refused));
+      return;
+    }
+    const late = setTimeout(() => this.remark(t("◌ still loading")), LOADING_MS);
+    try {
+      const url = this.el.dataset["module"] ?? `/widgets/${encodeURIComponent(this.config.widget)}/widget.js`;
+      /** @type {WidgetModule} */
+      const module = await import(url);
+      const instance = await module.default.mount(contextOf(this));
+      if (this.end.signal.aborted) return;
+      this.instance = instance ?? {};
+      this.isMounted = true;
+      this.remark("");
+      this.doors.wake();
+    } catch (error) {
+      this.fail(error);
+    } finally {
+      clearTimeout(late);
+    }
+  }
+
+  /** @param {string} name */
+  output(name) {
+    return Object.hasOwn(this.config.outputs, name) ? this.config.outputs[name] : undefined;
+  }
+
+  /**
+   * @param {string} input
+   * @param {(reading: Reading) => void} listener
+   */
+  listen(input, listener) {
+    this.listeners.set(input, [...(this.listeners.get(input) ?? []), listener]);
+  }
+
+  /**
+   * Let what a listener throws cost this cell only.
+   *
+   * @template T
+   * @param {(news: T) => void} listener
+   * @returns {(news: T) => void}
+   */
+  guarded(listener) {
+    return (news) => {
+      if (this.end.signal.aborted) return;
+      try {
+        listener(news);
+      } catch (error) {
+        this.fail(error);
+      }
+    };
+  }
+
+  /**
+   * @param {Bound} bound
+   * @param {number} place which of its signals
+   * @param {Store} store
+   * @param {number} nowMs
+   */
+  reading({ input, signals }, place, store, nowMs) {
+    const conversions = this.config.conversions ?? {};
+    const conversion = Object.hasOwn(conversions, input) ? conversions[input]?.[place] : undefined;
+    return store.reading(signals[place] ?? "", nowMs, conversion ?? undefined);
+  }
+
+  /** Whether the widget may be called now. @param {number} nowMs */
+  isDue(nowMs) {
+    return this.isMounted && this.isVisible && this.budget.allows(nowMs);
+  }
+
+  /**
+   * Choose the images of an input that the widget shows; the server sends no others.
+   *
+   * @param {string} input
+   * @param {readonly number[]} places
+   */
+  look(input, places) {
+    this.looks.set(input, new Set(places));
+    this.images.edition = -1;
+    this.doors.wake();
+  }
+
+  /** Names of the images that it shows now. @param {Store} store */
+  pictures(store) {
+    if (!this.isMounted || !this.isVisible) return NONE;
+    if (this.images.edition !== store.edition) {
+      const names = this.inputs.flatMap(({ input, signals }) => {
+        const places = this.looks.get(input);
+        return places ? signals.filter((_, place) => places.has(place)) : signals;
+      });
+      const found = names.filter((name) => PICTURES.has(store.signals.get(name)?.type ?? ""));
+      this.images = { edition: store.edition, names: found };
+    }
+    return this.images.names;
+  }
+
+  /**
+   * Whether the widget has to be called: 0 not, 1 something is new, 2 something is that waits for no
+   * turn (a size, an output, a value that is no longer live, an alarm that comes or goes).
+   *
+   * @param {Store} store
+   * @param {number} nowMs
+   * @returns {0 | 1 | 2}
+   */
+  news(store, nowMs) {
+    if (!this.isDue(nowMs)) return 0;
+    if (this.size || this.edition !== store.edition) return 2;
+    if (this.outputs.length > 0 ? this.outlook(store) !== this.seenOutlets : this.seenOutlets === null) return 2;
+    /** @type {0 | 1 | 2} */
+    let found = 0;
+    for (const { signals, seen, alarms } of this.inputs) {
+      for (let place = 0; place < signals.length; place += 1) {
+        const name = signals[place] ?? "";
+        const look = store.look(name, nowMs);
+        if (look === seen[place]) continue;
+        if (typeof look === "string" || typeof seen[place] === "string") return 2;
+        found = 1;
+      }
+      if (found && alarms !== alarmsOf(signals, store)) return 2;
+    }
+    return found;
+  }
+
+  /** @param {Store} store */
+  outlook(store) {
+    return JSON.stringify(this.outlets(store));
+  }
+
+  /**
+   * Give the widget what has changed, if anything has. Called in an animation frame.
+   *
+   * @param {Store} store
+   * @param {number} nowMs
+   */
+  frame(store, nowMs) {
+    if (this.news(store, nowMs)) this.show(store, nowMs);
+  }
+
+  /**
+   * Give the widget what has changed since it was last shown something.
+   *
+   * @param {Store} store
+   * @param {number} nowMs
+   */
+  show(store, nowMs) {
+    /** An input of many signals is a list. @type {Record<string, any>} */
+    const readings = Object.create(null);
+    /** @type {string[]} */
+    const changed = [];
+    const isAllNew = this.edition !== store.edition;
+    const outlets = this.outputs.length > 0 ? this.outlets(store) : NO_OUTLETS;
+    const outlook = this.outputs.length > 0 ? JSON.stringify(outlets) : "";
+    const isOutputNews = this.seenOutlets !== outlook;
+    this.edition = store.edition;
+    this.seenOutlets = outlook;
+    for (const bound of this.inputs) {
+      const { input, signals, seen } = bound;
+      const each = signals.map((_, place) => this.reading(bound, place, store, nowMs));
+      const looks = signals.map((name) => store.look(name, nowMs));
+      readings[input] = bound.isMany ? each : each[0];
+      if (isAllNew || looks.some((look, place) => look !== seen[place])) changed.push(input);
+      bound.seen = looks;
+      bound.alarms = alarmsOf(signals, store);
+    }
+    this.measured(nowMs, () => this.call(readings, changed, outlets, isOutputNews));
+  }
+
+  /**
+   * @param {Record<string, Reading>} readings
+   * @param {string[]} changed
+   * @param {Record<string, Outlet>} outlets
+   * @param {boolean} isOutputNews
+   */
+  call(readings, changed, outlets, isOutputNews) {
+    if (this.size) {
+      this.instance.resize?.(this.size);
+      this.size = null;
+    }
+    if (changed.length === 0 && !isOutputNews) return;
+    for (const input of changed) {
+      const reading = readings[input];
+      if (reading) this.listeners.get(input)?.forEach((listener) => listener(reading));
+    }
+    this.instance.update?.(readings, outlets);
+  }
+
+  /**
+   * Call the widget, and count the time that it takes.
+   *
+   * @param {number} nowMs
+   * @param {() => void} work
+   */
+  measured(nowMs, work) {
+    const startMs = performance.now();
+    try {
+      work();
+    } catch (error) {
+      this.fail(error);
+      return;
+    }
+    const wasSlow = this.budget.isSlow;
+    this.budget.count(nowMs, performance.now() - startMs);
+    if (this.budget.isSpent) this.fail(new Error(t("it stops the page again and again")));
+    else if (this.budget.isSlow !== wasSlow) {
+      this.remark(this.budget.isSlow ? t("◆ slow: shown once a second") : "");
+    }
+  }
+
+  /**
+   * @param {Store} store
+   * @returns {Record<string, Outlet>}
+   */
+  outlets(store) {
+    /** @type {Record<string, Outlet>} */
+    const found = Object.create(null);
+    const { input } = this.doors;
+    for (const [name, { line, refusal, isAnswered, isHeld, moves }] of this.outputs) {
+      const shared = refusal || store.hindrance(line, isHeld);
+      const reason = shared || (isHeld ? input.refusal() : input.hindrance(moves));
+      found[name] = { isReady: reason === "", reason, isAnswered };
+    }
+    return found;
+  }
+
+  /**
+   * Say something over the widget; "" takes it away.
+   *
+   * @param {string} text
+   */
+  remark(text) {
+    this.note?.remove();
+    this.note = null;
+    if (!text || this.end.signal.aborted) return;
+    this.note = document.createElement("p");
+    this.note.className = "urc-remark";
+    this.note.setAttribute("role", "status");
+    this.note.textContent = text;
+    this.el.append(this.note);
+  }
+
+  /**
+   * Replace the widget by a card that says what happened.
+   *
+   * @param {unknown} error
+   */
+  fail(error) {
+    console.warn(`widget ${this.config.widget} in slot ${this.config.slot}:`, error);
+    this.unmount();
+    const card = document.createElement("div");
+    card.className = "urc-fault";
+    card.setAttribute("role", "group");
+    const title = document.createElement("strong");
+    title.textContent = t("◆ {title}: this widget does not work", { title: this.config.title });
+    const reason = document.createElement("p");
+    reason.textContent = error instanceof Error ? error.message : String(error);
+    const hint = document.createElement("p");
+    hint.textContent = t("The others go on. Open the page again to try this one anew.");
+    card.append(title, reason, hint);
+    this.el.replaceChildren(card);
+  }
+
+  unmount() {
+    const { destroy } = this.instance;
+    this.isMounted = false;
+    this.instance = {};
+    this.end.abort();
+    try {
+      destroy?.();
+    } catch (error) {
+      console.warn(`widget ${this.config.widget}: destroy failed:`, error);
+    }
+  }
+}
+
+/**
+ * @param {readonly string[]} signals
+ * @param {Store} store
+ */
+function alarmsOf(signals, store) {
+  if (signals.length === 1) return store.samples.get(signals[0] ?? "")?.alarm ?? "";
+  return signals.map((name) => store.samples.get(name)?.alarm ?? "").join();
+}

@@ -1,0 +1,103 @@
+// @ts-check
+/**
+ * Starts the gallery: each widget in each state of its demo, with a robot that is only played.
+ *
+ * Every cell has a store, a host and a played robot of its own, so that one state knows nothing of
+ * the next. What a widget would send is written into a list.
+ *
+ * When all of them stand and what they were told is drawn, the page says so: `data-ready` on the
+ * element with `data-gallery`.
+ */
+import { part } from "../live/badge.js";
+import { t } from "./kit.js";
+import { Exhibit } from "./exhibit.js";
+import { Themes } from "../live/follow.js";
+import { chosenSystem } from "../core/units.js";
+
+/** What stands there must not grow old by itself. */
+const REPEAT_MS = 1000;
+const STAMP_EVERY_MS = 700;
+const LINES_KEPT = 100;
+
+const gallery = part(document, "[data-gallery]");
+const sent = part(gallery, "[data-sent]");
+const bar = part(document, "[data-bar]");
+
+/**
+ * Write down what would be sent.
+ *
+ * @param {string} state
+ * @param {string} text
+ */
+function tell(state, text) {
+  const line = document.createElement("li");
+  line.textContent = `${state}: ${text}`;
+  sent.prepend(line);
+  while (sent.childElementCount > LINES_KEPT) sent.lastElementChild?.remove();
+}
+
+/** @type {Exhibit[]} */
+const exhibits = [];
+let isFrameDue = false;
+
+function wake() {
+  if (isFrameDue) return;
+  isFrameDue = true;
+  requestAnimationFrame(() => {
+    isFrameDue = false;
+    const nowMs = performance.now();
+    for (const exhibit of exhibits) exhibit.frame(nowMs);
+  });
+}
+
+async function start() {
+  const themes = new Themes(wake);
+  for (const el of gallery.querySelectorAll("[data-news]")) {
+    if (el instanceof HTMLElement) exhibits.push(new Exhibit(el, bar, wake, tell, themes));
+  }
+  const mounted = exhibits.map((exhibit) => exhibit.start(chosenSystem()));
+  setInterval(() => {
+    for (const exhibit of exhibits) exhibit.keep();
+    wake();
+  }, REPEAT_MS);
+  wake();
+  await Promise.all(mounted);
+  for (const exhibit of exhibits) exhibit.play();
+  wake();
+  await frames(3);
+  gallery.dataset["ready"] = "";
+}
+
+/** @param {number} count */
+async function frames(count) {
+  for (let frame = 0; frame < count; frame += 1) {
+    await new Promise((resolve) => requestAnimationFrame(resolve));
+  }
+}
+
+/** Load the page anew when a file of its widgets has been saved since the server read them. */
+async function watch() {
+  const url = gallery.dataset["stamp"];
+  if (!url) return;
+  const before = gallery.dataset["stampNow"];
+  for (;;) {
+    try {
+      const answer = await fetch(url, { cache: "no-store" });
+      if (answer.ok && (await answer.text()) !== before) {
+        location.reload();
+        return;
+      }
+    } catch {
+      // The server is being started anew: the next try may find it.
+    }
+    await new Promise((resolve) => setTimeout(resolve, STAMP_EVERY_MS));
+  }
+}
+
+const choice = document.querySelector("select[data-size-choice]");
+choice?.addEventListener("change", () => {
+  if (choice instanceof HTMLSelectElement) gallery.dataset["size"] = choice.value;
+});
+
+void start().catch((error) => tell("URC", t("the gallery could not start: {error}", { error: String(error) })));
+void watch();

@@ -1,0 +1,74 @@
+// @ts-check
+/**
+ * One value on a scale, with its figure below: what is the same whatever the scale looks like.
+ * `import { Meter } from "urc/meter"`.
+ *
+ * @typedef {import("../core/types.js").Context} Context
+ * @typedef {import("../core/types.js").Reading} Reading
+ * @typedef {import("../core/types.js").Signal} Signal
+ *
+ * @callback DrawScale
+ * @param {Signal} signal
+ * @param {[number, number]} scale its ends, in the signal's unit
+ * @param {(value: number) => number} factor to the unit that is shown
+ */
+import { attribute, digitsIn, format, noteOf, number, part, tell, write } from "./kit.js";
+import { ends } from "./scale.js";
+
+export class Meter {
+  /**
+   * @param {Context} ctx its input `value`, and its options min, max, precision
+   * @param {string} name the widget's; it has `.NAME`, `.NAME-meter`, `-text`, `-unit` and `-note`
+   * @param {DrawScale} draw called when the scale is another one
+   */
+  constructor(ctx, name, draw) {
+    this.ctx = ctx;
+    this.draw = draw;
+    this.root = part(ctx.el, `.${name}`);
+    this.meter = part(ctx.el, `.${name}-meter`);
+    this.text = part(ctx.el, `.${name}-text`);
+    this.unit = part(ctx.el, `.${name}-unit`);
+    this.note = part(ctx.el, `.${name}-note`);
+    /** @type {[number, number]} */
+    this.scale = [0, 1];
+    /** What the scale was drawn for. @type {Signal | null} */
+    this.drawn = null;
+    this.shownIn = "";
+    /** How wide the figure is, in characters; its unit is half as large. */
+    this.characters = 1;
+  }
+
+  /**
+   * @param {Reading} value
+   * @returns {number | null} it, in the signal's unit; null while nobody knows it
+   */
+  show(value) {
+    const { ctx, root, meter } = this;
+    const { symbol, factor } = ctx.unit("value");
+    const known = number(value);
+    if (value.signal !== this.drawn || symbol !== this.shownIn) {
+      [this.drawn, this.shownIn] = [value.signal, symbol];
+      this.scale = ends(value.signal, ctx.options);
+      this.draw(value.signal, this.scale, factor);
+      attribute(meter, "aria-valuemin", format(factor(this.scale[0])));
+      attribute(meter, "aria-valuemax", format(factor(this.scale[1])));
+    }
+    attribute(root, "data-state", value.state);
+    attribute(root, "data-alarm", value.alarm);
+    attribute(root, "data-known", known === null ? "no" : "yes");
+    const wanted = ctx.options["precision"];
+    const digits = digitsIn(typeof wanted === "number" ? wanted : value.signal.precision, factor);
+    const figure = format(known === null ? null : factor(known), digits);
+    this.characters = figure.length + symbol.length / 2;
+    write(this.text, figure);
+    write(this.unit, known === null ? "" : symbol);
+    const said = noteOf(value, ctx.t);
+    write(this.note, said);
+    const spoken = said ? `${figure} ${symbol}, ${said.replace(/[▲◆] /g, "")}` : `${figure} ${symbol}`;
+    tell(meter, {
+      "aria-valuenow": format(factor(known ?? this.scale[0])),
+      "aria-valuetext": known === null ? ctx.t("unknown") : spoken,
+    });
+    return known;
+  }
+}

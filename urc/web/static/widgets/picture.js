@@ -1,0 +1,72 @@
+// @ts-check
+/**
+ * Images of one input, decoded as fast as this device can: the newest wins, none waits in a queue.
+ *
+ * @typedef {import("../core/types.js").Picture} Picture
+ */
+
+export class Decoder {
+  /**
+   * @param {(bitmap: ImageBitmap, picture: Picture) => void} show The bitmap is closed when the next
+   *   one has been shown.
+   * @param {(error: unknown) => void} failed An image could not be decoded.
+   * @param {(blob: Blob) => Promise<ImageBitmap>} [decode]
+   */
+  constructor(show, failed, decode = (blob) => createImageBitmap(blob)) {
+    this.show = show;
+    this.failed = failed;
+    this.decode = decode;
+    /** Came while another one was being decoded. @type {Picture | null} */
+    this.next = null;
+    this.isBusy = false;
+    this.isOver = false;
+    this.serial = 0;
+    /** @type {ImageBitmap | null} */
+    this.shown = null;
+  }
+
+  /** @param {Picture} picture */
+  take(picture) {
+    if (this.isOver || picture.serial <= this.serial) return;
+    this.serial = picture.serial;
+    this.next = picture;
+    if (!this.isBusy) void this.work();
+  }
+
+  async work() {
+    this.isBusy = true;
+    while (this.next && !this.isOver) {
+      const picture = this.next;
+      this.next = null;
+      try {
+        const bitmap = await this.decode(picture.blob);
+        if (this.isOver) bitmap.close();
+        else this.replace(bitmap, picture);
+      } catch (error) {
+        this.failed(error);
+      }
+    }
+    this.isBusy = false;
+  }
+
+  /**
+   * @param {ImageBitmap} bitmap
+   * @param {Picture} picture
+   */
+  replace(bitmap, picture) {
+    const old = this.shown;
+    this.shown = bitmap;
+    try {
+      this.show(bitmap, picture);
+    } finally {
+      old?.close();
+    }
+  }
+
+  end() {
+    this.isOver = true;
+    this.next = null;
+    this.shown?.close();
+    this.shown = null;
+  }
+}

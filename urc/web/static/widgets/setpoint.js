@@ -1,0 +1,171 @@
+// @ts-check
+/**
+ * A number that a hand sets: what is given when, what is shown, and what the robot says about it.
+ * Draws nothing; a slider, a knob and a number field are three looks of it.
+ *
+ * @typedef {import("../core/types.js").Value} Value
+ * @typedef {import("../core/types.js").Context} Context
+ * @typedef {import("../core/types.js").Outlet} Outlet
+ * @typedef {import("../core/types.js").Reading} Reading
+ */
+import { boundsOf, keyed, snapped } from "./bounds.js";
+import { Giver } from "./giver.js";
+import { format, noteOf, number } from "./kit.js";
+import { Wish } from "./wish.js";
+
+export class Setpoint {
+  /**
+   * @param {Context} ctx its options: send, every_ms, step, min, max, unit, precision, echo, echo_s
+   * @param {() => void} show called when anything has changed
+   */
+  constructor(ctx, show) {
+    const { options, signal, send, t, onStop } = ctx;
+    this.ctx = ctx;
+    this.show = show;
+    this.isLive = options["send"] !== "release";
+    this.isOptimistic = options["echo"] === "optimistic";
+    this.bounds = boundsOf(Object.values(ctx.command("change")?.arguments ?? {})[0], options);
+    /** Where the hand is; null when there is none. @type {number | null} */
+    this.hand = null;
+    /** Takes the hand away. Set by what the hand is on. */
+    this.drop = () => this.cancel();
+    /** What was given last. @type {number | null} */
+    this.last = null;
+    /** @type {Reading | undefined} */
+    this.state = undefined;
+    const everyMs = Number(options["every_ms"] ?? 100);
+    const give = (/** @type {Record<string, Value>} */ args) => this.sent(send("change", args));
+    this.giver = new Giver({ give, show, t, signal, everyMs, onStop });
+    this.wish = new Wish({
+      withinMs: 1000 * Number(options["echo_s"] ?? 3),
+      show,
+      signal,
+      isSame: (wished, said) => Math.abs(Number(wished) - Number(said)) <= this.bounds.step / 2,
+    });
+    onStop(({ phase }) => {
+      if (phase !== "" && this.hand !== null) this.drop(); // what it draws from now on sets nothing
+    });
+  }
+
+  /** What the robot says; null when it does not. */
+  get said() {
+    return number(this.state);
+  }
+
+  /** What the control shows: the hand, else the robot, else what was given. */
+  get shown() {
+    if (this.hand !== null) return this.hand;
+    if (this.isOptimistic && this.wish.isWaiting) return Number(this.wish.value);
+    return this.state ? this.said : this.last;
+  }
+
+  /** Where a hand begins that only steps. */
+  get from() {
+    const wished = this.wish.isWaiting ? Number(this.wish.value) : null;
+    return this.hand ?? wished ?? this.said ?? this.last ?? Math.max(this.bounds.min, Math.min(0, this.bounds.max));
+  }
+
+  /** 0 to 1 between the bounds; null for none. */
+  shareOf(/** @type {number | null} */ value) {
+    const { min, max } = this.bounds;
+    if (value === null || max <= min) return null;
+    return Math.min(1, Math.max(0, (value - min) / (max - min)));
+  }
+
+  /** @param {number} share 0 to 1 */
+  at(share) {
+    const { min, max } = this.bounds;
+    return snapped(min + share * (max - min), this.bounds);
+  }
+
+  /** @param {number | null} value */
+  text(value) {
+    const { digits, unit } = this.bounds;
+    return `${format(value, digits)}${unit ? ` ${unit}` : ""}`;
+  }
+
+  /**
+   * @param {Reading | undefined} state
+   * @param {Outlet | undefined} change
+   */
+  take(state, change) {
+    this.state = state;
+    this.wish.take(state);
+    this.giver.take(change);
+    if (!this.giver.isReady && this.hand !== null) this.drop();
+  }
+
+  /** @param {number} value where the hand is now */
+  move(value) {
+    if (!this.giver.isReady) return;
+    const isNews = this.hand !== value;
+    this.hand = value;
+    if (isNews && this.isLive) this.put(value);
+    this.show();
+  }
+
+  /** The hand has gone. */
+  release() {
+    const value = this.hand;
+    this.hand = null;
+    if (value !== null && !this.isLive && this.giver.isReady) this.put(value);
+    this.show();
+  }
+
+  /** The hand is gone, and meant nothing. */
+  cancel() {
+    this.hand = null;
+    this.show();
+  }
+
+  /** @param {number} value set at once, without a hand that stays */
+  set(value) {
+    if (!this.giver.isReady) return;
+    this.put(value);
+    this.show();
+  }
+
+  /**
+   * @param {string} key
+   * @returns {boolean} whether it means something here
+   */
+  key(key) {
+    const value = keyed(key, this.from, this.bounds);
+    if (value === null) return false;
+    this.set(value);
+    return true;
+  }
+
+  /** @param {number} value */
+  put(value) {
+    this.last = value;
+    if (this.state) this.wish.make(value, this.state);
+    this.giver.newest({ value });
+  }
+
+  /** @param {Promise<unknown>} giving */
+  async sent(giving) {
+    try {
+      await giving;
+    } catch (error) {
+      if (this.giver.next === null) this.wish.drop();
+      throw error;
+    }
+  }
+
+  /** "", "waiting" or "missed". */
+  get wishState() {
+    return this.wish.isMissed ? "missed" : this.wish.isWaiting && this.hand === null ? "waiting" : "";
+  }
+
+  note() {
+    const { wish, giver, ctx } = this;
+    const wished = wish.value === null ? "" : this.text(Number(wish.value));
+    const waiting = this.wishState === "waiting" && !this.isOptimistic ? ctx.t("asked for {wish}", { wish: wished }) : "";
+    const missed = wish.isMissed ? ctx.t("≠ asked for {wish}, the robot says otherwise", { wish: wished }) : "";
+    const outcome = this.state && giver.phase === "done" ? "" : giver.outcome;
+    const hindrance = giver.reason ? `◆ ${giver.reason}` : "";
+    const state = this.state ? noteOf(this.state, ctx.t) : "";
+    return [giver.isPending ? "" : outcome, hindrance, missed || waiting, state].filter(Boolean).join(" · ");
+  }
+}
