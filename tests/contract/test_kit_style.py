@@ -25,11 +25,11 @@ def rules(css: str) -> Iterator[tuple[str, frozenset[str]]]:
 
 
 KIT = list(rules((STATIC / "widgets/kit.css").read_text("utf-8")))
-NAMED = set(
+NAMED = {
     name
     for file in STATIC.rglob("*.css")
     for name in re.findall(r"\.(urc-[\w-]+)", file.read_text("utf-8"))
-)
+}
 
 
 @pytest.mark.parametrize("folder", FOLDERS, ids=lambda folder: folder.name)

@@ -1,4 +1,4 @@
-"""What a browser client needs of the socket below it, and how much it may say there.
+"""The socket below a browser client, and the limit on its messages.
 
 Floor 5.
 """
@@ -30,7 +30,7 @@ class Line(Protocol):
 
 
 class Flow(Protocol):
-    """What the server knows of the socket below, where it can be reached."""
+    """The state of the socket below a client."""
 
     def is_free(self) -> bool:
         """Whether the kernel has taken everything written so far."""
@@ -74,7 +74,7 @@ class Allowance:
 
 
 class Guest(NamedTuple):
-    """Who is at the other end."""
+    """The person or program at the other end."""
 
     place: str = ""
     """Address, for the others; "" for this machine."""
