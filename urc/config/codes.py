@@ -1,4 +1,4 @@
-"""What each code of a finding means: the pages in ``codes.md``, for `urc explain` and for SARIF.
+"""The meaning of each code of a problem: ``codes.md``, for `urc explain` and for SARIF.
 
 Reads one text file and imports nothing. Each page has the same four parts; an example stands
 indented, as code.
@@ -18,7 +18,7 @@ class Page(NamedTuple):
 
     code: str
     what: str
-    """What was found, in one sentence."""
+    """The problem, in one sentence."""
     why: str
     """Why it is a fault."""
     example: str

@@ -1,8 +1,8 @@
 """The look of a profile that declares none: a widget for each slot, and their grid.
 
 Pure: the same driver and the same widgets give the same look. When a widget is missing, or does not
-take its signal, a plainer one is chosen. Commands with several arguments get no widget: the dev
-page has a form for each.
+take its signal, a plainer one is chosen. Commands with several arguments get no widget: the
+developer page has a form for each.
 """
 
 import math
@@ -82,7 +82,7 @@ def automatic_slots(driver: Driver, shelf: Shelf) -> dict[str, WidgetUse]:
 
 
 def _put(slots: dict[str, WidgetUse], use: WidgetUse) -> None:
-    """Add what fills a slot, under a name that a grid can draw and nobody has."""
+    """Add the widget of a slot, under a free name that a grid can draw."""
     name = re.sub(r"[^a-z0-9_-]", "-", use.slot.lower()).lstrip("-_0123456789")[:60] or "slot"
     names = (name, *(f"{name}-{number}" for number in range(2, len(slots) + 3)))
     free = next(one for one in names if one not in slots)

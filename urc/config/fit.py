@@ -1,4 +1,4 @@
-"""An interface that was added beside a robot's own: whether it fits there, and what it brings."""
+"""An interface that a user adds to a robot: does it fit, and which widgets does it need?"""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -19,18 +19,18 @@ __all__ = ["Fitted", "fit_interface"]
 
 
 class Fitted(NamedTuple):
-    """What came of an interface on a robot."""
+    """The result for one interface on one robot."""
 
     interface: Interface | None
-    """None: it does not fit."""
+    """None when it does not fit."""
     widgets: Mapping[str, Widget] = NOTHING
-    """Those that it uses."""
+    """The widgets in use."""
     fault: str = ""
-    """Why it does not fit, in one line."""
+    """The reason for a misfit, in one line."""
 
 
 class _Known(Shelf):
-    """The widgets of a profile, and behind them those of a shelf: one name is one widget."""
+    """The widgets of a profile, then those of a shelf; a name means one widget."""
 
     def __init__(self, widgets: Mapping[str, Widget], behind: Shelf) -> None:
         super().__init__(Path())
@@ -39,7 +39,7 @@ class _Known(Shelf):
         self.problems = behind.problems
 
     def names(self) -> list[str]:
-        """Return the names of all widgets there are."""
+        """Return the names of all widgets."""
         return sorted({*self._mine, *self._behind.names()})
 
     def get(self, name: str) -> Widget | None:
@@ -57,7 +57,7 @@ def fit_interface(path: str, profile: Profile, shelf: Shelf) -> Fitted:
     Args:
         path: the interface's document.
         profile: of the robot.
-        shelf: the widgets that the document may use beside those of the robot.
+        shelf: more widgets that the document may use, after the robot's own.
     """
     gathered = gather(path)
     sources = gathered.sources

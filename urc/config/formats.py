@@ -1,6 +1,6 @@
-"""Findings for other programs: SARIF 2.1.0, and annotations of GitHub's workflow runs.
+"""Problems for other programs: SARIF 2.1.0, and annotations of GitHub's workflow runs.
 
-Reporters over `Problem`, beside the text and JSON of `urc.problems`; pure.
+Reporters over `Problem`, in addition to the text and JSON of `urc.problems`; pure.
 """
 
 import os
@@ -17,14 +17,14 @@ _SCHEMA: Final = (
     "https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/schemas/sarif-schema-2.1.0.json"
 )
 _DATA: Final = {"%": "%25", "\r": "%0D", "\n": "%0A"}
-"""What a workflow command escapes in its message …"""
+"""Escapes in the message of a workflow command …"""
 _PROPERTY: Final = str.maketrans(_DATA | {":": "%3A", ",": "%2C"})
 """… and in its properties, which colons and commas part."""
 _MESSAGE: Final = str.maketrans(_DATA)
 
 
 def to_github(problem: Problem) -> str:
-    """Return the finding as a workflow command, one line."""
+    """Return the problem as a workflow command, one line."""
     properties = {
         "file": _slashed(problem.file),
         "line": str(problem.line),
@@ -45,9 +45,9 @@ def to_sarif(
     """Return a log of one run.
 
     Args:
-        problems: every finding.
+        problems: all problems.
         version: of URC.
-        summaries: code → what it means, in one sentence.
+        summaries: code → its meaning, in one sentence.
     """
     codes = list(dict.fromkeys(problem.code for problem in problems))
     return {

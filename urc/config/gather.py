@@ -1,7 +1,7 @@
 """The passes over documents: compose, expand, shape, for a robot and the documents that it names.
 
-compose merges a document with what it extends and includes; expand fills in `params` and writes
-out each `each`; shape compares the result with the schema. Each is a function of one document.
+compose merges a document with its base and its includes. expand fills in `params` and writes out
+each `each`. shape compares the result with the schema. Each is a function of one document.
 A robot comes first, because it names its driver and its interfaces.
 """
 
@@ -63,11 +63,11 @@ def _is_part(document: Document) -> bool:
 def _prepared(
     document: Document, library: Library, given: Part | None = None, use: Part | None = None
 ) -> Document | None:
-    """Return a document after the passes compose, expand and shape, or None with findings.
+    """Return a document after the passes compose, expand and shape, or None.
 
     Args:
-        document: as it stands in its file.
-        library: reads its sources, and takes the findings.
+        document: as read from its file.
+        library: reads its sources, and collects the problems.
         given: the robot's mapping with `params` and `overrides` for the driver.
         use: the robot's reference to the driver.
     """
@@ -91,7 +91,7 @@ def _prepared(
 
 
 def _place(problem: Problem) -> tuple[str, str, int, int]:
-    """Return the identity of a finding: two passes may report one text."""
+    """Return the identity of a problem: two passes may report one text."""
     return problem.code, problem.file, problem.line, problem.column
 
 
@@ -148,7 +148,7 @@ def _driver(part: Part, sources: Sources, library: Library) -> Part:
 
 
 def _follow(reference: Part, kind: str, library: Library, given: Part | None = None) -> Part | None:
-    """Return the prepared document that `reference` names, or None with findings."""
+    """Return the prepared document that `reference` names, or None."""
     document = library.follow(reference, (kind,))
     if document is None:
         return None

@@ -1,7 +1,7 @@
-"""The only door from YAML to the model: ordered passes, all findings of a pass at once.
+"""The only way from YAML to the model: ordered passes, all problems of a pass at once.
 
-read → shape → parse and compile → link names → whole-profile rules. A later pass runs only when the
-earlier ones found no error; warnings are kept and never stop anything.
+compose → expand → shape → parse → link → rules. A later pass runs only when the earlier ones found
+no error; warnings never stop a pass.
 """
 
 from collections.abc import Iterable
@@ -34,21 +34,21 @@ __all__ = ["Checked", "Shelf", "check", "load_profile"]
 
 
 class Checked(NamedTuple):
-    """What came of a document."""
+    """The result for one document."""
 
     profile: Profile | None
-    """Of a robot or driver without errors; a driver's has the default look."""
+    """The profile of a robot or driver without errors; a driver has the default look."""
     problems: tuple[Problem, ...]
     kind: str
     """``robot``, ``driver``, ``interface``, ``widget``, or "" when a first pass stopped."""
     files: tuple[str, ...] = ()
-    """Every document that was looked at, whether there is one or not; this one is the first."""
+    """Every document that was looked for, existing or not; this one is the first."""
     pages: tuple[str, ...] = ()
-    """URLs of other people's pages that its widgets show, as they are written."""
+    """URLs of web pages that its widgets show, as written."""
     widget: Widget | None = None
-    """Of a widget's manifest without errors."""
+    """The widget of a manifest without errors."""
     is_cut_short: bool = False
-    """Whether a pass with errors has kept later ones from being run: more may follow."""
+    """Whether errors stopped a pass: later passes may have more."""
 
 
 def load_profile(
@@ -57,7 +57,7 @@ def load_profile(
     """Return the profile in a robot's or driver's document.
 
     Raises:
-        ProblemsError: with every finding of the pass that stopped it.
+        ProblemsError: with every problem of the pass that stopped it.
     """
     checked = check(path, catalog, shelf)
     if checked.profile is not None:
@@ -80,13 +80,13 @@ def load_profile(
 
 
 def check(path: str | PathLike[str], catalog: Catalog, shelf: Shelf | None = None) -> Checked:
-    """Return every finding about a document of any kind, and about those it refers to.
+    """Return every problem of a document of any kind, and of its references.
 
     Args:
-        path: the document; findings name it as it is written here.
-        catalog: which transports and framings there are.
-        shelf: the widgets there are; those that ship with URC by default. Give the same one to
-            several calls and each manifest is read once.
+        path: the document; problems name it as written here.
+        catalog: the transports and framings.
+        shelf: the widgets; by default those that ship with URC. With one shelf for several calls,
+            each manifest is read once.
     """
     path = fspath(path)
     sources, problems, kind, files = gather(path)
@@ -125,7 +125,7 @@ def _pages(uses: Iterable[WidgetUse]) -> tuple[str, ...]:
 
 
 def _told_once(problems: Iterable[Problem]) -> list[Problem]:
-    """Return the findings without those of texts that `each` repeats: the first says it all."""
+    """Return the problems, one for each text that `each` repeats."""
     paths: dict[tuple[str, str, int, int], str] = {}
     return [
         problem
@@ -138,7 +138,7 @@ def _told_once(problems: Iterable[Problem]) -> list[Problem]:
 
 
 class _Parsed(NamedTuple):
-    """What the third pass made of the sources."""
+    """The result of the parse pass."""
 
     driver: Driver
     settings: dict[str, Setting]

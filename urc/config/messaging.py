@@ -1,6 +1,6 @@
-"""Transports that carry messages instead of bytes, and what may be said on them.
+"""Transports that carry messages instead of bytes, and the forms that each allows.
 
-A kind of transport that a package adds is not in here: of those nothing is refused.
+Transports of packages are not listed here, and are refused nothing.
 """
 
 from typing import Final, NamedTuple
@@ -9,12 +9,12 @@ __all__ = ["BYTE_LINES", "CARRIERS", "MESSAGING", "Messaging"]
 
 
 class Messaging(NamedTuple):
-    """What one kind of transport takes."""
+    """The forms of one kind of transport."""
 
     verbs: tuple[str, ...]
-    """Forms of what is sent."""
+    """Forms of sent messages."""
     listen: tuple[str, ...]
-    """Keys beside ``topic`` under ``subscribe``."""
+    """More keys under ``subscribe``, next to ``topic``."""
 
 
 MESSAGING: Final = {
@@ -26,4 +26,4 @@ MESSAGING: Final = {
 }
 BYTE_LINES: Final = frozenset(("tcp", "udp", "serial", "ssh", "telnet", "websocket"))
 CARRIERS: Final = frozenset(("ssh",))
-"""Kinds that others may go through."""
+"""Transports that can carry other transports."""

@@ -1,4 +1,4 @@
-"""What moves something by itself: how it is said, which sequences do, and who may not run it."""
+"""Commands that move something by themselves: their key, their sequences, and their limits."""
 
 from collections.abc import Mapping
 
@@ -42,7 +42,7 @@ def runs_what_moves(command: Command, arguments: Mapping[str, Template | Reading
 
 
 def with_moving_steps(commands: Mapping[str, Command]) -> dict[str, Command]:
-    """Return the commands; a sequence that runs what moves, or is held, moves as well."""
+    """Return the commands; a sequence moves when one of its commands moves or is held."""
     found = dict(commands)
 
     def does(step: object) -> bool:
@@ -68,7 +68,7 @@ def refuse_moving(
     command: Command,
     arguments: Mapping[str, Template | Reading],
 ) -> None:
-    """Report what moves something by itself where nobody asks for it."""
+    """Report a command that moves something by itself, where no person gives it."""
     if runs_what_moves(command, arguments):
         findings.error(
             part,

@@ -1,7 +1,7 @@
-"""A place in a document whose shape is known, and the findings about it.
+"""A place in a document of the right shape, and the problems there.
 
-The parsers read documents through `Part` only: so each value they take has a place to report at,
-and a test can see which keys are read. Everything here assumes that the shape pass found no fault.
+The parsers read documents only through `Part`. So each value has a place for a problem, and a test
+can see which keys are read. All functions here assume that the shape pass found no fault.
 """
 
 import math
@@ -33,7 +33,7 @@ def duration_s(text: str) -> float:
 
 
 class Part(NamedTuple):
-    """One value of a document, and where it stands."""
+    """One value of a document, and its place."""
 
     document: Document
     path: Path
@@ -45,13 +45,13 @@ class Part(NamedTuple):
         return str(self.path[-1]) if self.path else ""
 
     def get(self, key: str) -> "Part | None":
-        """Return what stands under `key`, or None when the document leaves it out."""
+        """Return the part under `key`, or None."""
         if key not in self.data:
             return None
         return Part(self.document, (*self.path, key), self.data[key])
 
     def must(self, key: str) -> "Part":
-        """Return what stands under `key`, which the schema requires."""
+        """Return the part under `key`, which the schema requires."""
         return Part(self.document, (*self.path, key), self.data[key])
 
     def named(self, key: str) -> dict[str, "Part"]:
@@ -104,7 +104,7 @@ class Part(NamedTuple):
 
 
 class Findings:
-    """What one pass has found so far."""
+    """The problems of one pass so far."""
 
     def __init__(self) -> None:
         self.problems: list[Problem] = []

@@ -46,9 +46,8 @@ def resolve(path: str, shelf: Shelf, profile: Profile | None = None) -> Resolved
 
     Args:
         path: a robot, driver, interface or widget.
-        shelf: the widgets there are.
-        profile: the loaded profile; the text then has the default look as well, where the document
-            declares none.
+        shelf: the widgets.
+        profile: the loaded profile. With it, the text has a default look where none is declared.
     """
     sources, problems, _, _ = gather(path)
     if sources is None:

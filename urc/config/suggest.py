@@ -14,9 +14,9 @@ def did_you_mean(word: str, known: Iterable[str], noun: str = "") -> str:
     """Return a hint: the nearest known word, else all of them.
 
     Args:
-        word: what was written.
-        known: what could have been written.
-        noun: what the known words are, in the plural: ``signals``.
+        word: the unknown word.
+        known: the known words.
+        noun: the kind of the known words, in the plural: ``signals``.
     """
     from difflib import get_close_matches  # 6 ms that only a broken document pays
 

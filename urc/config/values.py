@@ -69,7 +69,7 @@ def fit(value: Value, kind: str) -> Value:
 
 
 def fit_argument(value: Any, kind: str, of: str, size: int | None) -> tuple[Value, ...]:
-    """Return the values in what is given for an argument: its elements, or the one that it is.
+    """Return the values given for an argument: the elements of an array, or one value.
 
     Raises:
         ValueError: it is of another type or size.
@@ -146,7 +146,7 @@ def check_within(
 def known_argument(
     name: str, part: Part, command: Command, findings: Findings, *, key: bool = True
 ) -> Argument | None:
-    """Return the argument of that name, or report at `part`, or its key, that there is none."""
+    """Return the argument of that name, or report its absence at `part` or its key."""
     argument = command.arguments.get(name)
     if argument is None:
         findings.error(

@@ -1,7 +1,4 @@
-"""The copies that an `each` makes: its variables, names filled in, and what is changed below.
-
-Floor 3. For `urc.config.compose.each`.
-"""
+"""The copies of one `each`: its variables, the names filled in, and changes to single copies."""
 
 import re
 from collections.abc import Iterator, Mapping
@@ -22,7 +19,7 @@ _RESERVED: Final = ("params", "settings")
 
 
 class _Copy(NamedTuple):
-    """One thing that an `each` wrote out."""
+    """One item of the result."""
 
     name: str | None
     tree: Tree
@@ -36,7 +33,7 @@ class Expander:
         self.findings = findings
         self.budget = budget
         self.path: Path = ()
-        """What is being written out."""
+        """The item in work."""
 
     def collection(self, tree: Tree, path: Path) -> Tree:
         """Return a mapping or list with every `each` of its items written out."""
@@ -125,7 +122,7 @@ class Expander:
     ) -> Mapping[str, list[object]] | None:
         """Return the variables of an item, or None when it has no `each` that can be used.
 
-        An `each` of a wrong shape stays where it is, for the shape pass to tell.
+        An `each` of a wrong shape stays in the document; the shape pass reports it.
         """
         if not isinstance(inner.value, dict) or "each" not in inner.value:
             return None
@@ -170,7 +167,7 @@ class Expander:
 
 
 class _First:
-    """Reports what is wrong with the texts of an item, while the first copy is made."""
+    """Reports faults in the texts of an item, while the first copy is made."""
 
     def __init__(self, expander: Expander, path: Path) -> None:
         self._expander = expander
@@ -196,7 +193,7 @@ class _First:
 
 
 class _Rest:
-    """Says nothing: the first copy told it."""
+    """Reports nothing: the first copy did."""
 
     def unknown(self, path: Path, name: str, word: str, offset: int) -> None:
         """Say nothing."""
@@ -245,7 +242,7 @@ def is_removal(item: object) -> bool:
 
 
 def item_at(data: Any, path: Path) -> Any:
-    """Return what stands at a place that there is."""
+    """Return the data at a path that exists."""
     for part in path:
         data = data[part]
     return data

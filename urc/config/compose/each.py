@@ -1,10 +1,10 @@
-"""`each`: one declaration for many like things, written out before anything else looks at it.
+"""`each`: one declaration for many like things, written out before the shape pass.
 
     signals:
       "joint_{i}": { each: { i: [1, 2, 3] }, unit: rad }
 
-What is written out goes below what is declared by name: ``joint_2: { unit: deg }`` changes one of
-them, and ``joint_2: null`` takes it away.
+Items declared by name change the copies: ``joint_2: { unit: deg }`` changes one copy, and
+``joint_2: null`` removes it.
 """
 
 from collections.abc import Iterator
@@ -25,7 +25,7 @@ _BY_NAME: Final = ("simulator", "rules")
 
 
 def expand(document: Document, findings: Findings) -> Document:
-    """Return the document with every `each` written out, or itself when there is none."""
+    """Return the document with every `each` written out."""
     everywhere = list(_places(document.data))
     _check_names(document, everywhere, findings)
     places = [path for path in everywhere if _has_each(_at(document.data, path))]
@@ -48,7 +48,7 @@ def expand(document: Document, findings: Findings) -> Document:
 
 
 def _without_removals(document: Document, places: list[Path], findings: Findings) -> Document:
-    """Report items that take something away which is not there: else they were gone by now."""
+    """Report removals of missing items, and drop them; the merge has applied the others."""
     tree = Tree(document.data, document.mark, document)
     for path in places:
         items = _at(document.data, path)
@@ -134,7 +134,7 @@ def _has_each(collection: object) -> bool:
 
 
 def _replaced(tree: Tree, path: Path, change: Any, done: Path = ()) -> Tree:
-    """Return `tree` with what stands at `path` changed; the rest is shared."""
+    """Return `tree` with its part at `path` changed; the rest is shared."""
     if not path:
         result: Tree = change(tree, done)
         return result

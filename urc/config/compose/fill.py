@@ -1,7 +1,7 @@
 """Names in single braces → what they stand for: ``{i}`` of an `each`, ``{params.id}`` of a driver.
 
-They are filled in while a document is loaded, in keys and texts alike; templates, which have double
-braces, come later and know nothing of it. A text that is one name and nothing else becomes the
+They are filled in while a document is loaded, in keys and texts alike. Templates have double braces
+and are not changed. A text that is one name and nothing else becomes the
 value itself, so ``"{i}"`` may be a number.
 """
 
@@ -20,7 +20,7 @@ Names = Mapping[str, object]
 
 
 class Listener(Protocol):
-    """Who is told of names that cannot be filled in."""
+    """Receives the names that cannot be filled in."""
 
     def unknown(self, path: Path, name: str, word: str, offset: int) -> None:
         """Take note that `name` is known, and the word behind its dot is not."""
@@ -38,18 +38,18 @@ _CHARACTERS_MOST: Final = 4 << 20
 
 
 class TooMuch(Exception):
-    """The document would become larger than any document may be."""
+    """The document would exceed the bounds of a document."""
 
 
 class Budget:
-    """How much may still be written out."""
+    """The nodes and characters that may still be written."""
 
     def __init__(self, nodes: int) -> None:
         self._nodes = nodes
         self._characters = _CHARACTERS_MOST
 
     def spend(self, nodes: int, characters: int = 0) -> None:
-        """Take note of what is written out; raise `TooMuch` when that is more than there may be."""
+        """Count new nodes and characters; raise `TooMuch` beyond the bound."""
         self._nodes -= nodes
         self._characters -= characters
         if self._nodes < 0 or self._characters < 0:
@@ -122,7 +122,7 @@ class _Filler:
         return Tree([item.value for item in items], tree.mark.copy(marks), tree.home)
 
     def text(self, text: str, path: Path) -> tuple[object, Written | None]:
-        """Return the text with its names filled in, and how that came about."""
+        """Return the text with its names filled in, and the edits that did it."""
         if "{" not in text:
             return text, None
         edits: list[tuple[int, int, int]] = []
@@ -165,7 +165,7 @@ def _item(tree: Tree, key: str | int, item: object) -> Tree:
 
 
 def fill(tree: Tree, path: Path, names: Names, budget: Budget, listener: Listener) -> Tree:
-    """Return `tree` with every name filled in; what has none is shared, not copied."""
+    """Return `tree` with every name filled in; parts without names are shared, not copied."""
     return _Filler(names, budget, listener).tree(tree, path)
 
 
@@ -185,7 +185,7 @@ def report_unquoted(part: Part, text: str, findings: Findings) -> None:
 
 
 def _written(value: object) -> str:
-    """Return a value as text has it."""
+    """Return a value as text."""
     if isinstance(value, bool):
         return "true" if value else "false"
     return "" if value is None else str(value)

@@ -46,7 +46,7 @@ class Composed(NamedTuple):
 def compose(document: Document, library: Library) -> Composed:
     """Return a document merged with those that it extends and includes.
 
-    The library reads them, and takes the findings about references and clashes. Nothing else is
+    The library reads them, and collects the problems of references and clashes. Nothing else is
     checked here: the shape pass looks at the sources and at the result.
     """
     composer = _Composer(library)

@@ -45,7 +45,7 @@ class Library:
         return read_document(path)
 
     def follow(self, reference: Part, kinds: tuple[str, ...]) -> Document | None:
-        """Return the document that a reference names, or None with a finding."""
+        """Return the document that a reference names, or None after a problem."""
         here = reference.document.source_of(reference.path).file
         if _NAME.fullmatch(reference.data):
             named = _shipped(reference.data, kinds)

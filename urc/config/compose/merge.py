@@ -1,9 +1,8 @@
-"""Two trees of data with their marks → one: what stands above goes before what it stands on.
+"""Two trees of data with their marks → one: the upper tree changes the lower one.
 
-Mappings are merged key by key, lists of named things name by name; anything else is replaced. Of
-the rules of a simulator those with names are changed, and the others stay. A
-``null`` takes a key away, ``remove: true`` an item of such a list. No finding loses its place: each
-mark of the result says in which document it stands.
+Mappings are merged key by key, lists of named items name by name; other values are replaced. Rules
+of a simulator change by name; rules without a name stay. A ``null`` removes a key, ``remove: true``
+an item of a list. Every mark of the result keeps its document, and so every problem its place.
 """
 
 from collections.abc import Callable
@@ -16,28 +15,26 @@ __all__ = ["Tree", "children", "count_nodes", "item_name", "mark_inside", "merge
 
 _NAMES: Final = ("name", "id")
 _EXCLUSIVE: Final = (frozenset(("grid", "grids", "tabs")),)
-"""Keys of which a mapping has at most one, beside the forms of frames."""
-
-
+"""Keys of which a mapping has at most one; forms of frames exclude each other, too."""
 _OF_USED_DRIVER: Final = frozenset(("use", "params", "overrides"))
-"""Keys of a driver in a document of its own."""
+"""Keys of a robot's ``driver`` that names a document."""
 
 
 class Tree(NamedTuple):
-    """Data, and where it stands."""
+    """Data and its place."""
 
     value: object
     mark: Mark
     home: Document
-    """In whose text it stands, unless a mark inside says otherwise."""
+    """The document of the text, unless a mark inside has another one."""
 
 
 _Clash = Callable[[Path, Tree, Tree], None]
-"""Told of two values for one key, of which the second is kept."""
+"""Receives two values of one key; the second is kept."""
 
 
 def _pinned(tree: Tree) -> Mark:
-    """Return the mark with the document that it stands in."""
+    """Return the mark with its document."""
     if tree.mark.origin is not None:
         return tree.mark
     mark = tree.mark.copy()
@@ -46,12 +43,12 @@ def _pinned(tree: Tree) -> Mark:
 
 
 def mark_inside(inner: Tree, around: Tree) -> Mark:
-    """Return the mark of what stands inside `around`, with its document where that is another."""
+    """Return the mark of `inner`, a part of `around`, with its document if that differs."""
     return _pinned(inner) if inner.home is not around.home else inner.mark
 
 
 def children(tree: Tree) -> dict[str | int, Tree]:
-    """Return what is inside a mapping or list."""
+    """Return the parts of a mapping or list."""
     home = tree.mark.origin or tree.home
     if isinstance(tree.value, dict):
         inside = tree.value.items()
@@ -88,10 +85,10 @@ def merge(base: Tree, over: Tree, path: Path = (), clash: _Clash | None = None) 
     """Return `base` with all that `over` says.
 
     Args:
-        base: what is changed; it is left as it is.
-        over: what changes it.
-        path: where both stand in their documents.
-        clash: asked about each value that is replaced by another one.
+        base: the lower tree; it is not modified.
+        over: the upper tree.
+        path: place of both in their documents.
+        clash: receives each value that another one replaces.
     """
     if path == ("driver",) and isinstance(over.value, dict):
         base = _driver_in_full(base, over.value)
@@ -112,7 +109,7 @@ def merge(base: Tree, over: Tree, path: Path = (), clash: _Clash | None = None) 
 
 
 def _driver_in_full(base: Tree, over: dict[str, object]) -> Tree:
-    """Return a driver that is only named as one that can be changed, where `over` changes it."""
+    """Return a driver's name as a mapping, where `over` adds params or overrides to it."""
     if not isinstance(base.value, str) or not over.keys() <= _OF_USED_DRIVER:
         return base
     mark = base.mark.copy({"use": _pinned(base)})
@@ -137,7 +134,7 @@ def _mappings(base: Tree, over: Tree, path: Path, clash: _Clash | None) -> Tree:
 
 
 def _exclusive(path: Path) -> tuple[frozenset[str], ...]:
-    """Return groups of keys of which the mapping at `path` has one at most."""
+    """Return groups of keys of which the mapping at `path` has at most one."""
     if path[-1:] == ("send",):
         return (frozenset(WRITE_FORMS),)
     if path[-1:] == ("reply",) or path[-2:-1] == ("messages",):
@@ -176,7 +173,7 @@ def _lists(
 
 
 def _rules(base: Tree, new: dict[str, Tree], over: Tree, path: Path, clash: _Clash | None) -> Tree:
-    """Return rules of which some are changed by their names; new ones go before all others."""
+    """Return rules, some changed by name; new ones come first."""
     left, items = dict(new), []
     for inner in children(base).values():
         name = item_name(inner.value)

@@ -1,6 +1,6 @@
-"""`params`: what a driver leaves open for each robot, ``{params.id}`` in keys and texts.
+"""`params`: values of a driver that each robot chooses, ``{params.id}`` in keys and texts.
 
-They are filled in while the documents are loaded. What an operator fills in are settings.
+They are filled in while the documents are loaded. Settings, in contrast, are the operator's.
 """
 
 from collections.abc import Mapping
@@ -29,11 +29,11 @@ def fill_params(
     """Return a driver's document with its params filled in.
 
     Args:
-        document: the driver, merged from all that it is made of.
-        given: what a robot gives for them, if it gives any.
-        use: where the robot names the driver; None while the driver is looked at alone, when what
-            has no default gets a sample of its type.
-        findings: where faults go.
+        document: the merged driver.
+        given: the robot's values, if any.
+        use: the robot's reference to the driver. None for a driver alone: then a param without a
+            default gets a sample of its type.
+        findings: collects the problems.
     """
     data = document.data
     if not isinstance(data, dict):
@@ -194,7 +194,7 @@ class _Filler:
 
 
 class _Watched(Mapping[str, Value]):
-    """Values that take note of who was asked for."""
+    """Values that remember which names were used."""
 
     def __init__(self, values: Mapping[str, Value], used: set[str]) -> None:
         self._values = values

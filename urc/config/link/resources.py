@@ -46,7 +46,7 @@ def link_files(options: Part, widget: Widget, findings: Findings) -> dict[str, s
     Args:
         options: of one slot; their shape is right.
         widget: its manifest marks the options that name files.
-        findings: takes the faults.
+        findings: collects the problems.
     """
     found = {}
     for _, part in named_texts(options, widget.options, "file"):
@@ -101,7 +101,7 @@ def link_pages(options: Part, widget: Widget, findings: Findings) -> dict[str, t
     Args:
         options: of one slot; their shape is right.
         widget: its manifest marks the options that name pages.
-        findings: takes the faults. An empty text is right: it names no page.
+        findings: collects the problems. An empty text is right: it names no page.
     """
     found: dict[str, tuple[str, ...]] = {}
     for name, part in named_texts(options, widget.options, "page"):

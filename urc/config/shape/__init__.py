@@ -1,1 +1,1 @@
-"""The shape of a document: what its schema asks for, and the findings where it differs."""
+"""The shape of a document: its schema, and the problems where it differs."""

@@ -1,7 +1,7 @@
 """The shape pass: does a document fit the schema of its kind?
 
-A quick verdict comes first; `jsonschema` is imported only for documents that it does not clear, and
-`urc.config.shape.report` tells its errors in words of our own.
+The fast verdict of `urc.config.schemas` comes first. Other documents go to `jsonschema`, and
+`urc.config.shape.report` writes its errors in our own words.
 """
 
 import math
@@ -40,10 +40,10 @@ def check_shape(document: Document) -> list[Problem]:
 
 
 def check_source(document: Document) -> list[Problem]:
-    """Return the faults of one source of a merged document, whatever the others say.
+    """Return the faults of one source of a merged document, apart from the others.
 
     These are unknown keys, and keys of the source alone. The merge may lose both, and with them
-    the finding. A missing key may come from another source, so the merged document is checked too.
+    the problem. A missing key may come from another source, so the merged document is checked too.
     """
     if not kind_of(document):
         return [_without_kind(document)]

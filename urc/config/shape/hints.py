@@ -1,7 +1,4 @@
-"""What to do about a document of the wrong shape: the hint behind a finding's message.
-
-Floor 3. Only for `urc.config.shape.report`.
-"""
+"""Hints for a document of the wrong shape."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -35,7 +32,7 @@ _OTHER_WORDS: Final = {
     "message": ("text",),
     "license": ("licence",),
 }
-"""What other tools call a key → what it is called here."""
+"""Keys of other tools → keys here."""
 _SAME_TYPES: Final = {
     "float": "number",
     "double": "number",
@@ -50,7 +47,7 @@ _SAME_TYPES: Final = {
     "picture": "image",
     "bytes": "blob",
 }
-"""What other tools call a type → what it is called here."""
+"""Types of other tools → types here."""
 _URL: Final = re.compile(r"[a-z]+://(?P<host>[^/:?#]+)(?::(?P<port>[0-9]+))?(?P<path>/[^?#]+)?")
 _FRAMING: Final = "framing: { type: delimiter, tx: LF, rx: LF }"
 _ELSEWHERE: Final = {
@@ -139,7 +136,7 @@ def _quoted(value: object) -> str:
 def type_hint(
     document: Document, path: Path, value: object, types: Sequence[str], *, is_duration: bool
 ) -> str:
-    """Return how a value of a wrong type could be one of `types`; "" where nobody can tell."""
+    """Return how a value of a wrong type could become one of `types`, or ""."""
     if value is None:
         return "give it a value, or leave the key out"
     if is_duration and isinstance(value, (int, float)) and not isinstance(value, bool):

@@ -1,4 +1,4 @@
-"""`jsonschema`'s errors as findings in our own words, exact at the key or value.
+"""`jsonschema`'s errors as problems in our own words, exact at the key or value.
 
 Imported only for a document that is broken: `jsonschema` costs 80 ms.
 """
@@ -28,13 +28,13 @@ __all__ = ["report"]
 
 
 class _Error(NamedTuple):
-    """One error of the library, as far as it is told here."""
+    """One error of the library."""
 
     keyword: str
     limit: Any
-    """What the schema says under the keyword."""
+    """The value of the keyword in the schema."""
     value: Any
-    """What the document says."""
+    """The value in the document."""
     schema: Mapping[str, Any]
     is_name: bool
     """Whether it is about the name of a key."""
@@ -57,14 +57,14 @@ _EXPECTED: Final = {
 def report(
     document: Document, schema: Mapping[str, Any], read: _Read, path: Path = (), value: Any = None
 ) -> list[Problem]:
-    """Return the findings, deepest first.
+    """Return the problems, deepest first.
 
     Args:
-        document: what is checked.
-        schema: the schema of it, or of the part at `path`.
+        document: the document.
+        schema: its schema, or that of the part at `path`.
         read: returns another schema by its file name.
-        path: part of the document that is checked.
-        value: data of that part; the whole document when `path` is empty.
+        path: the part to check; empty for the whole document.
+        value: the data of that part.
     """
     registry: Registry[Any] = Registry(  # type: ignore[call-arg]  # attrs' alias, unseen by mypy
         retrieve=lambda uri: Resource.from_contents(read(uri), DRAFT202012)
@@ -90,7 +90,7 @@ def report(
 def _branches(
     validator: Any, condition: Any, instance: Any, schema: Mapping[str, Any]
 ) -> Iterator[ValidationError]:
-    """Check ``then`` or ``else``; what is missing there is missing from what they belong to."""
+    """Check ``then`` or ``else``; a key that is missing there is missing from the schema above."""
     branch = "then" if validator.evolve(schema=condition).is_valid(instance) else "else"
     for error in validator.descend(instance, schema.get(branch, True), schema_path=branch):
         if not error.path and "properties" in schema and "properties" not in error.schema:
