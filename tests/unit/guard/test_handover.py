@@ -6,8 +6,9 @@ import pytest
 
 from tests.unit.guard.lines import STOP, TERMS, Bench, CountedWire, GatedWire, Prompter, Rig
 from urc.guard import line, wire
+from urc.guard.lane import Lane
 from urc.model.codec import Count, Numbered, Payload
-from urc.testing.clock import settle
+from urc.testing.clock import FakeClock, settle
 from urc.transports.hurry import HURRY
 
 pytestmark = pytest.mark.anyio
@@ -165,3 +166,31 @@ async def test_new_arrivals_wait_behind_unread_ones(benches: list[Bench]) -> Non
     assert robot.taken[:2] == [False, False]
     received = [said.data for said in bench.heard() if isinstance(said, wire.Received)]
     assert received[:2] == [b"first", b"second"]
+
+
+async def test_frames_may_be_refused_more_than_once(benches: list[Bench]) -> None:
+    """Each time all that is under way is made again, and only that is taken."""
+    benches.append(bench := Bench(CountedWire()))
+    await bench.open()
+    used, free = Count({}, {"n": 0}), Count({"n": 0}, {"n": 1})
+    bench.tell(wire.Send("wire", 1, 1, b"0 poll", used))
+    bench.tell(wire.Send("wire", 1, 2, b"0 ping", used))
+    bench.tell(wire.Send("wire", 1, 2, b"0 ping", used, 1))
+    bench.tell(wire.Send("wire", 1, 2, b"1 late", free, 1))
+    bench.tell(wire.Send("wire", 1, 2, b"1 ping", free, 2))
+    assert bench.robot.written == [b"0 poll", b"1 ping"]
+
+
+async def test_next_frame_of_a_lane_has_its_own_time() -> None:
+    lane = Lane[int](robot := GatedWire(), clock := FakeClock(), lambda tag, fault: None)
+    lane.put(lambda: b"first", 1)
+    lane.put(lambda: b"second", 2)
+    assert lane.busy_since_s == clock.now()
+    await clock.advance(1.0)
+    robot.let_through(1)
+    await settle()
+    assert lane.busy_since_s == clock.now()
+    robot.let_through(1)
+    await settle()
+    assert lane.busy_since_s is None
+    lane.end()

@@ -332,3 +332,21 @@ async def test_numbers_count_when_their_frame_has_left() -> None:
     assert gone == [b"1 go"]
     guard.tell(wire.Refused("wire", 1, 2, "no room", False))
     assert gone == [b"1 go"]
+
+
+async def test_frame_without_a_next_number_is_given_up() -> None:
+    """Its sender goes on with the frame after it, and only that one counts."""
+    guard = Guard()
+    await guard.line.open(1.0)
+    gone: list[Payload] = []
+    first = Numbered(b"1 go", Count({"n": 0}, {"n": 1}))
+    again = Numbered(b"3 on", Count({"n": 2}, {"n": 3}))
+    sending = asyncio.ensure_future(
+        guard.line.send_counted(Counted(first, lambda: None), gone.append)
+    )
+    await settle()
+    assert guard.line.offer_counted(Counted(first, lambda: again), gone.append)
+    guard.tell(wire.Stale("wire", 1, 1, {"n": 2}))
+    guard.tell(wire.Sent("wire", 1, 2))
+    await sending
+    assert gone == [b"3 on"]

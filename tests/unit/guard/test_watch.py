@@ -84,6 +84,17 @@ async def test_one_that_is_let_run_by_nobody_is_waited_for(stands: list[Standing
 
 
 @pytest.mark.anyio
+async def test_one_that_runs_for_less_than_half_the_time_is_waited_for(
+    stands: list[Standing],
+) -> None:
+    guard = Watched()
+    for number in range(10):
+        stands.append(Standing(wants_to_run=True, ran_s=number * 0.4 * client._LOOK_S))
+        guard.looks(1)
+    assert guard.deaths == 0
+
+
+@pytest.mark.anyio
 async def test_one_that_speaks_now_and_then_is_alive(stands: list[Standing]) -> None:
     guard = Watched()
     for _ in range(4):

@@ -114,6 +114,21 @@ async def test_a_full_disk_is_told_and_harms_nothing(
     assert told == ["No space left on device", ""]
 
 
+async def test_a_fault_without_a_number_is_told_in_its_own_words(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It is kept here as well, for want of a listener."""
+    file = LatchFile(tmp_path, "puppet")
+
+    def broken(descriptor: int) -> None:
+        raise OSError("the card was pulled out")
+
+    monkeypatch.setattr("os.fsync", broken)
+    file.keep(Latch(LeaseState(1)))
+    await file.settle()
+    assert file.fault == "the card was pulled out"
+
+
 async def test_what_could_not_be_written_is_tried_again(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
