@@ -194,3 +194,48 @@ async def test_next_frame_of_a_lane_has_its_own_time() -> None:
     await settle()
     assert lane.busy_since_s is None
     lane.end()
+
+
+class Tried(CountedWire):
+    """Refuses after the first connection, and keeps when it was tried, and with which patience."""
+
+    def __init__(self, clock: FakeClock, *, is_hurried: bool) -> None:
+        super().__init__()
+        self.clock = clock
+        self.is_hurried = is_hurried
+        self.tries: list[tuple[float, float]] = []
+
+    async def open(self, timeout_s: float) -> None:
+        hurry = HURRY.get()
+        if hurry is not None:
+            hurry.is_used = self.is_hurried
+            self.tries.append((self.clock.now(), timeout_s))
+        await super().open(timeout_s)
+
+
+@pytest.mark.parametrize(
+    ("is_dear", "is_hurried", "every_s", "patience"),
+    [
+        (False, False, 0.05, [0.07, 0.0875, 0.109375]),
+        (False, True, 0.05, [0.07, 2.0, 2.0]),
+        (True, True, 0.25, [0.07, 6.0, 6.0]),
+    ],
+)
+async def test_rescue_is_tried_at_a_pace_and_with_patience(
+    is_dear: bool, is_hurried: bool, every_s: float, patience: list[float]
+) -> None:
+    """More of it with each try; all of it where tries overlap."""
+    robot = Tried(FakeClock(), is_hurried=is_hurried)
+    rig = Rig(robot, is_strict=is_dear)
+    robot.clock = rig.clock
+    await rig.drive()
+    robot.refusal = "nothing listens"
+    robot.cut()
+    await rig.clock.advance(1.0)
+    times = [at for at, _ in robot.tries[:3]]
+    assert times[1] - times[0] == pytest.approx(every_s)
+    assert times[2] - times[1] == pytest.approx(every_s)
+    assert [one for _, one in robot.tries[:3]] == pytest.approx(patience)
+    robot.refusal = ""
+    await rig.clock.advance(1.0)
+    assert robot.written[-1] == STOP

@@ -269,6 +269,23 @@ async def test_stop_that_did_not_get_through_is_owed_after_closing(
     assert robot.written == [b"go 1", STOP, STOP]
 
 
+async def test_stuck_line_is_reset_when_it_is_closed(
+    rigs: list[Rig], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The system would deliver the motion later, after the stop on the next connection."""
+    monkeypatch.setattr(proxy, "_CLOSE_S", 0.02)  # as above
+    robot = CountedWire()
+    rigs.append(rig := Rig(robot, stalled_s=1.0, is_strict=True))
+    await rig.drive()
+    robot.is_stuck = True
+    robot.stuck_bytes = 5
+    closing = asyncio.ensure_future(rig.transport.close())
+    await rig.clock.advance(0.9)
+    assert (robot.aborts, robot.opens) == (1, 2)
+    assert robot.written[-1] == STOP
+    await closing
+
+
 async def test_end_of_the_guard_stops_before(rig: Rig) -> None:
     await rig.drive()
     finishing = asyncio.ensure_future(rig.guard.finish())
@@ -343,6 +360,12 @@ async def test_engine_may_take_as_much_as_it_likes_where_there_is_no_process(rig
     async with asyncio.timeout(5.0):
         for number in range(40):
             assert await rig.transport.receive() == bytes([number]) * 4096
+
+
+async def test_what_arrives_counts_with_its_envelope(rig: Rig) -> None:
+    """So many small things take no more memory than a few large ones."""
+    assert rig.guard._emit(wire.Received("wire", 1, b"four")) == 36
+    assert rig.guard._emit(wire.Sent("wire", 1, 1)) == 0
 
 
 async def test_a_tick_without_bytes_renews_the_lease_and_writes_nothing(rig: Rig) -> None:

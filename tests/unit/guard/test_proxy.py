@@ -350,3 +350,48 @@ async def test_frame_without_a_next_number_is_given_up() -> None:
     guard.tell(wire.Sent("wire", 1, 2))
     await sending
     assert gone == [b"3 on"]
+
+
+def counted(number: int) -> Counted:
+    """Return a frame that is made in vain again."""
+    count = Count({"n": number - 1}, {"n": number})
+    return Counted(Numbered(b"%d go" % number, count), lambda: None)
+
+
+async def test_frame_with_a_counter_is_taken_while_there_is_room() -> None:
+    """Its length changes with its number, so it may pass the bound by itself."""
+    guard = Guard()
+    gone: list[Payload] = []
+    assert not guard.line.offer_counted(counted(1), gone.append)
+    await guard.line.open(1.0)
+    assert guard.line.offer(b"x" * 65536)
+    assert guard.line.offer_counted(counted(1), gone.append)
+    assert not guard.line.offer_counted(counted(2), gone.append)
+
+
+async def test_sender_of_a_frame_with_a_counter_is_told_what_has_left() -> None:
+    guard = Guard()
+    gone: list[Payload] = []
+    with pytest.raises(PeerClosed, match="the line is closed"):
+        await guard.line.send_counted(counted(1), gone.append)
+    await guard.line.open(1.0)
+    sending = asyncio.ensure_future(guard.line.send_counted(counted(1), gone.append))
+    await settle()
+    guard.tell(wire.Sent("wire", 1, 1))
+    await sending
+    assert gone == [b"1 go"]
+
+
+async def test_counters_are_settled_when_all_their_frames_have_left() -> None:
+    """Frames without one do not matter."""
+    guard = Guard()
+    await guard.line.open(1.0)
+    stands: list[tuple[str, dict[str, int], bool]] = []
+    guard.line._stands = lambda *told: stands.append(told)  # type: ignore[arg-type]
+    assert guard.line.offer(b"poll")
+    guard.tell(wire.Counted("wire", 1, 0, {"n": 1}, []))
+    for number in (2, 3):
+        assert guard.line.offer_counted(counted(number), lambda data: None)
+    guard.tell(wire.Counted("wire", 1, 2, {"n": 2}, []))
+    guard.tell(wire.Counted("wire", 1, 3, {"n": 3}, []))
+    assert stands == [("wire", {"n": 1}, True), ("wire", {"n": 2}, False), ("wire", {"n": 3}, True)]
