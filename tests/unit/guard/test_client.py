@@ -424,3 +424,14 @@ async def test_guard_that_falls_silent_is_replaced(
     assert first.is_killed
     await house.nth(3)
     assert second.is_killed, "that one has never spoken"
+
+
+async def test_guard_that_is_gone_when_it_is_to_be_killed_is_replaced(house: House) -> None:
+    process = house.begin()
+
+    def kill() -> None:
+        raise ProcessLookupError
+
+    process.kill = kill  # type: ignore[method-assign]
+    process.die()
+    await house.nth(2)

@@ -424,6 +424,13 @@ async def test_unread_stops_are_bounded(rig: Rig) -> None:
     assert stops[-1] == ("control 999", "expired")
 
 
+async def test_session_is_told_that_the_counters_of_an_opened_line_are_settled(rig: Rig) -> None:
+    told: list[object] = []
+    rig.guard.on_stand = lambda *stand: told.append(stand)
+    await rig.transport.open(1.0)
+    assert told == [("wire", {}, True)]
+
+
 async def test_line_has_the_address_of_its_transport_before_it_is_opened(rig: Rig) -> None:
     assert rig.transport.address == "wire"
 

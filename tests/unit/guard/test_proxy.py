@@ -395,3 +395,28 @@ async def test_counters_are_settled_when_all_their_frames_have_left() -> None:
     guard.tell(wire.Counted("wire", 1, 2, {"n": 2}, []))
     guard.tell(wire.Counted("wire", 1, 3, {"n": 3}, []))
     assert stands == [("wire", {"n": 1}, True), ("wire", {"n": 2}, False), ("wire", {"n": 3}, True)]
+
+
+async def test_line_is_closed_once() -> None:
+    """A sender that still waits is told so."""
+    guard = Guard()
+    await guard.line.open(1.0)
+    sending = asyncio.ensure_future(guard.line.send(b"x"))
+    await settle()
+    guard.said.clear()
+    await guard.line.close()
+    await guard.line.close()
+    assert guard.said == [wire.Close("wire", 1)]
+    with pytest.raises(PeerClosed, match="the line is closed"):
+        await sending
+
+
+async def test_second_word_about_an_opening_changes_nothing() -> None:
+    guard = Guard()
+    guard.answers = False
+    opening = asyncio.ensure_future(guard.line.open(1.0))
+    await settle()
+    for _ in range(2):
+        guard.tell(wire.Opened("wire", 1, "tcp robot:2", {}))
+    await opening
+    assert guard.line.is_open

@@ -317,3 +317,12 @@ def test_a_cut_disarms_also_what_did_not_move() -> None:
     held.cut()
     held.restored(2.0)
     assert not held.tick(b"go", 2.0)
+
+
+def test_the_end_of_a_step_is_told_once_also_on_a_line_that_may_lose_it() -> None:
+    """There is nothing to write, so nothing to repeat."""
+    held = mover(stop=b"", is_lossy=True)
+    held.tick(b"step", 1.0)
+    held.stop("released", 1.1)
+    assert held.due(1.1, is_clear=True) == b""
+    assert held.state == "idle"

@@ -192,6 +192,12 @@ def test_a_request_goes_with_the_client_that_made_it() -> None:
     assert lease.state == before
 
 
+def test_a_holder_without_a_request_has_a_minute() -> None:
+    lease = Lease()
+    lease.take(ANNA, 0.0)
+    assert lease.deadline == 60.0
+
+
 def test_returned_controls_are_free() -> None:
     lease = Lease()
     lease.take(ANNA, 0.0)

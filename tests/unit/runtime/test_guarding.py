@@ -238,6 +238,12 @@ def test_guard_is_told_the_settings_and_what_is_listened_to() -> None:
     assert make.subscriptions == [("/odom", {"type": "Odometry"})]
 
 
+def test_guard_in_this_process_goes_by_the_clock_of_the_session() -> None:
+    clock = FakeClock()
+    movers = take_reins(robot("tcp"), {}, TABLE, clock, is_guarded=False)
+    assert movers.client._now() == clock.now()
+
+
 def test_guard_is_a_process_where_the_system_can(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:

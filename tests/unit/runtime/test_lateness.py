@@ -53,6 +53,15 @@ async def test_an_ended_watch_looks_no_more() -> None:
     assert it.told == []
 
 
+async def test_a_watch_may_be_ended_twice_and_begun_again() -> None:
+    it = Scene()
+    it.watch.end()
+    it.watch.end()
+    it.watch.start()
+    await it.clock.hold_up(5.0)
+    assert len(it.told) == 1
+
+
 async def test_the_worst_is_remembered() -> None:
     it = Scene()
     assert it.watch.worst_s == 0.0
