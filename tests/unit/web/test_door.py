@@ -15,7 +15,7 @@ from urc.testing.dashboard import FakeRobot, dashboard_profile
 from urc.testing.entry import ACCESS, BEARER, HERE, KEY, OPEN
 from urc.web.app import build_app
 from urc.web.door import SAID
-from urc.web.feed.flow import SocketFlow
+from urc.web.feed.line import SocketFlow
 from urc.web.fleet.robots import Robot
 from urc.web.serve.access import Access
 

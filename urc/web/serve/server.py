@@ -21,7 +21,7 @@ from uvicorn.server import ServerState
 from urc._addresses import local_addresses
 from urc.problems import UrcError
 from urc.transports.own_doors import OWN_DOORS
-from urc.web.feed.flow import SocketFlow
+from urc.web.feed.line import SocketFlow
 from urc.web.serve.connection import CONNECTIONS, REQUEST_S, Connection
 from urc.web.serve.frames import Frames, text_of
 from urc.web.wire.messages import INBOUND_BYTES

@@ -7,12 +7,24 @@ from collections.abc import Mapping
 
 from urc.model.binding import targets
 from urc.model.driver import Argument, Command, Driver
+from urc.model.flow import (
+    ExpectStep,
+    FailStep,
+    IfStep,
+    PromptStep,
+    RepeatStep,
+    RunStep,
+    SendStep,
+    SetStep,
+    Step,
+    UntilStep,
+    WaitStep,
+)
 from urc.model.interface import Given, WidgetUse
 from urc.model.units import conversion
 from urc.model.values import Reading
 from urc.model.widget import Port, Widget
 from urc.web.drive.once import HELD, needs_holding
-from urc.web.show.step_words import step_words
 
 __all__ = ["asked_before", "inputs_config", "motion_lines", "output_config"]
 
@@ -62,7 +74,7 @@ def output_config(use: WidgetUse, output: str, widget: Widget, driver: Driver) -
         "title": (command and command.title) or "",
         "arguments": _arguments(command, given),
         "asks": asked_before(command),
-        "steps": [step_words(one) for one in command.steps] if command is not None else [],
+        "steps": [_step_words(one) for one in command.steps] if command is not None else [],
         "isAnswered": command is not None and (command.reply is not None or bool(command.steps)),
     }
 
@@ -172,3 +184,33 @@ def _neutral(command: Command | None, port: Port, given: Given) -> dict[str, Rea
 
 def _release_of(command: Command) -> Mapping[str, Reading]:
     return command.hold.release if command.hold is not None else {}
+
+
+def mark(text: str) -> str:
+    """Return `text`; the mark puts it into the catalogues, and the page translates it."""
+    return text
+
+
+def _step_words(step: Step) -> dict[str, str]:
+    """Return the name of a step as a key of the catalogues, and the value of its ``{what}``."""
+    match step:
+        case RunStep(command):
+            return {"text": mark("run {what}"), "what": command}
+        case SendStep():
+            return {"text": mark("send"), "what": ""}
+        case ExpectStep():
+            return {"text": mark("wait for the answer"), "what": ""}
+        case PromptStep():
+            return {"text": mark("wait for the prompt"), "what": ""}
+        case WaitStep(seconds):
+            return {"text": mark("wait {what} s"), "what": f"{seconds:g}"}
+        case UntilStep(condition):
+            return {"text": mark("wait until {what}"), "what": condition.source}
+        case RepeatStep(_, times):
+            return {"text": mark("repeat up to {what} times"), "what": str(times)}
+        case SetStep(values):
+            return {"text": mark("set {what}"), "what": ", ".join(values)}
+        case IfStep(condition):
+            return {"text": mark("if {what}"), "what": condition.source}
+        case FailStep():
+            return {"text": mark("fail"), "what": ""}

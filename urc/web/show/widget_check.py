@@ -1,21 +1,25 @@
-"""What `urc validate` says of a widget beside its manifest: its template, its module, its demo.
+"""The checks of a widget's template, module and demo, for `urc validate` and the pages.
 
 Floor 5. Each is read as the dashboard reads it; the module is only looked at, for nothing here runs
 JavaScript.
 """
 
 import re
+from collections.abc import Iterable, Iterator
 from typing import Final
 
+from jinja2 import TemplateSyntaxError, nodes
+from jinja2.meta import find_undeclared_variables
+
 from urc._files import read_bytes
+from urc.config.suggest import did_you_mean
 from urc.model.widget import Widget
 from urc.problems import Problem, ProblemsError, has_errors
 from urc.runtime.shelves import hidden_widget
 from urc.web.load.foreign import OURS, Border
-from urc.web.show.cells import render_widget, widget_context
+from urc.web.show.cells import WidgetContext, render_widget, widget_context
 from urc.web.show.demos import DemoState, demo_states
-from urc.web.show.sandbox import TEMPLATE
-from urc.web.show.template_check import TemplateCheck
+from urc.web.show.sandbox import TEMPLATE, fault_line, widget_environment
 
 __all__ = ["FILES", "check_widget"]
 
@@ -39,10 +43,10 @@ def check_widget(widget: Widget, *, with_demo: bool = True) -> list[Problem]:
     problems: list[Problem] = []
     if widget.name in OURS and Border().is_foreign(widget):
         problems.append(hidden_widget(str(widget.folder / "widget.yaml"), widget.name))
-    template: TemplateCheck | None = None
+    template: _TemplateCheck | None = None
     states: list[DemoState] = []
     try:
-        template = TemplateCheck(widget, _text(widget, TEMPLATE))
+        template = _TemplateCheck(widget, _text(widget, TEMPLATE))
         problems += template.problems()
     except ProblemsError as error:
         problems += error.problems
@@ -64,7 +68,7 @@ def _text(widget: Widget, name: str) -> str:
     return read_bytes(str(widget.folder / name), MOST_BYTES).decode("utf-8", "replace")
 
 
-def _rendered(widget: Widget, states: list[DemoState], template: TemplateCheck) -> list[Problem]:
+def _rendered(widget: Widget, states: list[DemoState], template: "_TemplateCheck") -> list[Problem]:
     """Return why the template cannot be rendered in a state; one finding is enough."""
     for state in states:
         context = widget_context(state.use, widget, state.profile, uid="cell-0")
@@ -90,3 +94,91 @@ def _module(widget: Widget, text: str) -> list[Problem]:
             hint="write 'export default { mount(ctx) { … } };'",
         )
     ]
+
+
+class _TemplateCheck:
+    """The template of one widget."""
+
+    def __init__(self, widget: Widget, source: str) -> None:
+        self._widget = widget
+        self._source = source
+        self._lines = source.splitlines()
+
+    def problems(self) -> list[Problem]:
+        """Return why it cannot be compiled, or the names in it that mean nothing."""
+        environment = widget_environment()
+        try:
+            environment.from_string(self._source)
+            tree = environment.parse(self._source)
+        except TemplateSyntaxError as error:
+            return [self._problem("bad-template", str(error.message), error.lineno)]
+        asked = _asked(tree)
+        known = {*WidgetContext.__slots__, *environment.globals}
+        found = [*self._names(tree, asked, known)]
+        tables = {
+            "options": self._widget.options,
+            "inputs": self._widget.inputs,
+            "outputs": self._widget.outputs,
+        }
+        for table, declared in tables.items():
+            found += self._keys(tree, asked, table, declared)
+        return sorted(dict.fromkeys(found), key=lambda one: (one.line, one.column))
+
+    def fault(self, error: Exception, where: str) -> Problem:
+        """Return what it raised when it was rendered, at its line."""
+        text = str(error).partition("\n")[0] or type(error).__name__
+        return self._problem("bad-template", f"{text}{where}", fault_line(error))
+
+    def _names(
+        self, tree: nodes.Template, asked: set[int], known: Iterable[str]
+    ) -> Iterator[Problem]:
+        unknown = find_undeclared_variables(tree).difference(known)
+        for node in tree.find_all(nodes.Name):
+            if node.ctx == "load" and node.name in unknown and id(node) not in asked:
+                text = f"there is no {node.name!r} in a template"
+                yield self._unknown(text, node.lineno, node.name, known)
+
+    def _keys(
+        self, tree: nodes.Template, asked: set[int], table: str, declared: Iterable[str]
+    ) -> Iterator[Problem]:
+        """Yield what is taken out of a mapping, as ``options.label``, and is not in it."""
+        known = frozenset(declared)
+        if any(node.name == table and node.ctx != "load" for node in tree.find_all(nodes.Name)):
+            return  # it is another thing here
+        looked_up: list[nodes.Getattr | nodes.Getitem] = [*tree.find_all(nodes.Getattr)]
+        looked_up += tree.find_all(nodes.Getitem)
+        for node in looked_up:
+            key = _key(node)
+            is_of_table = isinstance(node.node, nodes.Name) and node.node.name == table
+            if not is_of_table or not key or id(node) in asked:
+                continue
+            if key not in known and not hasattr(dict, key):
+                text = f"{key!r} is none of the {table} in the manifest"
+                yield self._unknown(text, node.lineno, key, known)
+
+    def _unknown(self, text: str, line: int, name: str, known: Iterable[str]) -> Problem:
+        hint = did_you_mean(name, known, "names")
+        return self._problem("unknown-name", text, line, name)._replace(hint=hint)
+
+    def _problem(self, code: str, message: str, line: int, name: str = "") -> Problem:
+        text = self._lines[line - 1] if 0 < line <= len(self._lines) else ""
+        start = text.find(name) if name else -1
+        end = start + len(name) + 1 if start >= 0 else 0
+        column = start + 1 if start >= 0 else len(text) - len(text.lstrip()) + 1
+        file = str(self._widget.folder / TEMPLATE)
+        return Problem(code, message, file, line, column, end, source=text)
+
+
+def _asked(tree: nodes.Template) -> set[int]:
+    """Return the nodes of which a template only asks whether they exist."""
+    tests = [one.node for one in tree.find_all(nodes.Test) if one.name in ("defined", "undefined")]
+    filters = [one.node for one in tree.find_all(nodes.Filter) if one.name in ("default", "d")]
+    return {id(node) for node in (*tests, *filters)}
+
+
+def _key(node: nodes.Getattr | nodes.Getitem) -> str:
+    """Return the key that is looked up, or "" when it is computed."""
+    if isinstance(node, nodes.Getattr):
+        return node.attr
+    key = node.arg.value if isinstance(node.arg, nodes.Const) else ""
+    return key if isinstance(key, str) else ""

@@ -23,7 +23,6 @@ import { isDown } from "./grasp.js";
 import { takesKeys, takesText } from "./keys.js";
 import { feel } from "./haptics.js";
 import { argumentsOf } from "../widgets/output.js";
-import { hurryMoves } from "./prompt.js";
 import { Together } from "./together.js";
 import { t } from "../core/words.js";
 
@@ -288,4 +287,25 @@ export class Grip {
     feel(this, isHeld, phase === "spent", values);
     this.spec.show({ phase: isHeld || phase === "spent" ? phase : "idle", reason, values });
   }
+}
+
+/**
+ * Get pointer moves as they happen, where the browser delays them to the next frame.
+ *
+ * Raw pointer events exist only in secure contexts, and a dashboard in a local network has none. But
+ * every browser has desynchronized canvases: a pointer that goes down on one delivers its moves at
+ * once. So an empty canvas covers the element. Without such canvases, moves come with the frames.
+ *
+ * @param {HTMLElement} el receives the pointer events of its children
+ */
+function hurryMoves(el) {
+  if ("onpointerrawupdate" in window) return;
+  const canvas = document.createElement("canvas");
+  canvas.width = canvas.height = 1;
+  const pen = canvas.getContext("2d", { desynchronized: true });
+  if (!pen?.getContextAttributes?.().desynchronized) return;
+  canvas.ariaHidden = "true";
+  Object.assign(canvas.style, { position: "absolute", inset: "0", width: "100%", height: "100%" });
+  if (getComputedStyle(el).position === "static") el.style.position = "relative";
+  el.append(canvas);
 }
