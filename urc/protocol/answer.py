@@ -12,7 +12,7 @@ from urc.expressions import ExpressionError, Template, quoted, text_of
 from urc.model.codec import traffic_of
 from urc.patterns import Pattern
 from urc.protocol.codec import BadItem, BadText, Frame, Reader
-from urc.protocol.fast_value import FastRead, Taken
+from urc.protocol.fast_value import Compiled, Taken
 from urc.protocol.framings.base import Framing
 from urc.protocol.readings import Decode
 
@@ -25,7 +25,6 @@ __all__ = [
     "Listening",
     "Matcher",
     "Offer",
-    "Quick",
     "shown",
 ]
 
@@ -40,18 +39,24 @@ Aside = Literal["resend", "extend"]
 """The request once more, or more time."""
 
 
-class Matcher(NamedTuple):
-    """A reader and what becomes of its fields."""
+class Matcher:
+    """Reads one kind of frame, and makes samples of its fields.
 
-    reader: Reader
-    decode: Decode
-    make_fast: Callable[[], FastRead | None] | None = None
-    """Makes a function that does both in one, for text."""
-    prefix: str = ""
-    """What the text of its frames begins with, blanks aside; "" when that is not known."""
+    Args:
+        reader: from a frame to its fields.
+        decode: from fields to samples and refused values.
+        compiled: does both in one for the frames that happen most, or None.
+    """
 
-    def take(self, frame: Frame, now: float) -> Taken | None:
+    __slots__ = ("decode", "reader", "take")
+
+    def __init__(self, reader: Reader, decode: Decode, compiled: Compiled | None = None) -> None:
+        self.reader = reader
+        self.decode = decode
+        self.take: Compiled = compiled or self._take
         """Return samples and refused values, or None when the frame is another one."""
+
+    def _take(self, frame: Frame, now: float) -> Taken | None:
         found = self.read(frame)
         return None if found is None else self.decode(found, now)
 
@@ -64,10 +69,6 @@ class Matcher(NamedTuple):
             return None
         except BadText:
             return None
-
-
-Quick = Callable[[bytes, float], "Taken | None"]
-"""A frame and the time → samples and refused values, or None when it is another one."""
 
 
 class Answer(NamedTuple):

@@ -7,17 +7,16 @@ from collections.abc import Mapping
 from functools import partial
 
 from urc.expressions import COUNTERS, NONCE, NOW
-from urc.model.codec import NUMBERED, Payload, ReadSpec, WriteSpec
+from urc.model.codec import NUMBERED, ReadSpec, WriteSpec
 from urc.model.driver import Argument, Command, Driver, Message, Poll, Reply, TransportSpec
 from urc.model.flow import RESENDS, Asides, ExpectStep, SendStep, Stage
 from urc.model.values import NOTHING
-from urc.protocol.answer import Answer, Aside, Matcher, Quick
+from urc.protocol.answer import Answer, Aside, Matcher
 from urc.protocol.bounds import queue_limit_s
-from urc.protocol.codec import CodecContext, Frame
+from urc.protocol.codec import CodecContext
 from urc.protocol.encode import build_encode
 from urc.protocol.exchange import Ask
-from urc.protocol.fast_read import build_fast_read, prefix_of
-from urc.protocol.fast_value import Taken
+from urc.protocol.fast_read import build_fast_read
 from urc.protocol.forms import build_reader
 from urc.protocol.framing import build_framing
 from urc.protocol.fresh import FIXED, Fresh
@@ -25,13 +24,10 @@ from urc.protocol.gate import RANKS, Bucket
 from urc.protocol.head import LOCATION
 from urc.protocol.known import Known
 from urc.protocol.line import Line
-from urc.protocol.messages import Messages
 from urc.protocol.reacting import Collector, Replies, answering, collecting
 from urc.protocol.readings import Readings
 
 __all__ = ["Builder"]
-
-_BLANKS = b" \t\r\n\f\v\x1c\x1d\x1e\x1f"
 
 
 class Builder:
@@ -43,16 +39,23 @@ class Builder:
     """
 
     def __init__(
-        self, driver: Driver, readings: Readings, known: Known, fresh: Fresh = FIXED
+        self,
+        driver: Driver,
+        readings: Readings,
+        known: Known,
+        fresh: Fresh = FIXED,
+        *,
+        is_compiled: bool = False,
     ) -> None:
         self._driver = driver
         self._fresh = fresh
+        self._is_compiled = is_compiled
         self._readings = readings
         self._known = known
         self.lines: dict[str, Line] = {}
         for name, spec in driver.transports.items():
             messages = [one for one in driver.messages.values() if one.transport == name]
-            context = CodecContext(spec.encoding, self._readings.settings, fresh)
+            context = CodecContext(spec.encoding, self._readings.settings, fresh, is_compiled)
             matchers = [self._message(one.read, context) for one in messages]
             if any(one.answer or one.read.collects for one in messages):
                 self._react(spec, messages, matchers, context)
@@ -81,7 +84,7 @@ class Builder:
                 counters = (lambda: self.lines[name].counters) if counts else None
                 decode = answering(encode, partial(self._view, name), counters, replies, decode)
             if decode is not matcher.decode:
-                matchers[place] = matcher._replace(decode=decode, make_fast=None)
+                matchers[place] = Matcher(matcher.reader, decode)
         line = self.lines[name] = Line(spec, matchers)
         line.inbox.replies, line.inbox.collectors = replies, kept
 
@@ -136,7 +139,9 @@ class Builder:
         arguments: Mapping[str, Argument] = NOTHING,
     ) -> Ask:
         line = self.lines[transport]
-        context = CodecContext(line.spec.encoding, self._readings.settings, self._fresh)
+        context = CodecContext(
+            line.spec.encoding, self._readings.settings, self._fresh, self._is_compiled
+        )
         encode = build_encode(send, line.framing, context, arguments)
         has_counters = COUNTERS in send.names
         is_fresh = bool((send.names & {NOW, NONCE}) - arguments.keys())
@@ -173,22 +178,10 @@ class Builder:
             learnt=learnt,
             is_fresh=is_fresh,
             queue_s=queue_limit_s(line.spec, answers[0].timeout_s),
-            quick=None if is_numbered else self._quick(reply, context),
-            starts=_starts(reply.read, context.encoding),
+            plain=self._message(reply.read, context)
+            if _is_plain(reply) and not is_numbered
+            else None,
         )
-
-    def _quick(self, reply: Reply, context: CodecContext) -> Quick | None:
-        """Return what makes samples of a reply, or None where it may mean more than samples."""
-        read = reply.read
-        is_more = reply.errors or reply.faults or reply.stages or reply.match or reply.framing
-        if (
-            is_more
-            or reply.asides != Asides()
-            or read.lines
-            or any(name.startswith("_") for name in read.fields)
-        ):
-            return None
-        return Messages([self._message(read, context)], context.encoding).take
 
     def _answer(self, transport: str, stage: Stage) -> Answer:
         spec = self.lines[transport].spec
@@ -211,24 +204,20 @@ class Builder:
 
     def _message(self, read: ReadSpec, context: CodecContext) -> Matcher:
         matcher = self._matcher(read, context)
-
-        def slow(payload: Payload, now: float) -> Taken | None:
-            return matcher.take(Frame(payload, context.encoding), now)
-
-        if read.topic is not None:
-            return matcher  # what is made for text alone knows no topics
-        make_fast = partial(
-            build_fast_read, read, matcher.reader, self._readings, slow, context.encoding
+        if not context.is_compiled or read.topic is not None:
+            return matcher  # a compiled function knows no topics
+        compiled = build_fast_read(
+            read, matcher.reader, self._readings, matcher.take, context.encoding
         )
-        return matcher._replace(make_fast=make_fast, prefix=prefix_of(read))
+        return Matcher(matcher.reader, matcher.decode, compiled)
 
     def _matcher(self, read: ReadSpec, context: CodecContext) -> Matcher:
         return Matcher(build_reader(read, context), self._readings.decoder(read.fields))
 
 
-def _starts(read: ReadSpec, encoding: str) -> frozenset[int]:
-    """Return what frames of `read` may begin with: blanks, or its literal; nothing is anything."""
-    prefix = prefix_of(read)
-    if not prefix or encoding not in ("utf-8", "ascii", "latin-1"):
-        return frozenset()
-    return frozenset((prefix.encode(encoding)[0], *_BLANKS))
+def _is_plain(reply: Reply) -> bool:
+    """Return whether a reply is one frame that says nothing but readings."""
+    read = reply.read
+    has_own = any(name.startswith("_") for name in read.fields)
+    has_more = reply.errors or reply.faults or reply.stages or reply.match or reply.framing
+    return not (has_more or has_own or read.lines or reply.asides != Asides())

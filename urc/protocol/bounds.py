@@ -26,7 +26,6 @@ from urc.model.flow import (
 
 __all__ = ["GOOD_BYE_S", "calm_s", "lines_of", "longest_s", "needs_readings", "queue_limit_s"]
 
-_MOST_CALM_S: Final = 1.0
 GOOD_BYE_S: Final = 2.0
 """What ``on_close`` may take in all."""
 
@@ -63,7 +62,7 @@ def calm_s(driver: Driver) -> float:
         return 0.0
     if any(spec.keepalive or spec.min_gap_s for spec in driver.transports.values()):
         return 0.0  # a gap may be nearly over when the next one comes
-    waits = [_MOST_CALM_S, *(poll.every_s for poll in driver.polls)]
+    waits = [poll.every_s for poll in driver.polls]
     for spec in driver.transports.values():
         waits += [spec.timeouts.reply_s, *filter(None, (spec.stale_after_s,))]
     replies = [one.reply for one in driver.commands.values()]
@@ -75,7 +74,7 @@ def calm_s(driver: Driver) -> float:
         waits += [time for time in times if time is not None]
         if reply.framing is not None:
             return 0.0  # it may have waits of its own
-    return min(waits)
+    return min(waits, default=0.0)
 
 
 def _command_s(command: Command, driver: Driver, outer: frozenset[str]) -> float:

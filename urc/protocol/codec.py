@@ -75,6 +75,8 @@ class CodecContext(NamedTuple):
     """Values of the profile's settings, for ``when`` and ``set``."""
     fresh: Fresh = FIXED
     """What is new in each frame that is written."""
+    is_compiled: bool = False
+    """Whether to compile functions of messages and commands, which pays in live sessions only."""
 
 
 class Reader(Protocol):

@@ -129,7 +129,7 @@ def exchange_of(
         BadArgument: it cannot be written with these arguments.
     """
     names = values if ask.is_local else {**known.names, **values}
-    return Exchange(
+    exchange = Exchange(
         ask,
         (sink if type(sink) is Asked else Plain(sink))
         if command.verify is None
@@ -137,12 +137,12 @@ def exchange_of(
         names,
         ask.made(names),
         expires_at(ask, now),
-    ).mark(
-        on_sent=sink.on_sent if isinstance(sink, Asked) else None,
-        condition=partial(why_not_allowed, command, known, values, stops=known.stops)
-        if command.requires or command.moves
-        else None,
     )
+    if isinstance(sink, Asked):
+        exchange.on_sent = sink.on_sent
+    if command.requires or command.moves:
+        exchange.condition = partial(why_not_allowed, command, known, values, stops=known.stops)
+    return exchange
 
 
 def _written(value: object) -> str:

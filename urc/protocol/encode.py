@@ -15,7 +15,6 @@ from urc.problems import UrcError, printable
 from urc.protocol.codec import CodecContext, NotWritable
 from urc.protocol.forms import build_writer
 from urc.protocol.framings.base import Framing, FramingError
-from urc.protocol.generate import after_a_while
 
 __all__ = ["BadArgument", "Encode", "build_check", "build_encode", "check_arguments"]
 
@@ -57,14 +56,10 @@ def build_encode(
         constant = encode({})
         return lambda _: constant
     template = send.options.get("template")
-    if send.form == "text" and isinstance(template, Template):
+    if context.is_compiled and send.form == "text" and isinstance(template, Template):
+        from urc.protocol.fast_encode import build_fast_encode
 
-        def make() -> Encode | None:
-            from urc.protocol.fast_encode import build_fast_encode
-
-            return build_fast_encode(template, arguments, framing, context.encoding, encode)
-
-        return after_a_while(encode, make)
+        return build_fast_encode(template, arguments, framing, context.encoding, encode) or encode
     return encode
 
 
@@ -76,16 +71,16 @@ def _together(encodes: Sequence[Encode]) -> Encode:
     return encode
 
 
-def build_check(command: Command) -> Callable[[Mapping[str, object]], dict[str, Reading]]:
+def build_check(
+    command: Command, *, is_compiled: bool = False
+) -> Callable[[Mapping[str, object]], dict[str, Reading]]:
     """Return `check_arguments` for one command."""
-    slow = partial(check_arguments, command)
+    check = partial(check_arguments, command)
+    if not is_compiled:
+        return check
+    from urc.protocol.fast_encode import build_fast_check
 
-    def make() -> Callable[[Mapping[str, object]], dict[str, Reading]]:
-        from urc.protocol.fast_encode import build_fast_check
-
-        return build_fast_check(command.arguments, slow)
-
-    return after_a_while(slow, make)
+    return build_fast_check(command.arguments, check)
 
 
 def check_arguments(command: Command, given: Mapping[str, object]) -> dict[str, Reading]:

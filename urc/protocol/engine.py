@@ -20,16 +20,15 @@ that it returns. `_settle` takes these out, tells those concerned, and lets sequ
 nothing is left but what the outside must perform.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from urc.model.codec import Payload
 from urc.model.driver import Command, Driver
-from urc.model.values import Reading, Value
+from urc.model.values import Reading, Sample, Value
 from urc.protocol.actions import build_program, programs_of_lines
 from urc.protocol.answer import Heard
 from urc.protocol.asking import Builder
 from urc.protocol.bounds import GOOD_BYE_S, calm_s, lines_of, needs_readings
-from urc.protocol.brief import briefs
 from urc.protocol.commands import (
     Verifications,
     exchange_of,
@@ -40,14 +39,8 @@ from urc.protocol.encode import BadArgument, build_check
 from urc.protocol.events import (
     Close,
     Event,
-    Failed,
-    Fault,
-    Open,
-    Ready,
-    Replied,
     Request,
     Samples,
-    Send,
 )
 from urc.protocol.exchange import (
     Asked,
@@ -67,9 +60,6 @@ from urc.protocol.times import soonest
 
 __all__ = ["Engine"]
 
-_PLAIN = frozenset((Send, Fault, Open, Ready, Replied, Failed))
-"""Events that mean nothing to the engine itself."""
-
 
 class Engine:
     """One driver at work. Not safe to re-enter; every verb returns a list of events.
@@ -78,7 +68,8 @@ class Engine:
         driver: as loaded; its patterns and templates are compiled already.
         settings: value of every setting of the profile.
         fresh: the time of day, and randomness, for what is sent; fixed ones for tests.
-        is_brief: take the short way where there is one; the long way does the same, in more steps.
+        is_compiled: compile a function for each message and command. A live session gains by it;
+            the test of a document is over too soon.
 
     Raises:
         BadArgument: a constant frame contains its own delimiter, or cannot be encoded.
@@ -89,17 +80,19 @@ class Engine:
         driver: Driver,
         settings: Mapping[str, Value],
         *,
-        is_brief: bool = True,
         fresh: Fresh = FIXED,
+        is_compiled: bool = False,
     ) -> None:
         names: dict[str, object] = {"settings": dict(settings)}
         self.readings = Readings(driver.signals, names)
         self.known = Known(driver.signals, names)
-        builder = Builder(driver, self.readings, self.known, fresh)
+        builder = Builder(driver, self.readings, self.known, fresh, is_compiled=is_compiled)
         self.lines: Mapping[str, Line] = builder.lines
         self._all_lines = tuple(self.lines.values())
         self._commands = driver.commands
-        self._checks = {name: build_check(one) for name, one in driver.commands.items()}
+        self._checks = {
+            name: build_check(one, is_compiled=is_compiled) for name, one in driver.commands.items()
+        }
         self._guarded = {name for name, one in driver.commands.items() if is_guarded(one)}
         self._asks = {
             name: builder.command(command)
@@ -112,8 +105,6 @@ class Engine:
             if command.steps
         }
         self.motions = Motions(self._commands, self._checks, self._asks, self.lines, self.known)
-        self._is_brief = is_brief
-        self._brief = briefs(driver, self.lines, self._asks, self._checks) if is_brief else {}
         self._greetings = programs_of_lines(driver, builder, "on_connect")
         self._good_byes = programs_of_lines(driver, builder, "on_close")
         self._schedule = Schedule(driver, builder, self.known)
@@ -186,21 +177,10 @@ class Engine:
 
     def receive(self, transport: str, data: Payload, now: float) -> list[Event]:
         """Take bytes or an envelope that came in on `transport`."""
-        line = self.lines[transport]
-        if self._is_brief and type(data) is bytes:
-            told = line.at_once(data, now)
-            if told is not None:
-                has_more = self._is_watched or self._runners or type(told[-1]) is Ended
-                return self._tell(told, now) if has_more else told  # type: ignore[return-value]
-        return self._settle(line.receive(data, now), now)
+        return self._settle(self.lines[transport].receive(data, now), now)
 
     def command(self, request: Request, now: float) -> list[Event]:
         """Run a command: queued, sent, answered by exactly one `Replied` or `Failed`."""
-        brief = self._brief.get(request.command)
-        if brief is not None and not self._runners:
-            told = brief.send(request, now)
-            if told is not None:
-                return told
         asked, people = Asked(request), request.confirmed_by
         events = self.run(request.command, request.arguments, asked, now, confirmed_by=people)
         return self._settle(events, now)
@@ -303,7 +283,8 @@ class Engine:
             exchange = exchange_of(command, ask, values, sink, now, self.known, self._verifications)
         except BadArgument as error:
             return sink(Outcome("bad-argument", str(error)), now)
-        exchange.is_privileged, exchange.unless = on == command.transport, unless
+        exchange.is_privileged = on == command.transport
+        exchange.unless = unless
         return self.lines[command.transport].submit(exchange, now)
 
     def _begin(self, runner: Runner) -> None:
@@ -313,33 +294,13 @@ class Engine:
 
     # -- what follows from what
 
-    def _tell(self, told: list[LineEvent], now: float) -> list[Event]:
-        """Do what `_settle` does, for what `Line.at_once` returns."""
-        if type(told[-1]) is Ended or self._runners or self._verifications.is_waiting:
-            return self._settle(told, now)
-        for event in told:
-            if type(event) is Samples:
-                self.known.take(event.samples)
-        return told  # type: ignore[return-value]  # readings, faults, and the one answer
-
     def _settle(self, events: list[LineEvent], now: float) -> list[Event]:
         """Act upon the events meant for the engine; return those meant for the outside."""
         told: list[Event] = []
         pending = events
         while True:
             for event in pending:
-                kind = type(event)
-                if kind in _PLAIN:
-                    told.append(event)  # type: ignore[arg-type]  # these are meant for the outside
-                elif kind is Samples:
-                    if self._is_watched:
-                        self.known.take(event.samples)  # type: ignore[union-attr]  # they have them
-                        self._verifications.has_news = True
-                        for runner in self._runners:
-                            runner.look(now)
-                    told.append(event)  # type: ignore[arg-type]  # as above
-                else:
-                    told += self._outside(event, now)
+                self._act(event, told, now)
             pending = self._verifications.look(now) if self._verifications.has_news else []
             if self._runners:
                 pending += self._advance(now)
@@ -353,6 +314,31 @@ class Engine:
             if not pending:
                 return told
 
+    def _act(self, event: LineEvent, told: list[Event], now: float) -> None:
+        """Act upon one event; add what it means for the outside to `told`."""
+        if isinstance(event, Ended):
+            exchange, outcome = event
+            for one in exchange.owner.ended(exchange, outcome, now):
+                self._act(one, told, now)
+        elif isinstance(event, Heard):
+            if event.ear.owner is not None:
+                event.ear.owner.heard(event.ear, event.offer, now)
+        elif isinstance(event, Leaving):
+            self._say_good_bye(self.lines[event.transport], now)
+        else:
+            if isinstance(event, Samples):
+                self._note_readings(event.samples, now)
+            elif isinstance(event, Close):
+                self._down(self.lines[event.transport], event.reason or "the line was closed")
+            told.append(event)
+
+    def _note_readings(self, samples: Sequence[Sample], now: float) -> None:
+        if self._is_watched:
+            self.known.take(samples)
+            self._verifications.has_news = True
+            for runner in self._runners:
+                runner.look(now)
+
     def _advance(self, now: float) -> list[LineEvent]:
         """Let sequences do steps until they must wait."""
         pending: list[LineEvent] = []
@@ -363,29 +349,6 @@ class Engine:
             for line in self._all_lines:
                 line.is_scripted = False
         return pending
-
-    def _outside(self, event: LineEvent, now: float) -> list[Event]:
-        if isinstance(event, Ended):
-            inner = event.exchange.owner.ended(event.exchange, event.outcome, now)
-            return [told for one in inner for told in self._outside(one, now)] if inner else []
-        if type(event) in _PLAIN:
-            return [event]  # type: ignore[list-item]  # these are meant for the outside
-        match event:
-            case Heard(ear, offer):
-                if ear.owner is not None:
-                    ear.owner.heard(ear, offer, now)
-                return []
-            case Leaving(transport):
-                self._say_good_bye(self.lines[transport], now)
-                return []
-            case Samples(_, samples):
-                if self._is_watched:
-                    self.known.take(samples)
-                    self._verifications.has_news = True
-                return [event]
-            case Close(transport, reason):
-                self._down(self.lines[transport], reason or "the line was closed")
-        return [event]
 
     def _say_good_bye(self, line: Line, now: float) -> None:
         name = line.spec.name

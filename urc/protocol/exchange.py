@@ -12,7 +12,7 @@ from urc.expressions import COUNTERS, Template
 from urc.model.codec import Payload
 from urc.model.flow import Retry
 from urc.model.values import NOTHING, Reading
-from urc.protocol.answer import Answer, Heard, Quick
+from urc.protocol.answer import Answer, Heard, Matcher
 from urc.protocol.encode import Encode
 from urc.protocol.events import Event, Failed, Replied, Request
 from urc.protocol.framings.base import Framing
@@ -87,20 +87,12 @@ class Ask(NamedTuple):
     """Its templates use nothing but its arguments, and counters."""
     queue_s: float = 0.0
     """How long it may wait to be sent."""
-    quick: "Quick | None" = None
-    """Makes samples of its only answer, where that is all there is to it."""
-    starts: frozenset[int] = frozenset()
-    """First bytes of all frames that `quick` takes; none: it may be any."""
+    plain: Matcher | None = None
+    """Reads its only answer, where that is nothing but readings."""
     is_miss_harmless: bool = False
     """Its missing answers say nothing about the line: somebody else counts them."""
     is_numbered: bool = False
     """It is an envelope that carries a number, and so does its answer."""
-
-    @property
-    def is_simple(self) -> bool:
-        """Whether its bytes depend on its arguments alone, and a free line is all it waits for."""
-        has_more = self.has_counters or self.is_numbered or self.framing or self.bucket
-        return self.is_local and not has_more
 
     @property
     def is_made_late(self) -> bool:
@@ -245,11 +237,6 @@ class Asked:
     def on_sent(self) -> Callable[[Payload], None] | None:
         """Whoever is to be told what is sent for it."""
         return self._request.on_sent
-
-    def replied(self, values: Mapping[str, Reading]) -> Replied:
-        """Return the answer of a command that is done."""
-        request = self._request
-        return new(Replied, (request.id, request.command, values))
 
     def ended(self, exchange: Exchange, outcome: Outcome, now: float) -> list[LineEvent]:
         """Return the one answer."""

@@ -17,7 +17,7 @@ from urc.protocol.framings.base import Framing
 from urc.protocol.framings.delimited import DelimiterFraming
 from urc.protocol.generate import function_of
 
-__all__ = ["build_fast_check", "build_fast_encode", "build_fast_write"]
+__all__ = ["build_fast_check", "build_fast_encode"]
 
 Encode = Callable[[Mapping[str, object]], Payload]
 
@@ -64,45 +64,6 @@ def build_fast_encode(
         "spelt": spelt, "type": type,
     }  # fmt: skip
     return function_of("encode", "ns", lines, scope)
-
-
-def build_fast_write(
-    template: Template, arguments: Mapping[str, Argument], framing: Framing, encoding: str
-) -> Callable[[Mapping[str, object]], bytes | None] | None:
-    """Return given arguments → bytes on the wire, or None for what the two above must look at.
-
-    None as well where there is no such function: it is both of them in one.
-    """
-    if type(framing) is not DelimiterFraming or framing.seal is not None or not template.names:
-        return None
-    kinds = {name: one.type for name, one in arguments.items()}
-    if not template.names <= kinds.keys() or not {*kinds.values()} <= {"number", "integer"}:
-        return None
-    variables = {name: f"v{place}" for place, name in enumerate(arguments)}
-    text = _text_of(template, kinds, variables, framing.tx, encoding)
-    if text is None or any(one.choices for one in arguments.values()):
-        return None
-    lines = [f"    if len(given) != {len(arguments)}:", "        return None", "    try:"]
-    lines += [f"        {variable} = given[{name!r}]" for name, variable in variables.items()]
-    lines += ["    except KeyError:", "        return None"]
-    checks = [_range(variables[name], one) for name, one in arguments.items()]
-    checks += [
-        # Larger whole numbers are computed with otherwise.
-        f"-4611686018427387904 < {variable} < 4611686018427387904"
-        for name, variable in variables.items()
-        if not _is_small(arguments[name])
-    ]
-    lines += [*_written(checks, text, encoding), "    return None"]
-    scope = {
-        "ArithmeticError": ArithmeticError, "KeyError": KeyError, "float": float, "int": int,
-        "len": len, "spelt": spelt, "type": type,
-    }  # fmt: skip
-    return function_of("write", "given", lines, scope)
-
-
-def _is_small(argument: Argument) -> bool:
-    low, high = argument.min, argument.max
-    return low is not None and high is not None and low > -(2**62) and high < 2**62
 
 
 def _text_of(

@@ -11,7 +11,7 @@ from msgspec import UNSET, DecodeError
 
 from urc.model.codec import ReadSpec
 from urc.model.values import Sample
-from urc.protocol.fast_value import FastRead, Slow, Value, finish, of_json_type, value_of
+from urc.protocol.fast_value import Compiled, Value, finish, of_json_type, value_of
 from urc.protocol.generate import function_of
 from urc.protocol.json_types import Plan, Want
 from urc.protocol.readings import Readings
@@ -19,7 +19,9 @@ from urc.protocol.readings import Readings
 __all__ = ["build_fast_json"]
 
 
-def build_fast_json(spec: ReadSpec, plan: Plan, readings: Readings, slow: Slow) -> FastRead | None:
+def build_fast_json(
+    spec: ReadSpec, plan: Plan, readings: Readings, slow: Compiled
+) -> Compiled | None:
     """Return the function, or None where only `slow` can read these documents."""
     names = [name for name in spec.fields if not name.startswith("_")]
     values: dict[str, Value] = {}
@@ -31,13 +33,13 @@ def build_fast_json(spec: ReadSpec, plan: Plan, readings: Readings, slow: Slow) 
         values[name] = value._replace(is_finite=value.is_finite or value.convert in ("", "{r}"))
     raws = {name: f"r{place}" for place, name in enumerate(names)}
     lines = ["    try:", "        v = decode(payload)", "    except Otherwise:"]
-    lines += ["        return slow(payload, now)", "    try:", "        pass"]
+    lines += ["        return slow(frame, now)", "    try:", "        pass"]
     lines += _picks(plan.want, plan, "v", raws)
     lines += ["    except (AttributeError, IndexError, TypeError):"]
-    lines += ["        return careful(v, payload, now)"]
+    lines += ["        return careful(v, frame, now)"]
     checks = [of_json_type(values[name].signal.type, raws[name]) for name in names]
     lines += [f"    if not ({' and '.join(checks or ['True'])}):"]
-    lines += ["        return careful(v, payload, now)"]
+    lines += ["        return careful(v, frame, now)"]
     # Another structure or no document at all: the closures know which.
     otherwise = (DecodeError, UnicodeError, RecursionError)
     scope = {
@@ -63,7 +65,11 @@ def _picks(want: Want, plan: Plan, variable: str, raws: Mapping[str, str]) -> It
 
 
 def _careful(
-    values: Mapping[str, Value], raws: Mapping[str, str], plan: Plan, readings: Readings, slow: Slow
+    values: Mapping[str, Value],
+    raws: Mapping[str, str],
+    plan: Plan,
+    readings: Readings,
+    slow: Compiled,
 ) -> object:
     """Return what takes a decoded document in which fields are missing or null."""
     lines = [f"    {raw} = UNSET" for raw in raws.values()]
@@ -82,21 +88,21 @@ def _careful(
         lines += [f"    if {raw} is None:", f"        {sample.format(v=None)}"]
         lines += [f"    elif {raw} is not UNSET:"]
         lines += [f"        if not {of_json_type(value.signal.type, raw)}:"]
-        lines += ["            return slow(payload, now)"]
+        lines += ["            return slow(frame, now)"]
         lines += [f"        x = {(value.convert or '{r}').format(r=raw)}"]
         checks = [check.format(v="x") for check in value.checks]
         if value.convert and value.convert != "{r}":
             checks.append("x * 0 == 0")  # a product may be infinite
         if checks:
             lines += [f"        if not ({' and '.join(checks)}):"]
-            lines += ["            return slow(payload, now)"]
+            lines += ["            return slow(frame, now)"]
         lines += [f"        {sample.format(v='x')}"]
     missing = " and ".join(f"{raw} is UNSET" for raw in raws.values()) or "True"
-    lines += [f"    if {missing}:", "        return slow(payload, now)"]
+    lines += [f"    if {missing}:", "        return slow(frame, now)"]
     if any(readings.keeps(name) for name in values):
         scope["follow"] = readings.follow
         lines += ["    refused = []", "    follow(samples, refused, now)"]
         lines.append("    return samples, refused")
     else:
         lines.append("    return samples, ()")
-    return function_of("read_careful", "v, payload, now", lines, scope)
+    return function_of("read_careful", "v, frame, now", lines, scope)

@@ -5,24 +5,27 @@ there, a value of its signal, within its range. At anything else it turns to the
 which read the frame again; they are also the oracle of its tests.
 """
 
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING, Final, cast
 
 from urc.model.codec import ReadSpec
 from urc.model.text import FieldKind, Hole
 from urc.patterns import Pattern, is_plain_group, literal_prefix
 from urc.protocol.codec import Reader
-from urc.protocol.fast_value import FastRead, Slow, Value, finish, value_of
+from urc.protocol.fast_value import Compiled, Value, finish, value_of
 from urc.protocol.readings import Readings
 
 if TYPE_CHECKING:
     from urc.protocol.json_paths import JsonReader
 
-__all__ = ["build_fast_read", "prefix_of"]
+__all__ = ["build_fast_read"]
+
+_KEEPS_ASCII: Final = frozenset(("utf-8", "ascii", "latin-1"))
+"""Encodings in which ASCII text has its own bytes."""
 
 
 def build_fast_read(
-    spec: ReadSpec, reader: Reader, readings: Readings, slow: Slow, encoding: str = "utf-8"
-) -> FastRead | None:
+    spec: ReadSpec, reader: Reader, readings: Readings, slow: Compiled, encoding: str = "utf-8"
+) -> Compiled | None:
     """Return the function for frames of `spec`, or None where only `slow` can read them."""
     if spec.conversions or spec.sets or spec.when or spec.lines or spec.collects:
         return None
@@ -45,20 +48,23 @@ def build_fast_read(
     return None
 
 
-def prefix_of(spec: ReadSpec) -> str:
-    """Return the text with which every frame of `spec` begins, blanks aside; "" when unknown."""
-    if spec.form == "regex":
-        return literal_prefix(cast("Pattern", spec.options["pattern"]))
-    if spec.form == "pattern":
-        holes = cast("tuple[Hole, ...]", spec.options["holes"])
-        first = holes[0].before if holes else cast("str", spec.options["tail"])
-        return first.lstrip().partition(" ")[0]
-    if spec.form == "equals":
-        return cast("str", spec.options["text"])
-    return ""
+def _head_check(prefix: str, encoding: str) -> list[str]:
+    """Return the lines that refuse most frames which do not begin with `prefix`.
+
+    Blanks before the text may be skipped, and what is not ASCII may be no text: both need a look.
+    """
+    if not prefix or encoding not in _KEEPS_ASCII:
+        return []
+    return [
+        f"    if not payload.startswith({prefix.encode(encoding)!r}):",
+        "        if payload[:1] > b' ' and payload.isascii():",
+        "            return None",
+    ]
 
 
-def _of_regex(pattern: Pattern, encoding: str, readings: Readings, slow: Slow) -> FastRead | None:
+def _of_regex(
+    pattern: Pattern, encoding: str, readings: Readings, slow: Compiled
+) -> Compiled | None:
     if pattern.match is None:
         return None
     values: dict[str, Value] = {}
@@ -70,10 +76,11 @@ def _of_regex(pattern: Pattern, encoding: str, readings: Readings, slow: Slow) -
             return None
         values[name] = value
     lines = [
+        *_head_check(literal_prefix(pattern), encoding),
         "    try:",
         f"        text = payload.decode({encoding!r})",
         "    except UnicodeDecodeError:",
-        "        return slow(payload, now)",
+        "        return slow(frame, now)",
         "    found = match(text)",
         "    if found is None:",
         "        return None",
@@ -89,21 +96,22 @@ def _of_regex(pattern: Pattern, encoding: str, readings: Readings, slow: Slow) -
 
 
 def _of_pattern(
-    holes: tuple[Hole, ...], tail: str, encoding: str, readings: Readings, slow: Slow
-) -> FastRead | None:
+    holes: tuple[Hole, ...], tail: str, encoding: str, readings: Readings, slow: Compiled
+) -> Compiled | None:
     """Return the function for a pattern whose words are either fields or literals."""
     words = _words(holes, tail)
     kinds = {word.kind for word in words or () if isinstance(word, Hole)}
-    if words is None or "hex" in kinds or encoding not in ("utf-8", "ascii", "latin-1"):
+    if words is None or "hex" in kinds or encoding not in _KEEPS_ASCII:
         return None
     checks = ["payload.isascii()", f"len(parts) == {len(words)}"]
-    lines = ["    parts = payload.split(b' ')"]
+    head = _head_check(words[0], encoding) if words and isinstance(words[0], str) else []
+    lines = [*head, "    parts = payload.split(b' ')"]
     literals: dict[int, str | bytes] = {
         place: word.encode(encoding) for place, word in enumerate(words) if isinstance(word, str)
     }
     if "word" in kinds:
         # Only what is kept as text must be made into text.
-        lines = ["    if not payload.isascii():", "        return slow(payload, now)"]
+        lines = [*head, "    if not payload.isascii():", "        return slow(frame, now)"]
         lines += ["    text = payload.decode()", "    parts = text.split(' ')"]
         literals = {place: word for place, word in enumerate(words) if isinstance(word, str)}
         checks[0] = "text.isprintable()"
@@ -112,7 +120,7 @@ def _of_pattern(
         checks.append("len(payload) <= 400")  # as many digits as the pattern itself takes
     if kinds - {"word"}:
         checks.append("95 not in payload")  # an underscore, which only Python's numbers take
-    lines += [f"    if not ({' and '.join(checks)}):", "        return slow(payload, now)"]
+    lines += [f"    if not ({' and '.join(checks)}):", "        return slow(frame, now)"]
     values: list[Value] = []
     raws: list[str] = []
     skipped: list[str] = []

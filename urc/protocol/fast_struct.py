@@ -10,7 +10,7 @@ from typing import cast
 from urc.model.binary import Item
 from urc.model.codec import ReadSpec
 from urc.protocol.codec import BadItem
-from urc.protocol.fast_value import FastRead, Slow, Value, finish, of_json_type, value_of
+from urc.protocol.fast_value import Compiled, Value, finish, of_json_type, value_of
 from urc.protocol.readings import Readings
 from urc.protocol.struct_lines import BUILTINS, Lines
 from urc.protocol.struct_source import add_fixed
@@ -20,8 +20,8 @@ __all__ = ["build_fast_struct"]
 
 
 def build_fast_struct(
-    spec: ReadSpec, encoding: str, readings: Readings, slow: Slow
-) -> FastRead | None:
+    spec: ReadSpec, encoding: str, readings: Readings, slow: Compiled
+) -> Compiled | None:
     """Return the function for frames of `spec`, or None where only `slow` can read them."""
     items = cast("tuple[Item, ...]", spec.options["items"])
     source = Lines()
@@ -50,9 +50,9 @@ def build_fast_struct(
         values.append(value)
     head = source.lines
     body = ["    try:", *(f"        {line}" for line in lines or ["pass"])]
-    body += ["    except (BadItem, ValueError):", "        return slow(payload, now)"]
+    body += ["    except (BadItem, ValueError):", "        return slow(frame, now)"]
     if checks:
-        body += [f"    if not ({' and '.join(checks)}):", "        return slow(payload, now)"]
+        body += [f"    if not ({' and '.join(checks)}):", "        return slow(frame, now)"]
     scope = {**BUILTINS, **source.scope, "str": str}
     return finish(values, raws, [*head, *body], readings, scope, slow)
 

@@ -8,21 +8,24 @@ function turns to the closures (`Slow`), which read the frame again.
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Final, NamedTuple
 
-from urc.model.codec import Payload
 from urc.model.values import Sample, Signal
+from urc.protocol.codec import Frame
 from urc.protocol.convert import divisor_of
 from urc.protocol.generate import function_of
 from urc.protocol.readings import Readings
 
-__all__ = ["FastRead", "Slow", "Taken", "Value", "finish", "of_json_type", "value_of"]
+__all__ = ["Compiled", "Taken", "Value", "finish", "of_json_type", "value_of"]
 
 Taken = tuple[list[Sample], Sequence[str]]
-Slow = Callable[[Payload, float], "Taken | None"]
+Compiled = Callable[[Frame, float], "Taken | None"]
 """A frame and the time → samples and refused values, or None for another frame."""
-FastRead = Callable[[bytes, float], "Taken | None"]
-"""The same, of bytes alone."""
 
-_GIVE_UP: Final = "        return slow(payload, now)"
+_BEGIN: Final = (
+    "    payload = frame.payload",
+    "    if type(payload) is not bytes:",
+    "        return slow(frame, now)",
+)
+_GIVE_UP: Final = "        return slow(frame, now)"
 _WHOLE: Final = "(type({r}) is int and -9223372036854775808 <= {r} <= 9223372036854775807)"
 _JSON_TYPES: Final = {
     "number": "(type({r}) is float or " + _WHOLE + ")",
@@ -110,12 +113,13 @@ def finish(
     lines: list[str],
     readings: Readings,
     scope: Mapping[str, object],
-    slow: Slow,
+    slow: Compiled,
     skipped: Sequence[str] = (),
-) -> FastRead:
+) -> Compiled:
     """Add the conversions, their checks and the samples to `lines`, and make the function."""
     names: dict[str, Any] = {
-        **scope, "slow": slow, "float": float, "int": int, "new": tuple.__new__, "Sample": Sample,
+        **scope, "slow": slow, "bytes": bytes, "type": type, "float": float, "int": int,
+        "new": tuple.__new__, "Sample": Sample,
         "TypeError": TypeError, "ValueError": ValueError, "OverflowError": OverflowError,
         "IndexError": IndexError,
     }  # fmt: skip
@@ -131,7 +135,7 @@ def finish(
     if checks:
         lines += [f"    if not ({' and '.join(checks)}):", _GIVE_UP]
     lines += _samples(values, shown, readings, names)
-    return function_of("read", "payload, now", lines, names)
+    return function_of("read", "frame, now", [*_BEGIN, *lines], names)
 
 
 def _conversions(values: Sequence[Value], raws: Sequence[str], shown: Sequence[str]) -> list[str]:

@@ -22,13 +22,12 @@ class Flight:
     """One time that a request was sent, until its last answer has come or is given up."""
 
     __slots__ = (
-        "_ear",
         "due",
+        "ear",
         "exchange",
         "is_extended",
         "is_late",
         "number",
-        "quick",
         "since",
         "size",
         "stage",
@@ -38,10 +37,9 @@ class Flight:
     def __init__(self, exchange: Exchange, now: float) -> None:
         self.exchange = exchange
         ask = exchange.ask
-        self.quick = ask.quick
         self.stage = 0
-        self._ear: Ear | None = None
-        """Made when it is needed: hardly ever, where `quick` is enough."""
+        self.ear = Ear(ask.answers[0])
+        """Collects the frames of the answer that is waited for."""
         self.due = now + ask.answers[0].timeout_s
         """When its answer is overdue; of one that is late: when it is not expected any more."""
         self.size = 0
@@ -55,13 +53,6 @@ class Flight:
         self.values: dict[str, Reading] = {}
         self.number: int | None = None
         """What its answer carries; None: it is recognised otherwise."""
-
-    @property
-    def ear(self) -> Ear:
-        """Collects the frames of the answer that is waited for."""
-        if self._ear is None:
-            self._ear = Ear(self.exchange.ask.answers[self.stage])
-        return self._ear
 
     def answer(self, frame: Frame) -> Offer:
         """Return what the frame means, which carries the number of this request."""
@@ -107,7 +98,7 @@ class Flight:
         self.stage += 1
         if self.stage == len(answers):
             return False
-        self._ear, self.since, self.is_extended = None, now, False
+        self.ear, self.since, self.is_extended = Ear(answers[self.stage]), now, False
         self.due = now + answers[self.stage].timeout_s
         return True
 
@@ -197,6 +188,12 @@ class Flights(list[Flight]):
     def collects_lines(self) -> bool:
         """Return whether any frame at all may be part of an answer."""
         return any(flight.ear.answer.lines is not None for flight in self)
+
+    def plain(self) -> Flight | None:
+        """Return the only one, where its answer is expected and is nothing but readings."""
+        if len(self) != 1 or self[0].is_late or self[0].exchange.ask.plain is None:
+            return None
+        return self[0]
 
     def numbered(self, number: object) -> Flight | None:
         """Return the one whose answer carries `number`."""

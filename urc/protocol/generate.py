@@ -9,13 +9,9 @@ shows the generated line.
 import weakref
 from collections.abc import Callable, Mapping, Sequence
 from itertools import count
-from typing import Any, Final, TypeVar
+from typing import Any
 
-__all__ = ["WARM_AFTER", "after_a_while", "function_of"]
-
-WARM_AFTER: Final = 20
-"""Calls after which a function is made."""
-Result = TypeVar("Result")
+__all__ = ["function_of"]
 
 _numbers = count(1)
 
@@ -42,23 +38,3 @@ def function_of(
     # With its engine goes the function, and with the function its source.
     weakref.finalize(function, linecache.cache.pop, file, None).atexit = False
     return function
-
-
-def after_a_while(
-    slow: Callable[[Mapping[str, object]], Result],
-    make: Callable[[], Callable[[Mapping[str, object]], Result] | None],
-) -> Callable[[Mapping[str, object]], Result]:
-    """Return a function that does what `slow` does, and as what `make` returns does once it pays.
-
-    Making a function takes as long as a hundred calls of it; a test of a document calls it once.
-    """
-    chosen, calls = slow, 0
-
-    def call(given: Mapping[str, object]) -> Result:
-        nonlocal chosen, calls
-        calls += 1
-        if calls == WARM_AFTER:
-            chosen = make() or slow
-        return chosen(given)
-
-    return call

@@ -10,11 +10,10 @@ from urc.model.codec import Counted
 from urc.model.driver import TransportSpec
 from urc.model.values import Sample
 from urc.patterns import Pattern
-from urc.protocol.answer import Ear, Fields, Heard, Matcher, Offer, Quick, shown
+from urc.protocol.answer import Ear, Fields, Heard, Matcher, Offer, shown
 from urc.protocol.codec import BadText, Frame
 from urc.protocol.events import Fault, Samples, Send
 from urc.protocol.exchange import LineEvent
-from urc.protocol.flights import Flight
 from urc.protocol.framings.base import Decoder, Framing, StreamDecoder
 from urc.protocol.head import is_redirect
 from urc.protocol.messages import Messages
@@ -38,7 +37,7 @@ class Inbox:
         self._spec = spec
         self._name = spec.name
         self._framing = framing
-        self.messages = Messages(messages, spec.encoding)
+        self.messages = Messages(messages)
         self._stream = Stream()
         self._cut(framing)
         self.secrets = Secrets()
@@ -83,13 +82,13 @@ class Inbox:
 
     def tell(self, frame: Frame, now: float) -> list[LineEvent]:
         """Return what a frame says that answers no request."""
-        heard = self._listeners(frame, now)
+        heard = self._listeners(frame, now) if self._ears else None
         told = self.message(frame, now)
         if heard is None and told is None:
             fault = self._unknown(frame)
             self._stray = (now, fault.message)
             return [fault]
-        return [*(heard or ()), *(told or ())]
+        return told or [] if heard is None else heard + (told or [])
 
     def came_since(self, since: float, instead: str) -> str:
         """Return what to add to "it did not come": what came in its place; "" for nothing.
@@ -149,53 +148,8 @@ class Inbox:
 
     def message(self, frame: Frame, now: float) -> list[LineEvent] | None:
         """Return what a declared message makes of the frame, or None when it is none."""
-        taken = self.messages.take(frame.payload, now, frame)
+        taken = self.messages.take(frame, now)
         return None if taken is None else self.told(*taken)
-
-    def quick(self, payload: bytes, now: float) -> list[LineEvent] | None:
-        """Do what `tell` does with most frames: nobody listens, and it is a message."""
-        if self._ears:
-            return None
-        taken = self.messages.take(payload, now)
-        return None if taken is None else self.told(*taken)
-
-    def rush(self, flights: Sequence[Flight], now: float) -> list[LineEvent]:
-        """Take messages off the front of the stream, as many as come before anything else.
-
-        Their readings are told together. Whatever is no message, or may be somebody's answer, is
-        left in the stream, to be looked at by itself.
-        """
-        decoder = self.decoder
-        if self._ears or self._prompt is not None or not isinstance(decoder, StreamDecoder):
-            return []
-        quick: Quick | None = None
-        starts: frozenset[int] = frozenset()
-        if flights:
-            quick, starts = flights[0].quick, flights[0].exchange.ask.starts
-            if quick is None or len(flights) > 1 or flights[0].is_late:
-                return []
-        events: list[LineEvent] = []
-        samples: list[Sample] = []
-        frames, count, told = decoder.ahead(), 0, 0
-        take = self.messages.take
-        alone, length = self.messages.alone
-        for frame in frames:
-            may_answer = quick is not None and (not (starts and frame) or frame[0] in starts)
-            if may_answer and quick and quick(frame, now) is not None:
-                break
-            only = alone.get(frame[:length])
-            taken = take(frame, now) if only is None else only(frame, now)
-            if taken is None:
-                break
-            count += 1
-            samples += taken[0]
-            if taken[1]:
-                events += self.told(samples, taken[1])
-                samples, told = [], count
-        if count > told:
-            events += self.told(samples, ())
-        decoder.skip(count, sum(map(len, frames[:count])))
-        return events
 
     def _listeners(self, frame: Frame, now: float) -> list[LineEvent] | None:
         for ear in self._ears:

@@ -15,12 +15,10 @@ from urc.model.driver import Command
 from urc.model.flow import MOST_STOPS
 from urc.model.values import Reading
 from urc.problems import UrcError
-from urc.protocol.brief import Write, made_for
 from urc.protocol.commands import is_guarded, why_refused
 from urc.protocol.encode import BadArgument, check_arguments
 from urc.protocol.exchange import Ask
 from urc.protocol.gate import Made
-from urc.protocol.generate import WARM_AFTER
 from urc.protocol.known import Known
 from urc.protocol.line import Line
 
@@ -39,22 +37,11 @@ class NotNow(UrcError):
 class _Way:
     """What a frame of one held command takes: looked up once, for there are many a second."""
 
-    __slots__ = ("_cold", "ask", "check", "command", "is_guarded", "line", "write")
+    __slots__ = ("ask", "check", "command", "is_guarded", "line")
 
     def __init__(self, command: Command, check: Check, ask: Ask, line: Line) -> None:
         self.command, self.check, self.ask, self.line = command, check, ask, line
         self.is_guarded = is_guarded(command)
-        self.write: Write | None = None
-        """Where nothing but the arguments matters, once it pays to make it."""
-        is_plain = ask.is_local and not (ask.has_counters or self.is_guarded)
-        self._cold = WARM_AFTER if is_plain else 0
-
-    def warm_up(self) -> None:
-        """Take note that a frame was made in the usual way."""
-        if self._cold:
-            self._cold -= 1
-            if not self._cold:
-                self.write = made_for(self.command, self.line)
 
 
 class Motions:
@@ -203,12 +190,6 @@ class Motions:
         line, ask = way.line, way.ask
         if line.motion_must_wait(now):
             return b""
-        if way.write is not None and line.state == "open" and line.is_ready:
-            is_heard = line.spec.stale_after_s is None or not line.is_silent
-            data = way.write(arguments) if is_heard else None
-            if data is not None:
-                line.gave_motion(command, arguments, now)
-                return data
         values = way.check(arguments)
         if not (line.is_open and line.is_ready):
             raise NotNow("the robot is not connected")
@@ -218,7 +199,6 @@ class Motions:
             refused = why_refused(way.command, self._known, values, confirmed_by, now)
             if refused is not None:
                 raise NotNow(refused.message)
-        way.warm_up()
         line.gave_motion(command, values, now)
         names = values if ask.is_local else {**self._known.names, **line.learnt, **values}
         if not ask.has_counters:

@@ -78,8 +78,9 @@ class Outbox(Waiting[Exchange]):
 
     def is_free(self, exchange: Exchange, now: float) -> bool:
         """Return whether `exchange` may be sent at once, past an empty queue."""
-        is_busy = bool(self or self._flights) or not self._has_room(exchange)
-        return not (is_busy or now < self.next_send or _free_at(exchange) > now)
+        if self or self._flights or now < self.next_send:
+            return False
+        return self._has_room(exchange) and _free_at(exchange) <= now
 
     def wants_line(self, now: float) -> bool:
         """Return whether something could go if there were a connection."""

@@ -103,7 +103,8 @@ class Session:
         )
         self.hub = Hub(driver.signals, self._blanker, streams)
         self._clock: Clock = clock or LoopClock()
-        engine = Engine(driver, self.settings, fresh=Fresh(time.time, secrets.token_bytes))
+        fresh = Fresh(time.time, secrets.token_bytes)
+        engine = Engine(driver, self.settings, fresh=fresh, is_compiled=True)
         self.frames: Frames = engine.motions
         """Makes the frames of held commands."""
         self.movers: GuardedMovers | None = None

@@ -49,7 +49,7 @@ class _Watched(Engine):
     """An engine that remembers which commands it ran, and which messages frames were."""
 
     def __init__(self, driver: Driver, settings: Mapping[str, Value], fresh: Fresh) -> None:
-        super().__init__(driver, settings, is_brief=False, fresh=fresh)
+        super().__init__(driver, settings, fresh=fresh)
         self.used: set[Exercised] = set()
         for name, line in self.lines.items():
             names = [one.name for one in driver.messages.values() if one.transport == name]
@@ -57,8 +57,7 @@ class _Watched(Engine):
                 [
                     Matcher(one.reader, partial(self._decode, message, one.decode))
                     for message, one in zip(names, line.inbox.messages.declared, strict=True)
-                ],
-                line.spec.encoding,
+                ]
             )
 
     def _decode(

@@ -70,12 +70,6 @@ class Decoder(Protocol):
     def next(self, now: float = 0.0) -> bytes | FrameFault | None:
         """Return one frame or fault and take it off the stream; None when none is complete."""
 
-    def whole(self, data: bytes) -> bytes | None:
-        """Return the payload of `data`, if it is one good frame and nothing is held back.
-
-        That is as good as `push` and `next` with it; None leaves it to them.
-        """
-
     def tick(self, now: float) -> list[bytes | FrameFault]:
         """Return the frames that the silence until `now` has completed."""
 
@@ -133,20 +127,6 @@ class StreamDecoder:
     def tick(self, now: float) -> list[bytes | FrameFault]:
         """Return the frames that silence has completed: none."""
         return []
-
-    def whole(self, data: bytes) -> bytes | None:
-        """Return the payload of a single frame, or None: `next` finds out."""
-        return None
-
-    def ahead(self) -> list[bytes]:
-        """Return whole frames that there are, if several, and leave them where they are.
-
-        Nothing where each must be looked at by itself; `skip` takes those that were used.
-        """
-        return []
-
-    def skip(self, count: int, size: int) -> None:
-        """Take the first `count` frames of `ahead`, whose payloads have `size` bytes in all."""
 
     def restart(self) -> None:
         """Forget what was seen of the stream: one case of a `switch` has a frame begin here."""

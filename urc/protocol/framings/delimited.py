@@ -109,22 +109,11 @@ class DelimiterDecoder(StreamDecoder):
                     return frame
         return None
 
-    def whole(self, data: bytes) -> bytes | None:
-        """Return the payload of a single frame, unless it needs a closer look."""
-        stream, end = self._stream, data.find(self._delimiter)
-        if end + len(self._delimiter) != len(data) or not 0 <= end <= self._max_bytes:
-            return None
-        if stream.at != len(stream.data) or self._credit or self._is_skipping:
-            return None
-        if self._open is None:
-            return data[:end] if end or not self._skips_empty else None
-        try:
-            return self._open(data[:end])
-        except BadFrame:
-            return None  # it is told by `next`
-
     def ahead(self) -> list[bytes]:
-        """Return whole frames, unless they are unwrapped, skipped or too long."""
+        """Return the complete frames, if several, and leave them in the stream.
+
+        There are none where a frame needs a look of its own. `skip` takes those that were used.
+        """
         stream, delimiter = self._stream, self._delimiter
         if self._open or self._credit or self._is_skipping or self._skips_empty:
             return []
@@ -136,7 +125,7 @@ class DelimiterDecoder(StreamDecoder):
         return frames if max(map(len, frames)) <= self._max_bytes else []
 
     def skip(self, count: int, size: int) -> None:
-        """Take frames, and the delimiters behind them."""
+        """Take the first `count` frames of `ahead`, which have `size` bytes in all."""
         if count:
             self._stream.at += size + count * len(self._delimiter)
             self._searched = 0

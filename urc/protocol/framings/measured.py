@@ -104,37 +104,6 @@ class _MeasuredDecoder(StreamDecoder):
             if fault is not None:
                 return fault
 
-    def whole(self, data: bytes) -> bytes | None:
-        """Return the payload of a single frame of the only size."""
-        stream = self._stream
-        if len(data) != self._plain or stream.at != len(stream.data):
-            return None
-        if self._is_lost or not self._credit.is_full:
-            return None  # a good frame changes that
-        try:
-            return self._seal.open(data)
-        except BadFrame:
-            return None  # it is told by `next`
-
-    def ahead(self) -> list[bytes]:
-        """Return the payloads of whole frames of one size, up to one that cannot be opened."""
-        stream, size = self._stream, self._plain
-        payloads: list[bytes] = []
-        if size and len(stream) >= 2 * size:
-            data, unwrap = bytes(stream.data), self._seal.open
-            try:
-                for at in range(stream.at, len(data) - size + 1, size):
-                    payloads.append(unwrap(data[at : at + size]))
-            except BadFrame:
-                pass  # it is told when its turn comes
-        return payloads
-
-    def skip(self, count: int, size: int) -> None:
-        """Take frames."""
-        if count:
-            self._move(count * self._plain)
-            self._is_lost = False
-
     def _to_start(self) -> FrameFault | None:
         """Go to the next start bytes, or to what may become them."""
         stream, start = self._stream, self._start

@@ -101,10 +101,6 @@ class _PatientDecoder:
             return self._told.pop(0)
         return self._decoder.next(now)
 
-    def whole(self, data: bytes) -> bytes | None:
-        """Return None: silence and escape sequences must be looked at each time."""
-        return None
-
     def tick(self, now: float) -> list[bytes | FrameFault]:
         """Return the frames that the silence until `now` has completed, or brought to light."""
         frames = self._decoder.tick(now)

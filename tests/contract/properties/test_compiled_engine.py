@@ -1,4 +1,4 @@
-"""The short way through the engine: whatever is said, it tells what the long way tells."""
+"""A compiled engine: whatever is said, it tells what one without compiled functions tells."""
 
 from collections.abc import Callable, Sequence
 
@@ -10,8 +10,7 @@ from tests.dialogue import driver_of
 from tests.effort import examples
 from urc.model.driver import Driver
 from urc.protocol.engine import Engine
-from urc.protocol.events import Event, Replied, Request, Samples, Send
-from urc.protocol.messages import WARM_AFTER
+from urc.protocol.events import Event, Request
 
 TEXT = """
 signals:
@@ -117,32 +116,27 @@ deeds = st.lists(
 )
 
 
-def warm(driver: Driver, *, is_brief: bool) -> Engine:
-    """Return an engine that has made its functions."""
-    engine = Engine(driver, {}, is_brief=is_brief)
+def connected(driver: Driver, *, is_compiled: bool) -> Engine:
+    """Return an engine whose line is up."""
+    engine = Engine(driver, {}, is_compiled=is_compiled)
     engine.tick(0.0)
     engine.start("wire", 0.0)
-    is_text = "mode" in driver.signals
-    for _ in range(WARM_AFTER + 2):
-        engine.command(Request(1, "drive", {"v": 0.25, "n": 1} if is_text else {}), 0.0)
-        for data in (b"POS 1\n", b"BAT 30\n") if is_text else (b"\3\7\0\4",):
-            engine.receive("wire", data, 0.0)
     return engine
 
 
 @pytest.mark.parametrize("name", DRIVERS)
 @settings(max_examples=examples(240), deadline=None)
 @given(deeds=deeds)
-def test_short_way_tells_what_the_long_way_tells(
+def test_compiled_engine_tells_what_the_other_tells(
     name: str, deeds: Sequence[tuple[Deed, float]]
 ) -> None:
     """The same events, in the same order, and the same deadline after each of them."""
-    short, long = (warm(DRIVERS[name], is_brief=is_brief) for is_brief in (True, False))
+    compiled, other = (connected(DRIVERS[name], is_compiled=one) for one in (True, False))
     now = 1.0
     for deed, wait_s in deeds:
         now += wait_s
-        assert [*deed(short, now)] == [*deed(long, now)]
-        assert short.deadline == long.deadline
+        assert [*deed(compiled, now)] == [*deed(other, now)]
+        assert compiled.deadline == other.deadline
 
 
 @pytest.mark.parametrize("name", DRIVERS)
@@ -152,7 +146,7 @@ def test_no_deadline_comes_nearer_than_the_calm(
     name: str, deeds: Sequence[tuple[Deed, float]]
 ) -> None:
     """So whoever has set an alarm for before that need not look again after each frame."""
-    engine, now = warm(DRIVERS[name], is_brief=True), 1.0
+    engine, now = connected(DRIVERS[name], is_compiled=False), 1.0
     for deed, wait_s in deeds:
         now += wait_s
         before = engine.deadline
@@ -171,14 +165,3 @@ def test_plain_driver_is_calm() -> None:
     assert Engine(driver, {}).calm_s == 0.5
     assert Engine(DRIVERS["calm"], {}).calm_s == 0.3  # its poll
     assert Engine(DRIVERS["gap"], {}).calm_s == 0.0
-
-
-def test_command_that_the_short_way_takes_is_sent_and_answered() -> None:
-    """One `Send`, then the readings and the reply."""
-    engine = warm(DRIVERS["plain"], is_brief=True)
-    sent = engine.command(Request(2, "drive", {"v": 0.5, "n": 4}), 2.0)
-    assert sent == [Send("wire", b"VEL 500.0 4\n")]
-    samples, reply = engine.receive("wire", b"POS 7.5\n", 2.1)
-    assert isinstance(samples, Samples)
-    assert [(one.signal, one.value) for one in samples.samples] == [("x", 7.5), ("twice", 15.0)]
-    assert reply == Replied(2, "drive", {"x": 7.5, "twice": 15.0})

@@ -15,7 +15,6 @@ from urc.protocol.answer import Matcher
 from urc.protocol.codec import CodecContext, Frame
 from urc.protocol.events import Event, Samples
 from urc.protocol.fast_read import build_fast_read
-from urc.protocol.fast_value import Taken
 from urc.protocol.forms import build_reader
 from urc.protocol.generate import function_of
 from urc.protocol.readings import Readings
@@ -53,10 +52,8 @@ def others_of(events: Sequence[Event]) -> list[Event]:
 
 
 def told(text: str, chunks: Sequence[bytes], command: str = "") -> tuple[list[Sample], list[Event]]:
-    """Return the samples and all other events of chunks, after enough frames to be warm."""
+    """Return the samples and all other events of chunks."""
     talk = Dialogue(text).connect()
-    for _ in range(40):
-        talk.engine.receive("wire", b"BAT 30\n" if "BAT" in text else b"\x01\x05\x05\x01", 0.0)
     if command:
         talk.run(command)
     events = [event for chunk in chunks for event in talk.engine.receive("wire", chunk, 1.0)]
@@ -123,14 +120,12 @@ def test_struct_function_and_closures_agree(form: str, frames: list[bytes]) -> N
     readings = Readings(SIGNALS)
     matcher = Matcher(build_reader(spec, CodecContext()), readings.decoder(spec.fields))
 
-    def slow(payload: object, now: float) -> Taken | None:
-        return matcher.take(Frame(payload, "utf-8"), now)  # type: ignore[arg-type]  # bytes here
-
-    fast = build_fast_read(spec, matcher.reader, readings, slow)
+    fast = build_fast_read(spec, matcher.reader, readings, matcher.take)
     assert fast is not None
     for frame in frames:
         for payload in (frame, b"\x01" + frame[:4].ljust(4, b"\x00"), frame.ljust(10, b"\x00")):
-            expected, found = slow(payload, 1.0), fast(payload, 1.0)
+            expected = matcher.take(Frame(payload, "utf-8"), 1.0)
+            found = fast(Frame(payload, "utf-8"), 1.0)
             assert repr(found and (found[0], list(found[1]))) == repr(expected), payload
 
 
