@@ -11,7 +11,7 @@ import logging
 from collections.abc import Callable, Mapping, Sequence
 from typing import Literal, Protocol
 
-from urc.model.codec import Counted, Payload
+from urc.model.codec import Payload
 from urc.model.driver import Command
 from urc.model.values import NOTHING, Sample
 from urc.protocol.events import (
@@ -36,7 +36,6 @@ __all__ = ["Dispatcher", "EngineLike", "Port"]
 _SOONEST_S = 0.001
 """A tick that leaves work overdue is not repeated sooner, so that no engine can hold the loop."""
 _AFTER_A_BUG_S = 1.0
-_READINGS_AND_REPLY = 2
 
 log = logging.getLogger(__name__)
 
@@ -87,11 +86,8 @@ class Port(Protocol):
     def want_close(self, reason: str) -> None:
         """Write what is queued and close; at once when there is a reason."""
 
-    def queue(self, data: Payload, *, is_secret: bool = False) -> None:
+    def send(self, sent: Send) -> None:
         """Write bytes or an envelope; secret ones are not shown to whoever watches the traffic."""
-
-    def queue_counted(self, counted: Counted, *, is_secret: bool = False) -> None:
-        """Do the same with a frame whose numbers count once it has left."""
 
     def heard(self) -> None:
         """A good frame arrived."""
@@ -105,11 +101,8 @@ class Port(Protocol):
     def hang_up(self, reason: str) -> None:
         """Give the connection up, and tell the engine from the link's own task."""
 
-    def send(self, data: Payload, *, is_secret: bool = False) -> None:
-        """Do what `queue` and `publish` do, for the only thing that is to be written now."""
-
     def publish(self) -> None:
-        """Write what is queued; show the state, if it has changed."""
+        """Show the state, if it has changed."""
 
 
 class Dispatcher:
@@ -165,12 +158,7 @@ class Dispatcher:
         except Exception as bug:  # supervisor, as in `_run`
             self._survive(bug)
             return
-        if len(events) == 1 and type(only := events[0]) is Samples:
-            self._ports[transport].heard()
-            self._hub.put(only.samples)
-        elif len(events) == _READINGS_AND_REPLY and type(reply := events[1]) is Replied:
-            self._answered(events[0], reply, transport)
-        elif events:
+        if events:
             self._perform(events, transport)
         self._arm_after(now)
 
@@ -194,14 +182,7 @@ class Dispatcher:
         except Exception as bug:  # supervisor, as in `_run`
             self._survive(bug)
             return answer
-        if len(events) == 1 and type(sent := events[0]) is Send:
-            port_of_it = self._ports[sent.transport]
-            if sent.counted is None:
-                port_of_it.send(sent.data, is_secret=sent.is_secret)
-            else:
-                port_of_it.queue_counted(sent.counted, is_secret=sent.is_secret)
-                port_of_it.publish()
-        elif events:
+        if events:
             self._perform(events, None)
         self._arm_after(now)
         return answer
@@ -264,51 +245,46 @@ class Dispatcher:
             self._perform(events, None)
         self._arm()
 
-    def _answered(self, first: Event, reply: Replied, transport: str) -> None:
-        """Do what `_perform` does, with what most answers are: readings and a reply."""
-        if type(first) is not Samples:
-            self._perform((first, reply), transport)
-            return
-        self._ports[transport].heard()
-        self._hub.put(first.samples)
-        self._waiting.settle(reply)
-
     def _perform(self, events: Sequence[Event], heard_on: str | None) -> None:
-        samples: Sequence[Sample] = ()
-        answers: list[Answer] = []
         ports = self._ports
+        samples: list[Sample] = []
+        answers: list[Answer] = []
+        heard, is_changed = "", False
         for event in events:
-            if type(event) is Samples:
-                samples = (*samples, *event.samples) if samples else event.samples
-                if event.transport:
-                    ports[event.transport].heard()
-            elif type(event) is Send:
-                if event.counted is None:
-                    ports[event.transport].queue(event.data, is_secret=event.is_secret)
-                else:
-                    port = ports[event.transport]
-                    port.queue_counted(event.counted, is_secret=event.is_secret)
-            elif type(event) is Replied:
+            if isinstance(event, Samples):
+                samples += event.samples
+                if event.transport not in ("", heard):
+                    heard = event.transport
+                    ports[heard].heard()
+            elif isinstance(event, Send):
+                ports[event.transport].send(event)
+            elif isinstance(event, (Replied, Failed)):
                 answers.append(event)
-                if heard_on is not None and not samples:
+                if isinstance(event, Replied) and heard_on is not None and not samples:
                     ports[heard_on].heard()
-            elif type(event) is Failed:
-                answers.append(event)
-            elif type(event) is Fault:
-                ports[event.transport].count(event)
-            elif type(event) is Open:
-                ports[event.transport].want_open()
-            elif type(event) is Ready:
-                ports[event.transport].ready()
-            elif type(event) is Close:
-                ports[event.transport].want_close(event.reason)
+            else:
+                is_changed = True
+                self._change(event)
         if samples:
             self._hub.put(samples)
         # After the hub: whoever waits for a reply finds its readings there.
         for answer in answers:
             self._waiting.settle(answer)
-        for port in ports.values():
-            port.publish()
+        if is_changed:
+            for port in ports.values():
+                port.publish()
+
+    def _change(self, event: Event) -> None:
+        """Let a link take what changes its state."""
+        match event:
+            case Fault(transport):
+                self._ports[transport].count(event)
+            case Open(transport):
+                self._ports[transport].want_open()
+            case Ready(transport):
+                self._ports[transport].ready()
+            case Close(transport, reason):
+                self._ports[transport].want_close(reason)
 
     def _arm_after(self, now: float) -> None:
         """Do what `_arm` does, unless there is no need to look: the alarm rings soon enough."""

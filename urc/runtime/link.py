@@ -23,9 +23,9 @@ import logging
 from collections.abc import Callable, Coroutine
 from typing import Any
 
-from urc.model.codec import Counted, Envelope, Payload
+from urc.model.codec import Envelope, Payload
 from urc.model.driver import TransportSpec
-from urc.protocol.events import Fault
+from urc.protocol.events import Fault, Send
 from urc.runtime.clock import Clock, Repeating, within
 from urc.runtime.dispatcher import Dispatcher
 from urc.runtime.hub import Hub, LinkState
@@ -148,24 +148,11 @@ class Link:
         """Whether the transport is open."""
         return self._ended is not None
 
-    def queue(self, data: Payload, *, is_secret: bool = False) -> None:
-        """Write `data` with the next `publish`; secret bytes are shown to nobody."""
+    def send(self, sent: Send) -> None:
+        """Write what the engine sends; secret bytes are shown to nobody."""
         ended = self._ended
         if ended is not None and self._close_reason is None and not ended.done():
-            self._outgoing.put(data, is_secret=is_secret)
-
-    def queue_counted(self, counted: Counted, *, is_secret: bool = False) -> None:
-        """Do what `queue` does with a frame whose numbers count once it has left."""
-        ended = self._ended
-        if ended is not None and self._close_reason is None and not ended.done():
-            self._outgoing.put(counted.numbered.data, is_secret=is_secret, counted=counted)
-
-    def send(self, data: Payload, *, is_secret: bool = False) -> None:
-        """Do what `queue` and `publish` do, for the only thing that is to be written now."""
-        ended = self._ended
-        if ended is not None and self._close_reason is None and not ended.done():
-            self._outgoing.put_now(data, is_secret=is_secret)
-        self._report.publish()
+            self._outgoing.put(sent.data, is_secret=sent.is_secret, counted=sent.counted)
 
     def heard(self) -> None:
         """A good frame arrived: whatever was wrong is over, unless the login is still to come."""
@@ -201,8 +188,7 @@ class Link:
         self._end(reason)
 
     def publish(self) -> None:
-        """Write what is queued, if that needs no waiting; show the state, if it has changed."""
-        self._outgoing.flush()
+        """Show the state, if it has changed."""
         self._report.publish()
 
     async def settle(self) -> str:

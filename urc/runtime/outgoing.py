@@ -1,8 +1,7 @@
 """What is to be written on one line: joined, bounded, and shown in the traffic once it is written.
 
-Bytes wait for the writer's own task. On a transport that is a `Prompt` they do not, unless others
-wait before them: they go straight to the kernel, in the call that queues them or in the next
-`flush`. Whatever the kernel does not take at once is left to the task, which has time to wait.
+Bytes wait for the writer's own task. On a transport that is a `Prompt` they go straight to the
+kernel, unless others wait before them. The task, which has time to wait, writes the rest.
 """
 
 import asyncio
@@ -104,48 +103,26 @@ class Outgoing:
     def put(
         self, data: Payload, *, is_secret: bool = False, counted: Counted | None = None
     ) -> None:
-        """Write `data` with the next `flush` or turn of the loop; secrets are shown to nobody."""
+        """Write `data` at once where that needs no waiting, else as soon as the line takes it.
+
+        Secrets are shown to nobody.
+        """
+        shared = counted if self._shared is not None else None
+        item = _Waiting(data, REDACTED if is_secret else data, shared)
+        prompt = self._prompt
+        is_free = self._is_idle and not self._waiting and not self._has_some.is_set()
+        if prompt is not None and is_free and self._offer(prompt, item):
+            if prompt.is_clogged:
+                self._wait_for_rest()
+            return
         size = size_of(data)
         if self._bytes + size > MAX_QUEUED_BYTES:
             dropped = self._bytes + size
             self._give_up(f"the robot takes no more bytes; {dropped} waiting ones were dropped")
             return
-        shared = counted if self._shared is not None else None
-        self._waiting.append(_Waiting(data, REDACTED if is_secret else data, shared))
+        self._waiting.append(item)
         self._bytes += size
-        if self._prompt is None:
-            self._has_some.set()
-
-    def put_now(self, data: Payload, *, is_secret: bool = False) -> None:
-        """Do what `put` and `flush` do, in one step where nothing waits."""
-        prompt = self._prompt
-        is_free = self._is_idle and not self._waiting and not self._has_some.is_set()
-        if prompt is not None and is_free and type(data) is bytes and prompt.offer(data):
-            if self._hub.traffic_watchers:
-                self._report.saw("sent", REDACTED if is_secret else data)
-            if prompt.is_clogged:
-                self._wait_for_rest()
-            return
-        self.put(data, is_secret=is_secret)
-        self.flush()
-
-    def flush(self) -> None:
-        """Write what waits past the writer, where that needs no waiting."""
-        prompt = self._prompt
-        if prompt is None or not self._waiting:
-            return
-        if not self._is_idle or self._has_some.is_set():
-            self._has_some.set()
-            return
-        while self._waiting:
-            item = self._next()
-            if not self._offer(prompt, item):
-                self._waiting.insert(0, item)
-                self._has_some.set()  # the writer finds out why
-                return
-            self._bytes -= size_of(item.data)
-        if prompt.is_clogged:
-            self._wait_for_rest()
+        self._has_some.set()
 
     def _offer(self, prompt: Prompt, item: _Waiting) -> bool:
         if item.counted is not None and self._shared is not None:
