@@ -22,7 +22,7 @@ from math import isfinite
 from bench.engine_text import drive
 from urc.model.values import Sample
 
-__all__ = ["ProtocolDriver", "StreamDriver"]
+__all__ = ["StreamDriver"]
 
 REPLY_S = 1.0
 LATE_S = 2 * REPLY_S
@@ -129,83 +129,6 @@ def request(vx: float, wz: float) -> bytes:
     if not isfinite(vx + wz):
         raise ValueError("a speed must be a finite number")
     return drive(vx, wz)
-
-
-class ProtocolDriver(asyncio.Protocol):
-    """On `asyncio.Protocol`, as good as it gets without leaving the standard library's ways."""
-
-    def __init__(self) -> None:
-        self._robot = _Robot()
-        self._left = b""
-        self._is_skipping = False
-        self._transport: asyncio.Transport
-
-    @classmethod
-    async def connect(cls, port: int) -> "ProtocolDriver":
-        """Connect to the robot."""
-        loop = asyncio.get_running_loop()
-        _, driver = await loop.create_connection(cls, "127.0.0.1", port)
-        return driver
-
-    @property
-    def latest(self) -> dict[str, Sample]:
-        """The newest reading of every signal."""
-        return self._robot.latest
-
-    @property
-    def faults(self) -> int:
-        """Lines that were none."""
-        return self._robot.faults
-
-    def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """Take note of the line."""
-        assert isinstance(transport, asyncio.Transport)
-        self._transport = transport
-
-    def connection_lost(self, exc: Exception | None) -> None:
-        """Take note that it is gone."""
-        self._robot.lost()
-
-    def data_received(self, data: bytes) -> None:
-        """Cut lines, keep the readings, answer whoever waits."""
-        now = time.monotonic()
-        *lines, left = (self._left + data).split(b"\n")
-        if self._is_skipping and lines:
-            self._is_skipping = False
-            del lines[0]
-        take = self._robot.take
-        for line in lines:
-            take(line, now)
-        if len(left) > MOST_LINE:
-            self._robot.faults += not self._is_skipping
-            self._is_skipping = True
-            left = b""
-        self._left = left
-
-    def _write(self, data: bytes) -> None:
-        transport = self._transport
-        if transport.is_closing() or transport.get_write_buffer_size() > MOST_UNSENT:
-            raise ConnectionError("the robot is gone, or takes no more bytes")
-        transport.write(data)
-
-    async def drive(self, vx: float, wz: float) -> dict[str, object]:
-        """Send a speed, return what the robot answers."""
-        self._write(request(vx, wz))
-        answer = self._robot.ask()
-        async with asyncio.timeout(REPLY_S):
-            samples = await answer
-        return {sample.signal: sample.value for sample in samples}
-
-    async def flood(self, count: int) -> None:
-        """Ask for `count` lines, and return when all have come."""
-        self._robot.done.clear()
-        self._write(b"FLOOD %d\n" % count)
-        async with asyncio.timeout(60):
-            await self._robot.done.wait()
-
-    async def close(self) -> None:
-        """Hang up."""
-        self._transport.close()
 
 
 class StreamDriver:

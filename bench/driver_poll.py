@@ -11,7 +11,7 @@ from collections.abc import Callable, Coroutine, Sequence
 from functools import partial
 from typing import Any, Protocol
 
-from bench.driver_hand import ProtocolDriver, StreamDriver
+from bench.driver_hand import StreamDriver
 from bench.driver_robot import robot
 from bench.driver_urc import declared, profile
 from bench.harness import Goal, Result, compare_all
@@ -37,8 +37,8 @@ async def _measure(driver: Driver) -> float:
     return time.process_time() - began
 
 
-async def _by_hand(kind: type[ProtocolDriver] | type[StreamDriver], port: int) -> float:
-    driver = await kind.connect(port)
+async def _by_hand(port: int) -> float:
+    driver = await StreamDriver.connect(port)
     try:
         return await _measure(driver)
     finally:
@@ -60,12 +60,8 @@ def run(*, full: bool = False) -> Sequence[Result]:
         return compare_all(
             [
                 (
-                    Goal("driver_poll: command and reply over TCP, CPU / hand Protocol", 1.05),
-                    partial(seconds, partial(_by_hand, ProtocolDriver), port),
-                ),
-                (
-                    Goal("driver_poll: command and reply over TCP, CPU / hand StreamReader", 0.9),
-                    partial(seconds, partial(_by_hand, StreamDriver), port),
+                    Goal("driver_poll: command and reply over TCP, CPU / hand StreamReader", 1.2),
+                    partial(seconds, _by_hand, port),
                 ),
             ],
             partial(seconds, ours, port),
