@@ -43,9 +43,9 @@ class Matcher:
     """Reads one kind of frame, and makes samples of its fields.
 
     Args:
-        reader: from a frame to its fields.
-        decode: from fields to samples and refused values.
-        compiled: does both in one for the frames that happen most, or None.
+        reader: reads the fields of a frame.
+        decode: makes samples of fields, and lists refused values.
+        compiled: a function that does both for the most common frames.
     """
 
     __slots__ = ("decode", "reader", "take")

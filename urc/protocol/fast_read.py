@@ -51,7 +51,7 @@ def build_fast_read(
 def _head_check(prefix: str, encoding: str) -> list[str]:
     """Return the lines that refuse most frames which do not begin with `prefix`.
 
-    Blanks before the text may be skipped, and what is not ASCII may be no text: both need a look.
+    Blanks at the beginning may be skipped, and other encodings may fail: these frames are read.
     """
     if not prefix or encoding not in _KEEPS_ASCII:
         return []

@@ -112,7 +112,7 @@ class DelimiterDecoder(StreamDecoder):
     def ahead(self) -> list[bytes]:
         """Return the complete frames, if several, and leave them in the stream.
 
-        There are none where a frame needs a look of its own. `skip` takes those that were used.
+        The list is empty if a frame needs a closer look. `skip` takes the frames that were used.
         """
         stream, delimiter = self._stream, self._delimiter
         if self._open or self._credit or self._is_skipping or self._skips_empty:
