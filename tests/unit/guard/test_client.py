@@ -328,7 +328,7 @@ async def test_end_waits_for_a_guard_that_has_spoken(house: House) -> None:
     await house.open()
     await house.guard.finish()
     assert not process.is_killed
-    with pytest.raises(PeerClosed, match="the session was closed"):
+    with pytest.raises(PeerClosed, match=r"^the session was closed$"):
         await house.guard.transports["wire"].receive()
 
 
@@ -397,6 +397,43 @@ async def test_guard_comes_to_its_door(house: House, monkeypatch: pytest.MonkeyP
     await opening
     assert first.heard == []
     lines[0].close()
+
+
+async def test_guard_at_its_door_is_killed_before_it_is_waited_for(
+    house: House, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    process, line = house.launch(is_inherited=house.is_inherited)
+    waited: list[bool] = []
+
+    async def wait(process: Process) -> None:
+        waited.append(process.is_killed)
+
+    monkeypatch.setattr(client, "launch", lambda is_inherited: (process, StubDoor()))
+    monkeypatch.setattr(client, "reap", wait)
+    house.guard.start()
+    await house.guard.finish()
+    assert waited == [True]
+    line.close()
+
+
+async def test_end_waits_for_each_guard_that_died(
+    house: House, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    first, is_last = house.begin(), asyncio.Event()
+    gone: list[Process] = []
+
+    async def wait(process: Process) -> None:
+        if process is first:
+            await is_last.wait()
+            await settle()
+        is_last.set()
+        gone.append(process)
+
+    monkeypatch.setattr(client, "reap", wait)
+    first.die()
+    second = await house.nth(2)
+    await house.guard.finish()
+    assert gone == [second, first]
 
 
 async def test_end_does_not_wait_for_a_guard_at_its_door(
