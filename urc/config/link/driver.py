@@ -33,7 +33,7 @@ __all__ = ["Uses", "link_driver", "link_simulator"]
 
 
 class Uses:
-    """What is used by something, for the rules that ask what is not."""
+    """The names in use; rules report the others."""
 
     def __init__(self) -> None:
         self.settings: set[str] = set()
@@ -104,7 +104,7 @@ class _Linker:
             )
 
     def _beside(self, part: Part, read: ReadSpec) -> None:
-        """Check the names in what stands beside a form."""
+        """Check the names in the keys next to a form."""
         known = [
             name for name in read.fields if name not in read.sets and name not in read.collects
         ]
@@ -211,7 +211,7 @@ class _Linker:
 def link_driver(
     part: Part, driver: Driver, settings: Mapping[str, Setting], findings: Findings
 ) -> Uses:
-    """Check every name in the driver at `part`; return what is used."""
+    """Check every name in the driver at `part`; return the names in use."""
     linker = _Linker(driver, settings, findings)
     answered = {one.transport for one in driver.commands.values() if one.reply}
     answered |= {one.transport for one in driver.polls if one.reply}

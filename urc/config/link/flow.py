@@ -27,7 +27,7 @@ __all__ = [
 
 
 class Linker(Protocol):
-    """What is used of the pass over the wire's side."""
+    """The parts of the link pass that flow needs."""
 
     driver: Driver
     findings: Findings
@@ -49,7 +49,7 @@ class Linker(Protocol):
 
 
 def link_command(linker: Linker, part: Part, command: Command) -> None:
-    """Check what a command says beside what it sends."""
+    """Check the keys of a command, except its frame."""
     known = {*linker.driver.signals, *command.arguments}
     if command.reply is not None and "reply" in part.data:
         link_reply(linker, part.must("reply"), command.reply, command.arguments, command.send)
@@ -73,7 +73,7 @@ def link_command(linker: Linker, part: Part, command: Command) -> None:
 
 
 def _link_slew(findings: Findings, slew: Mapping[str, Part], command: Command) -> None:
-    """Check that what may grow so fast are numbers that may have any value between two others."""
+    """Check that `slew` limits only numbers without choices."""
     for name, inner in slew.items():
         argument = known_argument(name, inner, command, findings)
         if argument is None:
@@ -94,7 +94,7 @@ def link_requirements(linker: Linker, part: Part, command: Command) -> None:
 
 
 def refuse_two_person(linker: Linker, part: Part, command: Command) -> None:
-    """Report what is done by nobody, and yet wants two people to say yes."""
+    """Report a command that needs two people, where no person gives it."""
     if _needs_two(command):
         linker.findings.error(
             part,
@@ -225,7 +225,7 @@ def _link_counting(linker: Linker, part: Part, transport: str) -> None:
 
 
 def find_command(linker: Linker, part: Part, name: str) -> Command | None:
-    """Return the command or sequence that `part` names, or report that there is none."""
+    """Return the command or sequence that `part` names, or report its absence."""
     command = linker.driver.commands.get(name)
     if command is None:
         linker.findings.error(
@@ -243,7 +243,7 @@ def link_arguments(
     """Check plain values given to `command`.
 
     Args:
-        findings: takes what is wrong.
+        findings: collects the problems.
         part: where they stand.
         command: whose arguments they are.
         given: by name.

@@ -66,7 +66,7 @@ def _check_one(part: Part, send: WriteSpec, spec: TransportSpec, findings: Findi
 
 
 def _text(templates: Iterable[tuple[Part, Template]], encoding: str) -> bytes | None:
-    """Return the bytes of a constant text; None when it is none, or that is told elsewhere."""
+    """Return the bytes of a constant text, or None; other code reports the faults."""
     found = [template for _, template in templates]
     if len(found) != 1 or not found[0].is_constant:
         return None

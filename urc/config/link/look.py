@@ -47,12 +47,12 @@ def link_interface(
     """Return the interface with what it changes in the slots.
 
     Args:
-        part: where the interface stands.
+        part: the interface in its document.
         interface: as parsed.
-        slots: what the driver fills.
+        slots: the slots of the driver.
         driver: None when the interface is checked by itself, without any driver.
-        shelf: the widgets there are.
-        findings: takes what is wrong.
+        shelf: the widgets.
+        findings: collects the problems.
     """
     shown = set(interface.shown)
     uses = {}
@@ -133,7 +133,7 @@ def _use(
 
 
 class _Bound(NamedTuple):
-    """What is bound so far; the fields are those of `WidgetUse`."""
+    """The bindings so far; the fields are those of `WidgetUse`."""
 
     inputs: dict[str, str]
     lists: dict[str, tuple[str, ...]]

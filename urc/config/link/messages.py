@@ -41,7 +41,7 @@ def check_messages(part: Part, driver: Driver, findings: Findings) -> None:
 
 
 def _check_answer(part: Part | None, spec: TransportSpec | None, findings: Findings) -> None:
-    """Report what cannot be sent back: nobody would take the answer to an answer."""
+    """Report an answer whose form gets an answer itself."""
     verb = _check_send(part, spec, findings)
     if part is not None and verb in _ANSWERED:
         findings.error(
@@ -193,7 +193,7 @@ def _check_head(part: Part, spec: TransportSpec, findings: Findings) -> None:
 def check_via(
     parts: Mapping[str, Part], transports: Mapping[str, TransportSpec], findings: Findings
 ) -> set[str]:
-    """Report what goes through something that cannot carry it; return what carries others."""
+    """Report a transport whose `via` cannot carry it; return the transports that carry others."""
     carriers: set[str] = set()
     for name, spec in transports.items():
         if not spec.via:

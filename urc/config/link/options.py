@@ -1,6 +1,6 @@
 """Options of a line that are one setting: can that setting be what the option wants?
 
-A text in the place of a port would only be found when somebody tries to connect.
+Without this check, a text in place of a port fails only at the first connection.
 """
 
 import re
@@ -24,11 +24,11 @@ def check_option(
     """Report a setting of the wrong type.
 
     Args:
-        part: the option, as it is written.
+        part: the option.
         kind: type of the transport, a definition of the driver's schema where it is URC's own.
-        template: what `part` says.
+        template: the option as a template.
         settings: of the profile.
-        findings: takes the fault.
+        findings: collects the problems.
     """
     found = _ONE_SETTING.fullmatch(template.source)
     setting = settings.get(found[1]) if found else None

@@ -30,11 +30,11 @@ def link_output(
     """Return the command that an output is bound to, and what it gives to its arguments.
 
     Args:
-        part: what stands under the output in ``bind``: a name, or a mapping.
+        part: the output's value in ``bind``: a name, or a mapping.
         port: the output.
         widget: whose output it is.
         driver: None when the interface is checked by itself, without any driver.
-        findings: takes what is wrong.
+        findings: collects the problems.
     """
     is_short = isinstance(part.data, str)
     name = part.data if is_short else part.text("command")
@@ -93,7 +93,7 @@ def _given(part: Part, port: Port, widget: Widget, findings: Findings) -> Given:
 def _check_hold(
     part: Part, port: Port, widget: Widget, command: Command, findings: Findings
 ) -> bool:
-    """Return whether what holds is bound to what is held."""
+    """Return whether an output that holds has a held command."""
     if port.is_held and command.hold is None:
         findings.error(
             part,

@@ -24,7 +24,7 @@ def link_values(
     Args:
         parts: of the simulator: `signals` and `state`.
         driver: as linked.
-        findings: takes what is wrong.
+        findings: collects the problems.
     """
     values: dict[str, Reading] = {}
     if "state" in parts:
@@ -108,7 +108,7 @@ def link_rules(
     Args:
         linker: of the driver.
         part: the list of rules.
-        rules: what was made of them.
+        rules: the parsed rules.
         state: names of the robot's own state.
         world: of the robot.
     """

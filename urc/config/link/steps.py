@@ -1,4 +1,4 @@
-"""Names in sequences: what is sent, expected and run, and that no sequence runs itself."""
+"""Names in sequences: in frames, replies and runs; and no sequence may run itself."""
 
 from urc.config.link.flow import (
     Linker,
@@ -164,7 +164,7 @@ class _Walk:
             self._known |= command.reply.names
 
     def _learnt(self, transport: str) -> frozenset[str]:
-        """Return what is known on a line beside what the steps read; not to the login itself."""
+        """Return names that a line knows after its login, apart from those of the steps."""
         driver = self._linker.driver
         return (
             driver.learnt(transport)
@@ -186,7 +186,7 @@ class _Walk:
             self._linker.transport(part, key, name)
 
     def _must_last(self, part: Part, transport: str) -> None:
-        """Report what waits for a frame that its line cannot be there to hear."""
+        """Report steps that wait for a frame on a line that cannot receive it."""
         spec = self._linker.driver.transports.get(transport)
         if self._is_named and spec is not None and spec.connection == "per_request":
             self._linker.findings.error(

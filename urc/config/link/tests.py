@@ -139,7 +139,7 @@ def _link_steps(
 
 
 def _link_expect(part: Part, driver: Driver, findings: Findings) -> dict[str, Expected]:
-    """Return what is expected, with values of the signals' types."""
+    """Return the expected values, with the types of their signals."""
     return {
         name: _state(name, inner, driver, findings) for name, inner in part.named("expect").items()
     }
@@ -185,7 +185,7 @@ def _setting(part: Part, settings: Mapping[str, Setting], findings: Findings) ->
 def _expected(
     name: str, part: Part, driver: Driver, findings: Findings, *, is_part: bool = False
 ) -> Value | tuple[Value, ...]:
-    """Return the value at `part`, or None when it is only a `part` of what is expected."""
+    """Return the value at `part`, or None for a `part` of an expected value."""
     signal = driver.signals.get(name)
     if signal is None:
         findings.error(

@@ -1,4 +1,4 @@
-"""What bindings and options of one widget must be to each other, as its manifest declares it."""
+"""Relations between the bindings and options of one widget, as its manifest declares them."""
 
 import re
 from collections.abc import Iterator, Mapping
@@ -23,14 +23,14 @@ _LOCAL: Final = re.compile(r"/(?![/\\])")
 def link_together(
     part: Part, use: WidgetUse, widget: Widget, driver: Driver, findings: Findings
 ) -> None:
-    """Check bindings and options that may be right by themselves, and wrong beside the others.
+    """Check bindings and options that are right alone, and may be wrong together.
 
     Args:
-        part: what the document says of the slot; it may say a part of `use` only.
-        use: what fills the slot, with what the driver says of it.
-        widget: that is used.
-        driver: whose signals and commands are bound.
-        findings: takes what is wrong.
+        part: the slot in the document; it may have only some keys of `use`.
+        use: the widget in the slot, with the keys of the driver.
+        widget: the manifest of that widget.
+        driver: owner of the bound signals and commands.
+        findings: collects the problems.
     """
     bound = {**use.inputs, **use.lists, **use.outputs}
     _check_needs(part, use, widget, bound, findings)
@@ -88,7 +88,7 @@ def _check_instead(
 ) -> None:
     """Warn of what this document says in vain: another binding of the slot wins.
 
-    What the driver says of the slot is no mistake of the interface that binds something better.
+    An interface may bind better than the driver; the driver's keys are not its mistake.
     """
     said = (*part.named("bind").items(), *part.named("options").items())
     for port in widget.inputs.values():

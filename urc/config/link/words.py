@@ -1,4 +1,4 @@
-"""The words of a signal's states in an expression: a text that is none of them is never its value.
+"""The words of a signal's states in an expression: other texts are never its value.
 
 Floor 3.
 """

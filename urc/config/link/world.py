@@ -15,7 +15,7 @@ from urc.model.world import READINGS, Failsafe, WorldSpec
 __all__ = ["check_readings", "link_world"]
 
 _READING: Final = re.compile(r"_item\(ns\['world'\], '(\w+)'\)(?:, '(\w+)'\))?")
-"""What ``world.NAME`` and ``world.NAME.PART`` become."""
+"""The targets of ``world.NAME`` and ``world.NAME.PART``."""
 
 
 def link_world(
@@ -26,7 +26,7 @@ def link_world(
     Args:
         linker: of the driver.
         part: the world.
-        spec: what was made of it.
+        spec: the parsed world.
         state: names of the robot's own state.
         parts: of the simulator.
     """

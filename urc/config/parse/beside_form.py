@@ -1,4 +1,4 @@
-"""The keys beside a form of reading: fields, set, when, and the lines of a reply."""
+"""The keys next to a form of reading: fields, set, when, and the lines of a reply."""
 
 from urc.config.parse.conversion import parse_conversion, parse_states
 from urc.config.part import Findings, Part
@@ -13,7 +13,7 @@ __all__ = ["beside_form", "parse_lines", "with_collected"]
 
 
 def beside_form(part: Part, spec: ReadSpec, findings: Findings) -> ReadSpec:
-    """Return `spec` with what stands beside its form in the reply or message at `part`."""
+    """Return `spec` with the keys next to its form in the reply or message at `part`."""
     conversions = {
         name: _conversion(inner, findings) for name, inner in part.named("fields").items()
     }

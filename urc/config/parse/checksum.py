@@ -1,6 +1,6 @@
 """The checksum of a framing: mapping → what it is and where, as far as it is written there.
 
-What depends on the rest of the frame (`at: end`, `over: payload`) is settled by the framing.
+The framing settles places that depend on the rest of the frame (`at: end`, `over: payload`).
 """
 
 from typing import Any, Final, NamedTuple
@@ -56,7 +56,7 @@ class WrittenChecksum(NamedTuple):
     closes: bool
     before: bytes
     trail: "WrittenTrail | None" = None
-    """Where it stands behind a text; `at` is None then."""
+    """Its place after a text; `at` is then None."""
 
     @property
     def size(self) -> int:

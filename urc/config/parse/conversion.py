@@ -12,7 +12,7 @@ from urc.model.values import Conversion
 __all__ = ["CONVERSION_KEYS", "parse_conversion", "parse_states"]
 
 CONVERSION_KEYS: Final = ("base", "scale", "offset", "polynomial", "points", "not_available")
-"""Beside ``states``."""
+"""Without ``states``."""
 _A_NUMBER: Final = re.compile(r"[+-]?(0|[1-9][0-9]*)(\.[0-9]+)?([eE][+-]?[0-9]{1,3})?")
 _OF_NUMBERS: Final = ("base", "scale", "offset", "polynomial", "points")
 
@@ -22,8 +22,8 @@ def parse_conversion(part: Part, findings: Findings, kind: str = "number") -> Co
 
     Args:
         part: a signal, or a conversion.
-        findings: takes what is wrong.
-        kind: what the converted value is; text and truth have no arithmetic.
+        findings: collects the problems.
+        kind: type of the converted value; strings and booleans have no arithmetic.
     """
     if kind not in ("integer", "number"):
         for key in _OF_NUMBERS:

@@ -28,7 +28,7 @@ __all__ = ["parse_driver", "spoken_name"]
 
 
 def parse_driver(part: Part, findings: Findings, catalog: Catalog) -> Driver:
-    """Return the driver in the mapping at `part`; what was reported is left at a default."""
+    """Return the driver in the mapping at `part`; a reported value gets its default."""
     transports = {
         name: parse_transport(inner, findings, catalog)
         for name, inner in part.named("transports").items()

@@ -13,7 +13,7 @@ __all__ = ["parse_escape"]
 def parse_escape(
     part: Part, layout: FrameLayout, options: Mapping[str, Any], encoding: str, findings: Findings
 ) -> EscapeSpec | None:
-    """Return ``escape`` of the framing at `part`; None when there is none, or it was reported."""
+    """Return ``escape`` of the framing at `part`, or None."""
     if "escape" not in part.data:
         return None
     inner = part.must("escape")
@@ -120,7 +120,7 @@ def _table(
 
 
 def _check_hidden(part: Part, at: str, table: Mapping[int, int], findings: Findings) -> None:
-    """Report what stands for a hidden byte and would have to be hidden itself."""
+    """Report a replacement for an escaped byte that would need an escape itself."""
     wrong = next((one for one in table.values() if one in table), None)
     if wrong is not None:
         text = f"{wrong:02X} stands for a hidden byte, and is hidden itself"

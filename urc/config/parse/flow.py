@@ -1,4 +1,4 @@
-"""How talk flows: queues, rates, conditions, what is held and what is kept alive."""
+"""The flow of commands: queues, rates, conditions, held commands and keep-alives."""
 
 import math
 from collections.abc import Iterable, Mapping
@@ -44,7 +44,7 @@ __all__ = [
 
 _PER_S: Final = {"s": 1.0, "m": 60.0, "h": 3600.0}
 NOTHING_SENT: Final = WriteSpec("text", {"template": compile_template("")})
-"""What a sequence sends by itself."""
+"""The frame that a sequence itself sends."""
 
 
 def line_with_flow(
@@ -216,7 +216,7 @@ def parse_sequence(
         title: as people read its name.
         only: the only transport there is, or "".
         context: of forms.
-        findings: takes what is wrong.
+        findings: collects the problems.
     """
     inner = part.must("steps") if isinstance(part.data, dict) else part
     steps = parse_steps(inner, StepContext(only, is_named=True, forms=context), findings)

@@ -10,7 +10,7 @@ and for writing:
     parse_write(part, findings, context) -> WriteSpec | None
     templates(part, spec) -> iterable of (part, template), for the names used in them
 
-`part` is what stands under the form's key; None means that it was reported.
+`part` is the value of the form's key; None means that a problem was reported.
 """
 
 from collections.abc import Iterable, Mapping
@@ -45,7 +45,7 @@ _NO_WRITE = WriteSpec("text")
 
 
 class FormContext(NamedTuple):
-    """What a form may need to know of its surroundings."""
+    """The surroundings of a form."""
 
     encoding: str = "utf-8"
     """Of the line that the frame comes from or goes to."""
@@ -82,7 +82,7 @@ class WriteForm(Protocol):
 
 
 def read_form(part: Part) -> tuple[Part, ReadForm] | None:
-    """Return what stands under the form's key of a reply or message, and the form's module."""
+    """Return the value of the form's key in a reply or message, and the form's module."""
     for key in READ_FORMS:
         inner = part.get(key)
         if inner is not None:
@@ -91,7 +91,7 @@ def read_form(part: Part) -> tuple[Part, ReadForm] | None:
 
 
 def write_form(part: Part) -> tuple[Part, WriteForm]:
-    """Return what stands under ``send:``, or under the form's key in it, and the form's module."""
+    """Return the value of ``send:``, or of the form's key in it, and the form's module."""
     if isinstance(part.data, dict):
         for key in part.data:
             if key in WRITE_FORMS:
@@ -101,7 +101,7 @@ def write_form(part: Part) -> tuple[Part, WriteForm]:
 
 
 def body_form(part: Part) -> tuple[Part, WriteForm] | None:
-    """Return what stands under a form's key inside an envelope, and the form's module."""
+    """Return the value of a form's key inside an envelope, and the form's module."""
     for key in part.data:
         if key in _BODIES:
             return part.must(key), cast("WriteForm", import_module(WRITE_FORMS[key]))

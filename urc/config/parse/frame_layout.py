@@ -26,7 +26,7 @@ _SPELT: Final = ("delimiter", "brackets", "idle", "datagram")
 
 
 class _Frame(NamedTuple):
-    """What is known of a frame before its checksum is placed."""
+    """A frame before its checksum has a place."""
 
     start: bytes
     end: bytes
@@ -35,7 +35,7 @@ class _Frame(NamedTuple):
 
 
 def parse_layout(part: Part, encoding: str, findings: Findings, longest: int) -> FrameLayout:
-    """Return the layout of the framing at `part`; what was reported is left at a default."""
+    """Return the layout of the framing at `part`; a reported value gets its default."""
     kind = part.text("type")
     start = end = b""
     if kind in MARKED:

@@ -23,7 +23,7 @@ _SWITCHABLE: Final = (
 
 
 def parse_framing(part: Part, encoding: str, findings: Findings, catalog: Catalog) -> FramingSpec:
-    """Return the framing at `part`; what was reported is left at a default."""
+    """Return the framing at `part`; a reported value gets its default."""
     kind = part.must("type")
     if kind.data == "switch" and catalog.framings.get(kind.data) is not None:
         return _switch(part, encoding, findings, catalog)

@@ -14,7 +14,7 @@ _MOST: Final = 48
 _NAME = re.compile(r"[a-z][a-z0-9_-]{0,63}")
 _EMPTY = re.compile(r"\.+")
 _Cell = tuple[str, int]
-"""What a cell says, and its character in the text."""
+"""The content of a cell, and its character in the text."""
 
 
 def parse_interface(part: Part, name: str, findings: Findings) -> Interface:

@@ -56,7 +56,7 @@ def parse_transport(part: Part, findings: Findings, catalog: Catalog) -> Transpo
 
 
 def _framing(part: Part, encoding: str, findings: Findings, catalog: Catalog) -> FramingSpec:
-    """Return the framing of what comes, with that of what is sent where it is another one."""
+    """Return the framing of received frames, with that of sent frames if it differs."""
     own = part.get("framing")
     if own is None:
         return FramingSpec("datagram")  # the schema asks for it where the line is a stream

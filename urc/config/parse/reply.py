@@ -1,4 +1,4 @@
-"""What answers a request: mapping → `Reply`, with its stages, its errors and its correlation."""
+"""The reply to a request: mapping → `Reply`, with its stages, its errors and its correlation."""
 
 from urc.config.form_table import READ_FORMS
 from urc.config.parse.beside_form import parse_lines
@@ -29,7 +29,7 @@ _MOST_BUSY_S = 600.0
 
 
 def parse_reply(part: Part | None, findings: Findings, context: FormContext) -> Reply | None:
-    """Return the reply at `part`; None when there is none."""
+    """Return the reply at `part`, or None."""
     if part is None:
         return None
     own, context = parse_own_framing(part, findings, context)
@@ -73,7 +73,7 @@ def implied_reply(send: WriteSpec) -> Reply | None:
 
 
 def parse_stage(part: Part, findings: Findings, context: FormContext) -> Stage:
-    """Return one answer, whatever it belongs to."""
+    """Return one answer of any request."""
     errors, faults = parse_errors(part, findings, context)
     if "silence" in part.data:
         return _silence(part, errors, faults, findings)
@@ -92,7 +92,7 @@ def _silence(
     faults: tuple[ErrorReply, ...],
     findings: Findings,
 ) -> Stage:
-    """Return the answer of a robot that says nothing when it does what was asked."""
+    """Return the answer of a robot that is silent on success."""
     beside = (*READ_FORMS, *_BESIDE_SILENCE)
     refuse(part, beside, "means nothing beside 'silence', which is the answer", findings)
     read, within_s = ReadSpec("silence"), findings.duration(part, "silence", 0.3, most=60)

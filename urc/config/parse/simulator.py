@@ -23,7 +23,7 @@ _TRIGGERS: Final = ("match", "command", "poll", "every")
 
 
 class Simulated(NamedTuple):
-    """What a document says about its emulated robot, before any name is looked up."""
+    """The emulated robot of a document, before its names are looked up."""
 
     rules: Mapping[str, list[SimulatorRule]] = NOTHING
     """By transport."""
@@ -59,7 +59,7 @@ def parse_simulator(
 
 
 def _check_names(part: Part, rules: list[SimulatorRule], findings: Findings) -> None:
-    """Report two rules of one name: whoever builds on them could not tell which one is meant."""
+    """Report two rules of one name: a document that builds on them could not choose one."""
     seen: set[str] = set()
     for inner, rule in zip(part.items(), rules, strict=True):
         if rule.name and rule.name in seen:
@@ -107,7 +107,7 @@ def _rule(part: Part, transport: str, findings: Findings, context: FormContext) 
 
 
 def _speaks(part: Part) -> bool:
-    """Return whether a rule says something else than what is declared, now or later."""
+    """Return whether a rule has an answer of its own, now or later."""
     return any("send" in one.data or "answer" in one.data for one in (part, *part.listed("then")))
 
 

@@ -41,7 +41,7 @@ _BESIDE: Final = {
     "if": ("then", "else"),
     "fail": (),
 }
-"""Verb → the keys that may stand beside it."""
+"""Verb → the keys that may accompany it."""
 VERBS: Final = tuple(_BESIDE)
 _OF_REQUESTS: Final = ("match", "stages", "resend", "extend")
 _NEVER: Final = compile_template("")
@@ -49,7 +49,7 @@ _NO_PATTERN: Final = "^$"
 
 
 class StepContext(NamedTuple):
-    """What steps must know of their surroundings."""
+    """The surroundings of steps."""
 
     transport: str
     """Whose steps these are, or the only one there is; "" when each must say it."""

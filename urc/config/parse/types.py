@@ -15,7 +15,7 @@ Items = tuple[Item, ...]
 def parse_types(
     part: Part, enums: Mapping[str, tuple[tuple[int, str], ...]], findings: Findings
 ) -> Mapping[str, Items]:
-    """Return every type of the driver at `part`; what was reported is empty."""
+    """Return every type of the driver at `part`; a reported one is empty."""
     parts = part.named("types")
     types: dict[str, Items] = {}
     needed = {name: set(_names(inner.data)) & parts.keys() for name, inner in parts.items()}

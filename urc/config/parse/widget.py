@@ -142,7 +142,7 @@ class Shelf:
     def __init__(self, folder: FilePath) -> None:
         self.folder = folder
         self.problems: list[Problem] = []
-        """What is wrong with the manifests read so far."""
+        """The problems of the manifests read so far."""
         self._widgets: dict[str, Widget | None] = {}
 
     @property
@@ -158,7 +158,7 @@ class Shelf:
             return []
 
     def get(self, name: str) -> Widget | None:
-        """Return a widget, or None when there is none or its manifest is broken."""
+        """Return a widget, or None when it is missing or its manifest is broken."""
         if name not in self._widgets:
             self._widgets[name] = self._read(name) if self.has(name) else None
         return self._widgets[name]
@@ -172,7 +172,7 @@ class Shelf:
         return self.folder / name
 
     def hint(self, name: str) -> str:
-        """Return what may have been meant by a name that there is not."""
+        """Return a hint for an unknown name."""
         return did_you_mean(name, self.names(), "widgets")
 
     def _read(self, name: str) -> Widget | None:

@@ -1,4 +1,4 @@
-"""Rules about robots that say nothing: on a line by design, or when they do what was asked."""
+"""Rules about silent robots: on a line by design, or on success."""
 
 from typing import Final
 
@@ -13,12 +13,12 @@ _HINT: Final = "leave out 'answers: never', or leave out whatever waits for the 
 
 
 def check_answers(part: Part, driver: Driver, findings: Findings) -> None:
-    """Report whatever waits for a line that never answers, and silence that nothing can break.
+    """Report waits on a line that never answers, and silence that no answer can end.
 
     Args:
         part: the driver's mapping.
         driver: as loaded, without errors.
-        findings: takes the errors.
+        findings: collects the problems.
     """
     for name, inner in part.named("commands").items():
         one = driver.commands[name]

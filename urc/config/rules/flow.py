@@ -1,6 +1,6 @@
-"""Rules about traffic and safety: what cannot keep up, and what moves too easily. All are warnings.
+"""Rules about traffic and safety: rates that are too high, unsafe motion. All are warnings.
 
-A rule speaks only where somebody has decided something: never about a default.
+A rule reports written values only, never a default.
 """
 
 from collections.abc import Iterator
@@ -21,7 +21,7 @@ from urc.model.flow import SendStep, Step, UntilStep, WaitStep, all_steps
 __all__ = ["check_flow"]
 
 _GOOD_BYE_S = 2.0
-"""What ``on_close`` may take, see `urc.protocol.engine`."""
+"""The time for ``on_close``, see `urc.protocol.engine`."""
 _BITS_OF_A_BYTE = 10
 """On a serial line: start and stop bit included."""
 
@@ -32,8 +32,8 @@ def check_flow(part: Part, driver: Driver, secrets: frozenset[str], findings: Fi
     Args:
         part: the driver's mapping.
         driver: as loaded, without errors.
-        secrets: settings that nobody may see.
-        findings: takes the warnings.
+        secrets: names of secret settings.
+        findings: collects the problems.
     """
     for name, inner in part.named("transports").items():
         _check_line(inner, driver.transports[name], findings)
@@ -127,7 +127,7 @@ def _check_stages(
 
 
 def _check_haste(part: Part, driver: Driver, name: str, findings: Findings) -> None:
-    """Warn when what is to come true is read less often than that may take."""
+    """Warn when the signals of a condition are polled less often than its time limit."""
     verify = driver.commands[name].verify
     if verify is None:
         return
@@ -167,7 +167,7 @@ def _digested(part: Part, send: WriteSpec) -> set[str]:
 
 
 def _check_secrets(part: Part, driver: Driver, secrets: frozenset[str], findings: Findings) -> None:
-    """Warn of whatever sends a secret and does not keep it out of messages."""
+    """Warn of commands that send a secret without `redact`."""
     asked = [
         (inner.must("send"), driver.commands[name].send)
         for name, inner in part.named("commands").items()

@@ -1,6 +1,6 @@
-"""Rules about how frames are told apart: patterns that fit too much, and words that nobody uses.
+"""Rules about frames: patterns that match too much, and names without a use.
 
-All are warnings. A frame that two declarations take is only told of where one is at hand to show.
+All are warnings. Two declarations that match one frame are reported only with an example of it.
 """
 
 import re
@@ -21,14 +21,14 @@ from urc.patterns import Pattern, can_be_empty, example
 __all__ = ["check_frames_apart"]
 
 _FILLINGS: Final = ("0", "7", "-1.5", "q", "Zq", "a b", "~", "A5", "F", "+12", "x_1", "")
-"""What may stand in a field; only those that its pattern takes are tried."""
+"""Sample values of a field; those that its pattern rejects are skipped."""
 _VARIANTS: Final = 6
 _SHOWN: Final = 40
 _WORD: Final = re.compile(r"\w+")
 _LETTERS: Final = re.compile(r"\^([A-Za-z0-9 :,=/_-]*)")
 _GROUP: Final = re.compile(r"\(\?(?:P<\w+>|:)")
 _MAY_BE_LESS: Final = re.compile(r"[*?|{]|\(\)")
-"""What a group that may be empty has in it."""
+"""Marks inside a group that may be empty."""
 
 
 def check_frames_apart(part: Part, driver: Driver, findings: Findings) -> None:
@@ -101,7 +101,7 @@ class _Text:
         self._pattern = pattern
         self._text = text
         self.head = text if pattern is None else _head(pattern.source)
-        """What its frames begin with, as far as that is easily told."""
+        """The first characters of its frames, where they are evident."""
 
     def takes(self, text: str) -> bool:
         return text == self._text if self._pattern is None else bool(_finds(self._pattern, text))
@@ -198,7 +198,7 @@ def _covers(first: tuple[Item, ...], second: tuple[Item, ...]) -> bool:
 
 
 def _asked(items: tuple[Item, ...]) -> dict[tuple[int, int], object] | None:
-    """Return what must stand where: (offset, size) → value; None when more is asked than that."""
+    """Return the fixed values, (offset, size) → value, or None when there are other conditions."""
     found: dict[tuple[int, int], object] = {}
     offset = 0
     for item in items:

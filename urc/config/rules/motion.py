@@ -28,7 +28,7 @@ _ROUNDING: Final = 1.000001
 
 
 def check_motion(part: Part, driver: Driver, findings: Findings) -> None:
-    """Add what is to be said about the held commands of the driver at `part`."""
+    """Report problems of the held commands of the driver at `part`."""
     held = [
         (inner.must("hold"), driver.commands[name], hold)
         for name, inner in part.named("commands").items()
@@ -179,7 +179,7 @@ def _check_baud(
 def _check_will(
     held: list[tuple[Part, Command, Hold]], spec: TransportSpec, findings: Findings
 ) -> None:
-    """Warn of motion by way of a broker that nobody tells to stop the robot when URC is gone."""
+    """Warn of motion through a broker that has no last will to stop the robot."""
     if spec.type != "mqtt" or spec.options.get("will") is not None:
         return
     part, command, _ = held[0]
@@ -213,7 +213,7 @@ def _notices(spec: TransportSpec, driver: Driver) -> bool:
 def least_frame_bytes(send: WriteSpec, spec: TransportSpec) -> int:
     """Return the bytes of a frame at the least, what its framing adds included.
 
-    What is known only with the values counts one byte, and what a framing stuffs counts nothing.
+    A part that depends on values counts as one byte; stuffed bytes count as none.
     """
     frames = each_of(send)
     return sum(max(1, sum(_payload_bytes(one))) for one in frames) + len(frames) * _around(spec)

@@ -143,7 +143,7 @@ def _drawn(part: Part, slot: str) -> tuple[Part, int] | None:
 def _check_pace(part: Part, poll: Poll, driver: Part, findings: Findings) -> None:
     """Warn of a request whose lost answer is waited for while the next ones are due.
 
-    A written timeout up to the default is no worse than the default, of which nobody is warned.
+    A written timeout up to the default is no worse than the default, which gets no warning.
     """
     if poll.reply is None:
         return

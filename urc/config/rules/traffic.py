@@ -1,6 +1,6 @@
 """Rules about what a line carries: motion that comes late, and talk that is too fast or too slow.
 
-All are warnings, and speak only where somebody has decided something: never about a default.
+All are warnings about written values, never about a default.
 """
 
 from collections.abc import Mapping

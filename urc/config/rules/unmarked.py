@@ -1,7 +1,7 @@
 """Commands that move a robot: is each marked as such, and does anything end what goes on by itself?
 
-A command is taken for motion by its name, by the units and names of its arguments, or by the type
-of the message that it becomes. All words are compared whole: ``moves_left`` is not ``move``.
+Signs of motion are the name of a command, the units and names of its arguments, and the type of its
+message. All words are compared whole: ``moves_left`` is not ``move``.
 """
 
 import re
@@ -59,7 +59,7 @@ def check_unmarked(part: Part, driver: Driver, findings: Findings) -> None:
     Args:
         part: the driver's mapping.
         driver: as loaded, without errors.
-        findings: takes the warnings.
+        findings: collects the problems.
     """
     for key in ("commands", "sequences"):
         for name, inner in part.named(key).items():
@@ -86,7 +86,7 @@ def check_unguarded(part: Part, driver: Driver, findings: Findings) -> None:
     Args:
         part: the driver's mapping.
         driver: as loaded, without errors.
-        findings: takes the warnings.
+        findings: collects the problems.
     """
     if any(one.stops or one.hold is not None for one in driver.commands.values()):
         return

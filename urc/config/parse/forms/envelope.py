@@ -1,4 +1,4 @@
-"""The forms of what goes over a transport that carries messages: publish, call, goal, request.
+"""The forms of transports that carry messages: publish, call, goal, request.
 
 An envelope has an address, whose values may be templates, and a body in one of the other forms.
 ``stamped`` makes a message of ROS into its stamped kind here, so the engine knows nothing of it.

@@ -1,4 +1,4 @@
-"""The form ``json`` of what is sent: any value, with templates in its leaves."""
+"""The form ``json`` of sent frames: any value, with templates in its leaves."""
 
 from collections.abc import Iterable, Iterator
 from typing import Any
@@ -29,7 +29,7 @@ def templates(part: Part, spec: WriteSpec) -> Iterable[tuple[Part, Template]]:
 
 
 def compiled_tree(part: Part, findings: Findings) -> Any:
-    """Return what stands at `part`, with each text that has braces as a template."""
+    """Return the value at `part`, each text with braces as a template."""
     if isinstance(part.data, dict):
         for name, inner in part.entries().items():
             if "{{" in name:

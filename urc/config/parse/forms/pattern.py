@@ -15,11 +15,11 @@ _KINDS: Final = get_args(FieldKind)
 _PIECE = re.compile(r"\{\{|\}\}|\{([^{}]*)\}|[{}]")
 _FIELD = re.compile(r"(_?[A-Za-z][A-Za-z0-9_]*)?:([a-z]+)(?::([1-9][0-9]{0,3}))?")
 _EATS: Final = {"integer": "0123456789", "number": "0123456789.eE", "hex": "0123456789abcdefABCDEF"}
-"""Characters that a field may end with, so that what follows it cannot begin with one."""
+"""Last characters of a field; the text after it cannot begin with one."""
 
 
 class _Fault(Exception):
-    """What is wrong with a pattern, and where."""
+    """A fault of a pattern, and its place."""
 
     def __init__(self, message: str, offset: int, length: int = 1, hint: str = "") -> None:
         super().__init__(message)

@@ -1,7 +1,7 @@
 """The items of a ``struct:``, or of an entry of ``types:``: list → `Item`s.
 
-One `ItemParser` reads one scope: the ids that its expressions can name. What a key means for which
-kind of item stands in `_KEYS`; numbers, constants and enums are checked by `struct_numbers`.
+One `ItemParser` reads one scope: the ids that its expressions can name. `_KEYS` has the keys of
+each kind of item; `numbers` checks numbers, constants and enums.
 """
 
 from collections.abc import Mapping
@@ -66,7 +66,7 @@ class ItemParser:
         self.leaves = LeafParser(findings, enums, self.scope)
 
     def items(self, part: Part) -> Items:
-        """Return the items of the list at `part`; what was reported is left out."""
+        """Return the items of the list at `part`, without the reported ones."""
         found: list[Item | None] = []
         total = 0
         for inner in part.items():
@@ -324,7 +324,7 @@ class ItemParser:
 
 
 def _without_rest(items: Items) -> Items:
-    """Return the items but for a last one that takes whatever a longer window has."""
+    """Return the items without a last one that takes the rest of a longer window."""
     is_rest = bool(items) and items[-1].size is not None and items[-1].size.kind == "rest"
     return items[:-1] if is_rest and items[-1].kind == "padding" else items
 

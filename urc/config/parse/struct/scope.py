@@ -12,7 +12,7 @@ __all__ = ["Scope"]
 
 
 class Scope:
-    """What is known at one point of a struct: the items before it."""
+    """The names known at one point of a struct: the items before it."""
 
     def __init__(self, findings: Findings, purpose: Literal["read", "send", "type"]) -> None:
         self.known: dict[str, Item | None] = {}
@@ -32,7 +32,7 @@ class Scope:
         yield from names_of((item,))
 
     def add(self, part: Part, item: Item) -> None:
-        """Take note of an item; what is there twice is reported at `part`."""
+        """Add an item; report a second one of the same name at `part`."""
         own = {one.id: one for one in scope_of((item,)) if one.id}
         if item.switch is not None:
             return  # its cases were noted one by one
@@ -69,7 +69,7 @@ class Scope:
         return None if expression is None else self._checked(part, expression, outer)
 
     def value(self, part: Part | None) -> Template | None:
-        """Return what is sent: an expression, or a plain number."""
+        """Return the value to send: an expression, or a plain number."""
         if part is None:
             return None
         if isinstance(part.data, str):
