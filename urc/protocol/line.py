@@ -1,19 +1,19 @@
-"""One transport's conversation: what waits to be sent, what waits for its answer, what came in.
+"""The conversation on one transport: queued requests, requests in flight, and received frames.
 
-Floor 3, pure. Time is passed in; nothing is called back.
+Pure: time is passed in. Two callbacks, `on_ready` and `on_refused`, concern motion.
 
-Theory of operation. A line is closed, opening or open, and while open it is *ready* or not: what
-makes a fresh connection usable (``on_connect``) and what says good-bye (``on_close``) is done while
-it is not, by exchanges marked as privileged. A persistent line is opened from outside; a
-per-request one asks for it (`Open`) when something waits, and for the end (`Close`) when nothing
-does.
+Theory of operation. A line is closed, opening or open. An open line becomes *ready* after the steps
+of ``on_connect``, and stops being ready before those of ``on_close``. While it is not ready, it
+sends only the privileged exchanges of these steps. A persistent line is opened from outside. A
+per-request line asks for a connection (`Open`) when something waits, and for its end (`Close`) when
+nothing does.
 
-What is in flight is kept in the order of sending. A frame is offered to those that wait, the oldest
-first: one with a correlation takes its own answer only; of the others only the oldest may answer,
-since answers come in order (what is real-time has an order of its own). After an answer is overdue
-its flight stays as *late* for one more reply time: a frame for it is dropped, not taken for the
-answer of the next request, and meanwhile nothing is sent that it could be mistaken for. A line that
-misses `urc.protocol.answering.MISSES_UNTIL_CLOSED` answers in a row is given up and opened afresh.
+Requests in flight are kept in the order of sending. A frame is offered to them, the oldest first. A
+request with a correlation takes its own answer only. Of the others only the oldest may take it,
+because answers come in order; real-time requests have an order of their own. A request whose answer
+is overdue stays in flight as *late* for one more reply time. A frame for it is dropped, so that the
+next request does not take it. Until then nothing is sent whose answer could be confused with it.
+After `MISSES_UNTIL_CLOSED` missing answers in a row the line is closed and opened again.
 """
 
 from collections.abc import Mapping, Sequence
@@ -24,26 +24,31 @@ from urc.expressions import COUNTERS
 from urc.model.codec import Counted, Envelope, Numbered, Payload, size_of, traffic_of
 from urc.model.driver import TransportSpec
 from urc.model.values import Sample
-from urc.protocol.answer import Ear, Heard, Matcher
-from urc.protocol.answering import Answering
+from urc.protocol.answer import Ear, Heard, Matcher, Offer
 from urc.protocol.codec import Frame
+from urc.protocol.connection import Connection
 from urc.protocol.encode import BadArgument
 from urc.protocol.events import Fault, Open, Send
-from urc.protocol.exchange import DONE, Ended, Exchange, LineEvent, Outcome, untold
+from urc.protocol.exchange import DONE, Ended, Exchange, LineEvent, Outcome, expires_at, untold
 from urc.protocol.fast_value import Taken
 from urc.protocol.flights import Flight
 from urc.protocol.framings.base import FrameFault
 from urc.protocol.framings.delimited import DelimiterDecoder
+from urc.protocol.head import is_redirect
+from urc.protocol.held_replies import Refusal
 from urc.protocol.outbox import written
 from urc.protocol.times import soonest
+from urc.protocol.topics import frame_of
 
 __all__ = ["Line"]
 
+MISSES_UNTIL_CLOSED = 3
+"""Missing answers in a row after which a line is given up."""
 MOST_IN_FLIGHT = 256
 """Requests that wait for answers, late and real-time ones included."""
 
 
-class Line(Answering):
+class Line(Connection):
     """The conversation on one transport."""
 
     def __init__(self, spec: TransportSpec, messages: list[Matcher]) -> None:
@@ -79,7 +84,7 @@ class Line(Answering):
             return False
         return self._flights.has(label) or self._outbox.has(label)
 
-    # -- motion, which does not come by here
+    # -- motion, whose frames are sent elsewhere
 
     def motion_must_wait(self, now: float) -> bool:
         """Return whether a frame of motion has to wait for an answer that the robot owes."""
@@ -94,10 +99,6 @@ class Line(Answering):
         if self.spec.is_half_duplex and now < self.held.owed_until_s:
             self._free_at = now + self._gap_s
             self._outbox.next_send = max(self._outbox.next_send, self.held.owed_until_s)
-
-    def _motion_answered(self) -> None:
-        if self.spec.is_half_duplex:
-            self._outbox.next_send = self._free_at
 
     # -- sending
 
@@ -137,7 +138,7 @@ class Line(Answering):
         return ""  # it waits for them, as long as for any other turn
 
     def _pump(self, now: float) -> list[LineEvent]:
-        """Send what may be sent; open and close a per-request line as needed."""
+        """Send the requests whose turn it is; open and close a per-request line as needed."""
         events: list[LineEvent] = []
         if self.is_behind:
             return events
@@ -201,7 +202,7 @@ class Line(Answering):
         return sent
 
     def _freshen(self, exchange: Exchange) -> None:
-        """Make what is sent again anew, but for its numbers: nothing fresh is sent twice."""
+        """Write a repeated request again, with the same numbers but new nonces and times."""
         draw = self.counters.draw()
         draw.values.update(exchange.numbers)
         names = {**self.learnt, **exchange.namespace, COUNTERS: draw}
@@ -218,7 +219,7 @@ class Line(Answering):
             return 0  # it is told when it is sent
 
     def _as_sent(self, exchange: Exchange, number: int | None) -> Payload:
-        """Return the frame of a request; what is secret in it is not shown from now on."""
+        """Return the frame of a request, and hide its secrets from now on."""
         data = exchange.data
         assert data is not None  # noqa: S101 - it was made just before
         if exchange.is_secret:
@@ -264,9 +265,9 @@ class Line(Answering):
         return self.go_on(now)
 
     def go_on(self, now: float) -> list[LineEvent]:
-        """Look at what came in, up to something that a sequence may have waited for.
+        """Process received frames, up to the first that a sequence may have waited for.
 
-        What follows it may be for the next step: that step is to listen first.
+        Later frames may be for the next step, which has to listen first.
         """
         inbox = self.inbox
         events: list[LineEvent] = []
@@ -333,7 +334,7 @@ class Line(Answering):
         self.inbox.cut_by(framing or self.framing)
 
     def tick(self, now: float) -> list[LineEvent]:
-        """Do what is due at `now`."""
+        """Handle every deadline up to `now`."""
         events: list[LineEvent] = []
         if self.state == "open":
             for frame in self.inbox.decoder.tick(now):
@@ -375,7 +376,7 @@ class Line(Answering):
     def _plain(self, flight: Flight, frame: Frame, now: float) -> list[LineEvent]:
         """Take a frame while the only request in flight expects nothing but readings.
 
-        Most requests are such: this is what `_answer` does, without the steps that others need.
+        Most requests are of this kind. `_answer` takes the replies of all others.
         """
         matcher = flight.exchange.ask.plain
         taken = None if matcher is None else matcher.take(frame, now)
@@ -391,3 +392,179 @@ class Line(Answering):
         values = {sample.signal: sample.value for sample in samples}
         events.append(Ended(flight.exchange, Outcome("", "", values)))
         return events + self.leave(now) if self.is_per_request and self.is_ready else events
+
+    # -- answers: in time, too late, or none
+
+    def _envelope(self, envelope: Envelope, now: float) -> list[LineEvent]:
+        frame = frame_of(envelope, self.spec.encoding)
+        if envelope.verb == "response":
+            return self._response(envelope, frame, now)
+        answered = self._flights.offer(frame) if self._flights else None
+        if answered:
+            return self._answer(*answered, frame, now)
+        told = self._of_motion(frame, now) if self.held.is_listening(now) else None
+        return self.inbox.tell(frame, now) if told is None else told
+
+    def _response(self, envelope: Envelope, frame: Frame, now: float) -> list[LineEvent]:
+        attributes = envelope.attributes
+        number, reason = attributes.get("id"), ""
+        if not attributes.get("ok", True):
+            reason = str(attributes.get("reason") or "the robot refused")
+        flight = self._flights.numbered(number)
+        if flight is None:
+            if number is None and self.held.is_listening(now):
+                return self._motion_response(frame, attributes, now)
+            # Of a step, or nobody's: it was told already that it is late.
+            asker = self._askers.pop(number, None)
+            return [] if asker is None else self.inbox.answered(asker, frame, reason, now)
+        if reason and flight.ear.answer.takes_redirects and is_redirect(frame):
+            reason = ""
+        offer = flight.refused(frame, reason) if reason else flight.answer(frame)
+        return self._answer(flight, offer, frame, now)
+
+    def _motion_response(
+        self, frame: Frame, attributes: Mapping[str, object], now: float
+    ) -> list[LineEvent]:
+        """Return the events of the response to a frame of motion."""
+        if attributes.get("ok", True):
+            return self._of_motion(frame, now) or []
+        reason = str(attributes.get("reason") or "the robot refused")
+        return self._motion_refused(self.held.refuse(frame, reason, now), frame, now)
+
+    def _of_motion(self, frame: Frame, now: float) -> list[LineEvent] | None:
+        """Return the events of an answer to motion, or None for other frames."""
+        owed_until_s = self.held.owed_until_s
+        told = self._told_of_motion(frame, now)
+        if self.held.owed_until_s < owed_until_s and self.spec.is_half_duplex:
+            self._outbox.next_send = self._free_at
+        return told
+
+    def _told_of_motion(self, frame: Frame, now: float) -> list[LineEvent] | None:
+        refused = self.held.refusals(frame, now)
+        if refused:
+            return self._motion_refused(refused, frame, now)
+        if self.inbox.is_listening:
+            return None  # a sequence waits for a frame, and may mean this one
+        message = self.inbox.message(frame, now)
+        accepted = self.held.accepted(frame, now) if message is None else None
+        if accepted is None:
+            return message
+        answer, offer = accepted
+        events = self.inbox.dropped(offer) if offer.dropped else []
+        if offer.fields is not None:
+            events += self.inbox.samples(answer.matcher, offer.fields, now)[0]
+        return events
+
+    def _motion_refused(
+        self, refused: Sequence[Refusal], frame: Frame, now: float
+    ) -> list[LineEvent]:
+        events: list[LineEvent] = [*(self.inbox.message(frame, now) or ())]
+        for command, offer in refused:
+            if offer.told is not None:
+                events += self.inbox.samples(*offer.told, now)[0]
+            why = self.inbox.secrets.hide(offer.refusal)
+            events.append(Fault(self.spec.name, "motion-refused", f"{command}: {why}"))
+            if self.on_refused is not None:
+                self.on_refused(command, why)
+        return events
+
+    def _answer(
+        self, flight: Flight, offer: Offer, frame: Frame | None, now: float
+    ) -> list[LineEvent]:
+        """Return the events of a frame that means `offer` for a request.
+
+        A frame about the request that does not answer it may be a message as well. Without a
+        `frame`, its message has been told already.
+        """
+        exchange = flight.exchange
+        events: list[LineEvent] = self.inbox.dropped(offer) if offer.dropped else []
+        if offer.fields is None and not (offer.refusal or offer.aside):
+            return events  # more is to come
+        if offer.fields is None and frame is not None:
+            events += self.inbox.message(frame, now) or ()
+        if flight.is_late:
+            # It is as good as the answer to the same request, sent again.
+            again = self._flights.again(exchange)
+            if again is not None:
+                again.is_late = True
+            elif exchange in self._outbox:
+                self._outbox.remove(exchange)
+            elif offer.aside == "extend":
+                flight.extend(now)  # its answer is still to come, and still nobody else's
+                return events
+            else:
+                return [*events, self._late(flight)]
+            flight.is_late = False
+        self._misses = 0
+        if offer.told is not None:
+            events += self.inbox.samples(*offer.told, now)[0]
+        if offer.aside == "extend":
+            flight.extend(now)
+            return events
+        if offer.aside == "resend" and exchange.tries_left:
+            exchange.tries_left -= 1
+            self._flights.remove(flight)
+            text = f"the robot asked for {exchange.ask.label} again"
+            return [*events, Fault(self.spec.name, "sent-again", text), *self._send(exchange, now)]
+        if offer.aside:
+            times = 1 + exchange.ask.retries
+            text = f"the robot asks for {exchange.ask.label} again, and has got it {times} times"
+            outcome = Outcome("refused", text)
+        elif offer.fields is None:
+            outcome = Outcome("refused", self.inbox.secrets.hide(offer.refusal))
+        else:
+            told, samples = self.inbox.samples(flight.ear.answer.matcher, offer.fields, now)
+            events += told
+            flight.take(offer.fields, samples)
+            if flight.next_stage(now):
+                return events
+            outcome = Outcome(values=flight.values)
+        self._flights.remove(flight)
+        events.append(Ended(exchange, outcome))
+        # One connection, one request: the next one waits for a connection of its own.
+        return events + self.leave(now) if self.is_per_request and self.is_ready else events
+
+    def _late(self, flight: Flight) -> Fault:
+        self._flights.remove(flight)
+        text = f"the answer to {flight.exchange.ask.label} came too late and was dropped"
+        return Fault(self.spec.name, "late-reply", text)
+
+    def _silent(self, flight: Flight, now: float) -> list[LineEvent]:
+        """Take the silence of the robot for its answer."""
+        if flight.next_stage(now):
+            return []
+        self._flights.remove(flight)
+        done: list[LineEvent] = [Ended(flight.exchange, Outcome(values=flight.values))]
+        return done + self.leave(now) if self.is_per_request and self.is_ready else done
+
+    def _overdue(self, flight: Flight, now: float) -> list[LineEvent]:
+        if flight not in self._flights:
+            return []  # the line was given up for another one
+        if flight.is_late:
+            self._flights.remove(flight)
+            return []
+        if flight.ear.answer.is_silence:
+            return self._silent(flight, now)
+        exchange, reply_s = flight.exchange, flight.ear.answer.timeout_s
+        text = f"no answer to {exchange.ask.label} {flight.waited(now)}"
+        came = self.inbox.came_since(exchange.sent_at, f"no answer to {exchange.ask.label}")
+        text += came
+        if came and exchange.ask.match is None and len(self._flights) > 1:
+            text += "; answers that come in another order than their requests need 'match'"
+        events: list[LineEvent] = [Fault(self.spec.name, "reply-timeout", text)]
+        flight.is_late = True
+        flight.due = now + reply_s
+        if exchange.ask.is_repeated and exchange.tries_left and flight.stage == 0:
+            exchange.tries_left -= 1
+            wait_s = exchange.ask.retry.wait_s(exchange.ask.retries - exchange.tries_left)
+            exchange.waits_until = now + wait_s
+            exchange.gives_up_at = expires_at(exchange.ask, now + wait_s)
+            if self.is_per_request and exchange.ask.learnt:
+                exchange.data = None  # the next connection has a login of its own
+            self._outbox.put_back(exchange)
+            return events + self.give_up(text, now) if self.is_per_request else events
+        events.append(Ended(exchange, Outcome("timed-out", text)))
+        self._misses += not exchange.ask.is_miss_harmless
+        if self.is_per_request or self._misses >= MISSES_UNTIL_CLOSED:
+            events += self.give_up(text, now)
+        return events

@@ -13,7 +13,6 @@ from urc.model.driver import Driver
 from urc.model.profile import DialogueStep, DocumentTest, Profile, Setting, pieces_of
 from urc.model.values import Value
 from urc.problems import Problem, UrcError
-from urc.protocol.alone import alone
 from urc.protocol.events import Failed
 from urc.runtime.remedy import Remedy
 from urc.runtime.trial import Exercised, Trial
@@ -139,12 +138,12 @@ def _narrowed(driver: Driver, test: DocumentTest) -> Driver:
         narrowed = driver._replace(polls=polls)
         if not test.is_ready:
             return narrowed
-        return alone(narrowed, keeps_conditions=True)._replace(polls=polls)
+        return _isolated(narrowed, keeps_conditions=True)._replace(polls=polls)
     polls = (driver.polls[test.reply_to],) if isinstance(test.reply_to, int) else ()
     narrowed = driver._replace(polls=polls)
     if test.run is None and test.reply_to is None:
         return narrowed
-    return alone(narrowed, keeps_conditions=test.fails is not None)
+    return _isolated(narrowed, keeps_conditions=test.fails is not None)
 
 
 # -- in one instant
@@ -273,3 +272,24 @@ def _check_told(trial: Trial, step: DialogueStep) -> list[str]:
     trial.failures.clear()
     trial.ended[:] = [one for one in trial.ended if not isinstance(one, Failed)]
     return []
+
+
+def _isolated(driver: Driver, *, keeps_conditions: bool) -> Driver:
+    """Return the driver with lines that are usable at once and send nothing by themselves.
+
+    Args:
+        driver: as loaded.
+        keeps_conditions: whether commands still require and verify anything. A test of bytes has no
+            robot that could report the signals.
+    """
+    transports = {
+        name: spec._replace(on_connect=(), on_close=(), keepalive=None, stale_after_s=None)
+        for name, spec in driver.transports.items()
+    }
+    commands = driver.commands
+    if not keeps_conditions:
+        commands = {
+            name: command._replace(requires=(), verify=None) for name, command in commands.items()
+        }
+    polls = tuple(poll._replace(phase_s=0.0, when=None) for poll in driver.polls)
+    return driver._replace(transports=transports, commands=commands, polls=polls)
