@@ -38,10 +38,13 @@ def main() -> int:
     if not options.report:
         if bring_up_to_date(ROOT, COPY, settings):
             forget_open_questions(COPY)
-        if not _run(options.names, options.workers, options.minutes):
+        names = [*options.names, *(hung(mutants_in(COPY, settings)) if options.timeouts else ())]
+        is_idle = options.timeouts and not names
+        if not is_idle and not _run(names, options.workers, options.minutes):
             return 1
     mutants = mutants_in(COPY, settings)
-    return summarise(mutants, explained_in(EXPLAINED), is_part=bool(options.names))
+    is_part = bool(options.names) or options.timeouts
+    return summarise(mutants, explained_in(EXPLAINED), is_part=is_part)
 
 
 def _options() -> argparse.Namespace:
@@ -51,6 +54,7 @@ def _options() -> argparse.Namespace:
     add("names", nargs="*", metavar="NAME", help="try these again, such as 'urc.guard.reins.*'")
     add("--minutes", type=float, metavar="N", help="stop then; the next run goes on from there")
     add("--workers", type=int, default=2, metavar="N", help="so many at a time; 2 unless told")
+    add("--timeouts", action="store_true", help="try those again that did not end in time")
     add("--report", action="store_true", help="try nothing; show what is known")
     return parser.parse_args()
 
@@ -77,6 +81,11 @@ def _run(names: list[str], workers: int, minutes: float | None) -> bool:
             process.kill()
             process.wait()
         return True
+
+
+def hung(mutants: list[Mutant]) -> list[str]:
+    """Return the names of those that did not end in time; a busy machine may be the reason."""
+    return [one.name for one in mutants if one.status == "timeout"]
 
 
 def summarise(mutants: list[Mutant], explained: Explained, *, is_part: bool) -> int:

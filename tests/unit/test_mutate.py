@@ -210,6 +210,12 @@ def test_a_run_that_was_stopped_says_that_there_is_more(
     assert code == 3
 
 
+def test_mutants_that_hung_can_be_tried_again(tmp_path: Path) -> None:
+    """On a busy machine a test may be too slow for another reason."""
+    ran(tmp_path, _1=36, _2=1)
+    assert mutate.hung(mutants_in(tmp_path, SETTINGS)) == [f"{TICK}1"]
+
+
 def test_the_table_has_a_line_for_each_module(tmp_path: Path) -> None:
     """Shares are of those that were tried."""
     ran(tmp_path, _1=1, _2=0, _3=None)
