@@ -101,16 +101,16 @@ def add_host(parser: argparse.ArgumentParser) -> None:
         metavar="ADDRESS",
         type=_address,
         default="127.0.0.1",
-        help="to listen on (default: this machine only)",
+        help="address to listen on (default: this machine only)",
     )
 
 
 def add_dev(parser: argparse.ArgumentParser) -> None:
-    """Add `--dev`, which turns the dev pages on."""
+    """Add `--dev` for the developer pages."""
     parser.add_argument(
         "--dev",
         action="store_true",
-        help="a dev page for each robot: its traffic, a parser to try, reload on every save",
+        help="a developer page for each robot: traffic, parser, reload on every save",
     )
 
 
@@ -125,12 +125,12 @@ def is_loopback(host: str) -> bool:
 def add_port(parser: argparse.ArgumentParser) -> None:
     """Add `--port`, the dashboard's."""
     parser.add_argument(
-        "--port", type=port, default=8080, help="0 takes a free one (default: 8080)"
+        "--port", type=port, default=8080, help="port; 0 takes a free one (default: 8080)"
     )
 
 
 def load(word: str) -> "Profile":
-    """Return the profile that `word` names; raise `UrcError` with what is wrong with it."""
+    """Return the profile that `word` names; raise `UrcError` with its problems."""
     from urc.runtime.opened import open_document
 
     return open_document(profile_path(word))

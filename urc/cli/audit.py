@@ -1,4 +1,4 @@
-"""`urc audit`: who made a robot move, when, and what came of it, as JSON lines."""
+"""`urc audit`: the audit log of motions as JSON lines."""
 
 import argparse
 from pathlib import Path
@@ -23,12 +23,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         dest="data",
         metavar="FOLDER",
         type=Path,
-        help="the one that 'urc serve' was given (default: this user's own)",
+        help="data folder of 'urc serve' (default: this user's own)",
     )
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Print the entries, oldest first; 1 when somebody has changed the file."""
+    """Print the entries, oldest first; 1 when the file was tampered with."""
     from urc._folders import data_folder
     from urc.runtime.audit import check, read
 

@@ -13,9 +13,11 @@ EXAMPLE = "urc bundle drivers/puppet --to puppet.urcof"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add what goes into it, who signs it, and where it is written."""
+    """Add the content, the signer and the file."""
     parser.add_argument(
-        "package", metavar="PACKAGE", help="what is installed, a name as for 'install', or a folder"
+        "package",
+        metavar="PACKAGE",
+        help="an installed package, a name as for 'install', or a folder",
     )
     parser.add_argument(
         "--to", metavar="FILE", type=Path, help="file to write (default: NAME-VERSION.urcof)"
@@ -24,7 +26,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--key",
         metavar="FILE",
         type=Path,
-        help="signs what comes from a folder (default: your own, if any)",
+        help="key to sign packages from a folder (default: your own, if any)",
     )
 
 
@@ -52,7 +54,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _planned(word: str, store: "Store") -> "Plan":
-    """Return what goes in: what is installed is at hand, and is what somebody has tried."""
+    """Return the packages; installed versions come first, because they were tried."""
     from urc.cli.packages import is_path, planned
     from urc.packages.names import parse_wish
     from urc.packages.plan import Plan
@@ -66,7 +68,7 @@ def _planned(word: str, store: "Store") -> "Plan":
 
 
 def _signatures(plan: "Plan", arguments: argparse.Namespace) -> "dict[str, Signature]":
-    """Return who signed what; what was written in one's own folder one signs oneself."""
+    """Return the signatures; packages from a folder get the user's own."""
     from urc.cli.packages import signer
     from urc.packages.names import parse_key
 

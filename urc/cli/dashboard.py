@@ -1,4 +1,4 @@
-"""What `urc serve` and `urc demo` share: profiles → robots of the dashboard → a running server."""
+"""The common part of `urc serve` and `urc demo`: from profiles to a running server."""
 
 import asyncio
 import gc
@@ -52,7 +52,7 @@ class Place:
     data: Path | None = None
     """Folder of URC's own data; None: that of this user."""
     has_guard: bool = True
-    """Whether a process of its own stops what moves when this one cannot."""
+    """Whether a guard process stops motion when this one cannot."""
     tiles: Path | None = None
     """Folder of map pictures; None: maps are grids."""
     token: str = ""
@@ -152,7 +152,7 @@ async def _serve(
 
 @asynccontextmanager
 async def _listening(faulty: Faulty) -> AsyncIterator[None]:
-    """Obey what is typed about faults, for as long as the context lasts."""
+    """Execute typed fault commands for as long as the context lasts."""
     task = asyncio.create_task(faulty.listen())
     try:
         yield
@@ -179,7 +179,7 @@ def _motion(place: Place) -> Motion:
 
 
 def _first(garage: Garage, profile: Profile) -> Robot:
-    """Return a robot that is there from the start, whatever was kept of it."""
+    """Return a robot that exists from the start, with or without stored settings."""
     try:
         return garage.robot(profile.name, profile)
     except UrcError as error:
@@ -190,7 +190,7 @@ def _first(garage: Garage, profile: Profile) -> Robot:
 def _robot(
     place: Place, faulty: Faulty | None, profile: Profile, values: Mapping[str, Value]
 ) -> Robot:
-    """Return a robot whose session is opened when somebody looks at it."""
+    """Return a robot whose session opens with its first page."""
     settings = values if faulty is None else _complete(profile, values)
     opened = partial(_session, _motion(place), place.recordings, faulty, profile, settings)
     return Robot(profile, settings, opened, is_emulated=faulty is not None)
@@ -244,5 +244,5 @@ async def _kept(session: Session, folder: Path) -> AsyncIterator[None]:
 
 
 def _complete(profile: Profile, values: Mapping[str, Value]) -> dict[str, Value]:
-    """Return settings with what only a real robot needs to be told: nobody must fill it in."""
+    """Return settings with defaults for values that only a real robot needs."""
     return sample_settings(profile.settings) | dict(values)

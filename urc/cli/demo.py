@@ -21,7 +21,7 @@ USUAL_PORT = 8080
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add where to listen, what goes wrong, and whether a browser is opened."""
+    """Add the address, the faults, and the browser option."""
     add_host(parser)
     add_port(parser)
     parser.set_defaults(port=None)

@@ -26,7 +26,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "profile",
         metavar="PROFILE",
         nargs="?",
-        help="a robot file, or the name of a robot: its own kinds of lines and services only",
+        help="a robot file, or the name of a robot: search only its transports and services",
     )
     add_settings(parser)
     parser.add_argument(

@@ -1,4 +1,4 @@
-"""`urc doctor`: what works on this machine, and what is missing."""
+"""`urc doctor`: checks the features of this machine."""
 
 import argparse
 import platform

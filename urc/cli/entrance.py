@@ -41,7 +41,7 @@ class Entrance(NamedTuple):
         return self.access.address_once(self.url)
 
     def lines(self) -> Iterator[str]:
-        """Yield what is printed: first the address with all rights."""
+        """Yield the lines to print: first the address with all rights."""
         yield f"dashboard {self.address}"
         if self.access.is_open:
             yield f"for others {self.url}   (without a key they watch and drive)"

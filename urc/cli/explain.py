@@ -1,4 +1,4 @@
-"""`urc explain`: what a code of a finding means, and what to do instead."""
+"""`urc explain`: the page of a problem's code."""
 
 import argparse
 from difflib import get_close_matches
@@ -12,7 +12,10 @@ EXAMPLE = "urc explain unknown-key"
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the code."""
     parser.add_argument(
-        "code", metavar="CODE", nargs="?", help="as 'urc validate' prints it; without it, a list"
+        "code",
+        metavar="CODE",
+        nargs="?",
+        help="code printed by 'urc validate'; default: list all codes",
     )
 
 

@@ -1,4 +1,4 @@
-"""What is said when a verb ends in an error: one line for each fault, never a traceback."""
+"""Error messages of the verbs: one line for each problem, never a traceback."""
 
 from urc.cli.output import complain
 from urc.problems import ProblemsError, UrcError, to_text
@@ -7,11 +7,11 @@ __all__ = ["Misuse", "explain"]
 
 
 class Misuse(UrcError):
-    """The command line asks for what is not there: wrong use, exit code 2."""
+    """Wrong use of the command line: exit code 2."""
 
 
 def explain(error: Exception, program: str) -> int:
-    """Tell of a failure of `program`, ``urc watch`` for example; return the exit code."""
+    """Print a failure of `program`, ``urc watch`` for example; return the exit code."""
     match error:
         case ProblemsError():
             for problem in error.problems:

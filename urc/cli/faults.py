@@ -1,4 +1,4 @@
-"""Faults on demand of emulated robots: given at the start, and by lines that somebody types."""
+"""Fault injection for emulated robots: at the start, and by typed lines."""
 
 import argparse
 import sys
@@ -20,7 +20,7 @@ __all__ = ["Faulty", "add_faults"]
 
 
 def add_faults(parser: argparse.ArgumentParser, *, has_names: bool) -> None:
-    """Add what goes wrong from the start; `has_names` where there may be several robots."""
+    """Add the faults from the start; `has_names` where there may be several robots."""
     which = " with emulated robots: FAULT with all, ROBOT:FAULT with one," if has_names else ","
     name = "tello:" if has_names else ""
     parser.add_argument(
@@ -29,16 +29,16 @@ def add_faults(parser: argparse.ArgumentParser, *, has_names: bool) -> None:
         action="append",
         default=[],
         metavar="FAULT",
-        help=f"something that goes wrong{which} such as delay=200ms, loss=5%%, silent, noise=2x,"
-        " dropout=SIGNAL, stuck=SIGNAL, low-battery; may be given several times, and changed by"
+        help=f"a fault{which} such as delay=200ms, loss=5%%, silent, noise=2x,"
+        " dropout=SIGNAL, stuck=SIGNAL, low-battery; repeatable, and changed by"
         f" lines on standard input: 'fault {name}loss=10%%', 'mend', 'faults'",
     )
 
 
 class Faulty:
-    """The emulated robots of one process, and what is wrong with them on demand.
+    """The emulated robots of one process, and their injected faults.
 
-    A robot may be emulated anew while the process runs, as when its settings change: what is wrong
+    A robot may be emulated again while the process runs, as when its settings change: what is wrong
     with it stays.
     """
 
@@ -67,7 +67,7 @@ class Faulty:
             twins.remove(twin)
 
     def begin(self, texts: Sequence[str]) -> None:
-        """Let what was asked for on the command line go wrong; raise `Misuse` if it cannot."""
+        """Inject the faults of the command line; raise `Misuse` for an impossible one."""
         for text in texts:
             try:
                 self.inject(text)
@@ -117,7 +117,7 @@ class Faulty:
         raise UrcError(f"no robot {robot!r} is emulated here" + (f"; {hint}" if hint else ""))
 
     def __str__(self) -> str:
-        """Return what is wrong, for people."""
+        """Return the injected faults, for people."""
         found = []
         for name, twins in self._twins.items():
             faults = ", ".join(twins[0].faults if twins else self._wrong.get(name, {}).values())
@@ -126,7 +126,7 @@ class Faulty:
         return f"faults: {'; '.join(found) or 'none'}"
 
     def obey(self, line: str) -> None:
-        """Do what a typed line says about faults, and tell what is wrong now."""
+        """Execute a typed line, and print the injected faults."""
         verb, _, rest = line.strip().partition(" ")
         try:
             if verb == "fault" and rest:

@@ -1,4 +1,4 @@
-"""What keeps a command line from moving a robot: a latched STOP, or a person who drives it."""
+"""Interlock of the command line: a latched STOP or a driving operator prevents motion."""
 
 import asyncio
 import json

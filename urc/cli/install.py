@@ -24,30 +24,30 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "package",
         metavar="PACKAGE",
-        help="NAME or drivers/NAME, with @VERSION if one is wanted; a bundle, archive or folder",
+        help="NAME or drivers/NAME, optionally with @VERSION; or a bundle, archive or folder",
     )
     parser.add_argument("--yes", action="store_true", help="install without asking")
     parser.add_argument(
         "--allow-more",
         action="store_true",
-        help="with --yes: also another version that may do more than the one in use",
+        help="with --yes: also accept another version with more permissions",
     )
     add_risks(parser)
     parser.add_argument(
         "--signed-by",
         metavar="SHA256:…",
-        help="refuse the package, unless the key of this fingerprint signed it",
+        help="refuse the package unless the key with this fingerprint signed it",
     )
     parser.add_argument(
         "--withdrawn",
         action="store_true",
-        help="also take a version that its repository has withdrawn",
+        help="also accept a withdrawn version",
     )
     parser.add_argument(
         "--lock",
         metavar="FILE",
         type=Path,
-        help="take exactly what this lock names; if there is none, write it",
+        help="install exactly the versions of this lock file; write it if it is missing",
     )
 
 
@@ -89,7 +89,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _check_signer(plan: "Plan", fingerprint: str) -> None:
-    """Raise `PackageError` unless a certain key signed what was asked for."""
+    """Raise `PackageError` unless a certain key signed the package."""
     from urc.packages.names import PackageError
 
     signature = plan.signatures.get(plan.lock.packages[plan.lock.root].sha256)

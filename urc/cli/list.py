@@ -1,4 +1,4 @@
-"""`urc list`: what is installed, and what there is of newer versions."""
+"""`urc list`: the installed packages and their newer versions."""
 
 import argparse
 
@@ -6,15 +6,13 @@ EXAMPLE = "urc list --json"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add what is listed, and the form of the answer."""
-    parser.add_argument(
-        "--updates", action="store_true", help="only what the repositories have newer versions of"
-    )
-    parser.add_argument("--json", action="store_true", help="one JSON line for each")
+    """Add the selection and the format."""
+    parser.add_argument("--updates", action="store_true", help="only packages with a newer version")
+    parser.add_argument("--json", action="store_true", help="one JSON line for each package")
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Print what was asked for, and what it brought."""
+    """Print the requested packages and their dependencies."""
     from urc.cli.output import json_text
     from urc.cli.packages import known_entries, open_store
     from urc.packages.install import withdrawn_lines
@@ -39,7 +37,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _updates(*, is_json: bool) -> int:
-    """Print the updates there are; 0 also where there is none: that is no failure."""
+    """Print the updates; 0 also without any, which is no failure."""
     from urc.cli.failures import Misuse
     from urc.cli.output import complain, json_text
     from urc.cli.packages import open_store, repositories

@@ -11,31 +11,31 @@ from collections.abc import Sequence
 __all__ = ["VERBS", "main"]
 
 VERBS: dict[str, str] = {
-    "demo": "try the gallery's robots, each emulated, in the browser",
-    "serve": "the dashboard on real robots",
-    "validate": "check documents and run their own tests",
-    "explain": "what a code of a finding means, and what to do instead",
-    "resolve": "a profile as one document, with the place of every key",
-    "docs": "the manual page of a profile, as Markdown",
-    "simulate": "the emulated robot of a profile, on its real ports",
+    "demo": "serve all shipped robots, emulated, and open the browser",
+    "serve": "serve the dashboard for real robots",
+    "validate": "check documents and run their tests",
+    "explain": "explain the code of a problem, with a correction",
+    "resolve": "print a profile as one document, with the place of every key",
+    "docs": "write the manual page of a profile, as Markdown",
+    "simulate": "emulate the robot of a profile on its real ports",
     "watch": "print a robot's signals as JSON lines",
     "send": "run one command and print its reply",
-    "record": "keep all that happens with a robot in a file, until Ctrl-C",
-    "replay": "the dashboard on a recording, as if the robot told it now",
-    "new": "the files of a new widget, to be changed",
-    "repo": "repositories of packages: add, list, search, serve one; tokens and keys",
-    "install": "get a package with all that it needs, after showing what it may do",
-    "update": "newer versions of what is installed, after showing what changes; and back",
-    "search": "packages in the repositories",
-    "list": "the packages that are installed",
-    "remove": "take an installed package away, and what only it needed",
-    "bundle": "one file with a package and all that it needs",
-    "publish": "send a package to a repository that takes packages",
-    "trust": "show the host key of an SSH server, and keep it if it is right",
-    "audit": "who made a robot move, as JSON lines",
-    "discover": "robots on the network, serial ports, and the topics of a rosbridge",
+    "record": "record a session to a file; Ctrl-C stops",
+    "replay": "replay a recording in the dashboard",
+    "new": "create the files of a new widget",
+    "repo": "manage repositories of packages, their tokens and keys",
+    "install": "install a package and its dependencies, after showing its permissions",
+    "update": "update installed packages, after showing the changes; or revert",
+    "search": "search the repositories for packages",
+    "list": "list the installed packages",
+    "remove": "remove an installed package and its unused dependencies",
+    "bundle": "pack a package and its dependencies into one file",
+    "publish": "publish a package to a repository",
+    "trust": "show the host key of an SSH server, and store it on consent",
+    "audit": "print the audit log of motions as JSON lines",
+    "discover": "find robots on the network, serial ports, and ROS topics",
     "schema": "print the JSON Schema of a kind of document",
-    "doctor": "what works on this machine, and what is missing",
+    "doctor": "check the features of this machine",
 }
 
 _INTERRUPTED = 130
@@ -43,7 +43,7 @@ _INTERRUPTED = 130
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run one command line; return its exit code: 0 fine, 1 findings or failure, 2 wrong use."""
+    """Run one command line; return its exit code: 0 success, 1 problems or failure, 2 wrong use."""
     _mend_streams()
     words = list(sys.argv[1:] if argv is None else argv)
     try:
@@ -137,7 +137,7 @@ def _mend_streams() -> None:
 
 
 def _flush(code: int) -> int:
-    """Write what is left of the output, so that a failure is told as all others are."""
+    """Flush the output, so that its failure is reported as all others are."""
     try:
         sys.stdout.flush()
     except BrokenPipeError:
@@ -152,7 +152,7 @@ def _flush(code: int) -> int:
 
 
 def _discard_output() -> None:
-    """Send what is still to be written nowhere: Python would try, and complain, at its exit."""
+    """Discard pending output: Python would try to write it, and complain, at its exit."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 

@@ -16,15 +16,14 @@ _TYPES = Path(__file__).resolve().parents[1] / "web" / "static" / "core/types.js
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add what is made, and how it is called."""
-    parser.add_argument("kind", metavar="KIND", choices=("widget",), help="what is made: widget")
-    parser.add_argument("name", metavar="NAME", help="its name: small letters, digits and '-'")
+    """Add the kind and the name."""
+    parser.add_argument("kind", metavar="KIND", choices=("widget",), help="kind to create: widget")
+    parser.add_argument("name", metavar="NAME", help="name: lower-case letters, digits and '-'")
     parser.add_argument(
         "--into",
         metavar="DIR",
         type=Path,
-        help="folder in which the new folder is made; by default 'widgets' in this one, where "
-        "the robots beside it look for it",
+        help="folder for the new folder (default: 'widgets' here, next to the robots that use it)",
     )
 
 

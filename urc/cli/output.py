@@ -1,4 +1,4 @@
-"""What is printed: lines for people on standard error, JSON that any reader takes."""
+"""Output: lines for people on standard error, JSON for any reader."""
 
 import os
 import sys
@@ -10,7 +10,7 @@ __all__ = ["complain", "json_text"]
 
 
 def complain(line: str) -> None:
-    """Print one line for people; when nobody can read it there is nothing left to do."""
+    """Print one line for people; ignore a closed standard error."""
     try:
         print(printable(line), file=sys.stderr, flush=True)
     except OSError:

@@ -1,4 +1,4 @@
-"""What the verbs about packages share: the store, the repositories, a question, installed names."""
+"""The common part of the package verbs: store, repositories, confirmation, installed names."""
 
 import argparse
 import os
@@ -103,7 +103,7 @@ def planned(word: str, pinned: "Lock | None" = None, *, takes_withdrawn: bool = 
 
 
 def known_entries() -> "list[Entry]":
-    """Return what the repositories said last; nobody is asked."""
+    """Return the stored indexes of the repositories, without a request."""
     from urc.packages.names import PackageError
 
     try:
@@ -122,12 +122,12 @@ def add_risks(parser: argparse.ArgumentParser) -> None:
         RISKS_FLAG,
         dest="takes_risks",
         action="store_true",
-        help="also where a package names keys, files, programs or hosts that nobody fills in",
+        help="also accept keys, files, programs or hosts that the package itself names",
     )
 
 
 def is_agreed(question: str) -> bool:
-    """Ask a person; raise `Misuse` where there is none."""
+    """Ask the user; raise `Misuse` without a terminal."""
     if not sys.stdin.isatty():
         raise Misuse("nobody can be asked here; --yes agrees beforehand")
     try:
@@ -188,7 +188,7 @@ def used_lock(store: "Store", key: "Key") -> "Lock | None":
 
 
 def keep_in_use(lock: "Lock") -> None:
-    """Let dashboards go on with a version, whatever else is installed."""
+    """Pin a version for dashboards, independent of other installed versions."""
     from urc.runtime.kept import DRIVEN, pin
 
     if lock.key.kind in DRIVEN:
@@ -219,7 +219,7 @@ def signer(file: Path | None = None) -> "Signer | None":
 
 
 def search_repositories(words: Sequence[str], kind: str = "", *, is_json: bool = False) -> int:
-    """Print the newest version of each package that has all words; 1 when there is none."""
+    """Print the newest version of each package with all words; 1 without any."""
     from urc.cli.output import json_text
     from urc.packages.index import search
     from urc.packages.sources import merged

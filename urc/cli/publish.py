@@ -20,27 +20,27 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="DIR|PACKAGE",
         nargs="+",
         type=Path,
-        help="folders or archives of packages, in this order: what another needs goes first",
+        help="folders or archives of packages, dependencies first",
     )
     parser.add_argument("--to", metavar="URL", required=True, help="the repository")
     parser.add_argument(
-        "--token-file", metavar="FILE", type=Path, required=True, help="the token of its keeper"
+        "--token-file",
+        metavar="FILE",
+        type=Path,
+        required=True,
+        help="the token from the maintainer of the repository",
     )
     parser.add_argument(
-        "--key", metavar="FILE", type=Path, help="of the publisher (default: your own, if any)"
+        "--key", metavar="FILE", type=Path, help="key of the publisher (default: your own, if any)"
     )
     parser.add_argument(
-        "--source", metavar="URL", default="", help="where it was made from: told who installs it"
+        "--source", metavar="URL", default="", help="URL of the source, shown at installation"
     )
+    parser.add_argument("--commit", metavar="HEX", default="", help="commit of --source")
     parser.add_argument(
-        "--commit", metavar="HEX", default="", help="of --source, that it was made from"
+        "--allow-warnings", action="store_true", help="publish despite warnings of 'urc validate'"
     )
-    parser.add_argument(
-        "--allow-warnings", action="store_true", help="publish what 'urc validate' warns of"
-    )
-    parser.add_argument(
-        "--insecure", action="store_true", help="send the token where others can read it"
-    )
+    parser.add_argument("--insecure", action="store_true", help="send the token without encryption")
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -121,7 +121,7 @@ def _look(source: "FileSource", document: Path, arguments: argparse.Namespace) -
 
 
 def _of_files(manifest: Path) -> "list[Problem]":
-    """Return what is wrong with the files beside a widget's manifest."""
+    """Return the problems of the files next to a widget's manifest."""
     from urc.config.load import Shelf, check
     from urc.runtime.catalog import built_in_catalog
     from urc.shipped import shipped

@@ -28,7 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--output",
         metavar="FILE",
         type=Path,
-        help="the recording (default: ROBOT-TIME.mcap here)",
+        help="file to write (default: ROBOT-TIME.mcap here)",
     )
     parser.add_argument(
         "--for", dest="seconds", type=duration, metavar="TIME", help="stop after 500ms, 5s, 2m …"

@@ -13,7 +13,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--keep-settings",
         action="store_true",
-        help="keep what was filled in for its robot, secrets too; else it is forgotten",
+        help="keep the settings of its robot, including secrets",
     )
 
 

@@ -25,15 +25,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--profile",
         metavar="PROFILE",
-        help="show it with this robot file, as after a change of its interface, or where it has"
-        " widgets of its own (default: the profile that is kept in the recording)",
+        help="robot file to show it with, for a changed interface or third-party widgets"
+        " (default: the profile in the recording)",
     )
     parser.add_argument(
         "--speed",
         type=_speed,
         default=1.0,
         metavar="X",
-        help="seconds that pass in one, 0.1 to 100",
+        help="playback speed, 0.1 to 100",
     )
     parser.add_argument(
         "--from",
@@ -41,9 +41,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=duration,
         default=0.0,
         metavar="TIME",
-        help="begin at 90s, 2m …",
+        help="start at 90s, 2m …",
     )
-    parser.add_argument("--loop", action="store_true", help="begin anew at the end")
+    parser.add_argument("--loop", action="store_true", help="restart at the end")
     add_host(parser)
     add_port(parser)
 

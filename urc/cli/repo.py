@@ -19,9 +19,9 @@ EXAMPLE = "urc repo add http://192.168.1.5:8090/"
 
 _PORT = 8090
 _ARCHIVE_S = 60.0
-"""In which a whole archive must come that somebody publishes."""
+"""Time limit for the upload of an archive."""
 _RENEW_S = 3600.0
-"""How often a server looks whether its index must be signed anew."""
+"""How often a server checks whether its index must be signed again."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -35,43 +35,46 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         " token add|remove NAME, token list; key new NAME, key show, key list, key forget PACKAGE",
     )
     parser.add_argument(
-        "words", metavar="URL|WORD|DIR|NAME", nargs="*", help="what it is done with"
+        "words", metavar="URL|WORD|DIR|NAME", nargs="*", help="arguments of the action"
     )
-    parser.add_argument("--json", action="store_true", help="of search: one JSON line for each")
-    parser.add_argument("--name", metavar="TEXT", help="of index and serve: what it is called")
+    parser.add_argument(
+        "--json", action="store_true", help="search: one JSON line for each package"
+    )
+    parser.add_argument("--name", metavar="TEXT", help="index, serve: title of the repository")
     parser.add_argument(
         "--tokens",
         metavar="FILE",
         type=Path,
-        help="of serve: who may publish; of token: the file that is changed",
+        help="serve: tokens that may publish; token: the file to change",
     )
     parser.add_argument(
         "--may",
         metavar="PACKAGES",
         action="append",
-        help="of token add: drivers/puppet, 'drivers/puppet*', 'widgets/*' or '*'; may be repeated",
+        help="token add: drivers/puppet, 'drivers/puppet*', 'widgets/*' or '*'; repeatable",
     )
     parser.add_argument(
         "--key",
         metavar="FILE",
         type=Path,
-        help="of index, serve, withdraw, restore and key: a publisher's key (default: your own,"
-        " if any)",
+        help="index, serve, withdraw, restore, key: a publisher's key (default: your own, if any)",
     )
     parser.add_argument(
         "--valid",
         metavar="DAYS",
         type=_days,
         default=14,
-        help="of index, serve, withdraw and restore: for how long a signed index holds, 1 to 365"
-        " (default: 14)",
+        help="index, serve, withdraw, restore: validity of a signed index, 1 to 365 (default: 14)",
     )
     parser.add_argument(
-        "--why", metavar="TEXT", help="of withdraw: what is told who has it installed"
+        "--why", metavar="TEXT", help="withdraw: reason, shown to users who have it installed"
     )
     add_host(parser)
     parser.add_argument(
-        "--port", type=port, default=_PORT, help=f"of serve; 0 takes a free one (default: {_PORT})"
+        "--port",
+        type=port,
+        default=_PORT,
+        help=f"serve: port; 0 takes a free one (default: {_PORT})",
     )
 
 
@@ -83,7 +86,7 @@ def _days(text: str) -> int:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Do what was asked for."""
+    """Run the action."""
     return _ACTIONS[arguments.action](arguments)
 
 
@@ -133,7 +136,7 @@ def _search(arguments: argparse.Namespace) -> int:
 
 
 def _index(arguments: argparse.Namespace) -> int:
-    """List what is in a folder, for any static web server; 1 when something is not listed."""
+    """Write the index of a folder, for any static web server; 1 when a package is left out."""
     from urc.packages.keeper import make_index
     from urc.runtime.examine import examine
 
@@ -182,7 +185,7 @@ def _note(arguments: argparse.Namespace, why: str) -> int:
 
 
 def _serve(arguments: argparse.Namespace) -> int:
-    """List what is in a folder, and give it out until Ctrl-C or SIGTERM."""
+    """Write the index of a folder, and serve it until Ctrl-C or SIGTERM."""
     from urc.cli.running import run_loop
     from urc.packages.server import repository_app
     from urc.runtime.examine import examine_apart
@@ -213,7 +216,7 @@ def _serve(arguments: argparse.Namespace) -> int:
 
 
 async def _renewing(folder: Path, seal: "Seal | None") -> None:
-    """Sign the index anew before it expires, for as long as it is served."""
+    """Sign the index again before it expires, for as long as it is served."""
     from urc.packages.keeper import renew
     from urc.packages.names import PackageError
 
@@ -226,7 +229,7 @@ async def _renewing(folder: Path, seal: "Seal | None") -> None:
 
 
 def _tokens(arguments: argparse.Namespace, folder: Path) -> "Tokens | None":
-    """Return who may publish, or None: nobody."""
+    """Return the tokens that may publish, or None."""
     from urc.packages.tokens import Tokens
 
     file: Path | None = arguments.tokens

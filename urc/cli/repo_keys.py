@@ -9,7 +9,7 @@ __all__ = ["key", "token"]
 
 
 def token(arguments: argparse.Namespace) -> int:
-    """Add, list or remove tokens of a repository's keeper."""
+    """Add, list or remove tokens of a repository."""
     from urc.packages.tokens import Tokens
     from urc.problems import printable
 

@@ -75,7 +75,7 @@ class _Job(NamedTuple):
 
 
 class LineWriter:
-    """Writes to the standard streams without holding up the loop while nobody reads.
+    """Writes to the standard streams without blocking the loop on a slow reader.
 
     The work is done by a daemon thread, straight on the descriptor: Python waits at its exit for
     other threads, and for the buffer of a `print` that may never end.

@@ -22,12 +22,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "kind", metavar="KIND", nargs="?", choices=KINDS, help=f"one of {', '.join(KINDS)}"
     )
     parser.add_argument(
-        "--path", action="store_true", help="print where its file is; without KIND, of all of them"
+        "--path",
+        action="store_true",
+        help="print the path of the file; without KIND, of all schemas",
     )
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Print the schema, whole in itself; or where it stands, beside those that it refers to."""
+    """Print the schema with its references resolved, or the path of its file."""
     folder = shipped("schemas")
     file = folder / f"{arguments.kind}.schema.json"
     if arguments.path:

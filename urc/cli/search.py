@@ -7,15 +7,20 @@ EXAMPLE = "urc search battery --kind widget"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the words, and the form of the answer."""
-    parser.add_argument("words", metavar="WORD", nargs="*", help="all of them must be there")
     parser.add_argument(
-        "--kind", choices=("driver", "interface", "widget", "robot"), default="", help="only these"
+        "words", metavar="WORD", nargs="*", help="words that a package must contain"
     )
-    parser.add_argument("--json", action="store_true", help="one JSON line for each")
+    parser.add_argument(
+        "--kind",
+        choices=("driver", "interface", "widget", "robot"),
+        default="",
+        help="only packages of this kind",
+    )
+    parser.add_argument("--json", action="store_true", help="one JSON line for each package")
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Print the newest version of each package that has all words; 1 when there is none."""
+    """Print the newest version of each package with all words; 1 without any."""
     from urc.cli.packages import search_repositories
 
     return search_repositories(arguments.words, arguments.kind, is_json=arguments.json)

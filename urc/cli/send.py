@@ -1,7 +1,7 @@
 """`urc send`: one command, its reply as JSON.
 
-What moves the robot is neither begun against a latched STOP nor against a person who drives, and
-ends when either comes: the engine is told of a STOP that is latched elsewhere.
+Motion starts neither against a latched STOP nor against a driving operator, and ends when either
+comes. The engine learns about a STOP that is latched by another process.
 """
 
 import argparse
@@ -30,7 +30,7 @@ _WHOLE = re.compile(r"[+-]?[0-9]{1,300}")
 KNOWN_S = 3.0
 """How long what a command requires may take to be read."""
 _WRONG_USE = ("bad-argument", "unknown-command")
-"""Codes of a failure that lies in what was typed."""
+"""Codes of failures that are caused by the arguments."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -43,19 +43,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         dest="hold_s",
         metavar="TIME",
         type=duration,
-        help="give a command that is held for so long (500ms, 2s), then release it",
+        help="hold a held command for this time (500ms, 2s), then release it",
     )
     parser.add_argument(
         "--despite-stop",
         action="store_true",
-        help="move the robot also while STOP is latched or a person drives it",
+        help="move the robot even while STOP is latched or a person drives it",
     )
     parser.add_argument(
         "--data-dir",
         dest="data",
         metavar="FOLDER",
         type=Path,
-        help="URC's own data, where 'urc serve' keeps a stop (default: as there)",
+        help="data folder of 'urc serve' (default: this user's own)",
     )
 
 
@@ -193,7 +193,7 @@ async def _given(
 async def _heeding(
     session: "Session", command: "Command", arguments: argparse.Namespace
 ) -> AsyncIterator["Hindrance | None"]:
-    """Let a STOP and whoever drives count for as long as the context lasts, unless told not to."""
+    """Heed STOP and driving operators while the context lasts, unless told not to."""
     may_move = command.moves or command.hold is not None
     if arguments.despite_stop or not may_move:
         yield None

@@ -24,7 +24,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "profiles",
         metavar="PROFILE",
         nargs="*",
-        help="robot files or names; without any, all that is installed",
+        help="robot files or names (default: all installed robots)",
     )
     add_settings(parser)
     add_host(parser)
@@ -35,7 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="NAME",
         action="append",
         default=[],
-        help="a name people reach this machine by, besides its addresses",
+        help="host name of this machine, in addition to its addresses",
     )
     parser.add_argument(
         "--simulate", action="store_true", help="emulate the robots instead of connecting"
@@ -45,19 +45,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--installed",
         action="store_true",
-        help="beside the profiles, all robots and drivers that are installed",
+        help="also serve all installed robots and drivers",
     )
     parser.add_argument(
         "--manage",
         action="store_true",
-        help="other machines, too, may install packages and change settings; needs --token",
+        help="allow other machines to install packages and change settings; needs --token",
     )
     parser.add_argument(
         "--token",
         dest="token_file",
         metavar="FILE",
         type=Path,
-        help="holds the token of those who manage from other machines; made where it is missing",
+        help="file with the token for --manage; created if it is missing",
     )
     parser.add_argument(
         "--no-guard",
@@ -70,20 +70,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         dest="data",
         metavar="FOLDER",
         type=Path,
-        help="where a stop is kept over a restart, the audit, and what else URC remembers",
+        help="data folder: latched stops, audit log, settings",
     )
     parser.add_argument(
         "--tiles",
         metavar="FOLDER",
         type=Path,
-        help="pictures of maps, as FOLDER/z/x/y.png, for the option tiles of the widget map",
+        help="map tiles as FOLDER/z/x/y.png, for the option tiles of the widget map",
     )
     parser.add_argument(
         "--record",
         dest="recordings",
         metavar="FOLDER",
         type=Path,
-        help="keep each session with a robot in a file there, for 'urc replay'",
+        help="record each session to a file in this folder, for 'urc replay'",
     )
     parser.add_argument(
         "--trust-widget",
@@ -91,8 +91,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="NAME",
         action="append",
         default=[],
-        help="let a widget that does not ship with URC share the page instead of a frame of its "
-        "own: it can then do all that the page may do",
+        help="run a third-party widget in the page instead of a sandboxed frame: it gets all "
+        "rights of the page",
     )
 
 

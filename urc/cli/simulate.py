@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 EXAMPLE = "urc simulate puppet --set port=6789"
 
 _SOURCE: Final = "urc.simulator.twin"
-"""Where an emulated robot tells of frames that it cannot answer."""
+"""Log of the frames that an emulated robot cannot answer."""
 _AGAIN_S: Final = 10.0
 """The same is told again after this time, with how often it happened."""
 _LINES_A_SECOND: Final = 5
@@ -79,7 +79,7 @@ async def _simulate(
 
 
 class Complaints(logging.Handler):
-    """Tells of what an emulated robot could not answer: one line each, the same ones counted.
+    """Reports frames that an emulated robot could not answer: one line each, repeats counted.
 
     Args:
         tell: prints one line.
@@ -117,7 +117,7 @@ class Complaints(logging.Handler):
             self._told_at[text] = now
 
     def finish(self) -> None:
-        """Tell what was only counted so far, the most frequent ones by themselves."""
+        """Report the counted repeats, the most frequent ones first."""
         left = sorted(self._counts.items(), key=lambda item: -item[1])
         for text, count in left[:_LAST_LINES]:
             if count:

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 EXAMPLE = "urc trust my-robot.yaml --set host=192.168.1.20"
 
 _NOT_ASKED_FOR = "-"
-"""Stands for a password: nobody logs in to look at a key."""
+"""Placeholder for a password: reading a host key needs no login."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -26,7 +26,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "transport", metavar="TRANSPORT", nargs="?", help="an ssh transport, if there are several"
     )
-    parser.add_argument("--yes", metavar="SHA256:…", help="trust this fingerprint, and ask nothing")
+    parser.add_argument("--yes", metavar="SHA256:…", help="trust this fingerprint without asking")
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -63,7 +63,7 @@ def _transport(profile: "Profile", named: str | None) -> str:
 
 
 def _settings(profile: "Profile", name: str, arguments: argparse.Namespace) -> dict[str, "Value"]:
-    """Return the settings; where nobody logs in on the way, secrets may be left out."""
+    """Return the settings; without a login on the way, secrets may be left out."""
     from urc.cli.settings import settings_given
 
     ((values, missing),) = settings_given([profile], arguments)

@@ -1,4 +1,4 @@
-"""Lines that somebody types, or another program writes, while a verb runs."""
+"""Lines on standard input, typed or written by a program, while a verb runs."""
 
 import asyncio
 import os
@@ -10,9 +10,9 @@ from typing import Final, TextIO
 __all__ = ["typed_lines"]
 
 _LONGEST: Final = 4096
-"""Bytes of a line; what is longer is dropped."""
+"""Bytes of a line; longer lines are dropped."""
 _MOST_WAITING: Final = 64
-"""Lines that nobody has taken yet; beyond them the newest are dropped."""
+"""Unread lines; beyond this number the newest are dropped."""
 
 
 async def typed_lines(stream: TextIO | None) -> AsyncIterator[str]:

@@ -1,4 +1,4 @@
-"""`urc update`: newer versions of what is installed, after showing what changes; and back."""
+"""`urc update`: updates installed packages after showing the changes, and reverts."""
 
 import argparse
 from typing import TYPE_CHECKING
@@ -17,20 +17,21 @@ EXAMPLE = "urc update drivers/puppet"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add what to update, and what is agreed to beforehand."""
+    """Add the packages and the options of consent."""
     parser.add_argument(
-        "packages", metavar="NAME", nargs="*", help="with @RANGE if one is wanted (default: all)"
+        "packages",
+        metavar="NAME",
+        nargs="*",
+        help="packages, optionally with @RANGE (default: all)",
     )
     parser.add_argument(
-        "--yes", action="store_true", help="agree beforehand, where nothing may do more than before"
+        "--yes", action="store_true", help="do not ask, unless an update wants new permissions"
     )
     parser.add_argument(
-        "--allow-more", action="store_true", help="with --yes: also where something may do more"
+        "--allow-more", action="store_true", help="with --yes: also accept new permissions"
     )
     add_risks(parser)
-    parser.add_argument(
-        "--back", action="store_true", help="put back what the last update of NAME replaced"
-    )
+    parser.add_argument("--back", action="store_true", help="revert the last update of NAME")
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -61,7 +62,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _installed(store: "Store", word: str) -> "tuple[Lock, str]":
-    """Return what is installed of a name, and the range that is wanted of it."""
+    """Return the installed package of a name, and its wanted range."""
     from urc.packages.names import PackageError, parse_wish
 
     wish = parse_wish(word)

@@ -1,4 +1,4 @@
-"""`urc validate`: every finding in documents, and their own tests. Needs no robot, no network.
+"""`urc validate`: the problems of documents, and their own tests. Needs no robot, no network.
 
 Imports as little as it can: people run it on every save.
 """
@@ -24,7 +24,7 @@ FORMATS = ("text", "json", "sarif", "github")
 
 
 class _Report:
-    """What was found in all documents of one run."""
+    """The problems in all documents of one run."""
 
     def __init__(self) -> None:
         self.files = 0
@@ -38,7 +38,7 @@ class _Report:
         self.coverage: list[Coverage] = []
         """Of each profile whose tests were run."""
         self.looked_at: dict[str, None] = {}
-        """Every file that the findings depend on, whether there is one or not."""
+        """Every file that the problems depend on, existing or not."""
 
     def add(self, problems: list[Problem]) -> None:
         self.problems = list(dict.fromkeys([*self.problems, *problems]))
@@ -48,19 +48,17 @@ class _Report:
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the documents, the format and what is checked."""
+    """Add the documents, the format and the checks."""
     parser.add_argument(
         "paths", metavar="PATH", nargs="+", help="documents of any kind, or names of robots"
     )
     parser.add_argument(
-        "--format", choices=FORMATS, default="text", help="of the report (default: text)"
+        "--format", choices=FORMATS, default="text", help="format of the report (default: text)"
     )
-    parser.add_argument("--strict", action="store_true", help="warnings fail, too")
+    parser.add_argument("--strict", action="store_true", help="fail on warnings, too")
+    parser.add_argument("--no-tests", action="store_true", help="do not run the documents' tests")
     parser.add_argument(
-        "--no-tests", action="store_true", help="leave out the documents' own tests"
-    )
-    parser.add_argument(
-        "--coverage", action="store_true", help="list what the documents' own tests leave out"
+        "--coverage", action="store_true", help="list commands, polls and messages without a test"
     )
     parser.add_argument(
         "--watch", action="store_true", help="check again whenever a document changes, until Ctrl-C"
@@ -133,7 +131,7 @@ def _examine(paths: list[str], *, with_tests: bool) -> _Report:
 def _examine_folder(
     path: str, widget: "Widget | None", report: _Report, *, with_demo: bool = True
 ) -> None:
-    """Add what is wrong with the files beside a widget's manifest, once that is sound."""
+    """Add the problems of the files next to a widget's manifest, once that is valid."""
     from urc.web.show.widget_check import FILES, check_widget
 
     home = os.path.dirname(path)
@@ -143,7 +141,7 @@ def _examine_folder(
 
 
 def _examine_own_widgets(profile: "Profile", report: _Report) -> None:
-    """Add what is wrong with the files of a document's widgets, but for those that ship."""
+    """Add the problems of the files of a document's widgets, except shipped ones."""
     from urc.shipped import shipped
 
     home = shipped("widgets").resolve()
@@ -166,7 +164,7 @@ def _document_in(path: str) -> str:
 
 
 def _shelf_of_package(path: str) -> "Shelf | None":
-    """Return the widgets for a document that brings some, beside it or as a package. Else None."""
+    """Return the widgets in the folder or package of a document, or None."""
     home = os.path.dirname(path)
     is_package = os.path.isfile(os.path.join(home, "package.yaml"))
     if not is_package and not os.path.isdir(os.path.join(home, "widgets")):

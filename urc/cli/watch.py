@@ -32,11 +32,15 @@ _LOSSES_S = 5.0
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the profile, the signals, how long, and the raw traffic."""
     add_profile(parser)
-    parser.add_argument("signals", metavar="SIGNAL", nargs="*", default=[], help="only these")
+    parser.add_argument(
+        "signals", metavar="SIGNAL", nargs="*", default=[], help="only these signals"
+    )
     parser.add_argument(
         "--for", dest="seconds", type=duration, metavar="TIME", help="stop after 500ms, 5s, 2m …"
     )
-    parser.add_argument("--wire", action="store_true", help="the raw traffic, too, in hex and text")
+    parser.add_argument(
+        "--wire", action="store_true", help="print the raw traffic, too, in hex and text"
+    )
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -99,7 +103,7 @@ def _reasons(hub: "Hub") -> str:
 
 
 class _Printer:
-    """Turns what happens into lines: JSON on standard output, notes on standard error."""
+    """Prints events as lines: JSON on standard output, notes on standard error."""
 
     def __init__(self, writer: "LineWriter", signals: Iterable[str]) -> None:
         self.received = 0
@@ -112,7 +116,7 @@ class _Printer:
         self._offset_s = time.time() - time.monotonic()
 
     async def tell(self, events: "Iterable[Tapped]") -> None:
-        """Print what happened."""
+        """Print the events."""
         from urc.model.values import Sample
         from urc.runtime.hub import Note, Traffic
 
