@@ -39,8 +39,14 @@ from urc.protocol.encode import BadArgument, build_check
 from urc.protocol.events import (
     Close,
     Event,
+    Failed,
+    Fault,
+    Open,
+    Ready,
+    Replied,
     Request,
     Samples,
+    Send,
 )
 from urc.protocol.exchange import (
     Asked,
@@ -59,6 +65,10 @@ from urc.protocol.steps import Runner, Sink, Unless
 from urc.protocol.times import soonest
 
 __all__ = ["Engine"]
+
+
+_PLAIN = frozenset((Send, Fault, Open, Ready, Replied, Failed))
+"""Events that the engine itself does not act upon."""
 
 
 class Engine:
@@ -316,7 +326,9 @@ class Engine:
 
     def _act(self, event: LineEvent, told: list[Event], now: float) -> None:
         """Act upon one event; add what it means for the outside to `told`."""
-        if isinstance(event, Ended):
+        if type(event) in _PLAIN:
+            told.append(event)  # type: ignore[arg-type]  # these are for the outside
+        elif isinstance(event, Ended):
             exchange, outcome = event
             for one in exchange.owner.ended(exchange, outcome, now):
                 self._act(one, told, now)

@@ -231,7 +231,7 @@ class Asked:
         number, command = self._request.id, self._request.command
         if outcome.code:
             return [Failed(number, command, outcome.code, outcome.message)]
-        return [Replied(number, command, outcome.values)]
+        return [new(Replied, (number, command, outcome.values))]
 
     @property
     def on_sent(self) -> Callable[[Payload], None] | None:

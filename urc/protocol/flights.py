@@ -22,8 +22,8 @@ class Flight:
     """One time that a request was sent, until its last answer has come or is given up."""
 
     __slots__ = (
+        "_ear",
         "due",
-        "ear",
         "exchange",
         "is_extended",
         "is_late",
@@ -38,8 +38,7 @@ class Flight:
         self.exchange = exchange
         ask = exchange.ask
         self.stage = 0
-        self.ear = Ear(ask.answers[0])
-        """Collects the frames of the answer that is waited for."""
+        self._ear: Ear | None = None
         self.due = now + ask.answers[0].timeout_s
         """When its answer is overdue; of one that is late: when it is not expected any more."""
         self.size = 0
@@ -53,6 +52,13 @@ class Flight:
         self.values: dict[str, Reading] = {}
         self.number: int | None = None
         """What its answer carries; None: it is recognised otherwise."""
+
+    @property
+    def ear(self) -> Ear:
+        """Collects the frames of the present answer; a plain answer needs none."""
+        if self._ear is None:
+            self._ear = Ear(self.exchange.ask.answers[self.stage])
+        return self._ear
 
     def answer(self, frame: Frame) -> Offer:
         """Return what the frame means, which carries the number of this request."""
@@ -98,7 +104,7 @@ class Flight:
         self.stage += 1
         if self.stage == len(answers):
             return False
-        self.ear, self.since, self.is_extended = Ear(answers[self.stage]), now, False
+        self._ear, self.since, self.is_extended = None, now, False
         self.due = now + answers[self.stage].timeout_s
         return True
 

@@ -42,6 +42,8 @@ from urc.protocol.topics import frame_of
 
 __all__ = ["Line"]
 
+new = tuple.__new__
+"""Makes a named tuple faster than its class does, for events of every command."""
 MISSES_UNTIL_CLOSED = 3
 """Missing answers in a row after which a line is given up."""
 MOST_IN_FLIGHT = 256
@@ -186,7 +188,7 @@ class Line(Connection):
         if count is not None and count.after and self.counters.is_shared:
             again = partial(self._count_again, exchange, number)
             shared = Counted(Numbered(data, count), again)
-        sent: list[LineEvent] = [Send(self.spec.name, data, exchange.is_secret, shared)]
+        sent: list[LineEvent] = [new(Send, (self.spec.name, data, exchange.is_secret, shared))]
         if not ask.answers:
             if number is not None:
                 if len(self._askers) >= MOST_IN_FLIGHT:
@@ -390,7 +392,7 @@ class Line(Connection):
         samples, refused = taken
         events = self.inbox.told(samples, refused)
         values = {sample.signal: sample.value for sample in samples}
-        events.append(Ended(flight.exchange, Outcome("", "", values)))
+        events.append(new(Ended, (flight.exchange, new(Outcome, ("", "", values)))))
         return events + self.leave(now) if self.is_per_request and self.is_ready else events
 
     # -- answers: in time, too late, or none
