@@ -14,14 +14,12 @@ import socket
 import subprocess
 from collections.abc import Sequence
 from contextlib import suppress
-from time import monotonic
 from typing import Final
 
 from urc.guard import wire
 from urc.guard.pipe import Pipe
 from urc.guard.process import CAN_INHERIT, Door, Standing, launch, reap, standing
 from urc.guard.side import Client, LineSpec, LocalGuard
-from urc.model.codec import Payload
 
 __all__ = ["CAN_GUARD", "Client", "Guard", "LineSpec", "LocalGuard"]
 
@@ -228,12 +226,6 @@ class Guard(Client):
     def _post(self, said: wire.ToGuard) -> None:
         if self._pipe is not None:
             self._pipe.post(said)
-
-    def rehearse(self, control: str, data: Payload) -> None:
-        """Let the guard go the way of a tick, and write nothing; what has to wait is left out."""
-        held, pipe = self._held.get(control), self._pipe
-        if held is not None and pipe is not None and not pipe.is_backed_up:
-            pipe.post(wire.Rehearsal(control, held.number, data, monotonic()))
 
     def _pass_newest(self, slot: str, said: wire.ToGuard) -> None:
         if self._pipe is not None:

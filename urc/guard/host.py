@@ -39,7 +39,6 @@ class Host:
             wire.Make: self._make,
             wire.Renew: self._renew,
             wire.Owe: self._owe,
-            wire.Rehearsal: self._rehearse,
         }
 
     def take(self, said: wire.ToGuard) -> None:
@@ -103,11 +102,6 @@ class Host:
             line.reins.stop(control, terms)
             self._stirred.add(line)
         self.settle()  # before anything else that came with it
-
-    def _rehearse(self, said: wire.Rehearsal) -> None:
-        line = self._controls.get(said.control)
-        if line is not None:
-            line.rehearse(said)
 
     def _owe(self, said: wire.Owe) -> None:
         line = self._controls[said.control] = self._lines[said.line]

@@ -15,7 +15,6 @@ from functools import partial
 from typing import Any, Final
 
 from urc.guard import wire
-from urc.guard.double import Double
 from urc.guard.hearing import HearingWatch
 from urc.guard.lane import Clock, Lane, Ring, why_broken
 from urc.guard.pipe import UNFIT
@@ -87,7 +86,6 @@ class Line:
             is_moving=lambda: self.reins.is_moving,
             failed=self._stall,
         )
-        self._double = Double(transport, clock)
         self._offer: Callable[[bytes], bool] | None = getattr(transport, "offer", None)
         self._lane: Lane[int] = Lane(
             transport,
@@ -195,12 +193,6 @@ class Line:
             self._emit(wire.Sent(self.name, self._turn, number))
         self.reins.tell_counted()
         self._hearing.start()
-
-    def rehearse(self, said: wire.Rehearsal) -> None:
-        """Go the way of a tick, and write nothing."""
-        terms = self.reins.moving(said.control)
-        if terms is not None and self._is_open:
-            self._double.tick(said.control, terms, said.number, said.data, said.at_s)
 
     def rescue(self) -> None:
         """Open the line by ourselves, because a stop is owed."""

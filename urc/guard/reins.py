@@ -126,11 +126,6 @@ class Reins:
         if mover.tick(None if is_stale else data or None, min(at_s, now)) and is_stale:
             self._stale.append((control, number))
 
-    def moving(self, control: str) -> Terms | None:
-        """Return the terms under which `control` moves; None: it does not."""
-        mover = self._movers.get(control)
-        return mover.terms if mover is not None and mover.state == "moving" else None
-
     def renew(self, control: str, stop: Payload, stops: tuple[Numbered, ...] = ()) -> None:
         """Stop `control` with `stop` from now on."""
         mover = self._movers.get(control)

@@ -105,9 +105,6 @@ class Client:
         tick = wire.Tick(control, held.number, numbered.data, held.at_s, count)
         self._pass_newest(control, tick)
 
-    def rehearse(self, control: str, data: Payload) -> None:
-        """Let the guard go the way of a tick, and write nothing, where it is another process."""
-
     def renew(self, control: str, stop: Payload | Series) -> None:
         """Let `stop` be what stops `control` from now on; it arms nothing."""
         held = self._held.get(control)

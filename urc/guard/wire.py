@@ -29,7 +29,6 @@ __all__ = [
     "Owe",
     "Received",
     "Refused",
-    "Rehearsal",
     "Release",
     "Renew",
     "Send",
@@ -150,15 +149,6 @@ class Renew(msgspec.Struct, array_like=True, frozen=True, tag=11):
     stops: tuple[Numbered, ...] = ()
 
 
-class Rehearsal(msgspec.Struct, array_like=True, frozen=True, tag=12):
-    """Go the way of a `Tick`, and write nothing: the next one finds at hand what it needs."""
-
-    control: str
-    number: int
-    data: Payload
-    at_s: float
-
-
 class Opened(msgspec.Struct, array_like=True, frozen=True, tag=21):
     """A line is open."""
 
@@ -259,9 +249,7 @@ class Stale(msgspec.Struct, array_like=True, frozen=True, tag=31):
     stand: dict[str, int]
 
 
-ToGuard = (
-    Make | Open | Send | Close | Credit | Arm | Tick | Release | Renew | Stop | Owe | Rehearsal
-)
+ToGuard = Make | Open | Send | Close | Credit | Arm | Tick | Release | Renew | Stop | Owe
 FromGuard = (
     Opened
     | OpenFailed

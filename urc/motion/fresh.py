@@ -47,9 +47,7 @@ class Freshness:
         self._issued.append(now)
         return self._number
 
-    def refusal(
-        self, given: Input, epoch: int, now: float, of: str = "", *, counts: bool = True
-    ) -> str:
+    def refusal(self, given: Input, epoch: int, now: float, of: str = "") -> str:
         """Return why an input is not taken, or "" and remember it.
 
         Args:
@@ -57,7 +55,6 @@ class Freshness:
             epoch: of the lease that holds now.
             now: the time.
             of: the control: the inputs of one may overtake those of another.
-            counts: False: it is not remembered.
         """
         if given.epoch != epoch:
             return f"it belongs to lease {given.epoch}, and this is {epoch}"
@@ -69,8 +66,7 @@ class Freshness:
         issued_at = self._issued[-1 - back]
         if now - issued_at > OLDEST_S:
             return f"it is {(now - issued_at) * 1000:.0f} ms old"
-        if counts:
-            self._newest[of] = given.number
+        self._newest[of] = given.number
         return ""
 
 

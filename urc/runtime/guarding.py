@@ -40,7 +40,7 @@ class GuardedMovers:
         """
         self._driver = driver
         self.client = client
-        self.tick, self.rehearse = client.tick, client.rehearse
+        self.tick = client.tick
         self._known: dict[str, Terms] = {}
         """Of every control that was armed or stopped."""
 

@@ -52,9 +52,6 @@ class Movers(Protocol):
     def tick(self, command: str, data: Payload | Counted) -> None:
         """Renew the lease of `command`; `data` is its newest frame."""
 
-    def rehearse(self, command: str, data: Payload) -> None:
-        """Do what a tick takes, and write nothing."""
-
     def renew(self, command: str, stop: Payload | Series) -> None:
         """Let `stop` be what stops `command` from now on; it arms nothing."""
 
@@ -105,11 +102,6 @@ class Control:
     """What closed it, where it needs that."""
     closed_epoch: int = -1
     """Lease in which it stopped by itself: it goes on in a later one only."""
-
-    @property
-    def can_rehearse(self) -> bool:
-        """Whether a frame of it may be made for nothing: it moves, and uses no number up."""
-        return self.course == "moving" and self.is_armed and self.is_lasting
 
     def rest(self) -> None:
         """Take note that it is to stand."""

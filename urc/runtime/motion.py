@@ -220,28 +220,23 @@ class MotionDesk:
         arguments: Mapping[str, Reading],
         given: Input,
         now: float,
-        *,
-        counts: bool = True,
     ) -> str:
-        """Take a tick of sampled input; return why it was refused, or "".
-
-        One that does not count is a rehearsal: it goes the same way, and changes nothing.
-        """
+        """Take a tick of sampled input; return why it was refused, or ""."""
         control, screen = self._controls.get(command), self._screens.get(client)
         if control is None or screen is None:
             return f"{command!r} is no held command of this robot"
         epoch = self.lease.state.epoch
         refusal = self.lease.refusal(client, given.epoch) or screen.freshness.refusal(
-            given, epoch, now, command, counts=counts
+            given, epoch, now, command
         )
-        if refusal or not (counts or control.can_rehearse):
+        if refusal:
             return refusal
         if control.needs_release or epoch <= control.closed_epoch:
             return control.why if control.needs_release else _TAKE_ANEW
         frames, movers = self._frames, self._movers
         if frames is None or movers is None:
             return _NO_ROBOT
-        if control.slew is not None and counts:
+        if control.slew is not None:
             arguments = control.limited(arguments, now)
         self._is_making = True  # its stop is made after it
         try:
@@ -252,15 +247,10 @@ class MotionDesk:
             elif not control.is_lasting:
                 self._renew_stops(control.line)
         except UrcError as error:
-            if counts:
-                self._abandon(command, control, movers, str(error))
+            self._abandon(command, control, movers, str(error))
             return str(error)
         finally:
             self._is_making = False
-        if not counts:
-            if not isinstance(data, Counted) and data:
-                movers.rehearse(command, data)
-            return ""
         self.lease.touch(now)
         control.course = "moving"
         movers.tick(command, data)

@@ -84,8 +84,6 @@ class FakeMovers:
         self.ticked_s = float("-inf")
         """When the newest tick was taken."""
         self.is_up = True
-        self.rehearsed: list[Payload] = []
-        """Frames of ticks that were none."""
         self._clock = clock
         self._write = write
         self._movers: dict[str, Mover] = {}
@@ -110,10 +108,6 @@ class FakeMovers:
         if self._movers[command].tick(data or None, self._clock.now()):
             self.ticked_s = self._clock.now()
         self.step()
-
-    def rehearse(self, command: str, data: Payload) -> None:
-        """Count it: nothing is written."""
-        self.rehearsed.append(data)
 
     def renew(self, command: str, stop: Payload | Series) -> None:
         """Stop it with these bytes from now on."""

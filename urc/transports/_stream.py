@@ -159,12 +159,6 @@ class Stream(asyncio.BufferedProtocol):
         self._transport.write(data)
         return True
 
-    def touch(self) -> None:
-        """Go the way of `offer` with nothing: to write no byte to a stream sends nothing at all."""
-        if _CAN_WRITE and self._ended is None and not self._transport.get_write_buffer_size():
-            with suppress(OSError):  # the loop sees it, too
-                os.write(self._number, b"")
-
     @property
     def has_ended(self) -> bool:
         """Whether nothing more will come, and nothing more goes."""

@@ -50,12 +50,6 @@ class TcpTransport(StreamLine):
         stream = self._stream
         return type(stream) is Stream and stream.offer(data)
 
-    def touch(self) -> None:
-        """Go the way of `offer` with nothing to hand over."""
-        stream = self._stream
-        if type(stream) is Stream:
-            stream.touch()
-
     @property
     def is_clogged(self) -> bool:
         """Whether some of what was taken waits for the kernel; `send` waits for it."""

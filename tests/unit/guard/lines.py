@@ -72,10 +72,6 @@ class CountedWire(Wire):
         super().__init__()
         self.is_stuck = False
         self.stuck_bytes = 0
-        self.touches = 0
-
-    def touch(self) -> None:
-        self.touches += 1
 
     def offer(self, data: bytes) -> bool:
         self.written.append(data)

@@ -32,25 +32,6 @@ async def test_lease_that_runs_out_stops(rig: Rig) -> None:
     assert rig.robot.written == [b"go 1", STOP], "idle is silent, and nothing goes on by itself"
 
 
-async def test_rehearsal_goes_up_to_the_line_and_writes_nothing(rig: Rig) -> None:
-    """Nor does it renew the lease, or begin a motion."""
-    host = rig.guard._host
-    rehearsal = wire.Rehearsal("drive", 2, b"go 2", rig.clock.now())
-    host.take(rehearsal)
-    await rig.drive()
-    rehearsals = 0
-    for _ in range(24):
-        await rig.clock.advance(0.01)
-        host.take(rehearsal)
-        rehearsals += 1
-    assert (rig.robot.written, rig.robot.touches) == ([b"go 1"], rehearsals)
-    await rig.clock.advance(0.02)
-    host.take(rehearsal)
-    await rig.clock.advance(1.0)
-    assert (rig.robot.written, rig.robot.touches) == ([b"go 1", STOP], rehearsals)
-    assert await rig.stops() == [("drive", "expired")]
-
-
 async def test_release_stops_and_may_go_on(rig: Rig) -> None:
     await rig.drive()
     rig.guard.release("drive")

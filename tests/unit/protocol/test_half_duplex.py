@@ -96,6 +96,5 @@ def test_on_other_lines_motion_waits_for_nothing() -> None:
     assert give(it) == b"V 1\n"
 
 
-def test_nothing_is_rehearsed_where_a_frame_may_owe_an_answer() -> None:
-    """A rehearsal would hold up the motion that it is for."""
+def test_a_stop_is_not_lasting_where_a_frame_may_owe_an_answer() -> None:
     assert not talk().engine.motions.is_lasting("drive")

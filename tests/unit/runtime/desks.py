@@ -50,11 +50,6 @@ class Movers:
         assert isinstance(data, bytes)
         self.told.append(data.decode())
 
-    def rehearse(self, command: str, data: Payload) -> None:
-        assert isinstance(data, bytes)
-        assert command in data.decode()
-        self.told.append(f"rehearse {data.decode()}")
-
     def renew(self, command: str, stop: Payload) -> None:
         assert isinstance(stop, bytes)
         assert command in stop.decode()

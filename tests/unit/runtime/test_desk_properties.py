@@ -57,9 +57,6 @@ class Line:
         self.is_up = True
         self.now = 0.0
 
-    def rehearse(self, command: str, data: Payload) -> None:
-        """Nothing is written."""
-
     def arm(self, command: str, terms: Terms) -> None:
         self._mover(command, terms).arm()
 

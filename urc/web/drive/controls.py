@@ -23,7 +23,6 @@ from urc.runtime.lateness import TOO_LATE_S, LoopWatch
 from urc.runtime.motion import MotionDesk, Movers
 from urc.runtime.trail import Trail
 from urc.web.drive.once import Once
-from urc.web.drive.rehearsal import Rehearsal
 from urc.web.drive.seat import FLOOD, Drivable, Seat
 from urc.web.wire import drive as wire
 
@@ -71,7 +70,6 @@ class Controls:
         """Of the newest lease."""
         self._beating: Alarm | None = None
         self._expiring: Alarm | None = None
-        self._rehearsal = Rehearsal(clock, lambda: self.desk)
         self.once = Once(driver, lambda: self.desk, clock, self.trail)
         self.watch = LoopWatch(clock, self._held_up)
         """Runs while the robot is connected."""
@@ -131,7 +129,6 @@ class Controls:
                     group.create_task(self._follow(session.movers))
         finally:
             self.watch.end()
-            self._rehearsal.end()
             self._hub = None
             self.desk.detach()
             now = self._clock.now()
@@ -217,8 +214,6 @@ class Controls:
         is_moving = now - seat.moved_at_s < PATIENCE_S and not seat.alarms
         if is_moving and not seat.doubled and pace is not None and pace.take(now):
             self._tick(seat, tick, now)
-            if seat.moved_at_s == now:
-                self._rehearsal.take(seat.client.id, data, now)
             return "in time"
         self._thin(seat, tick)
         return "one more"
@@ -233,7 +228,6 @@ class Controls:
                     return
                 seat.forget(said.command)
                 seat.moved_s.pop(said.command, None)
-                self._rehearsal.end()
                 self.desk.release(seat.client.id, said.command)
             case wire.Stop():
                 if not seat.is_first("", said.number):
@@ -244,7 +238,6 @@ class Controls:
 
     def stop(self, by: str) -> None:
         """Stop and latch. Never refused."""
-        self._rehearsal.end()
         for seat in self._seats.values():
             for command in list(seat.alarms):
                 seat.forget(command)
@@ -331,7 +324,6 @@ class Controls:
 
     def _refused(self, command: str, why: str) -> None:
         """Let every screen know in which words the robot refused to move."""
-        self._rehearsal.end()
         self.trail.stopped(command, why, self._clock.now())
         for seat in self._seats.values():
             seat.forget(command)

@@ -7,7 +7,7 @@ are counted, so that the next frame is known to begin where it begins.
 
 from typing import Final
 
-__all__ = ["Frames", "again", "text_of"]
+__all__ = ["Frames", "text_of"]
 
 _TEXT: Final = 0x81
 """First byte of a text that is not continued."""
@@ -17,7 +17,6 @@ _HEAD: Final = 2
 _MASK: Final = 4
 _PLAIN: Final = bytes(_MASK)
 """A mask that changes nothing."""
-_SOME_MASK: Final = b"mask"
 _CONTROL: Final = 0x08
 
 
@@ -79,14 +78,6 @@ def text_of(frame: bytes) -> bytes:
     """Return the text in a whole frame of `Frames.spans`."""
     at = _HEAD + _MASK + (2 if frame[1] & 0x7F == _SHORT else 0)
     return _unmasked(frame[at - _MASK : at], frame[at:])
-
-
-def again(text: bytes) -> bytes:
-    """Return `text`, found in a frame as it came: the way through this module, and nothing else."""
-    size = len(text)
-    head = bytes((_TEXT, _MASKED | size)) if size < _SHORT else bytes((_TEXT, _MASKED | _SHORT))
-    wide = b"" if size < _SHORT else size.to_bytes(2, "big")
-    return Frames().whole(head + wide + _SOME_MASK + _unmasked(_SOME_MASK, text)) or text
 
 
 def _is_text(data: bytes, at: int) -> bool:
