@@ -6,7 +6,7 @@ from typing import Final
 
 from urc.guard.lane import Clock, Ring, why_broken
 from urc.motion.hearing import ASKED_EVERY_S, SILENCE_S, Hearing
-from urc.transports.base import Probed, Transport, TransportError
+from urc.transports.base import SupportsProbe, Transport, TransportError
 
 __all__ = ["HearingWatch"]
 
@@ -28,13 +28,13 @@ class HearingWatch:
         """Prepare.
 
         Args:
-            transport: asked for a sign of life where it is `Probed`.
+            transport: asked for a sign of life where it is a `SupportsProbe`.
             clock: the time.
             silent_s: how long the robot may say nothing unasked; None: for ever.
             is_moving: whether anything moves.
             failed: told why when the program stands still.
         """
-        self._transport = transport if isinstance(transport, Probed) else None
+        self._transport = transport if isinstance(transport, SupportsProbe) else None
         self._clock = clock
         self._silent_s = silent_s
         self._is_moving = is_moving
@@ -90,7 +90,7 @@ class HearingWatch:
         at_s = min(now + _LOOK_S, self._hearing.deadline)
         self._alarm = self._clock.call_at(at_s, self._look)
 
-    async def _ask(self, transport: Probed) -> None:
+    async def _ask(self, transport: SupportsProbe) -> None:
         try:
             await transport.probe()
             self.heard()

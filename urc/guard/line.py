@@ -21,7 +21,14 @@ from urc.guard.pipe import UNFIT
 from urc.guard.reins import Reins
 from urc.guard.tally import Tally
 from urc.model.codec import Payload
-from urc.transports.base import PeerClosed, Transport, TransportError
+from urc.transports.base import (
+    PeerClosed,
+    Prompt,
+    SupportsAbort,
+    SupportsOffer,
+    Transport,
+    TransportError,
+)
 from urc.transports.hurry import HURRY, Hurry
 
 __all__ = ["WINDOW_BYTES", "Line"]
@@ -86,7 +93,9 @@ class Line:
             is_moving=lambda: self.reins.is_moving,
             failed=self._stall,
         )
-        self._offer: Callable[[bytes], bool] | None = getattr(transport, "offer", None)
+        self._offer = transport.offer if isinstance(transport, SupportsOffer) else None
+        self._prompt = transport if isinstance(transport, Prompt) else None
+        self._abort = transport.abort if isinstance(transport, SupportsAbort) else None
         self._lane: Lane[int] = Lane(
             transport,
             clock,
@@ -153,7 +162,7 @@ class Line:
             self._lane.put(partial(self._leave, said), number)
         else:
             self._count(said)
-            if getattr(self.transport, "is_clogged", False):
+            if self._prompt is not None and self._prompt.is_clogged:
                 self._lane.put(lambda: b"", number)  # is handed over with the rest
             else:
                 self._acked = number
@@ -282,9 +291,8 @@ class Line:
         self._acked = self._counted = self._round = 0
         self._credit = WINDOW_BYTES
         self._handed.set()
-        divert = getattr(self.transport, "divert", None)
-        if divert is not None:
-            divert(self._arrived)
+        if self._prompt is not None:
+            self._prompt.divert(self._arrived)
         address, stand = self.transport.address, self._tally.stand
         self._emit(wire.Opened(self.name, self._turn, address, stand))
 
@@ -356,7 +364,7 @@ class Line:
             await self._rescue()
 
     async def _close_transport(self, *, is_abort: bool = False) -> None:
-        close = getattr(self.transport, "abort", None) if is_abort else None
+        close = self._abort if is_abort else None
         try:
             async with asyncio.timeout(_CLOSE_S):
                 await (close or self.transport.close)()

@@ -19,7 +19,13 @@ from urc.guard.tally import Tally
 from urc.model.codec import Count, Numbered, Payload
 from urc.motion.hold import Mover, Reason, Terms
 from urc.motion.stall import IN_FLIGHT_S, StallWatch
-from urc.transports.base import Transport, TransportError
+from urc.transports.base import (
+    SupportsForget,
+    SupportsOffer,
+    SupportsUnsent,
+    Transport,
+    TransportError,
+)
 
 __all__ = ["Reins"]
 
@@ -47,9 +53,8 @@ class Reins:
         """Prepare; nothing is written before `begin`.
 
         Args:
-            transport: where everything goes. It may have ``unsent()``, the bytes that have not left
-                for good, ``offer(data)``, which hands over without waiting, and ``forget()``, where
-                what is sent later may arrive sooner: it gives up what is unsent.
+            transport: where everything goes; used better where it is a `SupportsUnsent`,
+                `SupportsOffer` or `SupportsForget`.
             clock: the time.
             stalled_s: age of unsent bytes at which the line counts as stalled.
             is_strict: motion waits until nothing at all is unsent.
@@ -60,9 +65,9 @@ class Reins:
                 be written any more.
         """
         self._clock = clock
-        self._unsent: Callable[[], int] | None = getattr(transport, "unsent", None)
-        self._offer: Callable[[bytes], bool] | None = getattr(transport, "offer", None)
-        self._forget: Callable[[], None] | None = getattr(transport, "forget", None)
+        self._unsent = transport.unsent if isinstance(transport, SupportsUnsent) else None
+        self._offer = transport.offer if isinstance(transport, SupportsOffer) else None
+        self._forget = transport.forget if isinstance(transport, SupportsForget) else None
         self._is_strict = is_strict or self._forget is not None
         self._told = told
         self._failed = failed

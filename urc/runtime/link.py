@@ -31,7 +31,7 @@ from urc.runtime.dispatcher import Dispatcher
 from urc.runtime.hub import Hub, LinkState
 from urc.runtime.outgoing import STUCK_S, Outgoing
 from urc.runtime.report import LinkReport
-from urc.transports.base import NOTICE, Prompt, Settling, Transport, TransportError
+from urc.transports.base import NOTICE, Prompt, SupportsSettle, Transport, TransportError
 
 __all__ = ["Link"]
 
@@ -202,7 +202,7 @@ class Link:
             if self._clock.now() >= until:
                 return f"{self._transport.address} takes nothing"
             await self._clock.sleep(_LOOK_S)
-        if self.is_connected and isinstance(self._transport, Settling):
+        if self.is_connected and isinstance(self._transport, SupportsSettle):
             try:
                 return await self._transport.settle()
             except TransportError as broken:

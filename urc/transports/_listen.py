@@ -9,7 +9,7 @@ from urc.transports._faults import place_of, reason
 from urc.transports._lookup import Lookup
 from urc.transports._stream import StreamLine, adopt, tune
 from urc.transports._tls import Tls
-from urc.transports.base import ByteStream, ConnectFailed
+from urc.transports.base import ByteStream, ConnectFailed, SupportsEnd
 
 __all__ = ["HANDOVER_S", "TcpListener"]
 
@@ -193,9 +193,11 @@ class TcpListener(StreamLine):
 
     def _replace(self) -> None:
         """Let the connection that stands know that it is over."""
-        end = getattr(self._stream, "end", None)
-        if end is not None and self._newer is not None:
-            end(f"another robot took its place ({self._newer[1]})")
+        stream = self._stream
+        if stream is None or self._newer is None:
+            return
+        if isinstance(stream, SupportsEnd):
+            stream.end(f"another robot took its place ({self._newer[1]})")
 
     def _stay_open(self) -> None:
         if self._shut is not None:

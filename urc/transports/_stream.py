@@ -17,7 +17,13 @@ from typing import cast
 
 from urc.model.codec import Payload
 from urc.transports._faults import CLOSED, HUNG_UP, broke
-from urc.transports.base import ByteStream, PeerClosed, TransportError
+from urc.transports.base import (
+    ByteStream,
+    PeerClosed,
+    SupportsReset,
+    TransportError,
+    unsent_of,
+)
 
 if sys.platform == "linux":
     from fcntl import ioctl
@@ -225,15 +231,14 @@ class StreamLine:
 
         0 where that cannot be known: through another transport, or on a system that does not tell.
         """
-        count = getattr(self._stream, "unsent", None)
-        return int(count()) if count is not None else 0
+        return unsent_of(self._stream)
 
     async def abort(self) -> None:
         """Close at once; what the robot has not got by now it never gets. Never raises."""
-        reset = getattr(self._stream, "reset", None)
-        if reset is not None:
+        stream = self._stream
+        if stream is not None and isinstance(stream, SupportsReset):
             self._stream = None
-            await reset()
+            await stream.reset()
         else:
             await self.close()
 

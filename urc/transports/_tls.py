@@ -14,7 +14,15 @@ from typing import Self, TypeVar
 
 from urc.transports import _options
 from urc.transports._faults import HUNG_UP, reason
-from urc.transports.base import ByteStream, ConnectFailed, PeerClosed, TransportError
+from urc.transports.base import (
+    ByteStream,
+    ConnectFailed,
+    PeerClosed,
+    SupportsEnd,
+    TransportError,
+    reset,
+    unsent_of,
+)
 
 __all__ = ["Tls"]
 
@@ -127,17 +135,14 @@ class _TlsStream:
         await self._stream.abort()
 
     def unsent(self) -> int:
-        count = getattr(self._stream, "unsent", None)
-        return self._leaving.pending + (int(count()) if count is not None else 0)
+        return self._leaving.pending + unsent_of(self._stream)
 
     async def reset(self) -> None:
-        reset = getattr(self._stream, "reset", self._stream.abort)
-        await reset()
+        await reset(self._stream)
 
     def end(self, why: str) -> None:
-        end = getattr(self._stream, "end", None)
-        if end is not None:
-            end(why)
+        if isinstance(self._stream, SupportsEnd):
+            self._stream.end(why)
 
     async def _flush(self) -> None:
         async with self._turn:

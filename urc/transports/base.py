@@ -20,12 +20,21 @@ __all__ = [
     "ConnectFailed",
     "PeerClosed",
     "Prompt",
-    "Settling",
     "Setup",
     "Subscription",
+    "SupportsAbort",
+    "SupportsEnd",
+    "SupportsForget",
+    "SupportsOffer",
+    "SupportsProbe",
+    "SupportsReset",
+    "SupportsSettle",
+    "SupportsUnsent",
     "Transport",
     "TransportError",
     "bytes_of",
+    "reset",
+    "unsent_of",
 ]
 
 
@@ -122,9 +131,13 @@ class Setup(NamedTuple):
     """What it goes through; None: this machine's own network."""
 
 
+# Optional abilities. Users ask with `isinstance` once, when they are made, and do without where an
+# ability is missing.
+
+
 @runtime_checkable
-class Settling(Protocol):
-    """What a transport may offer beside, where handing over is not yet arriving."""
+class SupportsSettle(Protocol):
+    """A transport on which a message that was handed over may not have arrived yet."""
 
     async def settle(self) -> str:
         """Keep the line until what was sent has arrived, as far as can be known.
@@ -137,8 +150,8 @@ class Settling(Protocol):
 
 
 @runtime_checkable
-class Probed(Protocol):
-    """What a transport may offer beside, where the program at the other end can be asked."""
+class SupportsProbe(Protocol):
+    """A transport that can ask the program at the other end for a sign of life."""
 
     async def probe(self) -> None:
         """Return when anything has come from that program since the call.
@@ -149,15 +162,44 @@ class Probed(Protocol):
 
 
 @runtime_checkable
-class Prompt(Protocol):
-    """What a transport of bytes may offer beside: it saves a task's turn for each message.
+class SupportsUnsent(Protocol):
+    """A transport or stream that counts its unsent bytes."""
+
+    def unsent(self) -> int:
+        """Return the bytes handed over that have not left for good; 0 where nobody can tell."""
+
+
+@runtime_checkable
+class SupportsForget(Protocol):
+    """A transport that does not keep the order of messages: a later one may arrive sooner."""
+
+    def forget(self) -> None:
+        """Give up what is unsent: it would arrive after its stop."""
+
+
+@runtime_checkable
+class SupportsAbort(Protocol):
+    """A transport that can be closed without sending what is unsent."""
+
+    async def abort(self) -> None:
+        """Close at once; what the robot has not got by now, it never gets. Never raises."""
+
+
+@runtime_checkable
+class SupportsOffer(Protocol):
+    """A transport that can take bytes without waiting."""
+
+    def offer(self, data: bytes) -> bool:
+        """Hand `data` over if nothing waits before it; return whether it was taken. Never waits."""
+
+
+@runtime_checkable
+class Prompt(SupportsOffer, Protocol):
+    """A transport of bytes that saves a task's turn for each message, both ways.
 
     The order of bytes is kept: `offer` takes none while others wait, and a sink gets none while
     `receive` has some to give.
     """
-
-    def offer(self, data: bytes) -> bool:
-        """Hand `data` over if nothing waits before it; return whether it was taken. Never waits."""
 
     @property
     def is_clogged(self) -> bool:
@@ -168,3 +210,31 @@ class Prompt(Protocol):
 
         What it does not take is for `receive`.
         """
+
+
+@runtime_checkable
+class SupportsReset(Protocol):
+    """A stream that can be closed without sending what is unsent."""
+
+    async def reset(self) -> None:
+        """Close at once; what is unsent is never sent. Never raises."""
+
+
+@runtime_checkable
+class SupportsEnd(Protocol):
+    """A stream that this side can end with a reason for people."""
+
+    def end(self, why: str) -> None:
+        """Let `take` and `put` raise `PeerClosed` with `why` from now on."""
+
+
+def unsent_of(stream: ByteStream | None) -> int:
+    """Return the unsent bytes of a stream; 0 where it cannot count them."""
+    if stream is not None and isinstance(stream, SupportsUnsent):
+        return stream.unsent()
+    return 0
+
+
+async def reset(stream: ByteStream) -> None:
+    """Close a stream, without sending what is unsent where it can do so."""
+    await (stream.reset() if isinstance(stream, SupportsReset) else stream.abort())

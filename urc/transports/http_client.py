@@ -16,7 +16,8 @@ import httpcore2
 import httpx2
 
 from urc.transports._faults import HUNG_UP, late, one_line
-from urc.transports.base import ByteStream, ConnectFailed, PeerClosed, TransportError
+from urc.transports._stream import Stream
+from urc.transports.base import ByteStream, ConnectFailed, PeerClosed, TransportError, unsent_of
 from urc.transports.web_dial import Dialer
 from urc.transports.web_place import Credentials, WebPlace
 
@@ -346,20 +347,17 @@ class _Connection(httpcore2.AsyncNetworkStream):
 
         The robot may have closed a connection that the library still keeps: that holds nothing up.
         """
-        count = getattr(self._stream, "unsent", None)
-        if count is None or getattr(self._stream, "has_ended", False):
-            return 0
-        return int(count())
+        stream = self._stream
+        return 0 if isinstance(stream, Stream) and stream.has_ended else unsent_of(stream)
 
     def drop(self) -> None:
         """End it now: what is unsent is never sent. Whoever waits for it is told.
 
         What goes through another transport keeps its order, and stays.
         """
-        drop = getattr(self._stream, "drop", None)
-        if drop is not None:
+        if isinstance(self._stream, Stream):
             self._ended(self)
-            drop()
+            self._stream.drop()
 
     async def aclose(self) -> None:
         if self.unsent():  # a request that was given up would come late, after newer ones

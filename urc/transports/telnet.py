@@ -5,7 +5,7 @@ The line below is a TCP connection of this machine, or one that another transpor
 
 import asyncio
 import socket
-from collections.abc import Callable, Coroutine
+from collections.abc import Coroutine
 from contextlib import suppress
 from typing import Any, Final, NamedTuple
 
@@ -19,6 +19,8 @@ from urc.transports.base import (
     PeerClosed,
     Setup,
     TransportError,
+    reset,
+    unsent_of,
 )
 from urc.transports.telnet_protocol import BINARY, ECHO, NAWS, SGA, TTYPE, TelnetTalk
 from urc.transports.topic_socket import Address
@@ -127,12 +129,10 @@ class _TelnetStream:
         await self._inner.abort()
 
     def unsent(self) -> int:
-        count: Callable[[], int] | None = getattr(self._inner, "unsent", None)
-        return count() if count is not None else 0
+        return unsent_of(self._inner)
 
     async def reset(self) -> None:
-        reset = getattr(self._inner, "reset", self._inner.abort)
-        await reset()
+        await reset(self._inner)
 
 
 def _acknowledge(line: socket.socket) -> None:

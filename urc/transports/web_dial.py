@@ -13,7 +13,14 @@ from urc.transports._faults import late
 from urc.transports._reach import Reach
 from urc.transports._stream import forget_unsent, unsent_in
 from urc.transports._tls import Tls
-from urc.transports.base import ByteStream, Carrier, ConnectFailed, PeerClosed
+from urc.transports.base import (
+    ByteStream,
+    Carrier,
+    ConnectFailed,
+    PeerClosed,
+    SupportsReset,
+    unsent_of,
+)
 from urc.transports.topic_socket import Address
 from urc.transports.web_place import WebPlace
 
@@ -57,15 +64,14 @@ class Dialer:
 
     def unsent(self, line: socket.socket) -> int:
         """Return the bytes that were written to `line`, of `plug`, and have not left for good."""
-        count = getattr(self._carried, "unsent", None) if self._bridges else None
-        return unsent_in(line) + (int(count()) if count is not None else 0)
+        return unsent_in(line) + (unsent_of(self._carried) if self._bridges else 0)
 
     async def reset(self, line: socket.socket) -> None:
         """Close `line` and what it leads to; what is unsent is never sent."""
         forget_unsent(line)
-        reset = getattr(self._carried, "reset", None) if self._bridges else None
-        if reset is not None:
-            await reset()
+        carried = self._carried if self._bridges else None
+        if carried is not None and isinstance(carried, SupportsReset):
+            await carried.reset()
 
     async def close(self) -> None:
         """End what is pumped."""
