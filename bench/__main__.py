@@ -13,27 +13,12 @@ from scripts.needs import NEEDS, bring
 NAMES = (
     "startup",
     "engine_binary",
-    "engine_text",
     "driver_poll",
     "driver_flood",
-    "transport_tcp",
-    "transport_udp",
-    "transport_serial",
-    "transport_ssh",
-    "transport_telnet",
-    "transport_http",
-    "transport_websocket",
-    "transport_rosbridge",
-    "transport_mqtt",
     "fanout",
     "fanout_stall",
-    "image_relay",
-    "gallery",
     "browser_peers",
     "browser_widgets",
-    "browser_plot_scan",
-    "browser_needle",
-    "wire_to_pixel",
     "motion_path",
     "motion_stop",
     "motion_engine",
@@ -48,13 +33,8 @@ NAMES = (
 )
 
 PROGRAMS = {
-    "transport_ssh": "sshd",
-    "transport_mqtt": "mosquitto",
     "browser_peers": "chromium",
     "browser_widgets": "chromium",
-    "browser_plot_scan": "chromium",
-    "browser_needle": "chromium",
-    "wire_to_pixel": "chromium",
     "motion_input": "chromium",
 }
 """Benchmark → the program beside Python that it needs, as the tests name it."""

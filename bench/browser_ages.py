@@ -1,4 +1,4 @@
-"""How old the values are that a page shows, for `browser_peers`, `wire_to_pixel` and the needle."""
+"""The ages of the values that a page shows, for `browser_peers`."""
 
 import asyncio
 import json
@@ -13,13 +13,11 @@ LEAST_SHARE = 0.5
 """Of what the robot told; below it nothing is said."""
 FIRST_S = 20.0
 MODULUS_MS = MODULUS / 10
-# By "frame", the text counts that stood there when the frame was laid out: a page that writes
-# outside of frames may have changed it again before anybody looks at what was drawn. An observer of
-# sizes is called after all of a frame's callbacks and before it is drawn; a message that is posted
-# there comes when that is done, and then the age is taken. By "write", at the end of the callback
-# that wrote the value.
+# The text counts that was laid out in a frame: a page that writes outside of frames may change it
+# before it is read. An observer of sizes is called after the callbacks of a frame and before it is
+# drawn. A message that it posts arrives after drawing; then the age is taken.
 WATCH = """
-async ([seconds, by]) => {
+async (seconds) => {
   const isClock = (text) => /^[0-9]{10}$/.test(text);
   const search = () => {
     const walker = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
@@ -52,19 +50,15 @@ async ([seconds, by]) => {
     channel.port2.postMessage(0);
   });
   sizes.observe(probe);
-  const observer = new MutationObserver(() => look(read()));
-  const kinds = { subtree: true, childList: true, characterData: true };
-  if (by === "write") observer.observe(document.body, kinds);
   await new Promise((done) => {
     const frame = () => {
       const now = performance.now();
-      if (by === "frame") probe.style.width = probe.style.width === "1px" ? "2px" : "1px";
+      probe.style.width = probe.style.width === "1px" ? "2px" : "1px";
       if (now > untilMs || (!last && now - startMs > 20000)) done();
       else requestAnimationFrame(frame);
     };
     requestAnimationFrame(frame);
   });
-  observer.disconnect();
   sizes.disconnect();
   probe.remove();
   channel.port1.close();
@@ -77,21 +71,20 @@ class TooFew(Exception):
     """A page did not show enough of what the robot told."""
 
 
-async def ages(one: Opened, seconds: float, rate_hz: float, *, by: str = "frame") -> list[float]:
+async def ages(one: Opened, seconds: float, rate_hz: float) -> list[float]:
     """Return the ages of the values that a page shows in some seconds, in milliseconds.
 
     Args:
         one: the page.
         seconds: for how long, from the first value on.
         rate_hz: how often the robot tells its clock.
-        by: when a value counts as shown: "frame", once the frame that has it was drawn, or "write".
 
     Raises:
         TooFew: fewer than `LEAST_SHARE` of them were shown.
     """
     try:
         async with asyncio.timeout(FIRST_S + seconds * 4):
-            answer = await one.page.evaluate(WATCH, [seconds, by])
+            answer = await one.page.evaluate(WATCH, seconds)
     except TimeoutError as error:
         raise TooFew("the page drew no frames any more") from error
     found: Sequence[tuple[float, float]] = answer["found"]

@@ -5,7 +5,6 @@ the browser says when its page began by it.
 """
 
 import asyncio
-import statistics
 import sys
 from collections.abc import AsyncIterator, Iterator, Mapping, Sequence
 from contextlib import asynccontextmanager, contextmanager
@@ -19,11 +18,9 @@ from bench.rig.programs import Program, Server
 from tests.e2e.browser import running_browser
 
 __all__ = [
-    "FRAME_MS",
     "HERE",
     "Cost",
     "Opened",
-    "against",
     "at_share",
     "cost_of",
     "kept",
@@ -34,8 +31,7 @@ __all__ = [
 ]
 
 HERE = Path(__file__).resolve().parent
-FRAME_MS = 1000 / 60
-LEAST_FPS = 58
+LEAST_FPS = 50
 SIZE = (1920, 1200)
 LOAD_MS = 30_000
 WARM_S = 1.0
@@ -176,17 +172,3 @@ def kept(name: str, costs: Sequence[Cost], *, of: Mapping[str, str] | None = Non
 def at_share(ordered: Sequence[float], share: float) -> float:
     """Return the value below which a share of all lies."""
     return round(ordered[min(len(ordered) - 1, int(len(ordered) * share))], 3)
-
-
-def against(name: str, goal: float, pairs: Sequence[tuple[Cost, Cost]]) -> Result:
-    """Return what a frame costs beside another page: pairs of its cost and ours."""
-    bases = [base.frame_ms for base, _ in pairs]
-    return Result(
-        name=name,
-        ratio=round(statistics.median(ours.frame_ms / base.frame_ms for base, ours in pairs), 3),
-        goal=goal,
-        baseline_ms=round(statistics.median(bases), 3),
-        subject_ms=round(statistics.median(ours.frame_ms for _, ours in pairs), 3),
-        spread=round(max(bases) / statistics.median(bases), 2),
-        rounds=len(pairs),
-    )

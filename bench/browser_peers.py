@@ -35,6 +35,7 @@ RATE_HZ = 50
 LOOK_S, LOOK_IF_FULL_S = 2.5, 15.0
 ROUNDS, ROUNDS_IF_FULL = 3, 9
 TRIES = 2
+SLOWEST = 0.99
 SETTLE_S = 0.5
 START_S = 60.0
 HAND, OURS = "by hand", "URC"
@@ -118,9 +119,10 @@ def _results(taken: Ages) -> list[Result]:
         said = {"p50_ms": at_share(every, 0.5), "p99_ms": at_share(every, 0.99)}
         print(json.dumps({"browser_peers": name, **said, "shown": len(every)}), flush=True)
     results = []
-    for share, name in ((0.5, "median"), (0.99, "p99")):
-        for other, most in ((HAND, 1.2), ("Node-RED", 1.0), ("NiceGUI", 1.0)):
-            if other in taken:
+    for share, name in ((0.5, "median"), (SLOWEST, "p99")):
+        for other, most in ((HAND, 1.3), ("Node-RED", 1.0), ("NiceGUI", 1.0)):
+            is_goal = other != "NiceGUI" or share == SLOWEST
+            if other in taken and is_goal:
                 title = f"age of a shown value, {name}: URC / {other}"
                 results.append(_result(title, most, share, taken[other], taken[OURS]))
     return results

@@ -1,4 +1,4 @@
-"""What a flood of lines costs over a real socket, against drivers written by hand.
+"""What a flood of lines costs over a real socket, against a driver written by hand.
 
 CPU time of this process from asking for the lines until the newest value of each is kept.
 """

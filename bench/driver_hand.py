@@ -1,6 +1,6 @@
-"""Two drivers written by hand for the robot of `bench.driver_robot`: what people do without URC.
+"""A driver by hand for the robot of `bench.driver_robot`: what people write without URC.
 
-Tuned, and with what no driver of a real robot can go without, because URC does it, too:
+It is tidy, and has what every driver of a real robot needs, as URC has:
 
 - a speed is clamped, and what is no number is refused: `max` and `min` would make it full speed;
 - readings are taken at any time, asked for or not, and the newest of every signal is kept; values
@@ -11,7 +11,7 @@ Tuned, and with what no driver of a real robot can go without, because URC does 
   is to be written;
 - when the line is lost, whoever waits is told at once.
 
-What URC does beyond (states of the line, reconnecting, alarms, priorities) they do not.
+What URC does beyond (states of the line, reconnecting, alarms, priorities) it does not.
 """
 
 import asyncio
@@ -19,7 +19,6 @@ import time
 from collections import deque
 from math import isfinite
 
-from bench.engine_text import drive
 from urc.model.values import Sample
 
 __all__ = ["StreamDriver"]
@@ -128,7 +127,9 @@ def request(vx: float, wz: float) -> bytes:
     """Return the frame of a speed, clamped; raise `ValueError` when it is no number."""
     if not isfinite(vx + wz):
         raise ValueError("a speed must be a finite number")
-    return drive(vx, wz)
+    vx = max(-1.0, min(1.0, vx))
+    wz = max(-2.0, min(2.0, wz))
+    return f"VEL {vx * 1000:.1f} {wz * 57.3:.2f}\n".encode()
 
 
 class StreamDriver:

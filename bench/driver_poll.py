@@ -1,4 +1,4 @@
-"""What a request and its reply cost over a real socket, against drivers written by hand.
+"""What a request and its reply cost over a real socket, against a driver written by hand.
 
 CPU time of this process: the robot is another one, the same for all. Each round connects anew, and
 asks `TIMES` times after a warm-up.

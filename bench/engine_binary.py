@@ -12,14 +12,18 @@ from collections.abc import Callable, Mapping, Sequence
 from struct import Struct
 from typing import Any
 
-from bench.engine_text import driver_of
 from bench.harness import Goal, Result, compare
+from urc.config.parse.driver import parse_driver
+from urc.config.part import Findings, Part
+from urc.model.driver import Driver
 from urc.model.framing import ChecksumSpec, CrcSpec, FrameLayout, Window
 from urc.model.values import Sample
 from urc.protocol.codec import Frame
 from urc.protocol.engine import Engine
 from urc.protocol.events import Samples
 from urc.protocol.frame import Seal
+from urc.runtime.catalog import built_in_catalog
+from urc.source import parse_document
 from urc.testing.struct import reader, writer
 
 DECLARED = """
@@ -89,6 +93,14 @@ def decode_by_hand(frame: bytes) -> Mapping[str, object] | None:
         "energy": energy / 10000,
         "fault": FAULTS.get(fault, fault),
     }
+
+
+def driver_of(text: str) -> Driver:
+    document = parse_document(text, "bench.yaml")
+    findings = Findings()
+    driver = parse_driver(Part(document, (), document.data), findings, built_in_catalog())
+    assert not findings.problems, findings.problems
+    return driver
 
 
 class ByHand:

@@ -1,24 +1,15 @@
-"""Two hundred values to many pages: URC beside a bare loop in C, and beside a message a value.
+"""Two hundred values to 50 pages: URC beside a bare loop of sends.
 
-What counts is the processor time of the server for the same news, the making of the readings and
-their encoding included; the pages are another process, and so is the robot that wakes the server.
-The loop in C writes as many bytes to as many pages, and knows no value and no WebSocket.
+The figure is the processor time of the server, the readings and their encoding included. The pages
+are another process, and so is the robot that wakes the server. The loop sends as many bytes to as
+many pages, and knows neither values nor WebSockets.
 """
 
-import asyncio
-import json
-import shutil
 import subprocess
 import sys
-import tempfile
 from collections.abc import Sequence
 from functools import partial
 from itertools import repeat
-from pathlib import Path
-
-from starlette.applications import Starlette
-from starlette.routing import WebSocketRoute
-from starlette.websockets import WebSocket
 
 from bench.harness import Goal, Result, compare
 from bench.watching import cost_s, speaking
@@ -34,8 +25,8 @@ CHANNELS = 200
 RATE_HZ = 50
 TICKS, TICKS_IF_FULL = 50, 150
 ROUNDS, ROUNDS_IF_FULL = 5, 9
-MANY, FEW = 50, 10
-LOOP_GOAL, SINGLE_GOAL = 2.5, 0.05
+CLIENTS = 50
+GOAL = 2.5
 FAN_S = 60
 
 # As cheap as a reading can be: what drivers spend on them, other benchmarks say.
@@ -43,30 +34,17 @@ _sample = partial(tuple.__new__, Sample)
 
 
 def run(*, full: bool) -> Sequence[Result]:
-    """Compare at 50 pages with the loop, at 10 with single messages."""
+    """Compare the processor times."""
     ticks = TICKS_IF_FULL if full else TICKS
     rounds = ROUNDS_IF_FULL if full else ROUNDS
-    single = compare(
-        Goal(f"fan-out to {FEW} pages / a message a value", SINGLE_GOAL),
-        lambda: run_loop(_single(FEW, ticks // 5)),
-        lambda: run_loop(_urc(FEW, ticks // 5))[0],
+    _, size = run_loop(_urc(CLIENTS, ticks))
+    result = compare(
+        Goal(f"fan-out to {CLIENTS} pages / a bare loop of sends", GOAL),
+        lambda: _loop(CLIENTS, size, ticks),
+        lambda: run_loop(_urc(CLIENTS, ticks))[0],
         rounds=rounds,
     )
-    compiler = shutil.which("cc")
-    if compiler is None:
-        return [single]
-    with tempfile.TemporaryDirectory(prefix="urc-bench-") as folder:
-        fan = Path(folder) / "fan"
-        source = Path(__file__).parent / "fan.c"
-        subprocess.run([compiler, "-O2", "-o", str(fan), str(source)], check=True, timeout=FAN_S)
-        _, size = run_loop(_urc(MANY, ticks))
-        loop = compare(
-            Goal(f"fan-out to {MANY} pages / a bare loop in C", LOOP_GOAL),
-            lambda: _loop(fan, MANY, size, ticks),
-            lambda: run_loop(_urc(MANY, ticks))[0],
-            rounds=rounds,
-        )
-    return [loop, single]
+    return [result]
 
 
 async def _urc(clients: int, ticks: int) -> tuple[float, int]:
@@ -88,32 +66,10 @@ async def _urc(clients: int, ticks: int) -> tuple[float, int]:
     return spent_s, tally[0][1] // ticks
 
 
-async def _single(clients: int, ticks: int) -> float:
-    """Send every value to every page by itself."""
-    pages: set[WebSocket] = set()
-    over = asyncio.Event()
-
-    async def page(line: WebSocket) -> None:
-        await line.accept()
-        pages.add(line)
-        await over.wait()
-
-    async def play() -> None:
-        for tick in range(ticks):
-            for place in range(CHANNELS):
-                text = json.dumps({"signal": f"s{place}", "value": tick + 0.25})
-                for line in pages:
-                    await line.send_text(text)
-            await asyncio.sleep(1 / RATE_HZ)
-        over.set()
-
-    app = Starlette(routes=[WebSocketRoute("/ws", page)])
-    return (await cost_s(app, "/ws", clients, [], play))[0]
-
-
-def _loop(fan: Path, clients: int, size: int, ticks: int) -> float:
-    """Run the loop in C; return its processor time."""
-    words = [str(fan), str(clients), str(size), str(ticks), str(RATE_HZ)]
+def _loop(clients: int, size: int, ticks: int) -> float:
+    """Run the loop; return its processor time."""
+    words = [sys.executable, "-m", "bench.fan_plain"]
+    words += map(str, (clients, size, ticks, RATE_HZ))
     with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as loop:
         assert loop.stdout is not None
         port = loop.stdout.readline().strip()

@@ -1,19 +1,11 @@
-"""A robot that says much: ``python feed.py KIND``; prints its port.
-
-KIND is ``many`` (200 values 50 times a second in one line), or ``traces-60`` and ``traces-1000``:
-ten values so often a second, and a scan of 1080 rays 20 times a second. Lines are JSON.
-"""
+"""A robot with 200 values, 50 times a second in one JSON line; prints its port."""
 
 import asyncio
 import contextlib
 import json
-import math
-import sys
 import time
 
 CHANNELS, CHANNELS_HZ = 200, 50
-SERIES = 10
-RAYS, SCANS_HZ = 1080, 20
 
 
 def is_whole(channel: int) -> bool:
@@ -30,55 +22,24 @@ def channels(tick: int) -> dict[str, float]:
     }
 
 
-def traces(tick: int, rate_hz: int) -> dict[str, float]:
-    """Return a point of each trace, from -10 to 10."""
-    time_s = tick / rate_hz
-    return {
-        f"p{each}": round(each - 4.5 + 5 * math.sin((1 + each / 5) * time_s + each), 3)
-        for each in range(SERIES)
-    }
-
-
-def scan(tick: int) -> dict[str, list[float]]:
-    """Return the distances of one sweep, up to 10 m."""
-    return {
-        "r": [round(5 + 3 * math.sin(ray / 40 + tick / 10), 2) for ray in range(RAYS)],
-    }
-
-
-async def every(rate_hz: int, writer: asyncio.StreamWriter, kind: str) -> None:
-    """Tell lines of a kind at a rate, by a steady clock, until the other side is gone."""
+async def tell(_: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+    """Send lines by a steady clock, until the client leaves."""
     began_s = time.monotonic()
     tick = 0
     with contextlib.suppress(ConnectionError):
         while not writer.is_closing():
-            # A timer is not exact to a millisecond: what is due by now goes together.
-            due = int((time.monotonic() - began_s) * rate_hz)
+            # A timer is not exact to a millisecond: overdue lines go together.
+            due = int((time.monotonic() - began_s) * CHANNELS_HZ)
             while tick <= due:
-                values = {
-                    "many": channels,
-                    "traces": lambda number: traces(number, rate_hz),
-                    "scan": scan,
-                }[kind](tick)
-                writer.write(json.dumps(values, separators=(",", ":")).encode("ascii") + b"\n")
+                values = json.dumps(channels(tick), separators=(",", ":"))
+                writer.write(values.encode("ascii") + b"\n")
                 tick += 1
             await writer.drain()
-            await asyncio.sleep(max(0.0, began_s + tick / rate_hz - time.monotonic()))
-
-
-async def tell(_: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-    """Tell one client all of the kind."""
-    if sys.argv[1] == "many":
-        await every(CHANNELS_HZ, writer, "many")
-    else:
-        await asyncio.gather(
-            every(int(sys.argv[1].removeprefix("traces-")), writer, "traces"),
-            every(SCANS_HZ, writer, "scan"),
-        )
+            await asyncio.sleep(max(0.0, began_s + tick / CHANNELS_HZ - time.monotonic()))
 
 
 async def main() -> None:
-    """Serve whoever comes."""
+    """Serve every client."""
     server = await asyncio.start_server(tell, "127.0.0.1", 0)
     print("ready", server.sockets[0].getsockname()[1], flush=True)
     await server.serve_forever()

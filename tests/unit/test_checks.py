@@ -136,12 +136,12 @@ def test_a_benchmark_without_its_program_is_left_out_by_name(
     """One line with the remedy, and no success; nothing is started that could only break."""
     browser = [need for need in NEEDS if need.name == "chromium"]
     monkeypatch.setattr(bench, "bring", lambda wanted: Brought(left_out=list(wanted)))
-    monkeypatch.setattr("sys.argv", ["bench", "wire_to_pixel"])
+    monkeypatch.setattr("sys.argv", ["bench", "browser_peers"])
     assert bench.main() == 1
     said = capsys.readouterr()
     assert said.out == ""
     remedy = Brought(left_out=browser).remedy
-    line = f"bench: wire_to_pixel left out: no chromium; to bring it: {remedy}"
+    line = f"bench: browser_peers left out: no chromium; to bring it: {remedy}"
     assert said.err.splitlines() == [line]
 
 
@@ -192,8 +192,8 @@ def test_a_benchmark_asks_for_no_program_that_it_does_not_need(
         return Brought()
 
     monkeypatch.setattr(bench, "bring", bring)
-    assert bench.bring_programs(["fanout", "transport_ssh"]) == set()
-    assert asked == ["sshd"]
+    assert bench.bring_programs(["fanout", "browser_widgets"]) == set()
+    assert asked == ["chromium"]
 
 
 @pytest.mark.parametrize("name", bench.NAMES)

@@ -1,0 +1,38 @@
+"""A bare loop of sends, the baseline of `fanout`: ``fan_plain.py CLIENTS SIZE FRAMES RATE``.
+
+It accepts the clients, answers each with a status of 101, and sends a frame to each at the rate. It
+knows no values. It prints its port, and at the end its processor time in seconds.
+"""
+
+import socket
+import sys
+import time
+
+HEAD_BYTES = 4
+
+
+def accepted(server: socket.socket) -> socket.socket:
+    """Accept a client; each waits for its reply before the next one connects."""
+    page, _ = server.accept()
+    page.recv(4096)
+    page.sendall(b"HTTP/1.1 101 Switching Protocols\r\n\r\n")
+    return page
+
+
+def main() -> None:
+    clients, size, frames, rate_hz = map(int, sys.argv[1:])
+    body = b"x" * (size - HEAD_BYTES)
+    frame = bytes([0x81, 126]) + len(body).to_bytes(2, "big") + body
+    with socket.create_server(("127.0.0.1", 0), backlog=clients) as server:
+        print(server.getsockname()[1], flush=True)
+        pages = [accepted(server) for _ in range(clients)]
+    began_s = time.process_time()
+    for _ in range(frames):
+        for page in pages:
+            page.sendall(frame)
+        time.sleep(1 / rate_hz)
+    print(time.process_time() - began_s, flush=True)
+
+
+if __name__ == "__main__":
+    main()
