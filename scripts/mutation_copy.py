@@ -44,7 +44,7 @@ class Settings(NamedTuple):
         """Read them."""
         told = tomllib.loads((root / "pyproject.toml").read_text("utf-8"))["tool"]["mutmut"]
         named = [*told["source_paths"], *told["also_copy"], "tests", "pyproject.toml"]
-        return cls(tuple(told["only_mutate"]), tuple(told["do_not_mutate"]), tuple(named))
+        return cls(tuple(told["only_mutate"]), tuple(told.get("do_not_mutate", ())), tuple(named))
 
     def is_mutated(self, name: str) -> bool:
         """Return whether mutants are made of a file."""
