@@ -40,7 +40,7 @@ __all__ = [
 
 NOTICE: Final = "notice"
 """Verb of an envelope that a transport itself gives: its body is one line for people, about a fault
-that the robot does not tell. It goes to the robot's log and is no sign of life."""
+that the robot does not tell. It goes to the robot's log and does not count as a heartbeat."""
 
 
 class TransportError(UrcError):
@@ -140,7 +140,7 @@ class SupportsSettle(Protocol):
     """A transport on which a message that was handed over may not have arrived yet."""
 
     async def settle(self) -> str:
-        """Keep the line until what was sent has arrived, as far as can be known.
+        """Keep the line until all sent data has arrived, as far as the system tells.
 
         Bounded to a few seconds.
 
@@ -151,7 +151,7 @@ class SupportsSettle(Protocol):
 
 @runtime_checkable
 class SupportsProbe(Protocol):
-    """A transport that can ask the program at the other end for a sign of life."""
+    """A transport that can probe the program at the other end."""
 
     async def probe(self) -> None:
         """Return when anything has come from that program since the call.
@@ -166,7 +166,7 @@ class SupportsUnsent(Protocol):
     """A transport or stream that counts its unsent bytes."""
 
     def unsent(self) -> int:
-        """Return the bytes handed over that have not left for good; 0 where nobody can tell."""
+        """Return the bytes handed over that have not left for good; 0 where it is unknown."""
 
 
 @runtime_checkable
@@ -174,12 +174,12 @@ class SupportsForget(Protocol):
     """A transport that does not keep the order of messages: a later one may arrive sooner."""
 
     def forget(self) -> None:
-        """Give up what is unsent: it would arrive after its stop."""
+        """Discard unsent data: it would arrive after its stop."""
 
 
 @runtime_checkable
 class SupportsAbort(Protocol):
-    """A transport that can be closed without sending what is unsent."""
+    """A transport that can be closed without sending the rest."""
 
     async def abort(self) -> None:
         """Close at once; what the robot has not got by now, it never gets. Never raises."""
@@ -203,7 +203,7 @@ class Prompt(SupportsOffer, Protocol):
 
     @property
     def is_clogged(self) -> bool:
-        """Whether some of what was taken is still to be written; ``send(b"")`` waits for it."""
+        """Whether some accepted data is still to be written; ``send(b"")`` waits for it."""
 
     def divert(self, sink: Callable[[bytes], bool]) -> None:
         """Let `sink` have what arrives until the line is closed; it returns whether it took it.
@@ -214,10 +214,10 @@ class Prompt(SupportsOffer, Protocol):
 
 @runtime_checkable
 class SupportsReset(Protocol):
-    """A stream that can be closed without sending what is unsent."""
+    """A stream that can be closed without sending the rest."""
 
     async def reset(self) -> None:
-        """Close at once; what is unsent is never sent. Never raises."""
+        """Close at once, without sending the rest. Never raises."""
 
 
 @runtime_checkable
@@ -236,5 +236,5 @@ def unsent_of(stream: ByteStream | None) -> int:
 
 
 async def reset(stream: ByteStream) -> None:
-    """Close a stream, without sending what is unsent where it can do so."""
+    """Close a stream, without sending the rest where it can do so."""
     await (stream.reset() if isinstance(stream, SupportsReset) else stream.abort())
