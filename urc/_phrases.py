@@ -1,7 +1,7 @@
 """Lines for people that can still be said in another language.
 
 A phrase is its English text, and remembers what it is made of: who has a catalogue says it anew,
-see `urc.web.phrases`. `scripts.translations` finds the texts by the name of `phrase`.
+see `urc.web.words`. `scripts.translations` finds the texts by the name of `phrase`.
 """
 
 from collections.abc import Iterable, Mapping

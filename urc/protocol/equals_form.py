@@ -9,7 +9,17 @@ from urc.model.values import NOTHING
 from urc.protocol.codec import CodecContext, Frame, NotWritable
 from urc.protocol.texts import encoded
 
-__all__ = ["AnyReader", "EqualsReader", "RawReader"]
+__all__ = ["AnyReader", "EqualsReader", "RawReader", "SilenceReader"]
+
+
+class SilenceReader:
+    """Takes no frame at all; the line takes the time that passes."""
+
+    def __init__(self, spec: ReadSpec, context: CodecContext) -> None:
+        """Nothing of them matters."""
+
+    def read(self, frame: Frame) -> Mapping[str, object] | None:
+        """Return None: whatever comes is something else."""
 
 
 class EqualsReader:

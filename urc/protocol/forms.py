@@ -38,7 +38,7 @@ def build_writer(spec: WriteSpec, context: CodecContext) -> Writer:
 READERS = Table(
     "urc.readers",
     {
-        "silence": "urc.protocol.silence_form:SilenceReader",
+        "silence": "urc.protocol.equals_form:SilenceReader",
         "regex": "urc.protocol.regex_form:RegexReader",
         "pattern": "urc.protocol.pattern_form:PatternReader",
         "split": "urc.protocol.split_form:SplitReader",

@@ -4,12 +4,34 @@ Floor 3, pure. This is their table, and how one is built of what a document says
 imported when it is used. `urc.protocol.framings.base` says what a framing is.
 """
 
+from typing import NamedTuple
+
 from urc.model.driver import FramingSpec
 from urc.model.framing import EscapeSpec
-from urc.protocol.framings.base import Framing
+from urc.protocol.framings.base import Decoder, Framing
+from urc.protocol.stream import Stream
 from urc.registry import Table
 
 __all__ = ["FRAMINGS", "build_framing"]
+
+
+class TwoFramings(NamedTuple):
+    """What is sent is framed otherwise than what comes."""
+
+    sent: Framing
+    received: Framing
+
+    def encode(self, payload: bytes) -> bytes:
+        """Return the bytes of one frame, or raise `FramingError`."""
+        return self.sent.encode(payload)
+
+    def decoder(self, stream: Stream | None = None) -> Decoder:
+        """Return a fresh decoder."""
+        return self.received.decoder(stream)
+
+    def reversed(self) -> "TwoFramings":
+        """Return the same framings seen from the other end of the line."""
+        return TwoFramings(self.received.reversed(), self.sent.reversed())
 
 
 def build_framing(spec: FramingSpec) -> Framing:
@@ -21,7 +43,6 @@ def build_framing(spec: FramingSpec) -> Framing:
         framing = PatientFraming(framing, spec.timeout_s, spec.strips_ansi)
     if spec.sent is None:
         return framing
-    from urc.protocol.framings.paired import TwoFramings
 
     return TwoFramings(build_framing(spec.sent), framing)
 

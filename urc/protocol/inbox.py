@@ -3,7 +3,9 @@
 Floor 3, pure. See `urc.protocol.line` for the theory of operation.
 """
 
+from collections import deque
 from collections.abc import Sequence
+from typing import Final
 
 from urc.expressions import quoted
 from urc.model.codec import Counted
@@ -18,10 +20,38 @@ from urc.protocol.framings.base import Decoder, Framing, StreamDecoder
 from urc.protocol.head import is_redirect
 from urc.protocol.messages import Messages
 from urc.protocol.reacting import Collector, Replies
-from urc.protocol.secrets import Secrets
 from urc.protocol.stream import Stream
 
 __all__ = ["Inbox"]
+
+
+_HIDDEN: Final = "•••"
+_MOST_SECRETS: Final = 8
+_SHORTEST: Final = 3
+"""Shorter secrets would blot out half of every message; then the whole of it is hidden."""
+
+
+class Secrets:
+    """What was sent on a connection and must not be shown, not even when the robot echoes it."""
+
+    __slots__ = ("_texts",)
+
+    def __init__(self) -> None:
+        self._texts: deque[str] = deque(maxlen=_MOST_SECRETS)
+
+    def add(self, data: bytes, encoding: str) -> None:
+        """Take note of bytes that hold a secret."""
+        text = data.decode(encoding, "replace").strip()
+        if text:
+            self._texts.append(text)
+
+    def hide(self, text: str) -> str:
+        """Return a message without the secrets."""
+        for secret in self._texts:
+            if secret in text:
+                text = text.replace(secret, _HIDDEN) if len(secret) >= _SHORTEST else _HIDDEN
+        return text
+
 
 new = tuple.__new__
 """Makes a named tuple without the detour through its class: this is done for every frame."""

@@ -31,12 +31,36 @@ from urc.runtime.lines import make_transports
 from urc.runtime.link import Link
 from urc.runtime.motion import Frames
 from urc.runtime.settings import resolve_settings
-from urc.runtime.turnstile import Turnstile
 
 if TYPE_CHECKING:
     from urc.runtime.guarding import GuardedMovers
 
-__all__ = ["CommandFailed", "Motion", "Session", "resolve_settings"]
+__all__ = ["CommandFailed", "Motion", "Session", "Turnstile", "resolve_settings"]
+
+
+class Turnstile:
+    """Closed until an event has happened, and until all who waited for it are through."""
+
+    def __init__(self, event: asyncio.Event) -> None:
+        """Prepare; the event is never cleared."""
+        self._event = event
+        self._turn = asyncio.Lock()  # the first who wants it has it first
+        self._waiting = 0
+
+    @property
+    def is_open(self) -> bool:
+        """Whether somebody who comes now overtakes nobody."""
+        return self._event.is_set() and not self._waiting
+
+    async def wait(self) -> None:
+        """Return when it is one's turn; who gives up holds up nobody."""
+        self._waiting += 1
+        try:
+            async with self._turn:
+                await self._event.wait()
+        finally:
+            self._waiting -= 1
+
 
 Motion = Literal["none", "here", "guarded"]
 """Who writes motion: nobody; this process; a guard, which stops the robot when this one cannot."""

@@ -9,9 +9,10 @@ itself is the same for all of them.
 
 import logging
 import math
+import weakref
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, Protocol
 
 from urc.model.codec import Payload
 from urc.model.driver import Driver, TransportSpec
@@ -26,10 +27,31 @@ from urc.simulator.embodied import Embodied
 from urc.simulator.faults import Late, parse_fault
 from urc.simulator.flaws import inject, mend
 from urc.simulator.rules import Course, Ruled, Rules, not_taken
-from urc.simulator.setters import Setters
 from urc.simulator.values import Values
 
 __all__ = ["Twin", "TwinLine"]
+
+
+class _Line(Protocol):
+    is_over: bool
+
+
+class Setters:
+    """Rule → the line that does what it sets, while that line is there."""
+
+    def __init__(self) -> None:
+        """Begin without any line."""
+        self._lines: dict[int, weakref.ref[_Line]] = {}
+
+    def sets(self, rule: SimulatorRule, line: _Line) -> bool:
+        """Return whether `line` is the one that does what `rule` sets; the first to ask is."""
+        known = self._lines.get(id(rule))
+        before = known() if known is not None else None
+        if before is None or before.is_over:
+            self._lines[id(rule)] = weakref.ref(line)
+            return True
+        return before is line
+
 
 MOST_COURSES: Final = 256
 """Answers of one line that may wait for their time."""

@@ -1,6 +1,7 @@
 """A robot of one line, made without a document."""
 
 from urc.expressions import compile_template
+from urc.model.codec import ReadSpec, WriteSpec
 from urc.model.driver import (
     Argument,
     Backoff,
@@ -16,9 +17,21 @@ from urc.model.driver import (
 from urc.model.profile import Profile, Reaction, Setting, SimulatorRule
 from urc.model.values import Signal
 from urc.patterns import compile_pattern
-from urc.testing.codec import regex, text
 
-__all__ = ["line_profile"]
+__all__ = ["line_profile", "regex", "text"]
+
+
+def regex(source: str) -> ReadSpec:
+    """Return the form ``regex`` of a reply or message."""
+    pattern = compile_pattern(source)
+    return ReadSpec("regex", {"pattern": pattern}, pattern.groups)
+
+
+def text(source: str) -> WriteSpec:
+    """Return the form ``text`` of what is sent."""
+    template = compile_template(source)
+    return WriteSpec("text", {"template": template}, template.names, template.settings)
+
 
 QUESTION = "Give me the battery %"
 

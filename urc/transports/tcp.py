@@ -1,15 +1,251 @@
 """TCP to a robot, or from one (``mode: listen``), with TLS where it is asked for."""
 
+import asyncio
+import errno
+import socket
 from collections.abc import Callable
+from contextlib import suppress
 
 from urc.transports import _options
-from urc.transports._listen import TcpListener
+from urc.transports._faults import place_of, reason
+from urc.transports._lookup import Lookup
 from urc.transports._reach import Reach
-from urc.transports._stream import READ_AHEAD_BYTES, Stream, StreamLine
+from urc.transports._stream import READ_AHEAD_BYTES, Stream, StreamLine, adopt, tune
 from urc.transports._tls import Tls
-from urc.transports.base import Carrier, Setup, Transport, TransportError
+from urc.transports.base import (
+    ByteStream,
+    Carrier,
+    ConnectFailed,
+    Setup,
+    SupportsEnd,
+    Transport,
+    TransportError,
+)
 
-__all__ = ["READ_AHEAD_BYTES", "TcpTransport", "from_setup"]
+__all__ = ["READ_AHEAD_BYTES", "TcpListener", "TcpTransport", "from_setup"]
+
+
+HANDOVER_S = 6.0
+"""How long a robot that took the place of another waits for the line to be opened anew: a little
+longer than the back-off between attempts."""
+_WAITING = 8
+_AGAIN_S = 0.1
+"""Wait after a caller that could not be let in."""
+
+_Caller = tuple[socket.socket, str]
+"""A connection, and where it comes from."""
+
+
+class TcpListener(StreamLine):
+    """Listens on a port; one robot at a time, and a newer one takes the place of the older.
+
+    A failed `open` goes on listening, so that a robot which comes between two attempts is not
+    refused. So does the first `close` after a newer robot came: it is the next `open` that gets it,
+    within `HANDOVER_S`. Any other `close` leaves nothing.
+    """
+
+    def __init__(self, bind: str, port: int, *, only: str = "", tls: Tls | None = None) -> None:
+        """Prepare the line.
+
+        Args:
+            bind: own address; "" for all of them.
+            port: own port, 0..65535; 0 lets the system choose.
+            only: host that may connect; "": any.
+            tls: how the line is made secret.
+        """
+        super().__init__()
+        self._bind = bind
+        self._port = port
+        self._only = only
+        self._tls = tls
+        self._lookup = Lookup(only, 0, socket.SOCK_STREAM) if only else None
+        self._listener: socket.socket | None = None
+        self._newer: _Caller | None = None
+        self._door: asyncio.Task[None] | None = None
+        """Lets callers in where the loop cannot watch sockets."""
+        self._allowed_now: tuple[frozenset[str] | None] | None = None
+        """Who may come in; None while nobody is let in at all."""
+        self._again: asyncio.TimerHandle | None = None
+        self._came = asyncio.Event()
+        self._shut: asyncio.TimerHandle | None = None
+
+    @property
+    def address(self) -> str:
+        """Where robots connect to: ``tcp 0.0.0.0:6789 (listening)``."""
+        return f"tcp {self._place} (listening)"
+
+    @property
+    def port(self) -> int:
+        """The own port, once it is listened on."""
+        return self._port if self._listener is None else int(self._listener.getsockname()[1])
+
+    @property
+    def _place(self) -> str:
+        return place_of(self._bind or "*", self.port)
+
+    async def open(self, timeout_s: float) -> None:
+        """Wait for a robot, or raise `ConnectFailed` within `timeout_s` seconds."""
+        await super().close()
+        self._stay_open()
+        try:
+            async with asyncio.timeout(timeout_s):
+                allowed = await self._allowed()
+                self._listen(allowed)
+                self._stream = await self._next()
+        except TimeoutError as late:
+            message = f"no robot has connected to {self._place} within {timeout_s:g} s"
+            raise ConnectFailed(message) from late
+        except (OSError, UnicodeError) as fault:
+            raise ConnectFailed(f"cannot listen on {self._place} ({reason(fault)})") from fault
+
+    async def close(self) -> None:
+        """Close at once. Never raises, may be called twice."""
+        is_first = self._stream is not None
+        await super().close()
+        if is_first and self._newer is not None:
+            self._shut = asyncio.get_running_loop().call_later(HANDOVER_S, self._stop)
+        else:
+            await self._shut_down()
+
+    async def abort(self) -> None:
+        """Close at once; what the robot has not got by now it never gets. Never raises."""
+        await super().abort()
+        await self._shut_down()
+
+    async def _next(self) -> ByteStream:
+        while self._newer is None:
+            self._came.clear()
+            await self._came.wait()
+        (line, place), self._newer = self._newer, None
+        try:
+            tune(line)
+            stream = await adopt(line)
+        except BaseException:
+            line.close()
+            raise
+        if self._tls is None:
+            return stream
+        return await self._tls.secure(stream, "", place)
+
+    async def _allowed(self) -> frozenset[str] | None:
+        """Return the addresses that may connect; None: all."""
+        if self._lookup is None:
+            return None
+        try:
+            rows = await self._lookup.addresses()
+        except (OSError, UnicodeError) as fault:
+            raise ConnectFailed(f"no such host {self._only!r}") from fault
+        return frozenset(str(address[0]) for _, address in rows)
+
+    def _listen(self, allowed: frozenset[str] | None) -> None:
+        if self._listener is None:
+            family = socket.AF_INET6 if ":" in self._bind else socket.AF_INET
+            listener = socket.socket(family, socket.SOCK_STREAM)
+            try:
+                listener.setblocking(False)
+                listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+                listener.bind((self._bind, self._port))
+                listener.listen(_WAITING)
+            except BaseException:
+                listener.close()
+                raise
+            self._listener = listener
+        if self._door is None and self._allowed_now is None:
+            self._allowed_now = (allowed,)
+            try:
+                self._watch()
+            except NotImplementedError:  # the usual loop of Windows
+                self._door = asyncio.create_task(self._let_in(self._listener))
+
+    def _watch(self) -> None:
+        if self._listener is not None:
+            asyncio.get_running_loop().add_reader(self._listener, self._knock, self._listener)
+
+    def _knock(self, listener: socket.socket) -> None:
+        """Take a caller in; called by the loop.
+
+        The loop's own way to accept, when it is cancelled, may lose a connection that has come.
+        """
+        try:
+            line, address = listener.accept()
+        except BlockingIOError:
+            return
+        except OSError:  # no descriptors left, or the caller has gone again
+            loop = asyncio.get_running_loop()
+            loop.remove_reader(listener)
+            self._again = loop.call_later(_AGAIN_S, self._watch)
+            return
+        line.setblocking(False)
+        self._meet(line, address)
+
+    async def _let_in(self, listener: socket.socket) -> None:
+        """Take callers in, where the loop cannot watch sockets."""
+        loop = asyncio.get_running_loop()
+        while True:
+            try:
+                line, address = await loop.sock_accept(listener)
+            except OSError as fault:
+                if fault.errno in (errno.EBADF, errno.EINVAL):
+                    return
+                await asyncio.sleep(_AGAIN_S)
+                continue
+            self._meet(line, address)
+
+    def _meet(self, line: socket.socket, address: tuple[str, int]) -> None:
+        """Let the newest caller wait for `open`, and end the connection that stands."""
+        allowed = self._allowed_now[0] if self._allowed_now is not None else None
+        if allowed is not None and _plain(address[0]) not in allowed:
+            line.close()
+            return
+        if self._newer is not None:
+            self._newer[0].close()
+        self._newer = line, place_of(_plain(address[0]), address[1])
+        self._came.set()
+        self._replace()
+
+    def _replace(self) -> None:
+        """Let the connection that stands know that it is over."""
+        stream = self._stream
+        if stream is None or self._newer is None:
+            return
+        if isinstance(stream, SupportsEnd):
+            stream.end(f"another robot took its place ({self._newer[1]})")
+
+    def _stay_open(self) -> None:
+        if self._shut is not None:
+            self._shut.cancel()
+            self._shut = None
+
+    async def _shut_down(self) -> None:
+        door = self._door
+        self._stop()
+        if door is not None:
+            with suppress(asyncio.CancelledError):
+                await door
+
+    def _stop(self) -> None:
+        self._stay_open()
+        if self._door is not None:
+            self._door.cancel()
+            self._door = None
+        if self._newer is not None:
+            self._newer[0].close()
+            self._newer = None
+        if self._again is not None:
+            self._again.cancel()
+            self._again = None
+        self._allowed_now = None
+        if self._listener is not None:
+            with suppress(NotImplementedError):
+                asyncio.get_running_loop().remove_reader(self._listener)
+            self._listener.close()
+            self._listener = None
+
+
+def _plain(address: str) -> str:
+    """Return an IPv4 address that came in over IPv6 as people write it, without a zone."""
+    return address.removeprefix("::ffff:").partition("%")[0]
+
 
 _LOOPBACK = "127.0.0.1"
 

@@ -17,7 +17,30 @@ from pathlib import Path
 from starlette.requests import HTTPConnection
 from starlette.types import ASGIApp, Receive, Scope, Send
 
-__all__ = ["COOKIE", "LANGUAGES", "Reader", "address", "choose", "language", "module", "t", "table"]
+from urc._phrases import Phrase
+
+__all__ = [
+    "COOKIE",
+    "LANGUAGES",
+    "Reader",
+    "address",
+    "choose",
+    "language",
+    "module",
+    "spoken",
+    "t",
+    "table",
+]
+
+
+def spoken(line: str) -> str:
+    """Return a line in the current language; what is no phrase stays as it is."""
+    if not isinstance(line, Phrase):
+        return line
+    if line.pieces:
+        return line.between.join(map(spoken, line.pieces))
+    return t(line.text, **{name: spoken(one) for name, one in line.names.items()})
+
 
 FOLDER = Path(__file__).resolve().parent / "translations"
 COOKIE = "urc-language"

@@ -20,7 +20,7 @@ from urc.protocol.forms import build_reader
 from urc.protocol.framing import build_framing
 from urc.protocol.messages import Messages
 from urc.protocol.readings import Readings
-from urc.testing.codec import text
+from urc.testing.profile import text
 from urc.testing.reading import read_spec
 
 SIGNALS = {

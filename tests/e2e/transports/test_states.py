@@ -15,7 +15,7 @@ from urc.model.profile import Profile
 from urc.model.values import Signal
 from urc.runtime.hub import LinkStatus
 from urc.runtime.session import Session
-from urc.testing.codec import regex, text
+from urc.testing.profile import regex, text
 from urc.testing.transport import table_of
 
 pytestmark = pytest.mark.anyio

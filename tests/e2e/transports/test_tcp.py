@@ -17,9 +17,8 @@ from urc.runtime.catalog import built_in_catalog
 from urc.runtime.session import Session
 from urc.simulator.stand_in import stand_in
 from urc.testing.profile import line_profile
-from urc.transports._listen import TcpListener
 from urc.transports.base import ByteStream, ConnectFailed, PeerClosed, Setup, TransportError
-from urc.transports.tcp import TcpTransport, from_setup
+from urc.transports.tcp import TcpListener, TcpTransport, from_setup
 
 pytestmark = [pytest.mark.anyio, pytest.mark.needs("socat")]
 

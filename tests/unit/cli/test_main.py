@@ -21,7 +21,7 @@ from urc.cli.output import json_text
 from urc.model.driver import Argument, Command
 from urc.problems import Problem, ProblemsError, UrcError
 from urc.shipped import shipped
-from urc.testing.codec import text as text_form
+from urc.testing.profile import text as text_form
 
 Output = pytest.CaptureFixture[str]
 

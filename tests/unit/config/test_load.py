@@ -14,7 +14,7 @@ from urc.model.profile import DocumentTest, Profile
 from urc.model.values import Limits, Signal
 from urc.problems import ProblemsError
 from urc.runtime.catalog import built_in_catalog
-from urc.testing.codec import text
+from urc.testing.profile import text
 
 ROOT = Path(__file__).resolve().parents[3]
 SHELF = ROOT / "tests" / "broken" / "shelf"

@@ -12,7 +12,7 @@ from starlette.testclient import TestClient
 
 from tests.unit.packages.made import package, write_package
 from tests.unit.packages.test_archive import HOSTILE, hostile
-from urc.packages import disk, door
+from urc.packages import disk, server
 from urc.packages.archive import PACKAGE
 from urc.packages.index import INDEX, read_index
 from urc.packages.keeper import make_index
@@ -262,7 +262,7 @@ def test_a_header_that_is_no_signature_is_told(lab: Lab, text: str) -> None:
 
 def test_no_more_wait_than_can_be_looked_at(lab: Lab, monkeypatch: pytest.MonkeyPatch) -> None:
     """While one is being looked at, the others wait; one too many is told to come again."""
-    monkeypatch.setattr(door, "_WAITING_MOST", 1)
+    monkeypatch.setattr(server, "_WAITING_MOST", 1)
     started, go_on = threading.Event(), threading.Event()
 
     def slow(document: Path) -> list[str]:

@@ -7,7 +7,7 @@ from urc.model.driver import Driver, Message, TransportSpec
 from urc.protocol.engine import Engine
 from urc.protocol.events import Fault
 from urc.protocol.framing import build_framing
-from urc.testing.codec import regex
+from urc.testing.profile import regex
 from urc.testing.struct import struct_read
 
 FRAMED = "{ type: length, start: 0x13, length: { offset: 1, size: 1, adjust: 2 } }"

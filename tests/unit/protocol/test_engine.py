@@ -28,7 +28,7 @@ from urc.protocol.events import (
     Samples,
     Send,
 )
-from urc.testing.codec import regex, text
+from urc.testing.profile import regex, text
 
 LINES = FramingSpec("delimiter", {"tx": b"\n", "rx": b"\n"}, 64)
 BATTERY = Signal("battery", "integer", min=0, max=100, limits=Limits(low=20, hysteresis=2))

@@ -4,7 +4,7 @@ import pytest
 
 from urc.expressions import compile_template
 from urc.protocol.codec import NotWritable
-from urc.protocol.place_words import place_writer
+from urc.protocol.envelope_form import place_writer
 from urc.transports.http_client import leads_up
 
 NAMES = {"what": "", "n": 7, "settings": {"base": "/api/v2", "space": "lab/rover"}}

@@ -11,7 +11,7 @@ from urc.runtime import apart
 from urc.runtime.apart import Looks, look_apart
 from urc.runtime.look import look
 from urc.web import words
-from urc.web.phrases import spoken
+from urc.web.words import spoken
 
 
 def test_it_sees_what_the_same_process_would_see(tmp_path: Path) -> None:

@@ -6,9 +6,8 @@ from collections.abc import Sequence
 import pytest
 
 from urc.protocol.events import Event, Failed, Fault, Replied, Request
-from urc.runtime.dispatcher import Dispatcher
+from urc.runtime.dispatcher import MAX_WAITING, Dispatcher
 from urc.runtime.hub import Hub
-from urc.runtime.waiting import MAX_WAITING
 from urc.testing.clock import FakeClock
 
 pytestmark = pytest.mark.anyio

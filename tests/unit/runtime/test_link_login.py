@@ -8,8 +8,7 @@ from tests.unit.runtime.test_link import opened, state_of
 from urc.model.flow import ExpectStep, SendStep
 from urc.model.profile import Profile
 from urc.testing.clock import FakeClock
-from urc.testing.codec import regex, text
-from urc.testing.profile import line_profile
+from urc.testing.profile import line_profile, regex, text
 from urc.testing.transport import MemoryTransport
 
 pytestmark = pytest.mark.anyio

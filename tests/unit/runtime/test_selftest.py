@@ -10,8 +10,7 @@ from urc.patterns import compile_pattern
 from urc.problems import Problem
 from urc.runtime.selftest import run_tests, sample_settings
 from urc.runtime.verdicts import is_same
-from urc.testing.codec import regex, text
-from urc.testing.profile import line_profile
+from urc.testing.profile import line_profile, regex, text
 
 ASKED = "Give me the battery %"
 

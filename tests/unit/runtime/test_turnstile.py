@@ -5,7 +5,7 @@ from contextlib import suppress
 
 import pytest
 
-from urc.runtime.turnstile import Turnstile
+from urc.runtime.session import Turnstile
 
 pytestmark = pytest.mark.anyio
 

@@ -9,8 +9,7 @@ from urc.model.profile import Profile, Reaction, SimulatorRule
 from urc.patterns import compile_pattern
 from urc.runtime.scripting import load
 from urc.simulator.twin import Twin, TwinLine
-from urc.testing.codec import text
-from urc.testing.profile import line_profile
+from urc.testing.profile import line_profile, text
 
 ASK = b"Give me the battery %\n"
 

@@ -3,9 +3,8 @@
 import pytest
 
 from urc.transports.base import Setup, TransportError
-from urc.transports.ssh import from_setup
+from urc.transports.ssh import Program, from_setup, read_program, read_target
 from urc.transports.ssh_login import Login
-from urc.transports.ssh_options import Program, read_program, read_target
 from urc.transports.telnet import from_setup as telnet_from_setup
 
 GOOD = {"host": "10.0.0.5", "username": "robot"}

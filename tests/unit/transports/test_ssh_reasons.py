@@ -7,8 +7,8 @@ from typing import Any
 import pytest
 
 from urc.transports.base import ConnectFailed, Setup
+from urc.transports.ssh import read_target
 from urc.transports.ssh_dial import dial
-from urc.transports.ssh_options import read_target
 
 pytestmark = pytest.mark.anyio
 

@@ -16,8 +16,8 @@ from urc.motion.lease import Client as Screen
 from urc.problems import Problem, UrcError
 from urc.runtime.hub import Traffic
 from urc.testing.clock import FakeClock, settle
-from urc.testing.codec import text
 from urc.testing.dashboard import FakeRobot, dashboard_profile
+from urc.testing.profile import text
 from urc.web.dev.client import BAD_MESSAGES, MESSAGES_PER_S, ROWS_KEPT, Backlog, DevClient
 from urc.web.dev.rows import Row
 from urc.web.dev.watch import Examined, ProfileWatch

@@ -8,8 +8,7 @@ import pytest
 
 from tests.unit.web.test_client import frames_in
 from urc.model.values import Sample, Signal
-from urc.runtime.hub import Hub, Note
-from urc.runtime.streams import STREAM_KEPT
+from urc.runtime.hub import STREAM_KEPT, Hub, Note
 from urc.testing.clock import FakeClock, settle
 from urc.web.feed.fanout import Fanout, Known, Pacer, Place
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from urc.web.show.markdown import markdown
+from urc.web.show.sandbox import markdown
 
 
 def test_a_text_is_rendered_below_the_headings_of_its_cell() -> None:

@@ -1,8 +1,7 @@
 """Lines of lower floors, said in the reader's language."""
 
 from urc._phrases import joined, phrase
-from urc.web.phrases import spoken
-from urc.web.words import language
+from urc.web.words import language, spoken
 
 
 def test_a_phrase_is_its_english_text_and_is_said_in_others() -> None:

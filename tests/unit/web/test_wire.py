@@ -10,7 +10,7 @@ from urc.model.driver import Driver, Message, Poll, Reply
 from urc.model.profile import Profile
 from urc.model.values import Limits, Sample, Signal
 from urc.runtime.hub import LinkStatus, Note
-from urc.testing.codec import regex, text
+from urc.testing.profile import regex, text
 from urc.web.wire import messages as wire
 
 

@@ -1,19 +1,380 @@
 """The emulated robot behind a rosbridge server: version 2 of the protocol, over WebSocket."""
 
 import asyncio
-from collections.abc import Sequence
+import base64
+import struct
+import zlib
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any, NamedTuple
 
+import msgspec
 from websockets.asyncio.server import Server, ServerConnection, broadcast, serve
 from websockets.exceptions import ConnectionClosed
 
 from urc.model.codec import Envelope, Payload
 from urc.simulator.servers.base import ServerContext
 from urc.simulator.servers.clients import ClientConnection, converse
-from urc.simulator.servers.rosbridge_protocol import Bridge, BridgeClient
 from urc.simulator.servers.websocket import MessageServer
 from urc.transports.rosbridge_types import spelled
 
 __all__ = ["RosbridgeServer"]
+
+
+MAX_TOPICS = 512
+"""Topics, services and subscriptions that one client may name."""
+_ENDS = {True: 4, False: 6}
+"""Of an action: succeeded or aborted."""
+
+_decode = msgspec.json.Decoder().decode
+_encode = msgspec.json.Encoder().encode
+
+
+class _Wanted(NamedTuple):
+    """One client's subscription to one topic."""
+
+    throttle_s: float
+    compression: str
+    fragment_bytes: int
+
+
+class Bridge:
+    """The state that all clients of one bridge share."""
+
+    def __init__(self, declared: Mapping[str, str]) -> None:
+        """Start with the robot's own topics: name → type, or "" for an unknown type."""
+        self.types = dict(declared)
+        self.clients: list[BridgeClient] = []
+        self.servers: dict[str, BridgeClient] = {}
+        """Service → the client that offers it."""
+        self.asked: dict[str, tuple[BridgeClient, object]] = {}
+        """Id of a forwarded call → the caller and its id."""
+        self._count = 0
+
+    def passed_on(self, service: str, client: "BridgeClient", number: object, args: object) -> None:
+        """Let the client that offers a service answer another one's call."""
+        self._count += 1
+        key = f"call_service:{service}:{self._count}"
+        while len(self.asked) >= MAX_TOPICS:
+            del self.asked[next(iter(self.asked))]
+        self.asked[key] = client, number
+        self.servers[service].write(
+            {"op": "call_service", "id": key, "service": service, "args": args}
+        )
+
+    def publish(self, topic: str, message: object, now_s: float) -> None:
+        """Send a message to every subscriber."""
+        for client in self.clients:
+            client.show(topic, message, now_s)
+
+
+class BridgeClient:
+    """One client of the bridge."""
+
+    def __init__(self, bridge: Bridge, send: Callable[[str | bytes], None]) -> None:
+        """Join `bridge`; `send` takes one frame, text or binary."""
+        self._bridge = bridge
+        self._send = send
+        self.wanted: dict[str, _Wanted] = {}
+        """Topics that it subscribes to."""
+        self._shown_s: dict[str, float] = {}
+        self._calls: dict[object, str] = {}
+        """Id of an unanswered call → its service."""
+        self._goals: dict[object, str] = {}
+        """Id of a running goal → its action."""
+        self._fragments = 0
+        bridge.clients.append(self)
+
+    def leave(self) -> None:
+        """Remove the client and the services that it offered."""
+        bridge = self._bridge
+        bridge.clients.remove(self)
+        bridge.servers = {
+            name: client for name, client in bridge.servers.items() if client is not self
+        }
+        bridge.asked = {key: who for key, who in bridge.asked.items() if who[0] is not self}
+
+    def hears(self, text: str | bytes, now_s: float) -> Envelope | None:
+        """Handle one frame of the client; return the message for the emulated robot, if any."""
+        try:
+            operation = _decode(text)
+        except (msgspec.DecodeError, UnicodeDecodeError):
+            return None  # silent, as in the real bridge
+        if not isinstance(operation, dict):
+            return None
+        work = _WORK.get(str(operation.get("op")))
+        return None if work is None else work(self, operation, now_s)
+
+    def says(self, payload: Payload, now_s: float) -> None:
+        """Send a message of the emulated robot to the client."""
+        if not isinstance(payload, Envelope):
+            return
+        payload = payload._replace(body=_fields(payload.body))
+        number, body = payload.attributes.get("id"), payload.body
+        match payload.verb:
+            case "message":
+                topic = str(payload.attributes.get("topic"))
+                self._bridge.types.setdefault(topic, "")
+                self.show(topic, body, now_s)
+            case "feedback" if number in self._goals:
+                self._feedback(number, body)
+            case "response" if number in self._calls:
+                self._respond(self._calls.pop(number), number, payload)
+            case "response" if number in self._goals:
+                self._finish(self._goals.pop(number), number, payload)
+
+    def refuses(self, asked: Envelope) -> None:
+        """Report that the emulated robot has no such service or action."""
+        number = asked.attributes.get("id")
+        if number in self._calls:
+            service = self._calls.pop(number)
+            self.answer(service, number, f"Service {service} does not exist", False)
+        elif number in self._goals:
+            reason = {"reason": "no such action"}
+            self._finish(
+                self._goals.pop(number), number, Envelope("response", {"ok": False}, reason)
+            )
+
+    def show(self, topic: str, message: object, now_s: float) -> None:
+        """Send a message to the client if it subscribed, at most at its throttle rate."""
+        wanted = self.wanted.get(topic)
+        if wanted is None:
+            return
+        if now_s < self._shown_s.get(topic, float("-inf")) + wanted.throttle_s:
+            return
+        self._shown_s[topic] = now_s
+        operation = {"op": "publish", "topic": topic, "msg": message}
+        if wanted.compression == "cbor":
+            import cbor2  # only where a client asks for it
+
+            self._send(cbor2.dumps(operation))
+        elif wanted.compression == "png":
+            self.write({"op": "png", "data": _png(_encode(operation))})
+        elif wanted.fragment_bytes:
+            self._write_pieces(_encode(operation).decode(), wanted.fragment_bytes)
+        else:
+            self.write(operation)
+
+    def write(self, operation: Mapping[str, object]) -> None:
+        """Send one operation as text."""
+        self._send(_encode(operation).decode())
+
+    def _write_pieces(self, text: str, size: int) -> None:
+        self._fragments += 1
+        pieces = [text[start : start + size] for start in range(0, len(text), size)]
+        for number, piece in enumerate(pieces):
+            self.write(
+                {
+                    "op": "fragment",
+                    "id": str(self._fragments),
+                    "data": piece,
+                    "num": number,
+                    "total": len(pieces),
+                }
+            )
+
+    # -- replies of the robot
+
+    def answer(self, service: str, number: object, values: object, is_ok: bool) -> None:
+        """Answer a call of this client."""
+        operation = {"op": "service_response", "service": service, "values": values}
+        if number is not None:
+            operation["id"] = number
+        self.write({**operation, "result": is_ok})
+
+    def _respond(self, service: str, number: object, said: Envelope) -> None:
+        is_ok = said.attributes.get("ok") is not False
+        values = said.body if is_ok else said.attributes.get("reason") or said.body
+        self.answer(service, number, {} if values is None else values, is_ok)
+
+    def _feedback(self, number: object, body: object) -> None:
+        action = self._goals[number]
+        self.write({"op": "action_feedback", "id": number, "action": action, "values": body})
+
+    def _finish(self, action: str, number: object, said: Envelope) -> None:
+        is_ok = said.attributes.get("ok") is not False
+        self.write(
+            {
+                "op": "action_result",
+                "id": number,
+                "action": action,
+                "values": {} if said.body is None else said.body,
+                "status": _ENDS[is_ok],
+                "result": is_ok,
+            }
+        )
+
+    # -- the client's operations
+
+    def subscribe(self, operation: Mapping[str, Any], now_s: float) -> None:
+        """Subscribe; a second subscription to a topic replaces the first, throttle included."""
+        topic = _text(operation, "topic")
+        if not topic or len(self.wanted) >= MAX_TOPICS:
+            return
+        self._learn(topic, operation)
+        throttle_ms, fragment = operation.get("throttle_rate"), operation.get("fragment_size")
+        self.wanted[topic] = _Wanted(
+            max(0, throttle_ms) / 1000 if isinstance(throttle_ms, int | float) else 0.0,
+            str(operation.get("compression") or "none"),
+            max(0, fragment) if isinstance(fragment, int) else 0,
+        )
+
+    def unsubscribe(self, operation: Mapping[str, Any], now_s: float) -> None:
+        """Forget a subscription."""
+        self.wanted.pop(_text(operation, "topic"), None)
+
+    def advertise(self, operation: Mapping[str, Any], now_s: float) -> None:
+        """Note the type of a topic."""
+        self._learn(_text(operation, "topic"), operation)
+
+    def publish(self, operation: Mapping[str, Any], now_s: float) -> Envelope | None:
+        """Send a message to all subscribers and to the robot; drop it if its type is unknown."""
+        topic, message = _text(operation, "topic"), operation.get("msg")
+        if topic not in self._bridge.types or not isinstance(message, dict):
+            return None
+        self._bridge.publish(topic, message, now_s)
+        kind = self._bridge.types[topic]
+        attributes = {"topic": topic, "type": kind} if kind else {"topic": topic}
+        return Envelope("publish", attributes, message)
+
+    def call(self, operation: Mapping[str, Any], now_s: float) -> Envelope | None:
+        """Answer a call of rosapi, or forward it to the client or robot that offers the service."""
+        service, number = _text(operation, "service"), operation.get("id")
+        args = operation.get("args")
+        args = {} if args is None else args
+        known = self._rosapi(service, args)
+        if known is not None:
+            self.answer(service, number, known, True)
+        elif service in self._bridge.servers:
+            self._bridge.passed_on(service, self, number, args)
+        else:
+            self._keep(self._calls, number, service)
+            attributes = {"service": service, "id": number}
+            return Envelope("call", attributes, args)
+        return None
+
+    def offer(self, operation: Mapping[str, Any], now_s: float) -> None:
+        """Register this client as the server of a service."""
+        if len(self._bridge.servers) < MAX_TOPICS:
+            self._bridge.servers[_text(operation, "service")] = self
+
+    def withdraw(self, operation: Mapping[str, Any], now_s: float) -> None:
+        """Remove a service."""
+        name = _text(operation, "service")
+        if self._bridge.servers.get(name) is self:
+            del self._bridge.servers[name]
+
+    def respond(self, operation: Mapping[str, Any], now_s: float) -> None:
+        """Forward a reply to the caller."""
+        asked = self._bridge.asked.pop(str(operation.get("id")), None)
+        if asked is not None:
+            client, number = asked
+            values = operation.get("values")
+            is_ok = operation.get("result") is not False
+            client.answer(_text(operation, "service"), number, values, is_ok)
+
+    def start(self, operation: Mapping[str, Any], now_s: float) -> Envelope:
+        """Send a goal to the robot."""
+        action, number = _text(operation, "action"), operation.get("id")
+        self._keep(self._goals, number, action)
+        attributes = {
+            "action": action,
+            "type": _text(operation, "action_type"),
+            "feedback": operation.get("feedback") is True,
+            "id": number,
+        }
+        return Envelope("goal", attributes, operation.get("args") or {})
+
+    def cancel(self, operation: Mapping[str, Any], now_s: float) -> Envelope:
+        """Cancel a goal."""
+        attributes = {"action": _text(operation, "action"), "id": operation.get("id")}
+        return Envelope("cancel", attributes)
+
+    def _learn(self, topic: str, operation: Mapping[str, Any]) -> None:
+        kind = _text(operation, "type")
+        if topic and kind and len(self._bridge.types) < MAX_TOPICS:
+            self._bridge.types[topic] = self._bridge.types.get(topic) or kind
+
+    def _keep(self, table: dict[object, str], number: object, name: str) -> None:
+        if not isinstance(number, str | int):
+            return  # replies could not be matched
+        while len(table) >= MAX_TOPICS:
+            del table[next(iter(table))]
+        table[number] = name
+
+    def _rosapi(self, service: str, args: object) -> dict[str, object] | None:
+        """Return the reply of the node rosapi, or None for another service."""
+        folder, _, question = service.rpartition("/")
+        if folder not in ("/rosapi", "rosapi"):
+            return None
+        given = args if isinstance(args, dict) else {}
+        types = dict(sorted(self._bridge.types.items()))
+        match question:
+            case "topics":
+                return {"topics": list(types), "types": list(types.values())}
+            case "topic_type":
+                return {"type": types.get(str(given.get("topic")), "")}
+            case "topics_for_type":
+                kind = given.get("type")
+                return {"topics": [name for name, known in types.items() if known == kind]}
+            case "subscribers":
+                topic = str(given.get("topic"))
+                nodes = ["/robot"] if topic in types else []
+                if any(topic in client.wanted for client in self._bridge.clients):
+                    nodes.append("/rosbridge_websocket")
+                return {"subscribers": nodes}
+            case "services":
+                return {"services": sorted(self._bridge.servers)}
+        return None
+
+
+_Work = Callable[[BridgeClient, Mapping[str, Any], float], Envelope | None]
+_WORK: Mapping[str, _Work] = {
+    "subscribe": BridgeClient.subscribe,
+    "unsubscribe": BridgeClient.unsubscribe,
+    "advertise": BridgeClient.advertise,
+    "publish": BridgeClient.publish,
+    "call_service": BridgeClient.call,
+    "advertise_service": BridgeClient.offer,
+    "unadvertise_service": BridgeClient.withdraw,
+    "service_response": BridgeClient.respond,
+    "send_action_goal": BridgeClient.start,
+    "cancel_action_goal": BridgeClient.cancel,
+}
+
+
+def _text(operation: Mapping[str, Any], name: str) -> str:
+    value = operation.get(name)
+    return value if isinstance(value, str) else ""
+
+
+def _fields(body: object) -> object:
+    """Return a body as an object: the emulated robot may have it as JSON text."""
+    if not isinstance(body, bytes):
+        return body
+    try:
+        return _decode(body) if body.strip() else {}
+    except (msgspec.DecodeError, UnicodeDecodeError):
+        return {"data": body}
+
+
+def _png(data: bytes) -> str:
+    """Return `data` as the pixels of a square 8-bit RGB image, padded with newlines, in base64."""
+    side = max(1, round((len(data) / 3) ** 0.5))
+    height = -(-len(data) // (side * 3))
+    padded = data.ljust(side * height * 3, b"\n")
+    stride = side * 3
+    rows = b"".join(b"\0" + padded[at : at + stride] for at in range(0, len(padded), stride))
+    chunks: Iterable[tuple[bytes, bytes]] = (
+        (b"IHDR", struct.pack(">IIBBBBB", side, height, 8, 2, 0, 0, 0)),
+        (b"IDAT", zlib.compress(rows)),
+        (b"IEND", b""),
+    )
+    image = b"\x89PNG\r\n\x1a\n" + b"".join(
+        struct.pack(">I", len(body)) + kind + body + struct.pack(">I", zlib.crc32(kind + body))
+        for kind, body in chunks
+    )
+    return base64.b64encode(image).decode()
+
 
 MAX_BYTES = 10_000_000
 """Largest frame; the default of the real server."""

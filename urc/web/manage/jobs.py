@@ -27,7 +27,7 @@ from urc.runtime.kept import DRIVEN
 from urc.web.daemon import in_daemon
 from urc.web.manage.given import source_at
 from urc.web.manage.wire import JobNews, JobState
-from urc.web.phrases import spoken
+from urc.web.words import spoken
 
 __all__ = ["Busy", "Job", "Jobs", "Wanted"]
 

@@ -24,7 +24,7 @@ from urc.web.fleet.robots import Robot
 from urc.web.manage.catalogue import Catalogue
 from urc.web.manage.jobs import Busy, Job, Jobs
 from urc.web.manage.wire import MOST_HITS, Available, Installed, Shelf
-from urc.web.phrases import spoken
+from urc.web.words import spoken
 
 __all__ = ["Manager"]
 

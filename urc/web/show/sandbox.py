@@ -4,16 +4,58 @@ Floor 5. It bounds neither time nor memory: `urc.web.show.markup_apart` does, fo
 """
 
 import traceback
+from collections.abc import Sequence
 from functools import lru_cache
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from jinja2 import Environment, StrictUndefined, Template, TemplateSyntaxError
 from jinja2.sandbox import ImmutableSandboxedEnvironment
+from markupsafe import Markup
 
 from urc.web import words
-from urc.web.show.markdown import markdown
 
-__all__ = ["TEMPLATE", "fault_line", "widget_environment", "widget_template"]
+if TYPE_CHECKING:
+    from markdown_it import MarkdownIt
+    from markdown_it.token import Token
+
+__all__ = ["TEMPLATE", "fault_line", "markdown", "widget_environment", "widget_template"]
+
+
+FIRST_HEADING = 4
+"""Level of ``#``: the page and the cells have the levels above it."""
+
+
+def markdown(text: str) -> Markup:
+    """Return the HTML of a text in CommonMark, with tables and strikethrough."""
+    parser = _parser()
+    tokens = parser.parse(text)
+    _lower_headings(tokens)
+    _open_links_elsewhere(tokens)
+    return Markup(parser.renderer.render(tokens, parser.options, {}))  # noqa: S704  # no HTML in it
+
+
+def _lower_headings(tokens: Sequence["Token"]) -> None:
+    for token in tokens:
+        if token.type in ("heading_open", "heading_close"):
+            token.tag = f"h{min(6, int(token.tag[1:]) + FIRST_HEADING - 1)}"
+
+
+def _open_links_elsewhere(tokens: Sequence["Token"]) -> None:
+    """A link that takes the page away would take the controls away."""
+    for token in tokens:
+        for child in token.children or ():
+            if child.type == "link_open":
+                child.attrSet("target", "_blank")
+                child.attrSet("rel", "noopener noreferrer")
+
+
+@lru_cache(maxsize=1)
+def _parser() -> "MarkdownIt":
+    from markdown_it import MarkdownIt  # only pages with such a widget need it
+
+    parser = MarkdownIt("commonmark", {"html": False, "linkify": False})
+    return parser.enable(["table", "strikethrough"]).disable("image")
+
 
 TEMPLATE: Final = "template.html.j2"
 _CODE: Final = "<template>"

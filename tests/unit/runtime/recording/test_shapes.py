@@ -13,7 +13,7 @@ from urc.runtime.audit import Entry
 from urc.runtime.hub import LinkStatus, Moved, Note, Tapped, Told, Traffic
 from urc.runtime.recording.events import event_of
 from urc.runtime.recording.shapes import DRIVING, LOG, Shapes, channels
-from urc.testing.codec import text
+from urc.testing.profile import text
 
 BORN_NS = 1_700_000_000_000_000_000
 PNG = b"\x89PNG\r\n\x1a\n rest"
