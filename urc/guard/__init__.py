@@ -1,6 +1,10 @@
 """The guard: a small process that owns the lines of a robot that moves, and stops it.
 
-Floor 4. It runs nothing that comes from a document: no template, no pattern, no parser. What it
-writes was rendered elsewhere, and the stop before anything moved. `host` is what happens in there,
-`client` and `proxy` are the server's side of it; `wire` and `pipe` are between them.
+It stands on the transports and on `urc.motion`; sessions stand on it. The guard runs nothing of a
+document: no template, no pattern, no parser. It gets rendered frames, and the stop frame before any
+motion.
+
+`guard_client` is the engine's side: `GuardClient` talks to a guard over a `Channel`, by the messages
+of `wire`. `PipeChannel` leads to a process with `host` in it, `LocalChannel` to a `host` in this
+process.
 """

@@ -1,4 +1,4 @@
-"""The guard's process: ``python -m urc.guard PIPE DOOR…``, started by `urc.guard.client` alone."""
+"""The guard's process: ``python -m urc.guard PIPE DOOR…``, started by `PipeChannel` alone."""
 
 import asyncio
 import gc

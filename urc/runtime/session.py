@@ -33,7 +33,7 @@ from urc.runtime.motion import Frames
 from urc.runtime.settings import resolve_settings
 
 if TYPE_CHECKING:
-    from urc.runtime.guarding import GuardedMovers
+    from urc.guard.guard_client import GuardClient
 
 __all__ = ["CommandFailed", "Motion", "Session", "Turnstile", "resolve_settings"]
 
@@ -131,7 +131,7 @@ class Session:
         engine = Engine(driver, self.settings, fresh=fresh, is_compiled=True)
         self.frames: Frames = engine.motions
         """Makes the frames of held commands."""
-        self.movers: GuardedMovers | None = None
+        self.movers: GuardClient | None = None
         """Who writes them; None where nothing is held."""
         if motion != "none" and any(one.hold is not None for one in driver.commands.values()):
             from urc.runtime.guarding import take_reins  # 20 ms: only for what can be driven
@@ -140,7 +140,7 @@ class Session:
                 driver, self.settings, transports, self._clock, is_guarded=motion == "guarded"
             )
             engine.motions.share([name for name in driver.transports if is_lossy(driver, name)])
-            self.movers.client.on_stand = engine.motions.told
+            self.movers.on_stand = engine.motions.told
         self._dispatcher = Dispatcher(
             engine,
             self.hub,
@@ -190,7 +190,8 @@ class Session:
     ) -> None:
         try:
             if self.movers is not None:
-                self.movers.stop_all(self.frames)  # before anything is said in good order
+                # Before the good-byes of the lines: these may wait.
+                self.movers.stop_all(self.frames.stop_frame)
             await self._say_goodbye()
             await self._end(kind, error, trace)
         finally:

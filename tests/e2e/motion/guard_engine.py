@@ -21,7 +21,7 @@ import time
 from pathlib import Path
 
 from urc.config.load import load_profile
-from urc.guard.client import Guard
+from urc.guard.pipe_channel import PipeChannel
 from urc.motion.hold import Terms
 from urc.runtime.catalog import built_in_catalog
 from urc.runtime.session import Motion, Session
@@ -89,9 +89,9 @@ class Engine:
         """Tell of the guard and the line."""
         guard, state = 0, ""
         while True:
-            client = self.movers.client
-            if isinstance(client, Guard) and client.pid not in (0, guard):
-                guard = client.pid
+            channel = self.movers.channel
+            if isinstance(channel, PipeChannel) and channel.pid not in (0, guard):
+                guard = channel.pid
                 tell("guard", guard)
             now = self.session.hub.links["wire"].state if self.session.hub.links else ""
             if now != state:

@@ -2,13 +2,17 @@
 
 import asyncio
 import socket
+import subprocess
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager, suppress
+from functools import partial
 
 import pytest
 
 from urc.guard import wire
-from urc.guard.client import Guard, LineSpec
+from urc.guard.channel import LineSpec
+from urc.guard.guard_client import GuardClient, HeldSpec
+from urc.guard.pipe_channel import PipeChannel
 from urc.guard.process import Door
 from urc.motion.hold import Terms
 from urc.transports.tcp import TcpTransport
@@ -42,14 +46,16 @@ class Robot:
 
 
 @asynccontextmanager
-async def guarded() -> AsyncIterator[tuple[Guard, Robot]]:
+async def guarded() -> AsyncIterator[tuple[GuardClient, Robot]]:
     """Run a guard that came to its door, and a robot."""
     robot = Robot()
     server = await asyncio.start_server(robot.listen, "127.0.0.1", 0)
     port = server.sockets[0].getsockname()[1]
     options = {"host": "127.0.0.1", "port": port}
     make = wire.Make("wire", "urc.transports.tcp:from_setup", options, [], "", 0.22, False)
-    guard = Guard([LineSpec(make, TcpTransport("127.0.0.1", port))], is_inherited=False)
+    lines = [LineSpec(make, TcpTransport("127.0.0.1", port))]
+    held = {"drive": HeldSpec("wire", Terms(b"", period_s=0.02))}
+    guard = GuardClient(lines, held, partial(PipeChannel, is_inherited=False))
     guard.start()
     try:
         yield guard, robot
@@ -58,10 +64,16 @@ async def guarded() -> AsyncIterator[tuple[Guard, Robot]]:
         server.close()
 
 
+def process_of(guard: GuardClient) -> "subprocess.Popen[bytes]":
+    assert isinstance(guard.channel, PipeChannel)
+    assert guard.channel._process is not None
+    return guard.channel._process
+
+
 async def test_it_moves_and_stops_as_any_other() -> None:
     async with guarded() as (guard, robot):
         await guard.transports["wire"].open(BOUND_S)
-        guard.arm("wire", "drive", Terms(STOP, period_s=0.02))
+        guard.arm("drive", Terms(STOP, period_s=0.02))
         guard.tick("drive", b"go\n")
         await robot.hears(STOP)
         assert robot.heard == b"go\n" + STOP
@@ -70,18 +82,16 @@ async def test_it_moves_and_stops_as_any_other() -> None:
 async def test_the_next_one_stops_what_moved() -> None:
     async with guarded() as (guard, robot):
         await guard.transports["wire"].open(BOUND_S)
-        guard.arm("wire", "drive", Terms(STOP, period_s=0.02, lease_s=1.0))
+        guard.arm("drive", Terms(STOP, period_s=0.02, lease_s=1.0))
         guard.tick("drive", b"go\n")
         await robot.hears(b"go\n")
-        assert guard._process is not None
-        guard._process.kill()
+        process_of(guard).kill()
         await robot.hears(b"go\n" + STOP)
 
 
 async def test_a_guard_that_was_not_needed_is_ended_before_it_came() -> None:
     async with guarded() as (guard, robot):
-        process = guard._process
-        assert process is not None
+        process = process_of(guard)
     assert process.poll() is not None
     assert robot.heard == b""
 

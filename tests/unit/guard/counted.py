@@ -13,7 +13,7 @@ import pytest
 
 from tests.dialogue import driver_of
 from urc.guard import wire
-from urc.guard.side import LocalGuard
+from urc.guard.local_channel import LocalChannel
 from urc.model.codec import Payload
 from urc.model.profile import Profile
 from urc.motion.fresh import Input
@@ -157,8 +157,8 @@ class PromptRobot(Robot):
         return self.unsent_bytes
 
 
-class PipedGuard(LocalGuard):
-    """The guard behind a pipe that takes `delay_s`, each way."""
+class PipedChannel(LocalChannel):
+    """A guard behind a pipe that takes `delay_s`, each way."""
 
     delay_s = 0.0
 
@@ -169,8 +169,8 @@ class PipedGuard(LocalGuard):
         self._of_guard, self._of_server = wire.decoder_of_guard(), wire.decoder_of_server()
         super().start()
 
-    def _post(self, said: wire.ToGuard) -> None:
-        self._to_guard.append(self._encode(said))
+    def post(self, message: wire.ToGuard, *, slot: str = "", is_urgent: bool = False) -> None:
+        self._to_guard.append(self._encode(message))
         self._clock.call_at(self._clock.now() + self.delay_s, self._to)
 
     def _to(self) -> None:
@@ -178,8 +178,8 @@ class PipedGuard(LocalGuard):
             self._host.take(self._of_guard.decode(self._to_guard.popleft()))
             self._host.settle()
 
-    def _emit(self, said: wire.FromGuard) -> int:
-        data = self._encode(said)
+    def _emit(self, message: wire.FromGuard) -> int:
+        data = self._encode(message)
         self._to_engine.append(data)
         self._clock.call_at(self._clock.now() + self.delay_s, self._from)
         return len(data)
@@ -187,7 +187,7 @@ class PipedGuard(LocalGuard):
     def _from(self) -> None:
         if self._to_engine:
             data = self._to_engine.popleft()
-            self._take(self._of_server.decode(data), len(data))
+            self._listener.take(self._of_server.decode(data), len(data))
 
     async def finish(self) -> None:
         while self._to_guard:
@@ -205,7 +205,7 @@ class World:
         self.desk = MotionDesk(session.profile.driver)
         self.desk.join(Client("ann", "ann", "engineer"))
         assert session.movers is not None
-        self.guard = session.movers.client
+        self.guard = session.movers
         self.desk.attach(session.frames, session.movers)
         self._ticks = 0
         self._asking: list[asyncio.Task[object]] = []
@@ -213,8 +213,8 @@ class World:
 
     def delay(self, seconds: float) -> None:
         """Let the pipe take so long from now on."""
-        assert isinstance(self.guard, PipedGuard)
-        self.guard.delay_s = seconds
+        assert isinstance(self.guard.channel, PipedChannel)
+        self.guard.channel.delay_s = seconds
 
     def take(self) -> None:
         """Take the controls."""
@@ -260,7 +260,7 @@ async def opened(
     robot = (PromptRobot if is_prompt else Robot)(is_bytewise=is_bytewise)
     table = table_of(**{kind: robot})
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(guarding, "LocalGuard", PipedGuard)
+        patch.setattr(guarding, "LocalChannel", PipedChannel)
         patch.setattr(held, "_LOSSY", frozenset(("pigeon",)))
         session = Session(
             _PROFILES[kind], {}, table, clock=clock, random=lambda: 0.0, motion="here"

@@ -2,10 +2,13 @@
 
 import asyncio
 from collections.abc import Callable
+from functools import partial
 
 from urc.guard import wire
-from urc.guard.client import LineSpec, LocalGuard
+from urc.guard.channel import LineSpec
+from urc.guard.guard_client import GuardClient, HeldSpec
 from urc.guard.host import Host
+from urc.guard.local_channel import LocalChannel
 from urc.model.codec import Payload
 from urc.motion.hold import Terms
 from urc.motion.stall import STALLED_S
@@ -13,6 +16,7 @@ from urc.testing.clock import FakeClock, settle
 from urc.transports.base import ConnectFailed, PeerClosed, Transport, TransportError
 
 __all__ = [
+    "HELD",
     "STOP",
     "TERMS",
     "Bench",
@@ -27,6 +31,7 @@ __all__ = [
 
 STOP = b"stop"
 TERMS = Terms(STOP, period_s=0.02)
+HELD = {name: HeldSpec("wire", TERMS) for name in ("drive", "turn", "lift", "aim")}
 
 
 class Wire:
@@ -210,18 +215,34 @@ class Rig:
         self.clock = FakeClock()
         make = wire.Make("wire", "", {}, [], "", stalled_s, is_strict, silent_s)
         line: Transport = robot
-        self.guard = LocalGuard([LineSpec(make, line)], self.clock)
+        lines = [LineSpec(make, line)]
+        channel_to = partial(LocalChannel, lines=lines, clock=self.clock)
+        self.guard = GuardClient(lines, HELD, channel_to)
         self.guard.start()
         self.transport = self.guard.transports["wire"]
 
     async def drive(self, terms: Terms = TERMS) -> None:
         await self.transport.open(1.0)
-        self.guard.arm("wire", "drive", terms)
+        self.guard.arm("drive", terms)
         self.tick(b"go 1")
         await settle()
 
     def tick(self, data: Payload) -> None:
         self.guard.tick("drive", data)
+
+    def caught(self) -> list[tuple[str, wire.ToGuard]]:
+        """Return the messages that replace unsent ones, with their slots: none is sent any more."""
+        found: list[tuple[str, wire.ToGuard]] = []
+        post = self.guard.channel.post
+
+        def catch(message: wire.ToGuard, *, slot: str = "", is_urgent: bool = False) -> None:
+            if slot:
+                found.append((slot, message))
+            else:
+                post(message, is_urgent=is_urgent)
+
+        self.guard.channel.post = catch  # type: ignore[method-assign]
+        return found
 
     async def stops(self) -> list[tuple[str, str]]:
         async with asyncio.timeout(1.0):

@@ -126,7 +126,7 @@ async def test_way_that_has_become_long_is_given_its_time(rig: Rig) -> None:
         opening = asyncio.ensure_future(rig.transport.open(1.0))
         await rig.clock.advance(0.1)
         await opening
-    rig.guard.arm("wire", "drive", TERMS)
+    rig.guard.arm("drive", TERMS)
     rig.tick(b"go")
     await settle()
     rig.robot.cut()

@@ -85,7 +85,7 @@ async def test_nobody_is_asked_at_rest(robot: ProbedWire, rig: Rig) -> None:
     await rig.transport.open(1.0)
     await rig.clock.advance(5.0)
     assert robot.probes == 0
-    rig.guard.arm("wire", "drive", TERMS)
+    rig.guard.arm("drive", TERMS)
     rig.tick(b"go")
     await rig.clock.advance(0.1)
     assert robot.probes

@@ -6,7 +6,8 @@ import pytest
 
 from tests.unit.guard.lines import STOP, TERMS, CountedWire, GatedWire, Rig, Wire
 from urc.guard import proxy, wire
-from urc.model.codec import Count, Counted, Envelope, Numbered, Payload
+from urc.guard.local_channel import LocalChannel
+from urc.model.codec import Count, Counted, Envelope, Numbered
 from urc.testing.clock import settle
 from urc.transports.base import ConnectFailed
 
@@ -15,7 +16,7 @@ pytestmark = pytest.mark.anyio
 
 async def test_tick_is_written_at_once(rig: Rig) -> None:
     await rig.transport.open(1.0)
-    rig.guard.arm("wire", "drive", TERMS)
+    rig.guard.arm("drive", TERMS)
     rig.tick(b"go")
     assert rig.robot.written == [b"go"]
 
@@ -46,7 +47,7 @@ async def test_tick_that_waited_too_long_renews_nothing(rig: Rig) -> None:
     """A guard that was frozen finds old ticks in the pipe; each is as old as it is."""
     await rig.drive()
     await rig.clock.advance(0.24)
-    rig.guard._post(wire.Tick("drive", 9, b"old", rig.clock.now() - 0.3))
+    rig.guard.channel.post(wire.Tick("drive", 9, b"old", rig.clock.now() - 0.3))
     await rig.clock.advance(0.02)
     assert rig.robot.written == [b"go 1", STOP]
 
@@ -56,7 +57,7 @@ async def test_tick_that_waited_too_long_leaves_a_running_motion_alone(rig: Rig)
     await rig.drive()
     await rig.clock.advance(0.1)
     rig.tick(b"go 2")
-    rig.guard._post(wire.Tick("drive", 9, b"old", rig.clock.now() - 0.3))
+    rig.guard.channel.post(wire.Tick("drive", 9, b"old", rig.clock.now() - 0.3))
     await rig.clock.advance(0.1)
     rig.tick(b"go 3")
     await rig.clock.advance(0.1)
@@ -65,8 +66,8 @@ async def test_tick_that_waited_too_long_leaves_a_running_motion_alone(rig: Rig)
 
 async def test_tick_that_waited_too_long_writes_nothing_to_a_robot_at_rest(rig: Rig) -> None:
     await rig.transport.open(1.0)
-    rig.guard.arm("wire", "drive", TERMS)
-    rig.guard._post(wire.Tick("drive", 1, b"old", rig.clock.now() - 0.3))
+    rig.guard.arm("drive", TERMS)
+    rig.guard.channel.post(wire.Tick("drive", 1, b"old", rig.clock.now() - 0.3))
     await rig.clock.advance(1.0)
     assert rig.robot.written == [], "neither motion nor a stop"
     rig.tick(b"go")
@@ -85,7 +86,7 @@ async def test_stop_is_the_newest_that_was_made(rig: Rig) -> None:
     rig.tick(b"go 2")
     await rig.clock.advance(0.1)
     assert rig.robot.written == [b"go 1", b"stop 2"]
-    rig.guard.stop([("wire", "drive", TERMS._replace(stop=b"stop 4"))])
+    rig.guard.stop({"drive": b"stop 4"})
     assert rig.robot.written == [b"go 1", b"stop 2", b"stop 4"]
 
 
@@ -141,7 +142,7 @@ async def test_cuts_have_no_end(rig: Rig) -> None:
         await rig.clock.advance(0.1)
         assert rig.robot.written[-1] == STOP
         await rig.transport.open(1.0)
-        rig.guard.arm("wire", "drive", TERMS)
+        rig.guard.arm("drive", TERMS)
         rig.tick(b"go on")
         await settle()
         assert rig.robot.written[-1] == b"go on"
@@ -200,7 +201,7 @@ async def test_line_that_was_at_rest_is_left_to_the_engine(rig: Rig) -> None:
 
 
 async def test_stop_on_a_closed_line_is_the_first_thing_on_it(rig: Rig) -> None:
-    rig.guard.stop([("wire", "drive", TERMS)])
+    rig.guard.stop({"drive": STOP})
     await rig.clock.advance(1.0)
     assert rig.robot.opens == 0, "nothing moved: nobody is in a hurry"
     await rig.transport.open(1.0)
@@ -210,7 +211,7 @@ async def test_stop_on_a_closed_line_is_the_first_thing_on_it(rig: Rig) -> None:
 
 async def test_stop_needs_no_motion(rig: Rig) -> None:
     await rig.transport.open(1.0)
-    rig.guard.stop([("wire", "drive", TERMS), ("wire", "turn", TERMS._replace(stop=b"halt"))])
+    rig.guard.stop({"drive": STOP, "turn": b"halt"})
     assert rig.robot.written == [STOP, b"halt"]
     assert await rig.stops() == [("drive", "stopped"), ("turn", "stopped")]
 
@@ -282,7 +283,7 @@ async def test_messages_are_motion_too(rigs: list[Rig]) -> None:
     rig = Rig(Wire())
     rigs.append(rig)
     await rig.transport.open(1.0)
-    rig.guard.arm("wire", "drive", TERMS._replace(stop=halt))
+    rig.guard.arm("drive", TERMS._replace(stop=halt))
     rig.tick(go)
     await settle()
     rig.guard.release("drive")
@@ -292,7 +293,7 @@ async def test_messages_are_motion_too(rigs: list[Rig]) -> None:
 
 async def test_new_guard_opens_and_stops_what_moved(rig: Rig) -> None:
     """It is told what the one before it cannot tell any more."""
-    rig.guard._post(wire.Owe("wire", "drive", TERMS))
+    rig.guard.channel.post(wire.Owe("wire", "drive", TERMS))
     await rig.clock.advance(0.1)
     assert rig.robot.opens == 1
     assert rig.robot.written == [STOP]
@@ -300,7 +301,7 @@ async def test_new_guard_opens_and_stops_what_moved(rig: Rig) -> None:
 
 async def test_two_controls_stop_before_either_moves(rig: Rig) -> None:
     await rig.drive()
-    rig.guard.arm("wire", "turn", TERMS._replace(stop=b"halt"))
+    rig.guard.arm("turn", TERMS._replace(stop=b"halt"))
     await rig.clock.advance(0.24)
     rig.guard.tick("turn", b"left")
     await rig.clock.advance(0.011)
@@ -327,7 +328,7 @@ async def test_opening_that_took_long_once_does_not_make_the_next_attempts_slow(
         robot.cut()
         await rig.clock.advance(0.3)
         await rig.transport.open(1.0)
-        rig.guard.arm("wire", "drive", TERMS)
+        rig.guard.arm("drive", TERMS)
         rig.tick(b"go on")
         await settle()
     assert patience == [0.07, 0.07, 0.07]
@@ -345,8 +346,10 @@ async def test_engine_may_take_as_much_as_it_likes_where_there_is_no_process(rig
 
 async def test_what_arrives_counts_with_its_envelope(rig: Rig) -> None:
     """So many small things take no more memory than a few large ones."""
-    assert rig.guard._emit(wire.Received("wire", 1, b"four")) == 36
-    assert rig.guard._emit(wire.Sent("wire", 1, 1)) == 0
+    channel = rig.guard.channel
+    assert isinstance(channel, LocalChannel)
+    assert channel._emit(wire.Received("wire", 1, b"four")) == 36
+    assert channel._emit(wire.Sent("wire", 1, 1)) == 0
 
 
 async def test_a_tick_without_bytes_renews_the_lease_and_writes_nothing(rig: Rig) -> None:
@@ -369,7 +372,7 @@ async def test_control_may_be_stopping_for_a_while_after_its_stop_was_told(rig: 
     await rig.clock.advance(5.0)
     rig.tick(b"refused, and nobody knows yet")
     assert rig.guard.is_stopping("drive")
-    rig.guard.arm("wire", "drive", TERMS)
+    rig.guard.arm("drive", TERMS)
     rig.tick(b"go")
     rig.guard.release("drive")
     await rig.clock.advance(0.875)
@@ -380,26 +383,23 @@ async def test_control_may_be_stopping_for_a_while_after_its_stop_was_told(rig: 
 
 async def test_control_that_is_armed_again_may_still_be_moving(rig: Rig) -> None:
     await rig.drive()
-    rig.guard.arm("wire", "drive", TERMS)
+    rig.guard.arm("drive", TERMS)
     assert rig.guard.is_stopping("drive")
 
 
 async def test_only_frames_with_counters_are_passed_on_with_what_they_count(rig: Rig) -> None:
     await rig.drive()
-    passed: list[object] = []
-    rig.guard._pass_newest = (  # type: ignore[method-assign]
-        lambda slot, said: passed.append(said.count)  # type: ignore[union-attr]
-    )
+    caught = rig.caught()
     count = Count({}, {"n": 7})
     rig.guard.tick("drive", b"go")
     rig.guard.tick("drive", Counted(Numbered(b"7 go", count), lambda: None))
-    assert passed == [None, count]
+    assert [one.count for _, one in caught if isinstance(one, wire.Tick)] == [None, count]
 
 
 async def test_unread_stops_are_bounded(rig: Rig) -> None:
     """The newest are kept."""
     for number in range(1000):
-        rig.guard._take(wire.Stopped(f"control {number}", "expired", 1), 0)
+        rig.guard.take(wire.Stopped(f"control {number}", "expired", 1), 0)
     stops = await rig.stops()
     assert len(stops) < 500
     assert stops[-1] == ("control 999", "expired")
@@ -419,20 +419,19 @@ async def test_line_has_the_address_of_its_transport_before_it_is_opened(rig: Ri
 async def test_tick_whose_number_was_used_up_is_made_again_whatever_else_was(rig: Rig) -> None:
     """Unless it was let go meanwhile, or a newer one is under way; it is as old as it was."""
     await rig.drive()
-    rig.guard.arm("wire", "turn", TERMS._replace(stop=b"halt"))
+    rig.guard.arm("turn", TERMS._replace(stop=b"halt"))
     first = Numbered(b"7 left", Count({}, {"n": 7}))
     again = Numbered(b"8 left", Count({"n": 7}, {"n": 8}))
     rig.guard.tick("turn", Counted(first, lambda: again))
-    passed: list[tuple[str, Payload]] = []
-    rig.guard._pass_newest = (  # type: ignore[method-assign]
-        lambda slot, said: passed.append((slot, said.data))  # type: ignore[union-attr]
-    )
-    rig.guard._take(wire.Counted("wire", 1, 0, {}, [("drive", 1), ("lift", 1), ("turn", 1)]), 0)
-    assert passed == [("turn", b"8 left")]
-    rig.guard._take(wire.Counted("wire", 1, 0, {}, [("turn", 9)]), 0)
+    caught = rig.caught()
+    rig.guard.take(wire.Counted("wire", 1, 0, {}, [("drive", 1), ("lift", 1), ("turn", 1)]), 0)
+    ((slot, tick),) = caught
+    assert isinstance(tick, wire.Tick)
+    assert (slot, tick.data) == ("turn", b"8 left")
+    rig.guard.take(wire.Counted("wire", 1, 0, {}, [("turn", 9)]), 0)
     rig.guard.release("turn")
-    rig.guard._take(wire.Counted("wire", 1, 0, {}, [("turn", 1)]), 0)
-    assert len(passed) == 1
+    rig.guard.take(wire.Counted("wire", 1, 0, {}, [("turn", 1)]), 0)
+    assert len(caught) == 1
 
 
 async def test_tick_whose_number_was_used_up_is_not_made_again_after_the_guards_stop(
@@ -441,8 +440,7 @@ async def test_tick_whose_number_was_used_up_is_not_made_again_after_the_guards_
     await rig.drive()
     first = Numbered(b"7 go", Count({}, {"n": 7}))
     rig.guard.tick("drive", Counted(first, lambda: first))
-    passed: list[str] = []
-    rig.guard._pass_newest = lambda slot, said: passed.append(slot)  # type: ignore[method-assign]
-    rig.guard._take(wire.Stopped("drive", "expired", 2), 0)
-    rig.guard._take(wire.Counted("wire", 1, 0, {}, [("drive", 2)]), 0)
-    assert passed == []
+    caught = rig.caught()
+    rig.guard.take(wire.Stopped("drive", "expired", 2), 0)
+    rig.guard.take(wire.Counted("wire", 1, 0, {}, [("drive", 2)]), 0)
+    assert caught == []

@@ -160,7 +160,7 @@ async def test_a_stop_that_is_on_its_way_is_not_given_up_for_the_next_one(rigs: 
     rigs.append(rig)
     lift = TERMS._replace(stop=b"down")
     await rig.drive()
-    rig.guard.arm("wire", "lift", lift)
+    rig.guard.arm("lift", lift)
     rig.guard.tick("lift", b"up")
     await rig.clock.advance(0.01)
     robot.is_stuck = True
@@ -186,7 +186,7 @@ async def test_first_stop_of_all_gives_up_what_is_on_its_way(rigs: list[Rig]) ->
     await rig.transport.open(1.0)
     robot.is_stuck = True
     await rig.transport.send(b"go home")
-    rig.guard.stop([("wire", "drive", TERMS)])
+    rig.guard.stop({"drive": STOP})
     await settle()
     assert (robot.written, robot.forgotten_bytes) == ([b"go home", STOP], len(b"go home"))
 

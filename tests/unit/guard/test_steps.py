@@ -16,7 +16,7 @@ async def driven(rigs: list[Rig], line: CountedWire | None = None) -> Rig:
     rig = Rig(line or CountedWire())
     rigs.append(rig)
     await rig.transport.open(1.0)
-    rig.guard.arm("wire", "drive", STEPS)
+    rig.guard.arm("drive", STEPS)
     rig.tick(b"step 1")
     await settle()
     return rig
@@ -57,7 +57,7 @@ async def test_a_hand_that_is_gone_makes_no_further_step(rigs: list[Rig]) -> Non
 async def test_stop_makes_no_further_step(rigs: list[Rig]) -> None:
     """It is told once, and the line was not used."""
     rig = await driven(rigs)
-    rig.guard.stop([("wire", "drive", STEPS)])
+    rig.guard.stop({"drive": b""})
     rig.tick(b"step 2")
     await rig.clock.advance(1.0)
     assert await rig.stops() == [("drive", "stopped")]

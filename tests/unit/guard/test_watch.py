@@ -8,8 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from urc.guard import client, wire
-from urc.guard.client import Guard
+from urc.guard import pipe_channel, wire
+from urc.guard.guard_client import GuardClient
+from urc.guard.pipe_channel import PipeChannel
 from urc.guard.process import Standing, standing
 
 
@@ -24,11 +25,11 @@ class FakePipe:
         self.is_closed = True
 
 
-class Watched(Guard):
-    """A guard of whose process only the standing is known."""
+class Watched(PipeChannel):
+    """A channel of whose process only the standing is known."""
 
     def __init__(self) -> None:
-        super().__init__([])
+        super().__init__(GuardClient([], {}, PipeChannel))
         self._pipe = self.pipe = FakePipe()  # type: ignore[assignment]
         self._was_heard = True
         self.deaths = 0
@@ -51,7 +52,7 @@ class Watched(Guard):
 def stands(monkeypatch: pytest.MonkeyPatch) -> list[Standing]:
     """How the process stands: what was put here last."""
     said = [Standing()]
-    monkeypatch.setattr(client, "standing", lambda pid: said[-1] if pid == 0 else Standing())
+    monkeypatch.setattr(pipe_channel, "standing", lambda pid: said[-1] if pid == 0 else Standing())
     return said
 
 
@@ -89,7 +90,7 @@ async def test_one_that_runs_for_less_than_half_the_time_is_waited_for(
 ) -> None:
     guard = Watched()
     for number in range(10):
-        stands.append(Standing(wants_to_run=True, ran_s=number * 0.4 * client._LOOK_S))
+        stands.append(Standing(wants_to_run=True, ran_s=number * 0.4 * pipe_channel._LOOK_S))
         guard.looks(1)
     assert guard.deaths == 0
 

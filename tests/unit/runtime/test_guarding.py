@@ -1,160 +1,26 @@
-"""What a desk moves goes to the guard under the right name, line and terms."""
-
-from collections.abc import Sequence
-from typing import Any
+"""What the guard is told of a driver: how to make each line, and the terms of held commands."""
 
 import pytest
 
 from tests.unit.runtime.desks import DRIVER, held
 from urc.expressions import compile_template
-from urc.guard.client import Guard, LineSpec, LocalGuard
-from urc.guard.side import Client
-from urc.model.codec import Count, Numbered, Payload, ReadSpec, Series
+from urc.guard.guard_client import GuardClient, HeldSpec
+from urc.guard.local_channel import LocalChannel
+from urc.guard.pipe_channel import PipeChannel
+from urc.model.codec import ReadSpec
 from urc.model.driver import Driver, Message, TransportSpec
-from urc.motion.hold import LEASE_S, Reason, Terms
+from urc.motion.hold import LEASE_S, Terms
 from urc.motion.stall import STALLED_S, WAITED_S
-from urc.problems import UrcError
 from urc.registry import Table
 from urc.runtime import guarding
-from urc.runtime.guarding import GuardedMovers, take_reins
+from urc.runtime.guarding import take_reins
 from urc.testing.clock import FakeClock
-from urc.testing.movers import FakeFrames
 from urc.transports.base import Setup
 
-pytestmark = pytest.mark.anyio
-
-TERMS = Terms(b"stop", period_s=0.05)
-SERIES = Series(
-    (Numbered(b"7 stop", Count({}, {"n": 7})), Numbered(b"8 stop", Count({"n": 7}, {"n": 8})))
-)
-
-
-class FakeClient(Client):
-    """Keeps what it is told."""
-
-    def __init__(self) -> None:
-        super().__init__([])
-        self.told: list[tuple[Any, ...]] = []
-        self.moving: set[str] = set()
-        self.transports = {"wire": type("Line", (), {"is_open": True})()}
-
-    def start(self) -> None:
-        self.told.append(("start",))
-
-    async def finish(self) -> None:
-        self.told.append(("finish",))
-
-    def arm(self, line: str, control: str, terms: Terms) -> None:
-        self.told.append(("arm", line, control, terms))
-
-    def renew(self, control: str, stop: object) -> None:
-        self.told.append(("renew", control, stop))
-
-    def is_stopping(self, control: str) -> bool:
-        return control in self.moving
-
-    def release(self, control: str) -> None:
-        self.told.append(("release", control))
-
-    def stop(self, controls: Sequence[tuple[str, str, Terms]]) -> None:
-        self.told.append(("stop", *controls))
-
-    async def stops(self) -> Sequence[tuple[str, Reason]]:
-        return [("drive", "expired")]
-
-
-@pytest.fixture
-def client() -> FakeClient:
-    return FakeClient()
-
-
-@pytest.fixture
-def movers(client: FakeClient) -> GuardedMovers:
-    return GuardedMovers(DRIVER, client)
-
-
-async def test_control_is_armed_on_its_line(client: FakeClient, movers: GuardedMovers) -> None:
-    movers.start()
-    movers.arm("drive", TERMS)
-    movers.arm("lift", TERMS)
-    movers.release("drive")
-    await movers.finish()
-    assert client.told == [
-        ("start",),
-        ("arm", "wire", "drive", TERMS),
-        ("arm", "air", "lift", TERMS),
-        ("release", "drive"),
-        ("finish",),
-    ]
-    assert await movers.stops() == [("drive", "expired")]
-    assert movers.transports is client.transports
-    assert movers.is_open("drive")
-
-
-def test_terms_that_stop_nothing_arm_nothing(client: FakeClient, movers: GuardedMovers) -> None:
-    with pytest.raises(UrcError, match=r"^drive: a lease lasts 0\.1 to 1\.0 s, not 5$"):
-        movers.arm("drive", TERMS._replace(lease_s=5.0))
-    movers.renew("drive", b"later")
-    movers.stop_all(FakeFrames(DRIVER))
-    assert client.told == []
-
-
-def test_stop_goes_by_the_terms_of_what_is_armed(client: FakeClient, movers: GuardedMovers) -> None:
-    """With the newest frame, and the others as they were."""
-    terms = TERMS._replace(period_s=0.3, lease_s=0.4)
-    movers.arm("drive", terms)
-    movers.stop({"drive": b"stop 2"})
-    movers.stop({"drive": SERIES})
-    stops = {"stop": b"7 stop", "stops": SERIES.frames}
-    assert client.told[1:] == [
-        ("stop", ("wire", "drive", terms._replace(stop=b"stop 2"))),
-        ("stop", ("wire", "drive", terms._replace(**stops))),
-    ]
-
-
-def test_all_that_may_move_is_stopped_by_the_frames_of_now(
-    client: FakeClient, movers: GuardedMovers
-) -> None:
-    """Or by the newest that there was, where none can be made any more."""
-    frames = FakeFrames(DRIVER)
-    movers.arm("drive", TERMS)
-    movers.arm("lift", TERMS)
-    client.moving = {"drive"}
-    movers.stop_all(frames)
-    client.moving = {"drive", "lift"}
-    movers.renew("drive", b"stop 7")
-    movers.renew("lift", SERIES)
-
-    def broken(command: str) -> Payload:
-        raise UrcError("no such setting")
-
-    frames.stop_frame = broken  # type: ignore[method-assign]
-    movers.stop_all(frames)
-    numbered = TERMS._replace(stop=b"7 stop", stops=SERIES.frames)
-    assert client.told[2:] == [
-        ("stop", ("wire", "drive", TERMS._replace(stop=b"drive stop"))),
-        ("renew", "drive", b"stop 7"),
-        ("renew", "lift", SERIES),
-        ("stop", ("wire", "drive", TERMS._replace(stop=b"stop 7")), ("air", "lift", numbered)),
-    ]
-
-
-def test_stop_of_what_was_never_armed_has_the_terms_of_its_line(
-    client: FakeClient, movers: GuardedMovers
-) -> None:
-    """STOP needs no gesture; on lines that may lose it, it is repeated."""
-    movers.stop({"drive": b"halt", "lift": b"down"})
-    movers.stop({})
-    assert client.told == [
-        (
-            "stop",
-            ("wire", "drive", Terms(b"halt", 0.05, LEASE_S, is_lossy=False)),
-            ("air", "lift", Terms(b"down", 0.05, LEASE_S, is_lossy=True)),
-        )
-    ]
-
-
-# -- lines
+HELD = {
+    "drive": HeldSpec("wire", Terms(b"", 0.05, LEASE_S, is_lossy=False)),
+    "lift": HeldSpec("air", Terms(b"", 0.05, LEASE_S, is_lossy=True)),
+}
 
 
 class Stub:
@@ -169,11 +35,7 @@ KINDS = ("tcp", "udp", "serial", "mqtt", "rosbridge", "ssh")
 TABLE = Table("urc.transports", dict.fromkeys(KINDS, f"{__name__}:Stub"))
 
 
-def lines_of(client: Client) -> Sequence[LineSpec]:
-    return client._lines
-
-
-def reins(driver: Driver, *, is_guarded: bool = False) -> GuardedMovers:
+def reins(driver: Driver, *, is_guarded: bool = False) -> GuardClient:
     return take_reins(driver, {}, TABLE, FakeClock(), is_guarded=is_guarded)
 
 
@@ -194,6 +56,11 @@ def robot(kind: str, *on_stall: str, via: str = "") -> Driver:
     return Driver(specs, commands=commands)
 
 
+def test_guard_is_told_the_terms_of_each_held_command() -> None:
+    """For a stop before anything is armed."""
+    assert reins(DRIVER)._held == HELD
+
+
 @pytest.mark.parametrize(
     ("driver", "is_dear"),
     [
@@ -207,14 +74,14 @@ def robot(kind: str, *on_stall: str, via: str = "") -> Driver:
 )
 def test_line_that_is_dear_to_open_is_waited_for(driver: Driver, is_dear: bool) -> None:
     """Unless a control says otherwise; of two that differ, the more careful counts."""
-    make = lines_of(reins(driver).client)[-1].make
+    make = reins(driver).lines[-1].make
     assert make.is_strict is is_dear
     assert make.stalled_s == (WAITED_S if is_dear else STALLED_S)
 
 
 def test_guard_is_told_how_to_make_each_line() -> None:
     """As it is made here, in the order in which they carry each other."""
-    other, line = lines_of(reins(robot("ssh", via="other")).client)
+    other, line = reins(robot("ssh", via="other")).lines
     assert other.make.line == "other"
     assert (other.make.via, line.make.via) == ("", "other")
     assert line.make.line == "wire"
@@ -233,7 +100,7 @@ def test_guard_is_told_the_settings_and_what_is_listened_to() -> None:
         messages={"odom": Message("odom", "wire", read)},
     )
     movers = take_reins(driver, {"port": 9090}, TABLE, FakeClock(), is_guarded=False)
-    make = lines_of(movers.client)[0].make
+    make = movers.lines[0].make
     assert make.options == {"port": 9090}
     assert make.subscriptions == [("/odom", {"type": "Odometry"})]
 
@@ -241,20 +108,20 @@ def test_guard_is_told_the_settings_and_what_is_listened_to() -> None:
 def test_guard_in_this_process_goes_by_the_clock_of_the_session() -> None:
     clock = FakeClock()
     movers = take_reins(robot("tcp"), {}, TABLE, clock, is_guarded=False)
-    assert movers.client._now() == clock.now()
+    assert movers.channel.now() == clock.now()
 
 
 def test_guard_is_a_process_where_the_system_can(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     driver = robot("tcp")
-    assert isinstance(reins(driver).client, LocalGuard)
+    assert isinstance(reins(driver).channel, LocalChannel)
     guarded = reins(driver, is_guarded=True)
-    assert isinstance(guarded.client, Guard)
+    assert isinstance(guarded.channel, PipeChannel)
     assert not guarded.is_open("away")
     assert not caplog.records
     monkeypatch.setattr(guarding, "CAN_GUARD", False)
-    assert isinstance(reins(driver, is_guarded=True).client, LocalGuard)
+    assert isinstance(reins(driver, is_guarded=True).channel, LocalChannel)
     assert "there is no guard on this system" in caplog.text
 
 
@@ -265,7 +132,7 @@ def test_connection_is_reset_a_little_before_its_robot_counts_as_silent(kind: st
         "wire": TransportSpec("wire", kind, stale_after_s=2.0),
         "talker": TransportSpec("talker", kind),
     }
-    line, talker = lines_of(reins(Driver(specs)).client)
+    line, talker = reins(Driver(specs)).lines
     assert talker.make.silent_s is None
     if kind in ("udp", "serial"):
         assert line.make.silent_s is None

@@ -1,8 +1,13 @@
 """A robot on TCP whose line the guard holds: Link must not notice the difference."""
 
+from functools import partial
+
 from tests.e2e.transports.peers.tcp import TcpPeer
 from urc.guard import wire
-from urc.guard.client import Client, Guard, LineSpec, LocalGuard
+from urc.guard.channel import LineSpec
+from urc.guard.guard_client import GuardClient
+from urc.guard.local_channel import LocalChannel
+from urc.guard.pipe_channel import PipeChannel
 from urc.runtime.clock import LoopClock
 from urc.transports.base import Setup, Transport
 from urc.transports.tcp import from_setup
@@ -15,11 +20,11 @@ class GuardedPeer(TcpPeer):
 
     def __init__(self) -> None:
         super().__init__()
-        self._client: Client | None = None
+        self._client: GuardClient | None = None
 
-    def client(self, lines: list[LineSpec]) -> Client:
+    def client(self, lines: list[LineSpec]) -> GuardClient:
         """Return a guard of `lines`."""
-        return Guard(lines)
+        return GuardClient(lines, {}, PipeChannel)
 
     def transport(self) -> Transport:
         """Return a line that leads here."""
@@ -39,6 +44,6 @@ class GuardedPeer(TcpPeer):
 class InnerPeer(GuardedPeer):
     """The same lines, held by this process."""
 
-    def client(self, lines: list[LineSpec]) -> Client:
+    def client(self, lines: list[LineSpec]) -> GuardClient:
         """Return a guard of `lines`."""
-        return LocalGuard(lines, LoopClock())
+        return GuardClient(lines, {}, partial(LocalChannel, lines=lines, clock=LoopClock()))

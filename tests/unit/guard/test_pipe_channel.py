@@ -7,10 +7,12 @@ from collections.abc import AsyncIterator, Callable
 
 import pytest
 
-from tests.unit.guard.lines import TERMS, CountedWire
-from urc.guard import client, wire
-from urc.guard.client import Guard, LineSpec
+from tests.unit.guard.lines import HELD, STOP, TERMS, CountedWire
+from urc.guard import pipe_channel, wire
+from urc.guard.channel import LineSpec
+from urc.guard.guard_client import GuardClient
 from urc.guard.pipe import Pipe
+from urc.guard.pipe_channel import PipeChannel
 from urc.guard.process import CAN_INHERIT, Door, Standing
 from urc.testing.clock import settle
 from urc.transports.base import ConnectFailed, PeerClosed
@@ -75,7 +77,7 @@ class House:
         self.started: list[Process] = []
         self.fault: OSError | None = None
         self._news = asyncio.Event()
-        self.guard = Guard([LineSpec(MAKE, CountedWire())])
+        self.guard = GuardClient([LineSpec(MAKE, CountedWire())], HELD, PipeChannel)
         self.is_inherited = CAN_INHERIT
 
     def launch(self, *, is_inherited: bool) -> tuple[Process, socket.socket]:
@@ -96,6 +98,11 @@ class House:
         await self.until(lambda: len(self.started) >= number)
         return self.started[number - 1]
 
+    @property
+    def channel(self) -> PipeChannel:
+        assert isinstance(self.guard.channel, PipeChannel)
+        return self.guard.channel
+
     def begin(self) -> Process:
         self.guard.start()
         return self.started[-1]
@@ -112,8 +119,8 @@ class House:
 @pytest.fixture
 async def house(monkeypatch: pytest.MonkeyPatch) -> AsyncIterator[House]:
     made = House()
-    monkeypatch.setattr(client, "launch", made.launch)
-    monkeypatch.setattr(client, "_AGAIN_S", 0.02)
+    monkeypatch.setattr(pipe_channel, "launch", made.launch)
+    monkeypatch.setattr(pipe_channel, "_AGAIN_S", 0.02)
     yield made
     made.fault = None
     await made.guard.finish()
@@ -123,22 +130,22 @@ async def house(monkeypatch: pytest.MonkeyPatch) -> AsyncIterator[House]:
 
 async def test_guard_is_told_what_there_is(house: House) -> None:
     """Its lines, and what was armed before it ran."""
-    assert house.guard.pid == 0
-    house.guard.arm("wire", "drive", TERMS)
+    assert house.channel.pid == 0
+    house.guard.arm("drive", TERMS)
     process = house.begin()
-    assert house.guard.pid == process.pid
+    assert house.channel.pid == process.pid
     assert await process.hears(2) == [MAKE, wire.Arm("wire", "drive", TERMS)]
 
 
 async def test_guard_is_told_what_controls_do(house: House) -> None:
     process = house.begin()
     house.guard.tick("drive", b"nobody armed it")
-    house.guard.arm("wire", "drive", TERMS)
+    house.guard.arm("drive", TERMS)
     house.guard.tick("drive", b"go 1")
     house.guard.tick("drive", b"go 2")
     house.guard.renew("drive", b"stop 2")
     house.guard.release("drive")
-    house.guard.stop([("wire", "drive", TERMS)])
+    house.guard.stop({"drive": STOP})
     _, armed, first, second, *rest = await process.hears(7)
     assert armed == wire.Arm("wire", "drive", TERMS)
     assert isinstance(first, wire.Tick)
@@ -158,9 +165,9 @@ async def test_stop_goes_before_what_waits_and_no_old_tick_after_it(house: House
     process = house.begin()
     await house.open()
     for control, terms in (("drive", TERMS), ("turn", TURN), ("lift", TERMS)):
-        house.guard.arm("wire", control, terms)
+        house.guard.arm(control, terms)
     known = len(await process.hears(5))
-    while not house.guard._pipe.is_backed_up:  # type: ignore[union-attr]
+    while not house.channel._pipe.is_backed_up:  # type: ignore[union-attr]
         assert house.guard.transports["wire"].offer(b"x" * 60000)
         house.guard.transports["wire"]._under_way_bytes = 0
     for number in range(3):
@@ -169,7 +176,7 @@ async def test_stop_goes_before_what_waits_and_no_old_tick_after_it(house: House
     house.guard.renew("turn", b"halt 1")
     house.guard.renew("turn", b"halt 2")
     house.guard.release("lift")
-    house.guard.stop([("wire", "drive", TERMS)])
+    house.guard.stop({"drive": STOP})
     await house.until(lambda: any(isinstance(one, wire.Renew) for one in process.heard))
     told = [one for one in process.heard[known:] if not isinstance(one, wire.Send)]
     stop, release, tick, renewed = told
@@ -185,7 +192,7 @@ async def test_next_guard_is_told_what_may_move(house: House) -> None:
     first = house.begin()
     await house.open()
     for control, terms in (("drive", TERMS), ("turn", TURN), ("lift", TERMS), ("aim", TERMS)):
-        house.guard.arm("wire", control, terms)
+        house.guard.arm(control, terms)
         if control != "turn":
             house.guard.tick(control, b"go")
     first.pipe.post(wire.Stopped("lift", "released", 1))
@@ -197,7 +204,7 @@ async def test_next_guard_is_told_what_may_move(house: House) -> None:
     assert stops == [("lift", "released"), ("aim", "expired")]
     first.die()
     second = await house.nth(2)
-    assert house.guard.pid == second.pid
+    assert house.channel.pid == second.pid
     assert await second.hears(4) == [
         MAKE,
         wire.Owe("wire", "drive", TERMS),
@@ -206,7 +213,7 @@ async def test_next_guard_is_told_what_may_move(house: House) -> None:
     ]
     with pytest.raises(PeerClosed, match="the guard of this line ended; it is started anew"):
         await house.guard.transports["wire"].receive()
-    house.guard.arm("wire", "drive", TERMS)
+    house.guard.arm("drive", TERMS)
     house.guard.tick("drive", b"go on")
     tick = (await second.hears(6))[-1]
     assert isinstance(tick, wire.Tick)
@@ -216,7 +223,7 @@ async def test_next_guard_is_told_what_may_move(house: House) -> None:
 async def test_stop_of_an_older_tick_leaves_a_control_in_doubt(house: House) -> None:
     """A newer one was under way; whether it moves only the next stop tells."""
     first = house.begin()
-    house.guard.arm("wire", "drive", TERMS)
+    house.guard.arm("drive", TERMS)
     house.guard.tick("drive", b"go 1")
     house.guard.tick("drive", b"go 2")
     first.pipe.post(wire.Stopped("drive", "released", 1))
@@ -232,21 +239,21 @@ async def test_guard_that_died_is_killed_for_good(house: House) -> None:
     first.pipe.close()
     await house.nth(2)
     assert first.is_killed
-    await house.until(lambda: not house.guard._reaping)
+    await house.until(lambda: not house.channel._reaping)
 
 
 async def test_guards_that_end_at_once_are_started_at_a_pace(
     house: House, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The second and the third right away."""
-    monkeypatch.setattr(client, "_AGAIN_S", 60.0)
+    monkeypatch.setattr(pipe_channel, "_AGAIN_S", 60.0)
     house.begin()
     for number in (1, 2):
         house.started[-1].die()
         await house.nth(number + 1)
-    monkeypatch.setattr(client, "_AGAIN_S", 0.02)
+    monkeypatch.setattr(pipe_channel, "_AGAIN_S", 0.02)
     house.started[-1].die()
-    await house.until(lambda: house.guard.pid == 0)
+    await house.until(lambda: house.channel.pid == 0)
     assert len(house.started) == 3
     opening = asyncio.ensure_future(house.guard.transports["wire"].open(BOUND_S))
     fourth = await house.nth(4)
@@ -273,7 +280,7 @@ async def test_guard_that_opened_a_line_was_started_well(house: House) -> None:
     for _ in range(3):
         count = len(house.started)
         house.started[-1].die()
-        await house.until(lambda: house.guard.pid != count)  # noqa: B023 - awaited here
+        await house.until(lambda: house.channel.pid != count)  # noqa: B023 - awaited here
         assert len(house.started) == count + 1
 
 
@@ -282,10 +289,10 @@ async def test_guard_that_cannot_be_started_is_tried_again(
 ) -> None:
     house.fault = OSError("no more processes")
     house.guard.start()
-    assert house.guard.pid == 0
-    house.guard.arm("wire", "drive", TERMS)
+    assert house.channel.pid == 0
+    house.guard.arm("drive", TERMS)
     house.guard.release("drive")
-    house.guard.stop([("wire", "drive", TERMS)])
+    house.guard.stop({"drive": STOP})
     house.guard.renew("drive", b"later")
     assert "no more processes" in caplog.text
     house.fault = None
@@ -308,13 +315,13 @@ async def test_what_a_line_brings_is_counted_as_on_the_other_side(house: House) 
 async def test_end_lets_the_guard_stop_what_moves(house: House) -> None:
     """It is told by the end of the pipe, and waited for."""
     process = house.begin()
-    house.guard.arm("wire", "drive", TERMS)
+    house.guard.arm("drive", TERMS)
     house.guard.tick("drive", b"go")
     await process.hears(3)
     await house.guard.finish()
     assert (process.is_over, process.is_killed) == (True, False)
     assert len(house.started) == 1, "nothing is started after the end"
-    assert house.guard.pid == 0
+    assert house.channel.pid == 0
 
 
 async def test_end_of_a_guard_that_has_hardly_begun_is_at_once(house: House) -> None:
@@ -335,10 +342,10 @@ async def test_end_waits_for_a_guard_that_has_spoken(house: House) -> None:
 async def test_guard_that_does_not_end_is_killed(
     house: House, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(client, "_FINISH_S", 0.01)
+    monkeypatch.setattr(pipe_channel, "_FINISH_S", 0.01)
     process = house.begin()
     process.is_stubborn = True
-    house.guard.arm("wire", "drive", TERMS)
+    house.guard.arm("drive", TERMS)
     house.guard.tick("drive", b"go")
     await process.hears(3)
     await house.guard.finish()
@@ -347,9 +354,9 @@ async def test_guard_that_does_not_end_is_killed(
 
 async def test_deaf_guard_is_killed(house: House, monkeypatch: pytest.MonkeyPatch) -> None:
     """It does not see the end of the pipe, and still has its time."""
-    monkeypatch.setattr(client, "_FINISH_S", 0.01)
+    monkeypatch.setattr(pipe_channel, "_FINISH_S", 0.01)
     process = house.begin()
-    house.guard.arm("wire", "drive", TERMS)
+    house.guard.arm("drive", TERMS)
     house.guard.tick("drive", b"go")
     await process.hears(3)
     process.pipe._loop.remove_reader(process.pipe._line)
@@ -382,7 +389,7 @@ async def test_guard_comes_to_its_door(house: House, monkeypatch: pytest.MonkeyP
         doors.append(StubDoor())
         return process, doors[-1]
 
-    monkeypatch.setattr(client, "launch", launch)
+    monkeypatch.setattr(pipe_channel, "launch", launch)
     first = house.begin()
     await asyncio.sleep(0)
     doors[0].coming.set_exception(TimeoutError())
@@ -408,8 +415,8 @@ async def test_guard_at_its_door_is_killed_before_it_is_waited_for(
     async def wait(process: Process) -> None:
         waited.append(process.is_killed)
 
-    monkeypatch.setattr(client, "launch", lambda is_inherited: (process, StubDoor()))
-    monkeypatch.setattr(client, "reap", wait)
+    monkeypatch.setattr(pipe_channel, "launch", lambda is_inherited: (process, StubDoor()))
+    monkeypatch.setattr(pipe_channel, "reap", wait)
     house.guard.start()
     await house.guard.finish()
     assert waited == [True]
@@ -429,7 +436,7 @@ async def test_end_waits_for_each_guard_that_died(
         is_last.set()
         gone.append(process)
 
-    monkeypatch.setattr(client, "reap", wait)
+    monkeypatch.setattr(pipe_channel, "reap", wait)
     first.die()
     second = await house.nth(2)
     await house.guard.finish()
@@ -441,7 +448,7 @@ async def test_end_does_not_wait_for_a_guard_at_its_door(
 ) -> None:
     door = StubDoor()
     process, line = house.launch(is_inherited=house.is_inherited)
-    monkeypatch.setattr(client, "launch", lambda is_inherited: (process, door))
+    monkeypatch.setattr(pipe_channel, "launch", lambda is_inherited: (process, door))
     house.guard.start()
     await house.guard.finish()
     assert (process.is_killed, door.closed) == (True, 1)
@@ -452,9 +459,9 @@ async def test_guard_that_falls_silent_is_replaced(
     house: House, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """It is looked at again and again, as long as it lives."""
-    monkeypatch.setattr(client, "_LOOK_S", 0.02)
-    monkeypatch.setattr(client, "standing", lambda pid: Standing())
-    monkeypatch.setattr(client, "_START_LOOKS", 3)
+    monkeypatch.setattr(pipe_channel, "_LOOK_S", 0.02)
+    monkeypatch.setattr(pipe_channel, "standing", lambda pid: Standing())
+    monkeypatch.setattr(pipe_channel, "_START_LOOKS", 3)
     first = house.begin()
     first.pipe.post(wire.Beat(0.0))
     second = await house.nth(2)

@@ -1,10 +1,9 @@
-"""The engine's side of the guard: keeps it running, and remembers what it must stop.
+"""The channel to a guard in a process of its own: started, watched, and restarted.
 
-Theory of operation. The guard is a process of its own. It says ten times a second that it is alive;
-when it is silent for half a second, or gone, it is killed for good and another is started at once.
-Only a machine that gives it no time to run is no fault of its own: another one would have none.
-That one knows nothing: it is told the lines, the terms of everything armed, and what was moving,
-of which it opens the lines and writes the stop before anything else. Nothing moves on by itself.
+Theory of operation. The guard sends a beat ten times a second. A guard that is silent for half a
+second, or gone, is killed for good, and another one is started at once. A guard that is ready to
+run but gets no processor time is not replaced: another one would get none either. A new guard knows
+nothing: its client briefs it before anything else.
 """
 
 import asyncio
@@ -12,47 +11,47 @@ import logging
 import os
 import socket
 import subprocess
-from collections.abc import Sequence
+import time
 from contextlib import suppress
 from typing import Final
 
 from urc.guard import wire
+from urc.guard.channel import ChannelListener
 from urc.guard.pipe import Pipe
 from urc.guard.process import CAN_INHERIT, Door, Standing, launch, reap, standing
-from urc.guard.side import Client, LineSpec, LocalGuard
 
-__all__ = ["CAN_GUARD", "Client", "Guard", "LineSpec", "LocalGuard"]
+__all__ = ["CAN_GUARD", "PipeChannel"]
 
 CAN_GUARD: Final = CAN_INHERIT or os.name == "nt"
 """Whether this system can run the guard as a process of its own."""
 _LOOK_S: Final = 0.1
 _SILENT_LOOKS: Final = 5
 _MOST_KEPT_LOOKS: Final = 15
-"""Silence that is put down to a busy machine, at most."""
+"""Largest number of silent looks that a busy machine excuses."""
 _START_LOOKS: Final = 100
-"""A machine that is busy may take long until Python runs."""
+"""Silent looks allowed before the first beat: Python starts slowly on a busy machine."""
 _STEADY_S: Final = 0.5
-"""A guard that lives this long, or has opened a line, was started well."""
+"""Shortest life of a guard that was started well. One that opened a line was, too."""
 _AT_ONCE: Final = 3
+"""Guards with short lives that are replaced at once; further ones wait `_AGAIN_S`."""
 _AGAIN_S: Final = 1.0
-"""Guards that end at once are started anew so often right away, and then at this pace."""
 _FINISH_S: Final = 3.0
 _DIED: Final = "the guard of this line ended; it is started anew"
 
 log = logging.getLogger(__name__)
 
 
-class Guard(Client):
-    """The guard as a process."""
+class PipeChannel:
+    """The channel to a guard in a process of its own."""
 
-    def __init__(self, lines: Sequence[LineSpec], *, is_inherited: bool = CAN_INHERIT) -> None:
-        """Prepare; nothing is started yet.
+    def __init__(self, listener: ChannelListener, *, is_inherited: bool = CAN_INHERIT) -> None:
+        """Prepare; nothing runs before `start`.
 
         Args:
-            lines: as above.
-            is_inherited: whether the process inherits its pipe; else it comes to a door.
+            listener: the client.
+            is_inherited: whether the process inherits its pipe. If not, it connects to a door.
         """
-        super().__init__(lines)
+        self._listener = listener
         self._is_inherited = is_inherited
         self._door: Door | None = None
         self._entering: asyncio.Task[None] | None = None
@@ -74,11 +73,39 @@ class Guard(Client):
 
     @property
     def pid(self) -> int:
-        """Number of the process; 0 while there is none."""
+        """Number of the process; 0 without one."""
         return 0 if self._process is None else self._process.pid
 
+    # -- messages
+
+    def post(self, message: wire.ToGuard, *, slot: str = "", is_urgent: bool = False) -> None:
+        """Send a message; dropped without a guard. See `urc.guard.channel.Channel`."""
+        if self._pipe is not None:
+            self._pipe.post(message, slot=slot, is_urgent=is_urgent)
+
+    def drop(self, slot: str) -> None:
+        """Discard the unsent message of a slot."""
+        if self._pipe is not None:
+            self._pipe.drop(slot)
+
+    async def ready(self) -> None:
+        """Return when there is a guard that was briefed."""
+        await self._is_up.wait()
+
+    def now(self) -> float:
+        """Return this machine's monotonic time, which the guard's process reads, too."""
+        return time.monotonic()
+
+    def _hear(self, message: wire.FromGuard) -> None:
+        self._silent_looks = self._kept_looks = 0
+        self._was_heard = True
+        self._has_served |= isinstance(message, wire.Opened)
+        self._listener.take(message, 0 if self._pipe is None else self._pipe.taken_bytes)
+
+    # -- from start to end
+
     def start(self) -> None:
-        """Start the process; it takes what it is told as soon as it runs."""
+        """Start the process; needs a running loop. It is briefed as soon as it is connected."""
         loop = asyncio.get_running_loop()
         self._started_s = loop.time()
         try:
@@ -116,7 +143,8 @@ class Guard(Client):
             settle=_nothing,
             gone=self._died,
         )
-        self._brief()
+        for message in self._listener.briefing():
+            self._pipe.post(message)
         self._is_up.set()
         self._look_s = loop.time() + _LOOK_S
         self._look = loop.call_at(self._look_s, self._watch)
@@ -130,50 +158,34 @@ class Guard(Client):
             self._entering.cancel()
             await asyncio.wait({self._entering})
             if self._door is not None:
-                self._door.close()  # it may not even have begun to wait there
+                self._door.close()  # the task may not even have begun to wait there
             if self._process is not None:
-                self._process.kill()  # nothing is open, nothing moves
+                self._process.kill()  # no line is open, nothing moves
         if self._pipe is not None:
             self._pipe.end()
-            is_idle = not any(held.may_move for held in self._held.values())
+            is_idle = not self._listener.may_move
             if is_idle and not self._was_heard and self._process is not None:
-                self._process.kill()  # it has hardly begun: nothing is open, nothing moves
+                self._process.kill()  # it has hardly begun: no line is open, nothing moves
             with suppress(TimeoutError):
                 async with asyncio.timeout(_FINISH_S):
                     await self._gone.wait()
         if self._pipe is not None:  # it did not end in time
             self._pipe.close()
             self._pipe = None
-        for transport in self.transports.values():
-            transport.lost("the session was closed")
+        self._listener.lost("the session was closed")
         process, self._process = self._process, None
         if process is not None:
             await reap(process)
         if self._reaping:
             await asyncio.wait(self._reaping)
 
-    def _brief(self) -> None:
-        """Tell a new guard what it must know; what may move is stopped first."""
-        for spec in self._lines:
-            self._post(spec.make)
-        for control, held in self._held.items():
-            if held.may_move:
-                held.is_armed = False
-                self._post(wire.Owe(held.line, control, held.terms))
-                held.number = 0
-            elif held.is_armed:
-                self._post(wire.Arm(held.line, control, held.terms))
-
-    def _hear(self, said: wire.FromGuard) -> None:
-        self._silent_looks = self._kept_looks = 0
-        self._was_heard = True
-        self._has_served |= isinstance(said, wire.Opened)
-        self._take(said, 0 if self._pipe is None else self._pipe.taken_bytes)
+    # -- the watch
 
     def _watch(self) -> None:
-        """Look whether the guard is alive."""
+        """Look whether the guard is alive, and again after `_LOOK_S`."""
         loop = asyncio.get_running_loop()
-        if loop.time() - self._look_s < _LOOK_S and not self._is_kept():  # else it was we who slept
+        # A late look counts for nothing: this process slept, and beats may be unread.
+        if loop.time() - self._look_s < _LOOK_S and not self._is_kept():
             self._silent_looks += 1
         limit = _SILENT_LOOKS if self._was_heard else _START_LOOKS
         if self._silent_looks > limit and self._pipe is not None:
@@ -185,7 +197,7 @@ class Guard(Client):
         self._look = loop.call_at(self._look_s, self._watch)
 
     def _is_kept(self) -> bool:
-        """Return whether a guard that is silent would run, and the system has not let it."""
+        """Return whether a silent guard is ready to run, but the system gives it no time."""
         if not self._silent_looks or self._kept_looks >= _MOST_KEPT_LOOKS:
             return False
         before, self._standing = self._standing, standing(self.pid)
@@ -196,20 +208,14 @@ class Guard(Client):
         return is_kept
 
     def _died(self) -> None:
-        """Start another one, unless it was to end."""
+        """Start another guard, unless this one was to end."""
         self._gone.set()
         self._pipe = None
         if self._look is not None:
             self._look.cancel()
         if self._is_finishing:
             return
-        process, self._process = self._process, None
-        if process is not None:
-            with suppress(ProcessLookupError):
-                process.kill()  # never two of them on one line
-            task = asyncio.get_running_loop().create_task(reap(process))
-            self._reaping.add(task)
-            task.add_done_callback(self._reaping.discard)
+        self._bury()
         log.error("the guard ended; another one is started, and stops what moved")
         loop = asyncio.get_running_loop()
         is_short = loop.time() - self._started_s < _STEADY_S and not self._has_served
@@ -220,28 +226,18 @@ class Guard(Client):
         else:
             self._is_up.clear()
             self._look = loop.call_later(_AGAIN_S, self.start)
-        for transport in self.transports.values():
-            transport.lost(_DIED)
+        self._listener.lost(_DIED)
 
-    def _post(self, said: wire.ToGuard) -> None:
-        if self._pipe is not None:
-            self._pipe.post(said)
-
-    def _pass_newest(self, slot: str, said: wire.ToGuard) -> None:
-        if self._pipe is not None:
-            self._pipe.post(said, slot=slot)
-
-    def _pass_stop(self, said: wire.Stop) -> None:
-        if self._pipe is not None:
-            self._pipe.post(said, is_urgent=True)
-
-    def _drop(self, control: str) -> None:
-        if self._pipe is not None:
-            self._pipe.drop(control)
-
-    async def _ready(self) -> None:
-        await self._is_up.wait()
+    def _bury(self) -> None:
+        """Kill the process for good: never two guards on one line."""
+        process, self._process = self._process, None
+        if process is not None:
+            with suppress(ProcessLookupError):
+                process.kill()
+            task = asyncio.get_running_loop().create_task(reap(process))
+            self._reaping.add(task)
+            task.add_done_callback(self._reaping.discard)
 
 
 def _nothing() -> None:
-    """Nothing is to be done after what came together."""
+    """Do nothing after messages that came together."""

@@ -1,0 +1,144 @@
+"""The client of the guard: its one table of held commands, and what it tells a guard."""
+
+import pytest
+
+from urc.guard import wire
+from urc.guard.channel import ChannelListener
+from urc.guard.guard_client import GuardClient, HeldSpec
+from urc.model.codec import Count, Numbered, Payload, Series
+from urc.motion.hold import LEASE_S, Terms
+from urc.problems import UrcError
+
+pytestmark = pytest.mark.anyio
+
+TERMS = Terms(b"stop", period_s=0.05)
+SERIES = Series(
+    (Numbered(b"7 stop", Count({}, {"n": 7})), Numbered(b"8 stop", Count({"n": 7}, {"n": 8})))
+)
+
+
+class FakeChannel:
+    """Keeps the messages and calls that it gets; no guard is behind it."""
+
+    def __init__(self, listener: ChannelListener) -> None:
+        self.listener = listener
+        self.told: list[object] = []
+        self.time_s = 0.0
+
+    def start(self) -> None:
+        self.told.append("start")
+
+    async def finish(self) -> None:
+        self.told.append("finish")
+
+    def post(self, message: wire.ToGuard, *, slot: str = "", is_urgent: bool = False) -> None:
+        assert is_urgent is isinstance(message, wire.Stop)
+        self.told.append(message)
+
+    def drop(self, slot: str) -> None:
+        pass
+
+    async def ready(self) -> None:
+        pass
+
+    def now(self) -> float:
+        return self.time_s
+
+
+HELD = {
+    "drive": HeldSpec("wire", Terms(b"", 0.05, LEASE_S, is_lossy=False)),
+    "lift": HeldSpec("air", Terms(b"", 0.05, LEASE_S, is_lossy=True)),
+}
+
+
+@pytest.fixture
+def guard() -> GuardClient:
+    return GuardClient([], HELD, FakeChannel)
+
+
+def render(command: str) -> Payload:
+    return f"{command} stop".encode()
+
+
+def told(guard: GuardClient) -> list[object]:
+    """Return the messages and calls since this was last asked."""
+    assert isinstance(guard.channel, FakeChannel)
+    found, guard.channel.told = guard.channel.told, []
+    return found
+
+
+async def test_control_is_armed_on_its_line(guard: GuardClient) -> None:
+    guard.start()
+    guard.arm("drive", TERMS)
+    guard.arm("lift", TERMS)
+    guard.release("drive")
+    await guard.finish()
+    assert told(guard) == [
+        "start",
+        wire.Arm("wire", "drive", TERMS),
+        wire.Arm("air", "lift", TERMS),
+        wire.Release("drive"),
+        "finish",
+    ]
+
+
+def test_terms_that_stop_nothing_arm_nothing(guard: GuardClient) -> None:
+    with pytest.raises(UrcError, match=r"^drive: a lease lasts 0\.1 to 1\.0 s, not 5$"):
+        guard.arm("drive", TERMS._replace(lease_s=5.0))
+    guard.renew("drive", b"later")
+    guard.tick("drive", b"go")
+    guard.stop_all(render)
+    assert told(guard) == []
+    assert list(guard.briefing()) == []
+
+
+def test_stop_goes_by_the_terms_of_what_is_armed(guard: GuardClient) -> None:
+    """With the newest frame, and the others as they were."""
+    terms = TERMS._replace(period_s=0.3, lease_s=0.4)
+    guard.arm("drive", terms)
+    guard.stop({"drive": b"stop 2"})
+    guard.stop({"drive": SERIES})
+    stops = {"stop": b"7 stop", "stops": SERIES.frames}
+    assert told(guard)[1:] == [
+        wire.Stop([("wire", "drive", terms._replace(stop=b"stop 2"))]),
+        wire.Stop([("wire", "drive", terms._replace(**stops))]),
+    ]
+
+
+def test_all_that_may_move_is_stopped_by_the_frames_of_now(guard: GuardClient) -> None:
+    """Or by the newest that there was, where none can be made any more."""
+    guard.arm("drive", TERMS)
+    guard.arm("lift", TERMS)
+    guard.tick("drive", b"go")
+    told(guard)
+    guard.stop_all(render)
+    assert told(guard) == [wire.Stop([("wire", "drive", TERMS._replace(stop=b"drive stop"))])]
+    guard.tick("lift", b"up")
+    guard.renew("drive", b"stop 7")
+    guard.renew("lift", SERIES)
+    told(guard)
+
+    def broken(command: str) -> Payload:
+        raise UrcError("no such setting")
+
+    guard.stop_all(broken)
+    numbered = TERMS._replace(stop=b"7 stop", stops=SERIES.frames)
+    assert told(guard) == [
+        wire.Stop(
+            [("wire", "drive", TERMS._replace(stop=b"stop 7")), ("air", "lift", numbered)],
+        )
+    ]
+
+
+def test_stop_of_what_was_never_armed_has_the_terms_of_its_line(guard: GuardClient) -> None:
+    """STOP needs no gesture; on lines that may lose it, it is repeated."""
+    guard.stop({"drive": b"halt", "lift": b"down"})
+    guard.stop({})
+    assert told(guard) == [
+        wire.Stop(
+            [
+                ("wire", "drive", Terms(b"halt", 0.05, LEASE_S, is_lossy=False)),
+                ("air", "lift", Terms(b"down", 0.05, LEASE_S, is_lossy=True)),
+            ]
+        )
+    ]

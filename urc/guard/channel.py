@@ -1,0 +1,72 @@
+"""The channel between the guard's client and the guard: its two sides, as protocols.
+
+`urc.guard.pipe_channel.PipeChannel` leads to a process, `urc.guard.local_channel.LocalChannel` to a
+guard in this process. Neither knows which controls are armed: the client has that table.
+"""
+
+from collections.abc import Iterable
+from typing import NamedTuple, Protocol
+
+from urc.guard import wire
+from urc.transports.base import Transport
+
+__all__ = ["Channel", "ChannelListener", "LineSpec"]
+
+
+class LineSpec(NamedTuple):
+    """One line of the robot."""
+
+    make: wire.Make
+    transport: Transport
+    """The transport of `make` in this process. Only a guard in this process opens it."""
+
+
+class ChannelListener(Protocol):
+    """The user of a channel: `urc.guard.guard_client.GuardClient`."""
+
+    @property
+    def may_move(self) -> bool:
+        """Whether a control may be moving."""
+
+    def briefing(self) -> Iterable[wire.ToGuard]:
+        """Return everything a new guard must know, in the order of telling.
+
+        Asked for once for each new guard: an owed stop counts as told from then on.
+        """
+
+    def take(self, message: wire.FromGuard, size: int) -> None:
+        """Handle a message of the guard; `size` is its size in bytes for flow control."""
+
+    def lost(self, reason: str) -> None:
+        """Handle the end of the guard, and of every line with it."""
+
+
+class Channel(Protocol):
+    """The way to a guard, and the guard's life. Posting never waits."""
+
+    def start(self) -> None:
+        """Start the guard; needs a running loop."""
+
+    async def finish(self) -> None:
+        """Let the guard stop everything and close every line, then end it."""
+
+    def post(self, message: wire.ToGuard, *, slot: str = "", is_urgent: bool = False) -> None:
+        """Send a message to the guard. Without a guard it is dropped: the next one is briefed.
+
+        Args:
+            message: the message.
+            slot: an unsent message of the same slot is replaced by this one; "": none is.
+            is_urgent: sent before all unsent messages.
+
+        Raises:
+            UNFIT: the message cannot be encoded (`urc.guard.pipe.UNFIT`).
+        """
+
+    def drop(self, slot: str) -> None:
+        """Discard the unsent message of a slot."""
+
+    async def ready(self) -> None:
+        """Return when there is a guard."""
+
+    def now(self) -> float:
+        """Return the guard's time, in seconds."""

@@ -1,0 +1,279 @@
+"""The client of the guard: the robot's lines behind it, and one table of its held commands.
+
+Theory of operation. A guard that dies takes its knowledge with it. So the client keeps, for each
+held command that was armed or stopped, its terms and whether it may be moving. A new guard gets
+this table as its briefing: the lines, the owed stop of everything that may be moving, and the terms
+of everything else that is armed. It opens the lines of owed stops and writes these stops first.
+No motion goes on by itself.
+
+A control *may be moving* from its first tick, or from a stop, until the guard reports the stop of
+its newest tick as written. So a stop outlives the guard that was to write it.
+"""
+
+import asyncio
+from collections import deque
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final, NamedTuple
+
+from urc.guard import wire
+from urc.guard.channel import Channel, ChannelListener, LineSpec
+from urc.guard.proxy import GuardedTransport, Stands
+from urc.model.codec import Count, Counted, Numbered, Payload, Series
+from urc.motion.hold import STOP_FOR_S, Mover, Reason, Terms
+from urc.problems import UrcError
+
+__all__ = ["GuardClient", "HeldSpec"]
+
+_MOST_STOPS: Final = 256
+_TELLING_S: Final = 0.5
+"""Longest delay of a message on its way to the guard."""
+_UNCOUNTED: Final = Count({}, {})
+
+
+class HeldSpec(NamedTuple):
+    """One held command of the robot."""
+
+    line: str
+    terms: Terms
+    """Terms without a stop frame, for a stop before the first arming."""
+
+
+@dataclass(slots=True)
+class _Control:
+    """What is known of a held command that was armed or stopped."""
+
+    line: str
+    terms: Terms
+    is_armed: bool = False
+    number: int = 0
+    """Number of the newest tick, as the present guard counts them."""
+    at_s: float = 0.0
+    """Time of the newest tick."""
+    counted: Counted | None = None
+    """Frame of the newest tick while it is held, when it carries counters."""
+    may_move: bool = False
+    stopped_s: float = float("-inf")
+    """Time at which its last stop was reported."""
+
+
+class GuardClient:
+    """The lines of one robot behind a guard, and its held commands.
+
+    It is `urc.runtime.motion.Movers`, and the `ChannelListener` of its channel.
+    """
+
+    def __init__(
+        self,
+        lines: Sequence[LineSpec],
+        held: Mapping[str, HeldSpec],
+        channel_to: Callable[[ChannelListener], Channel],
+    ) -> None:
+        """Prepare; nothing runs before `start`.
+
+        Args:
+            lines: in the order in which they carry each other.
+            held: the held commands by name.
+            channel_to: makes the channel for this client.
+        """
+        self.lines = tuple(lines)
+        self.channel = channel_to(self)
+        self.transports = {
+            spec.make.line: GuardedTransport(
+                spec.make.line,
+                spec.transport.address,
+                self.channel.post,
+                self.channel.ready,
+                self._stands,
+            )
+            for spec in lines
+        }
+        """The lines, for the links of the session."""
+        self.on_stand: Stands = _unheard
+        """Told the counters of a line, and whether every counted frame of the engine has left."""
+        self._held = dict(held)
+        self._controls: dict[str, _Control] = {}
+        """The one table of what is armed, and of what may be moving."""
+        self._stops: deque[tuple[str, Reason]] = deque(maxlen=_MOST_STOPS)
+        self._stopped = asyncio.Event()
+
+    def start(self) -> None:
+        """Start the guard; needs a running loop."""
+        self.channel.start()
+
+    async def finish(self) -> None:
+        """Stop everything that may be moving, close every line, and end the guard."""
+        await self.channel.finish()
+
+    # -- held commands: `urc.runtime.motion.Movers`
+
+    def arm(self, command: str, terms: Terms) -> None:
+        """Accept ticks of `command` from now on.
+
+        Raises:
+            UrcError: nothing would ever stop it under these terms.
+        """
+        try:
+            Mover(terms)
+        except ValueError as fault:
+            raise UrcError(f"{command}: {fault}") from fault
+        control = self._control(command)
+        control.terms = terms
+        control.is_armed = True
+        self.channel.post(wire.Arm(control.line, command, terms))
+
+    def tick(self, command: str, data: Payload | Counted) -> None:
+        """Renew the lease of `command`; `data` is its newest frame. Never waits."""
+        control = self._controls.get(command)
+        if control is None:
+            return
+        control.number += 1
+        control.at_s = self.channel.now()
+        control.may_move = True
+        control.counted = data if isinstance(data, Counted) else None
+        numbered = data.numbered if isinstance(data, Counted) else Numbered(data, _UNCOUNTED)
+        self._post_tick(command, control, numbered)
+
+    def _post_tick(self, command: str, control: _Control, numbered: Numbered) -> None:
+        count = numbered.takes if numbered.takes.after else None
+        tick = wire.Tick(command, control.number, numbered.data, control.at_s, count)
+        self.channel.post(tick, slot=command)
+
+    def renew(self, command: str, stop: Payload | Series) -> None:
+        """Replace the stop frame of `command` from now on; it arms nothing."""
+        control = self._controls.get(command)
+        if control is not None:
+            control.terms = terms = control.terms.stopped_by(stop)
+            renewal = wire.Renew(command, terms.stop, terms.stops)
+            self.channel.post(renewal, slot=f"{command} stop")
+
+    def release(self, command: str) -> None:
+        """Stop `command`, which was let go."""
+        self._discard_tick(command)
+        self.channel.post(wire.Release(command))
+
+    def stop(self, stops: Mapping[str, Payload | Series]) -> None:
+        """Stop these commands at once, moving or not; the values are their stop frames."""
+        told: list[tuple[str, str, Terms]] = []
+        for command, frame in stops.items():
+            control = self._control(command)
+            control.terms = control.terms.stopped_by(frame)
+            control.is_armed = False
+            control.may_move = True  # until the guard reports that the stop was written
+            self._discard_tick(command)
+            told.append((control.line, command, control.terms))
+        if told:
+            self.channel.post(wire.Stop(told), is_urgent=True)
+
+    def stop_all(self, stop_frame: Callable[[str], Payload | Series]) -> None:
+        """Stop everything that may be moving.
+
+        Args:
+            stop_frame: renders the stop frame of a command as it is now. When it raises `UrcError`,
+                the last stop frame of the command is used.
+        """
+        stops: dict[str, Payload | Series] = {}
+        for command, control in self._controls.items():
+            if self.is_stopping(command):
+                try:
+                    stops[command] = stop_frame(command)
+                except UrcError:
+                    terms = control.terms
+                    stops[command] = Series(terms.stops) if terms.stops else terms.stop
+        self.stop(stops)
+
+    def is_stopping(self, command: str) -> bool:
+        """Return whether `command` may be moving, or its stop may still be repeated."""
+        control = self._controls.get(command)
+        if control is None:
+            return False
+        since_s = self.channel.now() - control.stopped_s
+        return control.may_move or since_s < STOP_FOR_S + _TELLING_S
+
+    def is_open(self, command: str) -> bool:
+        """Return whether the line of `command` is connected, as last reported by the guard."""
+        return self.transports[self._held[command].line].is_open
+
+    async def stops(self) -> Sequence[tuple[str, Reason]]:
+        """Wait for the next written stops: command, and the reason. Cancelling loses none."""
+        while not self._stops:
+            self._stopped.clear()
+            await self._stopped.wait()
+        found = tuple(self._stops)
+        self._stops.clear()
+        return found
+
+    def _control(self, command: str) -> _Control:
+        control = self._controls.get(command)
+        if control is None:
+            control = self._controls[command] = _Control(*self._held[command])
+        return control
+
+    def _discard_tick(self, command: str) -> None:
+        """Discard an unsent tick, and never render it again: it would begin a motion."""
+        self.channel.drop(command)
+        control = self._controls.get(command)
+        if control is not None:
+            control.counted = None
+
+    # -- the guard: `ChannelListener`
+
+    @property
+    def may_move(self) -> bool:
+        """Whether a control may be moving."""
+        return any(control.may_move for control in self._controls.values())
+
+    def briefing(self) -> Iterator[wire.ToGuard]:
+        """Yield everything a new guard must know; owed stops go before everything armed."""
+        for spec in self.lines:
+            yield spec.make
+        for command, control in self._controls.items():
+            if control.may_move:
+                control.is_armed = False
+                control.number = 0
+                yield wire.Owe(control.line, command, control.terms)
+            elif control.is_armed:
+                yield wire.Arm(control.line, command, control.terms)
+
+    def take(self, message: wire.FromGuard, size: int) -> None:
+        """Handle a message of the guard; `size` is its size in bytes for flow control."""
+        if isinstance(message, wire.Stopped):
+            self._note(message)
+        elif not isinstance(message, wire.Beat):
+            self.transports[message.line].take(message, size)
+            if isinstance(message, wire.Counted):
+                self._tick_again(message)
+
+    def lost(self, reason: str) -> None:
+        """Handle the end of the guard, and of every line with it."""
+        for transport in self.transports.values():
+            transport.lost(reason)
+
+    def _stands(self, line: str, stand: Mapping[str, int], is_settled: bool) -> None:
+        self.on_stand(line, stand, is_settled)
+
+    def _tick_again(self, counted: wire.Counted) -> None:
+        """Render ticks again whose numbers were used up. They keep their age."""
+        for command, number in counted.stale:
+            control = self._controls.get(command)
+            if control is None or control.counted is None or control.number != number:
+                continue  # it was let go, or a newer tick is on its way
+            numbered = control.counted.again()
+            if numbered is not None:
+                self._post_tick(command, control, numbered)
+
+    def _note(self, stopped: wire.Stopped) -> None:
+        control = self._controls.get(stopped.control)
+        if control is not None:
+            control.stopped_s = self.channel.now()
+            if stopped.number == control.number:  # else a newer tick is on its way
+                control.may_move = False
+            if stopped.reason != "released":
+                control.is_armed = False
+                control.counted = None
+        self._stops.append((stopped.control, stopped.reason))
+        self._stopped.set()
+
+
+def _unheard(line: str, stand: Mapping[str, int], is_settled: bool) -> None:
+    """Ignore the counters."""
