@@ -4,7 +4,7 @@ It stands on the transports and on `urc.motion`; sessions stand on it. The guard
 document: no template, no pattern, no parser. It gets rendered frames, and the stop frame before any
 motion.
 
-`guard_client` is the engine's side: `GuardClient` talks to a guard over a `Channel`, by the messages
-of `wire`. `PipeChannel` leads to a process with `host` in it, `LocalChannel` to a `host` in this
-process.
+`guard_client` is the engine's side: `GuardClient` talks to a guard over a `Channel`, by the
+messages of `wire`. A `PipeChannel` leads to a process with a `Host`, a `LocalChannel` to a `Host`
+in this process.
 """

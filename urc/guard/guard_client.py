@@ -1,10 +1,10 @@
 """The client of the guard: the robot's lines behind it, and one table of its held commands.
 
-Theory of operation. A guard that dies takes its knowledge with it. So the client keeps, for each
-held command that was armed or stopped, its terms and whether it may be moving. A new guard gets
-this table as its briefing: the lines, the owed stop of everything that may be moving, and the terms
-of everything else that is armed. It opens the lines of owed stops and writes these stops first.
-No motion goes on by itself.
+Theory of operation. A guard that dies takes its knowledge with it. So the client keeps a table of
+the held commands that were armed or stopped: their terms, and whether they may be moving. A new
+guard is briefed from this table. It gets the lines, the owed stop of each command that may be
+moving, and the terms of the other armed commands. It opens the lines of owed stops and writes these
+stops first. No motion goes on by itself.
 
 A control *may be moving* from its first tick, or from a stop, until the guard reports the stop of
 its newest tick as written. So a stop outlives the guard that was to write it.
@@ -41,7 +41,7 @@ class HeldSpec(NamedTuple):
 
 @dataclass(slots=True)
 class _Control:
-    """What is known of a held command that was armed or stopped."""
+    """A held command that was armed or stopped."""
 
     line: str
     terms: Terms
@@ -93,7 +93,7 @@ class GuardClient:
         """Told the counters of a line, and whether every counted frame of the engine has left."""
         self._held = dict(held)
         self._controls: dict[str, _Control] = {}
-        """The one table of what is armed, and of what may be moving."""
+        """The one table of armed and possibly moving commands."""
         self._stops: deque[tuple[str, Reason]] = deque(maxlen=_MOST_STOPS)
         self._stopped = asyncio.Event()
 

@@ -36,7 +36,7 @@ _AT_ONCE: Final = 3
 """Guards with short lives that are replaced at once; further ones wait `_AGAIN_S`."""
 _AGAIN_S: Final = 1.0
 _FINISH_S: Final = 3.0
-_DIED: Final = "the guard of this line ended; it is started anew"
+_DIED: Final = "the guard of this line ended; another one is starting"
 
 log = logging.getLogger(__name__)
 
@@ -216,7 +216,7 @@ class PipeChannel:
         if self._is_finishing:
             return
         self._bury()
-        log.error("the guard ended; another one is started, and stops what moved")
+        log.error("the guard ended; another one is starting and will stop the robot")
         loop = asyncio.get_running_loop()
         is_short = loop.time() - self._started_s < _STEADY_S and not self._has_served
         self._short_lives = self._short_lives + 1 if is_short else 0

@@ -211,7 +211,7 @@ async def test_next_guard_is_told_what_may_move(house: House) -> None:
         wire.Arm("wire", "turn", TURN),
         wire.Arm("wire", "lift", TERMS),
     ]
-    with pytest.raises(PeerClosed, match="the guard of this line ended; it is started anew"):
+    with pytest.raises(PeerClosed, match="the guard of this line ended; another one is starting"):
         await house.guard.transports["wire"].receive()
     house.guard.arm("drive", TERMS)
     house.guard.tick("drive", b"go on")
