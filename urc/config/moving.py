@@ -6,7 +6,7 @@ from urc.config.part import Findings, Part
 from urc.config.suggest import did_you_mean
 from urc.expressions import Template
 from urc.model.driver import Command
-from urc.model.flow import RunStep, all_steps
+from urc.model.sequence import RunStep, all_steps
 from urc.model.values import Reading
 
 __all__ = ["link_moves", "parse_moves", "refuse_moving", "runs_what_moves", "with_moving_steps"]

@@ -9,7 +9,6 @@ from urc.model.flow import (
     Asides,
     Confirm,
     ErrorReply,
-    ExpectStep,
     Hold,
     Keepalive,
     Offline,
@@ -17,12 +16,10 @@ from urc.model.flow import (
     Queue,
     Requirement,
     Retry,
-    RunStep,
     Stage,
-    Step,
     Verify,
-    all_steps,
 )
+from urc.model.sequence import ExpectStep, RunStep, Step, all_steps
 from urc.model.values import NOTHING, ElementType, Reading, Signal, Value
 from urc.patterns import Pattern
 

@@ -7,20 +7,8 @@ from collections.abc import Iterator, Mapping
 from typing import Literal
 
 from urc.expressions import COUNTERS, ExpressionError, Template
+from urc.model import sequence
 from urc.model.driver import Driver
-from urc.model.flow import (
-    ExpectStep,
-    FailStep,
-    IfStep,
-    PromptStep,
-    RepeatStep,
-    RunStep,
-    SendStep,
-    SetStep,
-    Step,
-    UntilStep,
-    WaitStep,
-)
 from urc.model.values import Value
 from urc.protocol.answer import Answer, Ear, Matcher
 from urc.protocol.asking import Builder
@@ -35,7 +23,7 @@ __all__ = ["build_program", "programs_of_lines"]
 
 
 def build_program(
-    label: str, steps: tuple[Step, ...], transports: frozenset[str], builder: Builder
+    label: str, steps: tuple[sequence.Step, ...], transports: frozenset[str], builder: Builder
 ) -> Program:
     """Compile a sequence."""
     actions = _actions(label, steps, builder)
@@ -53,31 +41,31 @@ def programs_of_lines(
     }
 
 
-def _actions(label: str, steps: tuple[Step, ...], builder: Builder) -> tuple[Action, ...]:
+def _actions(label: str, steps: tuple[sequence.Step, ...], builder: Builder) -> tuple[Action, ...]:
     return tuple(_action(f"{label}.{place}", step, builder) for place, step in enumerate(steps))
 
 
-def _action(label: str, step: Step, builder: Builder) -> Action:
+def _action(label: str, step: sequence.Step, builder: Builder) -> Action:
     match step:
-        case SendStep():
+        case sequence.SendStep():
             return _sending(builder.step(label, step), step)
-        case ExpectStep() | PromptStep():
+        case sequence.ExpectStep() | sequence.PromptStep():
             return _expecting(label, step, builder)
-        case WaitStep(seconds):
+        case sequence.WaitStep(seconds):
             return lambda runner, now: _slept(runner, now + seconds)
-        case UntilStep():
+        case sequence.UntilStep():
             return _awaiting(label, step, builder)
-        case RepeatStep():
+        case sequence.RepeatStep():
             return _repeating(label, step, builder)
-        case RunStep():
+        case sequence.RunStep():
             return _running(step)
-        case SetStep():
+        case sequence.SetStep():
             return _setting(step)
-        case IfStep():
+        case sequence.IfStep():
             then = _actions(f"{label}.then", step.then, builder)
             otherwise = _actions(f"{label}.else", step.otherwise, builder)
             return lambda runner, now: _chosen(runner, now, step.condition, then, otherwise)
-        case FailStep(text):
+        case sequence.FailStep(text):
             return lambda runner, now: _failed(runner, now, text)
 
 
@@ -98,7 +86,7 @@ def _chosen(
     return []
 
 
-def _awaiting(label: str, step: UntilStep, builder: Builder) -> Action:
+def _awaiting(label: str, step: sequence.UntilStep, builder: Builder) -> Action:
     otherwise = _otherwise(label, step.otherwise, builder)
     text = step.text or (
         f"{label}: {step.condition.source!r} did not come true within {step.timeout_s:g} s"
@@ -112,7 +100,7 @@ def _awaiting(label: str, step: UntilStep, builder: Builder) -> Action:
     return wait
 
 
-def _repeating(label: str, step: RepeatStep, builder: Builder) -> Action:
+def _repeating(label: str, step: sequence.RepeatStep, builder: Builder) -> Action:
     body = _actions(f"{label}.repeat", step.body, builder)
     otherwise = _otherwise(label, step.otherwise, builder)
     until = step.until
@@ -147,7 +135,7 @@ def _repeating(label: str, step: RepeatStep, builder: Builder) -> Action:
 
 
 def _otherwise(
-    label: str, steps: tuple[Step, ...] | None, builder: Builder
+    label: str, steps: tuple[sequence.Step, ...] | None, builder: Builder
 ) -> tuple[Action, ...] | None:
     return None if steps is None else _actions(f"{label}.else", steps, builder)
 
@@ -160,7 +148,7 @@ def _failed(runner: Runner, now: float, text: Template) -> list[LineEvent]:
     return []
 
 
-def _sending(ask: Ask, step: SendStep) -> Action:
+def _sending(ask: Ask, step: sequence.SendStep) -> Action:
     names = step.send.names - {COUNTERS}
 
     def send(runner: Runner, now: float) -> list[LineEvent]:
@@ -190,8 +178,14 @@ def _sending(ask: Ask, step: SendStep) -> Action:
     return send
 
 
-def _expecting(label: str, step: ExpectStep | PromptStep, builder: Builder) -> Action:
-    answer = builder.expected(step) if isinstance(step, ExpectStep) else _prompted(step, builder)
+def _expecting(
+    label: str, step: sequence.ExpectStep | sequence.PromptStep, builder: Builder
+) -> Action:
+    answer = (
+        builder.expected(step)
+        if isinstance(step, sequence.ExpectStep)
+        else _prompted(step, builder)
+    )
     otherwise = _otherwise(label, step.otherwise, builder)
     text = step.text or f"{label}: what it expects did not come within {answer.timeout_s:g} s"
 
@@ -202,14 +196,14 @@ def _expecting(label: str, step: ExpectStep | PromptStep, builder: Builder) -> A
             return []
         ear = Ear(answer, runner)
         runner.listen(line, ear, now, now + answer.timeout_s, otherwise, text)
-        if isinstance(step, PromptStep):
+        if isinstance(step, sequence.PromptStep):
             return line.inbox.look_for(step.pattern, ear)
         return line.listen(ear, now)
 
     return expect
 
 
-def _prompted(step: PromptStep, builder: Builder) -> Answer:
+def _prompted(step: sequence.PromptStep, builder: Builder) -> Answer:
     timeout_s = builder.reply_s(step.transport) if step.timeout_s is None else step.timeout_s
     return Answer(Matcher(_Nothing(), lambda fields, now: ([], [])), timeout_s)
 
@@ -224,7 +218,7 @@ class _Nothing:
         raise NotWritable("a prompt is no frame")
 
 
-def _running(step: RunStep) -> Action:
+def _running(step: sequence.RunStep) -> Action:
     def run(runner: Runner, now: float) -> list[LineEvent]:
         view = runner.names(now)
         try:
@@ -246,7 +240,7 @@ def _running(step: RunStep) -> Action:
     return run
 
 
-def _setting(step: SetStep) -> Action:
+def _setting(step: sequence.SetStep) -> Action:
     def put(runner: Runner, now: float) -> list[LineEvent]:
         view = runner.names(now)
         try:

@@ -9,7 +9,8 @@ from functools import partial
 from urc.expressions import COUNTERS, NONCE, NOW
 from urc.model.codec import NUMBERED, ReadSpec, WriteSpec
 from urc.model.driver import Argument, Command, Driver, Message, Poll, Reply, TransportSpec
-from urc.model.flow import RESENDS, Asides, ExpectStep, SendStep, Stage
+from urc.model.flow import RESENDS, Asides, Stage
+from urc.model.sequence import ExpectStep, SendStep
 from urc.model.values import NOTHING
 from urc.protocol.answer import Answer, Aside, Matcher
 from urc.protocol.bounds import queue_limit_s

@@ -9,9 +9,8 @@ from collections.abc import Callable, Mapping
 from typing import Final
 
 from urc.model.driver import Command, Driver, Reply, TransportSpec
-from urc.model.flow import (
-    RESENDS,
-    Asides,
+from urc.model.flow import RESENDS, Asides
+from urc.model.sequence import (
     ExpectStep,
     IfStep,
     PromptStep,

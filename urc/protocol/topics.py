@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator, Mapping
 from urc.expressions import ExpressionError
 from urc.model.codec import Envelope, Payload, ReadSpec
 from urc.model.driver import Driver, Reply
-from urc.model.flow import ExpectStep, all_steps
+from urc.model.sequence import ExpectStep, all_steps
 from urc.model.values import Value
 from urc.problems import UrcError
 from urc.protocol.codec import CodecContext, Frame, NotWritable, Reader

@@ -12,7 +12,7 @@ from typing import Final, NamedTuple
 from urc.expressions import COUNTERS, ExpressionError, Template
 from urc.model.codec import Envelope, Payload, ReadSpec, WriteSpec, each_of
 from urc.model.driver import Argument, Command, Driver, FramingSpec, Poll, TransportSpec
-from urc.model.flow import ExpectStep, IfStep, PromptStep, RepeatStep, SendStep, Step
+from urc.model.sequence import ExpectStep, IfStep, PromptStep, RepeatStep, SendStep, Step
 from urc.model.values import NOTHING, Value
 from urc.patterns import Pattern, example
 from urc.protocol.codec import CodecContext, Frame, NotWritable, Reader, Writer

@@ -4,7 +4,8 @@ import pytest
 
 from tests.dialogue import driver_of
 from urc.config.load import check
-from urc.model.flow import Hold, Offline, PromptStep, SendStep, all_steps
+from urc.model.flow import Hold, Offline
+from urc.model.sequence import PromptStep, SendStep, all_steps
 from urc.registry import Catalog, Table
 from urc.runtime.catalog import built_in_catalog
 

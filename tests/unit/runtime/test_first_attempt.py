@@ -6,7 +6,7 @@ import pytest
 
 from tests.unit.runtime.test_link import SETTINGS
 from urc.model.driver import Command
-from urc.model.flow import RunStep
+from urc.model.sequence import RunStep
 from urc.runtime.session import CommandFailed, Session
 from urc.testing.clock import FakeClock, settle
 from urc.testing.profile import line_profile

@@ -5,8 +5,8 @@ from collections.abc import Iterable
 import pytest
 
 from tests.unit.runtime.test_link import opened, state_of
-from urc.model.flow import ExpectStep, SendStep
 from urc.model.profile import Profile
+from urc.model.sequence import ExpectStep, SendStep
 from urc.testing.clock import FakeClock
 from urc.testing.profile import line_profile, regex, text
 from urc.testing.transport import MemoryTransport

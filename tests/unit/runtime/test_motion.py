@@ -7,7 +7,7 @@ import pytest
 from tests.unit.runtime.desks import DRIVER, Scene, held
 from urc.model.codec import Payload, WriteSpec
 from urc.model.driver import Command, Driver
-from urc.model.flow import WaitStep
+from urc.model.sequence import WaitStep
 from urc.motion.fresh import Input
 from urc.motion.hold import Terms
 from urc.motion.lease import Client, LeaseState

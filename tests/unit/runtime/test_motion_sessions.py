@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 from tests.unit.runtime.desks import DRIVER, Scene
 from urc.model.codec import Count, Counted, Numbered, Payload
-from urc.model.flow import WaitStep
+from urc.model.sequence import WaitStep
 from urc.model.values import Reading
 from urc.motion.lease import Client
 

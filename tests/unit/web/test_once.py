@@ -8,7 +8,7 @@ from tests.unit.web.test_client import FakeLine, scene
 from urc.expressions import compile_expression
 from urc.model.codec import WriteSpec
 from urc.model.driver import Argument, Command
-from urc.model.flow import WaitStep
+from urc.model.sequence import WaitStep
 from urc.protocol.events import Replied
 from urc.runtime.session import CommandFailed
 from urc.testing.clock import settle

@@ -5,8 +5,9 @@ from typing import Any
 from urc.expressions import compile_expression
 from urc.model.codec import WriteSpec
 from urc.model.driver import Argument, Command, Driver, TransportSpec
-from urc.model.flow import Confirm, RunStep, WaitStep
+from urc.model.flow import Confirm
 from urc.model.interface import Given, WidgetUse
+from urc.model.sequence import RunStep, WaitStep
 from urc.model.widget import Port, Widget
 from urc.shipped import shipped
 from urc.web.show.outputs import output_config

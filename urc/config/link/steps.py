@@ -11,20 +11,8 @@ from urc.config.link.flow import (
 from urc.config.moving import refuse_moving
 from urc.config.part import Part
 from urc.expressions import COUNTERS, NONCE, NOW, Template
+from urc.model import sequence
 from urc.model.driver import Driver
-from urc.model.flow import (
-    ExpectStep,
-    FailStep,
-    IfStep,
-    PromptStep,
-    RepeatStep,
-    RunStep,
-    SendStep,
-    SetStep,
-    Step,
-    UntilStep,
-    all_steps,
-)
 
 __all__ = ["link_sequences", "steps_of"]
 
@@ -79,44 +67,44 @@ class _Walk:
         """It comes after the login of its lines, and so knows what that has learnt."""
         self._known: set[str] = set(linker.driver.signals)
 
-    def steps(self, part: Part, steps: tuple[Step, ...]) -> None:
+    def steps(self, part: Part, steps: tuple[sequence.Step, ...]) -> None:
         for inner, step in zip(part.items(), steps, strict=True):
             self._step(inner, step)
 
-    def _step(self, part: Part, step: Step) -> None:
+    def _step(self, part: Part, step: sequence.Step) -> None:
         match step:
-            case SendStep():
+            case sequence.SendStep():
                 self._transport(part, "to", step.transport)
                 known = {*self._known, COUNTERS, NONCE, NOW, *self._learnt(step.transport)}
                 self._linker.templates(part.must("send"), step.send, known)
-            case ExpectStep():
+            case sequence.ExpectStep():
                 self._expect(part, step)
                 self._otherwise(part, step.otherwise)
-            case PromptStep():
+            case sequence.PromptStep():
                 self._transport(part, "from", step.transport)
                 self._must_last(part.must("prompt"), step.transport)
                 self._otherwise(part, step.otherwise)
-            case UntilStep():
+            case sequence.UntilStep():
                 self._template(part.must("wait").must("until"), step.condition)
                 self._otherwise(part, step.otherwise)
-            case RepeatStep():
+            case sequence.RepeatStep():
                 self._repeat(part, step)
-            case RunStep():
+            case sequence.RunStep():
                 self._run(part, step)
-            case SetStep():
+            case sequence.SetStep():
                 for name, inner in part.must("set").entries().items():
                     self._linker.field(inner, name, {"key": True})
                     self._template(inner, step.values.get(name))
-            case IfStep():
+            case sequence.IfStep():
                 self._template(part.must("if"), step.condition)
                 then = part.get("then")
                 if then is not None:
                     self.steps(then, step.then)
                 self._otherwise(part, step.otherwise or None)
-            case FailStep(text):
+            case sequence.FailStep(text):
                 self._template(part.must("fail"), text)
 
-    def _expect(self, part: Part, step: ExpectStep) -> None:
+    def _expect(self, part: Part, step: sequence.ExpectStep) -> None:
         self._transport(part, "from", step.transport)
         inner = part.must("expect")
         self._must_last(inner, step.transport)
@@ -129,14 +117,14 @@ class _Walk:
                 self._linker.field(inner, name, {"offset": offset, "length": len(name)})
         self._known |= {name for name in step.read.fields if name.startswith("_")}
 
-    def _repeat(self, part: Part, step: RepeatStep) -> None:
+    def _repeat(self, part: Part, step: sequence.RepeatStep) -> None:
         self.steps(part.must("repeat"), step.body)
         if step.until is not None:
             self._template(part.must("until"), step.until)
         self._otherwise(part, step.otherwise)
         commands = self._linker.driver.commands
-        for one in all_steps(step.body):
-            if isinstance(one, RunStep) and one.command in commands:
+        for one in sequence.all_steps(step.body):
+            if isinstance(one, sequence.RunStep) and one.command in commands:
                 loops = _loops(one.command, self._linker.driver)
                 if loops:
                     self._linker.findings.error(
@@ -149,7 +137,7 @@ class _Walk:
                         hint="repeat in one of them only",
                     )
 
-    def _run(self, part: Part, step: RunStep) -> None:
+    def _run(self, part: Part, step: sequence.RunStep) -> None:
         command = find_command(self._linker, part.must("run"), step.command)
         given = part.named("args")
         for name, inner in given.items():
@@ -172,7 +160,7 @@ class _Walk:
             else frozenset()
         )
 
-    def _otherwise(self, part: Part, steps: tuple[Step, ...] | None) -> None:
+    def _otherwise(self, part: Part, steps: tuple[sequence.Step, ...] | None) -> None:
         inner = part.get("else")
         if inner is not None and steps:
             self.steps(inner, steps)
@@ -203,10 +191,10 @@ def _loops(start: str, driver: Driver) -> str:
     while waiting:
         name = waiting.pop(0)
         command = driver.commands.get(name)
-        for step in all_steps(command.steps if command else ()):
-            if isinstance(step, RepeatStep):
+        for step in sequence.all_steps(command.steps if command else ()):
+            if isinstance(step, sequence.RepeatStep):
                 return name
-            if isinstance(step, RunStep) and step.command not in seen:
+            if isinstance(step, sequence.RunStep) and step.command not in seen:
                 seen.add(step.command)
                 waiting.append(step.command)
     return ""
@@ -219,8 +207,8 @@ def _cycle(start: str, driver: Driver) -> list[str]:
     while waiting:
         name = waiting.pop(0)
         command = driver.commands.get(name)
-        for step in all_steps(command.steps if command else ()):
-            if not isinstance(step, RunStep):
+        for step in sequence.all_steps(command.steps if command else ()):
+            if not isinstance(step, sequence.RunStep):
                 continue
             if step.command == start:
                 path = [name]

@@ -16,21 +16,17 @@ from urc.expressions import compile_template
 from urc.model.codec import WriteSpec
 from urc.model.driver import Argument, Command, Message, Poll, TransportSpec
 from urc.model.flow import (
-    MAX_STEP_S,
     Confirm,
-    ExpectStep,
     Hold,
     Keepalive,
     Offline,
     Priority,
-    PromptStep,
     Queue,
     Requirement,
     Retry,
-    SendStep,
     Verify,
-    all_steps,
 )
+from urc.model.sequence import MAX_STEP_S, ExpectStep, PromptStep, SendStep, all_steps
 from urc.model.values import Reading, Signal, Value
 
 __all__ = [

@@ -13,8 +13,8 @@ from urc.config.values import given
 from urc.expressions import Template
 from urc.model.codec import ReadSpec
 from urc.model.driver import Driver
-from urc.model.flow import MAX_STEP_S
 from urc.model.profile import Reaction, SimulatorRule
+from urc.model.sequence import MAX_STEP_S
 from urc.model.values import NOTHING, Reading
 from urc.model.world import (
     BODY_KEYS,

@@ -6,26 +6,9 @@ from urc.config.parse.form import FormContext, parse_write
 from urc.config.parse.reply import parse_own_framing, parse_stage, refuse
 from urc.config.part import Findings, Part
 from urc.expressions import Template, compile_template
+from urc.model import sequence
 from urc.model.codec import ReadSpec
-from urc.model.flow import (
-    MAX_STEP_S,
-    MAX_STEPS,
-    MAX_STEPS_DONE,
-    ExpectStep,
-    FailStep,
-    IfStep,
-    PromptStep,
-    RepeatStep,
-    RunStep,
-    SendStep,
-    SetStep,
-    Stage,
-    Step,
-    UntilStep,
-    WaitStep,
-    all_steps,
-    most_steps,
-)
+from urc.model.flow import Stage
 from urc.model.values import Value
 
 __all__ = ["VERBS", "StepContext", "parse_steps"]
@@ -58,33 +41,38 @@ class StepContext(NamedTuple):
     forms: FormContext
 
 
-def parse_steps(part: Part, context: StepContext, findings: Findings) -> tuple[Step, ...]:
+def parse_steps(part: Part, context: StepContext, findings: Findings) -> tuple[sequence.Step, ...]:
     """Return the steps in the list at `part`, branches included."""
     steps = _steps(part, context, findings)
-    count = sum(1 for _ in all_steps(steps))
-    if count > MAX_STEPS:
-        findings.error(
-            part, "too-many-steps", f"there are {count} steps, branches included; {MAX_STEPS} fit"
-        )
-    most = most_steps(steps)
-    if most > MAX_STEPS_DONE:
+    count = sum(1 for _ in sequence.all_steps(steps))
+    if count > sequence.MAX_STEPS:
         findings.error(
             part,
             "too-many-steps",
-            f"with all rounds of 'repeat' it would do {most} steps; {MAX_STEPS_DONE} are allowed",
+            f"there are {count} steps, branches included; {sequence.MAX_STEPS} fit",
+        )
+    most = sequence.most_steps(steps)
+    if most > sequence.MAX_STEPS_DONE:
+        findings.error(
+            part,
+            "too-many-steps",
+            f"with all rounds of 'repeat' it would do {most} steps;"
+            f" {sequence.MAX_STEPS_DONE} are allowed",
             hint="make 'times' smaller",
         )
     return steps
 
 
-def _steps(part: Part | None, context: StepContext, findings: Findings) -> tuple[Step, ...]:
+def _steps(
+    part: Part | None, context: StepContext, findings: Findings
+) -> tuple[sequence.Step, ...]:
     if part is None:
         return ()
     found = [_step(inner, context, findings) for inner in part.items()]
     return tuple(step for step in found if step is not None)
 
 
-def _step(part: Part, context: StepContext, findings: Findings) -> Step | None:
+def _step(part: Part, context: StepContext, findings: Findings) -> sequence.Step | None:
     verbs = [verb for verb in VERBS if verb in part.data]
     if len(verbs) != 1:
         findings.error(
@@ -106,13 +94,13 @@ def _step(part: Part, context: StepContext, findings: Findings) -> Step | None:
     return _one(verb, part, context, findings)
 
 
-def _one(verb: str, part: Part, context: StepContext, findings: Findings) -> Step | None:
+def _one(verb: str, part: Part, context: StepContext, findings: Findings) -> sequence.Step | None:
     inner = part.must(verb)
     match verb:
         case "send":
             send = parse_write(inner, findings, context.forms)
             transport = part.text("to", context.transport)
-            return SendStep(transport, send, part.flag("redact", default=False))
+            return sequence.SendStep(transport, send, part.flag("redact", default=False))
         case "expect":
             return _expect(part, inner, context, findings)
         case "prompt":
@@ -122,17 +110,19 @@ def _one(verb: str, part: Part, context: StepContext, findings: Findings) -> Ste
         case "repeat":
             return _repeat(part, inner, context, findings)
         case "run":
-            return RunStep(str(inner.data), _values(part.named("args"), findings))
+            return sequence.RunStep(str(inner.data), _values(part.named("args"), findings))
         case "set":
-            return SetStep(_values(inner.entries(), findings))
+            return sequence.SetStep(_values(inner.entries(), findings))
         case "if":
             return _if(part, inner, context, findings)
         case _:
             text = findings.template(inner)
-            return FailStep(text or _NEVER)
+            return sequence.FailStep(text or _NEVER)
 
 
-def _expect(part: Part, inner: Part, context: StepContext, findings: Findings) -> ExpectStep | None:
+def _expect(
+    part: Part, inner: Part, context: StepContext, findings: Findings
+) -> sequence.ExpectStep | None:
     transport = part.text("from", context.transport)
     framing = None
     if isinstance(inner.data, dict):
@@ -146,7 +136,7 @@ def _expect(part: Part, inner: Part, context: StepContext, findings: Findings) -
             return None
         stage = Stage(ReadSpec("regex", {"pattern": pattern}, pattern.groups))
     otherwise, text = _else(part, context, findings)
-    return ExpectStep(
+    return sequence.ExpectStep(
         transport,
         stage.read,
         stage.errors,
@@ -158,26 +148,32 @@ def _expect(part: Part, inner: Part, context: StepContext, findings: Findings) -
     )
 
 
-def _prompt(part: Part, inner: Part, context: StepContext, findings: Findings) -> PromptStep | None:
+def _prompt(
+    part: Part, inner: Part, context: StepContext, findings: Findings
+) -> sequence.PromptStep | None:
     pattern = findings.pattern(inner)
     if pattern is None:
         return None
     otherwise, text = _else(part, context, findings)
     transport = part.text("from", context.transport)
-    return PromptStep(transport, pattern, _timeout_s(part, findings), otherwise, text)
+    return sequence.PromptStep(transport, pattern, _timeout_s(part, findings), otherwise, text)
 
 
-def _wait(part: Part, inner: Part, context: StepContext, findings: Findings) -> Step | None:
+def _wait(
+    part: Part, inner: Part, context: StepContext, findings: Findings
+) -> sequence.Step | None:
     if not isinstance(inner.data, dict):
         refuse(part, ("else",), "means nothing for a plain wait", findings)
-        return WaitStep(findings.duration(part, "wait", 0.0, most=MAX_STEP_S))
+        return sequence.WaitStep(findings.duration(part, "wait", 0.0, most=sequence.MAX_STEP_S))
     condition = findings.expression(inner.must("until"))
     otherwise, text = _else(part, context, findings)
-    timeout_s = findings.duration(inner, "timeout", 0.0, most=MAX_STEP_S)
-    return None if condition is None else UntilStep(condition, timeout_s, otherwise, text)
+    timeout_s = findings.duration(inner, "timeout", 0.0, most=sequence.MAX_STEP_S)
+    return None if condition is None else sequence.UntilStep(condition, timeout_s, otherwise, text)
 
 
-def _repeat(part: Part, inner: Part, context: StepContext, findings: Findings) -> Step | None:
+def _repeat(
+    part: Part, inner: Part, context: StepContext, findings: Findings
+) -> sequence.Step | None:
     times = part.integer("times")
     if times is None:
         findings.error(
@@ -191,7 +187,7 @@ def _repeat(part: Part, inner: Part, context: StepContext, findings: Findings) -
     if until is None:
         refuse(part, ("else",), "means nothing without 'until'", findings)
     otherwise, text = _else(part, context, findings)
-    return RepeatStep(
+    return sequence.RepeatStep(
         _steps(inner, context, findings),
         times or 1,
         findings.expression(until) if until else None,
@@ -201,12 +197,12 @@ def _repeat(part: Part, inner: Part, context: StepContext, findings: Findings) -
 
 
 def _timeout_s(part: Part, findings: Findings) -> float | None:
-    return findings.duration(part, "timeout", 0.0, most=MAX_STEP_S) or None
+    return findings.duration(part, "timeout", 0.0, most=sequence.MAX_STEP_S) or None
 
 
 def _else(
     part: Part, context: StepContext, findings: Findings
-) -> tuple[tuple[Step, ...] | None, str]:
+) -> tuple[tuple[sequence.Step, ...] | None, str]:
     """Return what to do when it does not come: steps, or what to say."""
     inner = part.get("else")
     if inner is None:
@@ -216,7 +212,9 @@ def _else(
     return None, "" if inner.data == "fail" else str(inner.data)
 
 
-def _if(part: Part, inner: Part, context: StepContext, findings: Findings) -> IfStep | None:
+def _if(
+    part: Part, inner: Part, context: StepContext, findings: Findings
+) -> sequence.IfStep | None:
     condition = findings.expression(inner)
     then = _steps(part.get("then"), context, findings)
     otherwise, text = _else(part, context, findings)
@@ -229,7 +227,7 @@ def _if(part: Part, inner: Part, context: StepContext, findings: Findings) -> If
         )
     if "then" not in part.data and "else" not in part.data:
         findings.error(part, "missing-key", "'then' is missing: this step does nothing", key=True)
-    return None if condition is None else IfStep(condition, then, otherwise or ())
+    return None if condition is None else sequence.IfStep(condition, then, otherwise or ())
 
 
 def _values(parts: dict[str, Part], findings: Findings) -> dict[str, Template | Value]:

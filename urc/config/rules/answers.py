@@ -5,7 +5,7 @@ from typing import Final
 from urc.config.link.steps import steps_of
 from urc.config.part import Findings, Part
 from urc.model.driver import Driver, Reply, TransportSpec
-from urc.model.flow import ExpectStep, PromptStep, Step, all_steps
+from urc.model.sequence import ExpectStep, PromptStep, Step, all_steps
 
 __all__ = ["check_answers"]
 

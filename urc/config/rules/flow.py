@@ -16,7 +16,7 @@ from urc.config.rules.unmarked import check_unguarded, check_unmarked
 from urc.expressions import digested_settings, split_template
 from urc.model.codec import WriteSpec
 from urc.model.driver import Driver, Poll, Reply, TransportSpec
-from urc.model.flow import SendStep, Step, UntilStep, WaitStep, all_steps
+from urc.model.sequence import SendStep, Step, UntilStep, WaitStep, all_steps
 
 __all__ = ["check_flow"]
 

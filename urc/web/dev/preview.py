@@ -8,22 +8,9 @@ from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
 from urc.expressions import COUNTERS, ExpressionError, Template
+from urc.model import sequence
 from urc.model.codec import Payload, WriteSpec
 from urc.model.driver import Command, Driver
-from urc.model.flow import (
-    ExpectStep,
-    FailStep,
-    IfStep,
-    PromptStep,
-    RepeatStep,
-    RunStep,
-    SendStep,
-    SetStep,
-    Step,
-    UntilStep,
-    WaitStep,
-    all_steps,
-)
 from urc.problems import UrcError
 from urc.protocol.codec import CodecContext
 from urc.protocol.commands import questions
@@ -103,13 +90,13 @@ def _frames(
     if not command.steps:
         yield _written(driver, settings, command.transport, command.send, names)
         return
-    for step in all_steps(command.steps):
-        if isinstance(step, SendStep):
+    for step in sequence.all_steps(command.steps):
+        if isinstance(step, sequence.SendStep):
             if step.is_secret:
                 yield Written("", b"", f"sends something secret on {step.transport}")
             else:
                 yield _written(driver, settings, step.transport, step.send, names)
-        elif isinstance(step, RunStep) and depth < MOST_WITHIN:
+        elif isinstance(step, sequence.RunStep) and depth < MOST_WITHIN:
             yield from _run(driver, settings, step, names, depth)
         else:
             yield Written("", b"", _in_words(step))
@@ -118,7 +105,7 @@ def _frames(
 def _run(
     driver: Driver,
     settings: Mapping[str, object],
-    step: RunStep,
+    step: sequence.RunStep,
     names: Mapping[str, object],
     depth: int,
 ) -> Iterator[Written]:
@@ -152,23 +139,23 @@ def _written(
     return Written(transport, payload, "")
 
 
-def _in_words(step: Step) -> str:
+def _in_words(step: sequence.Step) -> str:
     match step:
-        case ExpectStep(transport):
+        case sequence.ExpectStep(transport):
             return f"waits for an answer on {transport}"
-        case PromptStep(transport):
+        case sequence.PromptStep(transport):
             return f"waits for a prompt on {transport}"
-        case WaitStep(seconds):
+        case sequence.WaitStep(seconds):
             return f"waits {seconds:g} s"
-        case UntilStep(condition):
+        case sequence.UntilStep(condition):
             return f"waits until {condition.source}"
-        case RepeatStep(_, times):
+        case sequence.RepeatStep(_, times):
             return f"repeats what follows, {times} times at most"
-        case SetStep(values):
+        case sequence.SetStep(values):
             return f"sets {', '.join(values)}"
-        case IfStep(condition):
+        case sequence.IfStep(condition):
             return f"goes on only if {condition.source}, else by its other steps"
-        case FailStep():
+        case sequence.FailStep():
             return "ends without success"
-        case RunStep(command) | SendStep(command):
+        case sequence.RunStep(command) | sequence.SendStep(command):
             return f"runs {command}"

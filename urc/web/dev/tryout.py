@@ -13,7 +13,7 @@ from typing import NamedTuple
 from urc.config.messaging import MESSAGING
 from urc.model.codec import Envelope, ReadSpec
 from urc.model.driver import Driver, Reply, TransportSpec
-from urc.model.flow import ExpectStep, all_steps
+from urc.model.sequence import ExpectStep, all_steps
 from urc.patterns import Pattern
 from urc.problems import UrcError
 from urc.protocol.answer import Answer, Ear, Matcher

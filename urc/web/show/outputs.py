@@ -5,21 +5,9 @@ Floor 5. Pure.
 
 from collections.abc import Mapping
 
+from urc.model import sequence
 from urc.model.binding import targets
 from urc.model.driver import Argument, Command, Driver
-from urc.model.flow import (
-    ExpectStep,
-    FailStep,
-    IfStep,
-    PromptStep,
-    RepeatStep,
-    RunStep,
-    SendStep,
-    SetStep,
-    Step,
-    UntilStep,
-    WaitStep,
-)
 from urc.model.interface import Given, WidgetUse
 from urc.model.units import conversion
 from urc.model.values import Reading
@@ -191,26 +179,26 @@ def mark(text: str) -> str:
     return text
 
 
-def _step_words(step: Step) -> dict[str, str]:
+def _step_words(step: sequence.Step) -> dict[str, str]:
     """Return the name of a step as a key of the catalogues, and the value of its ``{what}``."""
     match step:
-        case RunStep(command):
+        case sequence.RunStep(command):
             return {"text": mark("run {what}"), "what": command}
-        case SendStep():
+        case sequence.SendStep():
             return {"text": mark("send"), "what": ""}
-        case ExpectStep():
+        case sequence.ExpectStep():
             return {"text": mark("wait for the answer"), "what": ""}
-        case PromptStep():
+        case sequence.PromptStep():
             return {"text": mark("wait for the prompt"), "what": ""}
-        case WaitStep(seconds):
+        case sequence.WaitStep(seconds):
             return {"text": mark("wait {what} s"), "what": f"{seconds:g}"}
-        case UntilStep(condition):
+        case sequence.UntilStep(condition):
             return {"text": mark("wait until {what}"), "what": condition.source}
-        case RepeatStep(_, times):
+        case sequence.RepeatStep(_, times):
             return {"text": mark("repeat up to {what} times"), "what": str(times)}
-        case SetStep(values):
+        case sequence.SetStep(values):
             return {"text": mark("set {what}"), "what": ", ".join(values)}
-        case IfStep(condition):
+        case sequence.IfStep(condition):
             return {"text": mark("if {what}"), "what": condition.source}
-        case FailStep():
+        case sequence.FailStep():
             return {"text": mark("fail"), "what": ""}
