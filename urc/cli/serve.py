@@ -29,14 +29,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_settings(parser)
     add_host(parser)
     add_port(parser)
-    parser.add_argument(
-        "--allow-host",
-        dest="allowed_hosts",
-        metavar="NAME",
-        action="append",
-        default=[],
-        help="host name of this machine, in addition to its addresses",
-    )
+    _add_names(parser, "--allow-host", "host name of this machine, in addition to its addresses")
     parser.add_argument(
         "--simulate", action="store_true", help="emulate the robots instead of connecting"
     )
@@ -65,35 +58,22 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="store_false",
         help="for debugging: write motion from this process; if it hangs, nothing stops a robot",
     )
-    parser.add_argument(
-        "--data-dir",
-        dest="data",
-        metavar="FOLDER",
-        type=Path,
-        help="data folder: latched stops, audit log, settings",
-    )
-    parser.add_argument(
-        "--tiles",
-        metavar="FOLDER",
-        type=Path,
-        help="map tiles as FOLDER/z/x/y.png, for the option tiles of the widget map",
-    )
-    parser.add_argument(
-        "--record",
-        dest="recordings",
-        metavar="FOLDER",
-        type=Path,
-        help="record each session to a file in this folder, for 'urc replay'",
-    )
-    parser.add_argument(
+    for flag, text in (
+        ("--data-dir", "data folder: latched stops, audit log, settings"),
+        ("--tiles", "map tiles as FOLDER/z/x/y.png, for the option tiles of the widget map"),
+        ("--record", "record each session to a file in this folder, for 'urc replay'"),
+    ):
+        parser.add_argument(flag, metavar="FOLDER", type=Path, help=text)
+    _add_names(
+        parser,
         "--trust-widget",
-        dest="trusted",
-        metavar="NAME",
-        action="append",
-        default=[],
-        help="run a third-party widget in the page instead of a sandboxed frame: it gets all "
-        "rights of the page",
+        "run a third-party widget in the page instead of a sandboxed frame: it gets all rights of"
+        " the page",
     )
+
+
+def _add_names(parser: argparse.ArgumentParser, flag: str, text: str) -> None:
+    parser.add_argument(flag, metavar="NAME", action="append", default=[], help=text)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -104,23 +84,7 @@ def run(arguments: argparse.Namespace) -> int:
     from urc.runtime.settings import resolve_settings
     from urc.runtime.shelves import hidden_beside
 
-    if arguments.dev and not is_loopback(arguments.host):
-        raise Misuse(f"--dev shows all traffic and is for this machine alone, not {arguments.host}")
-    if arguments.manage and not arguments.token_file and not is_loopback(arguments.host):
-        raise Misuse(
-            f"--manage lets others at {arguments.host} install packages and change settings:"
-            " add --token FILE, and only those with the token in that file may"
-        )
-    if arguments.token_file and not arguments.manage:
-        raise Misuse("--token is for those who manage from other machines: add --manage")
-    if arguments.faults and not arguments.simulate:
-        raise Misuse("--fault is for emulated robots: add --simulate")
-    if arguments.tiles and not arguments.tiles.is_dir():
-        raise Misuse(f"--tiles names a folder of map pictures; {arguments.tiles} is none")
-    if arguments.recordings:
-        from urc.runtime.recording.recorder import check_installed
-
-        check_installed()  # said now, not when somebody drives
+    _check(arguments)
     profiles = [load(word) for word in arguments.profiles]
     if not profiles and (arguments.settings or arguments.settings_file):
         raise Misuse("--set and --settings are for the profiles that are named; name one")
@@ -150,14 +114,14 @@ def run(arguments: argparse.Namespace) -> int:
         Place(
             arguments.host,
             arguments.port,
-            tuple(arguments.allowed_hosts),
-            arguments.data,
+            tuple(arguments.allow_host),
+            arguments.data_dir,
             arguments.has_guard,
             arguments.tiles,
             token_in(arguments.token_file) if arguments.token_file else "",
             arguments.installed or not profiles,
-            tuple(arguments.trusted),
-            arguments.recordings,
+            tuple(arguments.trust_widget),
+            arguments.record,
         ),
         is_simulated=arguments.simulate,
         on_ready=print_entrance,
@@ -165,6 +129,31 @@ def run(arguments: argparse.Namespace) -> int:
         is_dev=arguments.dev,
         faults=arguments.faults,
     )
+
+
+def _check(arguments: argparse.Namespace) -> None:
+    """Refuse arguments that exclude each other.
+
+    Raises:
+        Misuse: two of them do, or a folder does not exist.
+    """
+    if arguments.dev and not is_loopback(arguments.host):
+        raise Misuse(f"--dev shows all traffic and is for this machine alone, not {arguments.host}")
+    if arguments.manage and not arguments.token_file and not is_loopback(arguments.host):
+        raise Misuse(
+            f"--manage lets others at {arguments.host} install packages and change settings:"
+            " add --token FILE, and only those with the token in that file may"
+        )
+    if arguments.token_file and not arguments.manage:
+        raise Misuse("--token is for those who manage from other machines: add --manage")
+    if arguments.faults and not arguments.simulate:
+        raise Misuse("--fault is for emulated robots: add --simulate")
+    if arguments.tiles and not arguments.tiles.is_dir():
+        raise Misuse(f"--tiles names a folder of map pictures; {arguments.tiles} is none")
+    if arguments.record:
+        from urc.runtime.recording.recorder import check_installed
+
+        check_installed()  # said now, not when somebody drives
 
 
 def _warn(arguments: argparse.Namespace) -> None:

@@ -94,11 +94,6 @@ class Ask(NamedTuple):
     is_numbered: bool = False
     """It is an envelope that carries a number, and so does its answer."""
 
-    @property
-    def is_made_late(self) -> bool:
-        """Whether it is made when it is sent: what is in it is not known before."""
-        return self.has_counters or self.is_fresh or bool(self.learnt)
-
     def made(self, names: Mapping[str, object]) -> Payload | None:
         """Return what is sent, as far as it is known now; None where it is made when it is sent.
 
@@ -157,7 +152,7 @@ class Exchange:
         self.namespace = namespace
         """What its templates know; without counters."""
         self.data = data
-        """None: it `Ask.is_made_late`."""
+        """None: `Ask.made` leaves it to the moment of sending."""
         self.gives_up_at = gives_up_at
         """When it fails for having waited too long to be sent."""
         self.tries_left = ask.retries

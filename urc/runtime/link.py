@@ -95,20 +95,9 @@ class Link:
             self._wanted.set()
         self._retry_s = clock.now()
         """Before this time no attempt is made."""
-        # Of the present connection.
         self._ended: asyncio.Future[str] | None = None
         """None while not connected; its result says why the connection ended."""
-        self._close_reason: str | None = None
-        """Set when the engine has closed the line: what arrives now is nobody's."""
-        self._heard_s = 0.0
-        self._is_reader_waiting = False
-        self._is_ready = False
-        """The steps of the connection are done, or there are none."""
-        self._has_heard = False
-        """A good frame came before they were."""
-        self._has_stood = False
-        """It has stood for `SETTLE_S`."""
-
+        self._forget_connection()
         self._is_overdue = False
         """The robot took a request and has not said anything since."""
         self.tried = asyncio.Event()
@@ -119,6 +108,19 @@ class Link:
         self._outgoing = Outgoing(
             transport, self._report, hub, clock, self._end, is_stream=self._is_stream
         )
+
+    def _forget_connection(self) -> None:
+        """Set what is known of a connection to its values at the start."""
+        self._close_reason: str | None = None
+        """Set when the engine has closed the line: data that arrives later is dropped."""
+        self._heard_s = self._clock.now()
+        self._is_reader_waiting = False
+        self._is_ready = not self._spec.on_connect
+        """The steps of the connection are done, or there are none."""
+        self._has_heard = False
+        """A good frame came before they were."""
+        self._has_stood = False
+        """It has stood for `SETTLE_S`."""
 
     @property
     def is_full(self) -> bool:
@@ -256,10 +258,7 @@ class Link:
     async def _serve(self) -> None:
         """Serve the open connection until it ends, and draw the conclusions."""
         self._ended = asyncio.get_running_loop().create_future()
-        self._close_reason = None
-        self._heard_s = self._clock.now()
-        self._is_reader_waiting = self._has_heard = self._has_stood = False
-        self._is_ready = not self._spec.on_connect
+        self._forget_connection()
         transport, prompt = self._transport, None
         if self._is_stream and isinstance(transport, Prompt):
             prompt = transport

@@ -34,6 +34,7 @@ from urc.runtime.settings import resolve_settings
 
 if TYPE_CHECKING:
     from urc.guard.guard_client import GuardClient
+    from urc.transports.base import Transport
 
 __all__ = ["CommandFailed", "Motion", "Session", "Turnstile", "resolve_settings"]
 
@@ -131,16 +132,8 @@ class Session:
         engine = Engine(driver, self.settings, fresh=fresh, is_compiled=True)
         self.frames: Frames = engine.motions
         """Makes the frames of held commands."""
-        self.movers: GuardClient | None = None
+        self.movers = self._made_movers(engine, transports, motion)
         """Who writes them; None where nothing is held."""
-        if motion != "none" and any(one.hold is not None for one in driver.commands.values()):
-            from urc.runtime.guarding import take_reins  # 20 ms: only for what can be driven
-
-            self.movers = take_reins(
-                driver, self.settings, transports, self._clock, is_guarded=motion == "guarded"
-            )
-            engine.motions.share([name for name in driver.transports if is_lossy(driver, name)])
-            self.movers.on_stand = engine.motions.told
         self._dispatcher = Dispatcher(
             engine,
             self.hub,
@@ -149,30 +142,53 @@ class Session:
             partial(_limit_s, driver),
             {name: program.reins for name, program in engine.programs.items()},
         )
-        self._links: dict[str, Link] = {}
-        made = (
+        self._links = self._made_links(
             make_transports(driver, self.settings, transports)
             if self.movers is None
-            else self.movers.transports
+            else self.movers.transports,
+            random,
         )
-        for name, spec in driver.transports.items():
-            link = Link(
-                spec,
-                made[name],
-                self._dispatcher,
-                self.hub,
-                clock=self._clock,
-                random=random,
-                expects_frames=_expects_frames(driver, name),
-            )
-            self._dispatcher.attach(name, link)
-            self._links[name] = link
         self._stops = 0
         self._untried = {name: Turnstile(link.tried) for name, link in self._links.items()}
         """Lines whose first attempt may not have ended yet: commands wait for it, in order."""
         self._numbers = count(1)
         self._group = asyncio.TaskGroup()
         self._tasks: list[asyncio.Task[None]] = []
+
+    def _made_movers(
+        self, engine: Engine, transports: Table, motion: Motion
+    ) -> "GuardClient | None":
+        driver = self.profile.driver
+        if motion == "none" or all(one.hold is None for one in driver.commands.values()):
+            return None
+        from urc.runtime.guarding import take_reins  # 20 ms: only for what can be driven
+
+        movers = take_reins(
+            driver, self.settings, transports, self._clock, is_guarded=motion == "guarded"
+        )
+        engine.motions.share([name for name in driver.transports if is_lossy(driver, name)])
+        movers.on_stand = engine.motions.told
+        return movers
+
+    def _made_links(
+        self, transports: "Mapping[str, Transport]", random: Callable[[], float]
+    ) -> dict[str, Link]:
+        driver = self.profile.driver
+        links = {
+            name: Link(
+                spec,
+                transports[name],
+                self._dispatcher,
+                self.hub,
+                clock=self._clock,
+                random=random,
+                expects_frames=_expects_frames(driver, name),
+            )
+            for name, spec in driver.transports.items()
+        }
+        for name, link in links.items():
+            self._dispatcher.attach(name, link)
+        return links
 
     async def __aenter__(self) -> "Session":
         await self._group.__aenter__()

@@ -55,7 +55,6 @@ def line_profile(
         transport: row of the transports table.
         max_bytes: longest frame.
     """
-    battery = Reply(regex(r"^(?P<battery>\d+)$"))
     wire = TransportSpec(
         name="wire",
         type=transport,
@@ -67,26 +66,6 @@ def line_profile(
         framing=FramingSpec("delimiter", {"tx": b"\n", "rx": b"\n"}, max_bytes),
         timeouts=timeouts or Timeouts(),
         backoff=backoff or Backoff(),
-    )
-    commands = {
-        "ask": Command("ask", "wire", text(QUESTION), reply=battery),
-        "say": Command(
-            "say",
-            "wire",
-            text("say {{ word }}"),
-            arguments={"word": Argument("word", "string")},
-        ),
-    }
-    polls = () if every_s is None else (Poll("polls.0", "wire", every_s, text(QUESTION), battery),)
-    driver = Driver(
-        transports={"wire": wire},
-        signals={
-            "battery": Signal("battery", "integer", unit="%", stale_after_s=3.0),
-            "note": Signal("note", "string", stale_after_s=3.0),
-        },
-        commands=commands,
-        messages={"note": Message("note", "wire", regex(r"^note (?P<note>.*)$"))},
-        polls=polls,
     )
     rule = SimulatorRule(
         "wire",
@@ -101,6 +80,30 @@ def line_profile(
             "host": Setting("host", "host", default="127.0.0.1"),
             "port": Setting("port", "port"),
         },
-        driver=driver,
+        driver=_driver(wire, every_s),
         simulator=(rule,),
+    )
+
+
+def _driver(wire: TransportSpec, every_s: float | None) -> Driver:
+    battery = Reply(regex(r"^(?P<battery>\d+)$"))
+    commands = {
+        "ask": Command("ask", "wire", text(QUESTION), reply=battery),
+        "say": Command(
+            "say",
+            "wire",
+            text("say {{ word }}"),
+            arguments={"word": Argument("word", "string")},
+        ),
+    }
+    polls = () if every_s is None else (Poll("polls.0", "wire", every_s, text(QUESTION), battery),)
+    return Driver(
+        transports={"wire": wire},
+        signals={
+            "battery": Signal("battery", "integer", unit="%", stale_after_s=3.0),
+            "note": Signal("note", "string", stale_after_s=3.0),
+        },
+        commands=commands,
+        messages={"note": Message("note", "wire", regex(r"^note (?P<note>.*)$"))},
+        polls=polls,
     )

@@ -20,7 +20,7 @@ from urc.config.parse.reply import implied_reply, parse_reply
 from urc.config.parse.signal import parse_signal, with_ages
 from urc.config.part import Findings, Part
 from urc.config.values import check_range, check_within, element_of, fit, fit_hint, shown
-from urc.model.driver import Argument, Command, Driver, Message, Poll, Reply, TransportSpec
+from urc.model.driver import Argument, Command, Driver, Message, Poll, TransportSpec
 from urc.model.values import NOTHING, Reading, Value
 from urc.registry import Catalog
 
@@ -122,13 +122,6 @@ def spoken_name(name: str) -> str:
     """Return ``joint_1`` as people read it: ``Joint 1``."""
     words = name.replace("_", " ").replace("-", " ").strip()
     return words[:1].upper() + words[1:]
-
-
-def reply_timeout_s(reply: Reply, transport: TransportSpec | None) -> float:
-    """Return how long the answer may take."""
-    if reply.timeout_s is not None:
-        return reply.timeout_s
-    return transport.timeouts.reply_s if transport else 2.0
 
 
 def _message(part: Part, lines: _Lines, findings: Findings) -> Message:

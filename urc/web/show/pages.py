@@ -132,22 +132,18 @@ def robot_page(
     uses = _uses(profile, interface)
     slots = tuple(uses)
     render_foreign(((use, profile) for use in uses.values()), border)
-    used = dict.fromkeys(use.widget for use in uses.values())
-    head = Head(
-        nonce=nonce,
-        title=profile.title,
-        import_map=with_words(modules),
-        widget_styles=DEBUG_STYLES
-        if interface is DEBUGGING
-        else border.styles(profile.widgets[name] for name in used),
-        grid_css=grid_css(interface, slots),
-    )
+    styles = _styles(profile, interface, uses, border)
     place = quote(name, safe="")
     url, watch = f"/robots/{place}/", "&watch" if is_watching else ""
-    lines = motion_lines(profile.driver)
     tabs = page_tabs(interface, tab)
     page = RobotPage(
-        head=head,
+        head=Head(
+            nonce=nonce,
+            title=profile.title,
+            import_map=with_words(modules),
+            widget_styles=styles,
+            grid_css=grid_css(interface, slots),
+        ),
         title=profile.title,
         socket=f"/ws?robot={place}{watch}",
         interfaces=choices(profile, interface, url, watch),
@@ -161,7 +157,7 @@ def robot_page(
             for index, (slot, use) in enumerate(uses.items())
         ),
         stop_url=f"/api/v1/robots/{place}/stop",
-        lines=json.dumps(lines),
+        lines=json.dumps(motion_lines(profile.driver)),
         can_move=can_move(profile.driver) and not tape,
         tape=tape,
     )
@@ -190,6 +186,15 @@ def _uses(profile: Profile, interface: Interface) -> dict[str, WidgetUse]:
         name: interface.widgets.get(name) or profile.slots.get(name) for name in interface.shown
     }
     return {name: use for name, use in found.items() if use is not None}
+
+
+def _styles(
+    profile: Profile, interface: Interface, uses: Mapping[str, WidgetUse], border: Border
+) -> tuple[str, ...]:
+    if interface is DEBUGGING:
+        return DEBUG_STYLES
+    used = dict.fromkeys(use.widget for use in uses.values())
+    return border.styles(profile.widgets[name] for name in used)
 
 
 @lru_cache(maxsize=1)
