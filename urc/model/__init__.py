@@ -1,1 +1,1 @@
-"""What a document means, as frozen values."""
+"""Frozen values that hold the content of a document."""

@@ -1,8 +1,8 @@
-"""Which way axes point, and how values go from one way to another.
+"""Axis conventions, and the conversion of values between them.
 
-Floor 2, arithmetic only. Body axes: FLU (x forward, y left, z up; REP-103) and FRD (x forward,
-y right, z down). Axes of the world: ENU (east, north, up) and NED (north, east, down). A bearing
-is the angle from north, clockwise.
+Arithmetic only. Body axes are FLU (x forward, y left, z up; REP-103) and FRD (x forward, y right, z
+down). World axes are ENU (east, north, up) and NED (north, east, down). A bearing is the angle from
+north, clockwise.
 """
 
 import math
@@ -20,7 +20,7 @@ _HALF: Final = math.sqrt(0.5)
 
 
 def turns(here: Axes, there: Axes) -> bool:
-    """Return whether values can go from one to the other: body to body, or world to world."""
+    """Return whether values convert between the two: body to body, or world to world."""
     if here == there or not here or not there:
         return here == there
     world = (*_WORLD, "bearing")
@@ -37,7 +37,7 @@ def turn_vector(vector: Sequence[float], here: Axes, there: Axes) -> tuple[float
     if here in _WORLD and there in _WORLD:
         east, north, *up = vector
         return (north, east, *(-one for one in up))
-    raise ValueError(f"a vector cannot go from {here} to {there}")
+    raise ValueError(f"a vector cannot be converted from {here} to {there}")
 
 
 def turn_quaternion(
@@ -45,8 +45,8 @@ def turn_quaternion(
 ) -> tuple[float, float, float, float]:
     """Return an orientation [x, y, z, w] in the axes `there`.
 
-    From body axes to body axes it is the same turn, told in the other axes. From ENU to NED both
-    ends change: of a FLU body in ENU it makes the FRD body in NED, as autopilots have it.
+    Between body axes, the result is the same rotation, expressed in the other axes. Between ENU and
+    NED, both ends change: a FLU body in ENU becomes a FRD body in NED, as in autopilots.
     """
     x, y, z, w = quaternion
     if here == there:
@@ -55,27 +55,27 @@ def turn_quaternion(
         return (x, -y, -z, w)
     if here in _WORLD and there in _WORLD:
         return ((x + y) * _HALF, (x - y) * _HALF, (w - z) * _HALF, (w + z) * _HALF)
-    raise ValueError(f"an orientation cannot go from {here} to {there}")
+    raise ValueError(f"an orientation cannot be converted from {here} to {there}")
 
 
 def turn_angle(
     angle: float, here: Axes, there: Axes, *, about: str = "z", unit: str = "rad"
 ) -> float:
-    """Return an angle or a rate about one axis of the body, or a heading, in the axes `there`.
+    """Return an angle or a rate about one body axis, or a heading, in the axes `there`.
 
     Args:
         angle: in `unit`.
-        here: its axes; for a heading ENU, NED or bearing.
-        there: the wanted ones.
+        here: present axes; ENU, NED or bearing for a heading.
+        there: wanted axes.
         about: ``x`` (roll), ``y`` (pitch) or ``z`` (yaw), for body axes.
-        unit: ``rad``, ``deg`` or ``°``; of headings, which are a matter of full turns.
+        unit: ``rad``, ``deg`` or ``°``, for headings, which wrap at a full turn.
     """
     if here == there:
         return angle
     if here in _BODY and there in _BODY:
         return angle if about == "x" else -angle
     if not turns(here, there):
-        raise ValueError(f"an angle cannot go from {here} to {there}")
+        raise ValueError(f"an angle cannot be converted from {here} to {there}")
     full = 2 * math.pi if unit == "rad" else 360.0
     from_north = full / 4 - angle if here == "ENU" else angle
     turned = full / 4 - from_north if there == "ENU" else from_north

@@ -1,8 +1,8 @@
-"""What is in a binary frame: its items, in the order of the frame, for both directions.
+"""Items of a binary frame, in the order of the frame, for both directions.
 
-The loader makes them out of ``struct:`` with every named type put in its place; the readers and
-writers of `urc.protocol` compile them. Whatever both must agree on stands here: how the fields of
-a nested struct are called, and which items are the sizes of others.
+The loader makes them from ``struct:`` and resolves every named type. The readers and writers of
+`urc.protocol` compile them. Both sides share the rules of this module: names of nested fields, and
+items that give the sizes of others.
 """
 
 from collections.abc import Iterator, Mapping
@@ -32,89 +32,89 @@ __all__ = [
 ]
 
 FRAME_NAMES: Final = frozenset(("_size", "_left"))
-"""Names that expressions of a struct know beside its items: the bytes of the whole frame, and the
-bytes from the item's own first one to the end."""
+"""Names that expressions of a struct know besides its items. `_size` has the bytes of the whole
+frame, `_left` the bytes from the first byte of the item to the end."""
 OUTER_NAMES: Final = frozenset(("settings", COUNTERS))
-"""Names that the values of a type's items know although they stand outside of it."""
+"""Outer names that the items of a named type may use, too."""
 WORDS_OF_TYPES: Final = ("bytes", "text")
 
 
 class Extent(NamedTuple):
-    """How many: bytes of a text, items of an array."""
+    """A number of units: bytes of a text, or items of an array."""
 
     kind: Literal["fixed", "rest", "prefix", "expression"]
     number: int = 0
     """Of ``fixed``."""
     prefix: Number | None = None
-    """Of ``prefix``: the number that stands in front of it."""
+    """Length field in front of the data, for ``prefix``."""
     expression: Template | None = None
-    """Of ``expression``: over the items before."""
+    """Formula over the items before, for ``expression``."""
 
 
 class Item(NamedTuple):
-    """One part of a frame."""
+    """One part of a binary frame."""
 
     kind: Literal[
         "number", "coded", "packed", "bytes", "text", "padding", "bits", "struct", "switch"
     ]
-    """``coded`` are numbers that are no plain bytes, ``packed`` arrays that heed no bytes."""
+    """``coded`` numbers have an encoding of their own. ``packed`` arrays ignore byte boundaries."""
     id: str = ""
-    """Name of the field or argument; "" for what has none."""
+    """Name of the field or argument; "" for a nameless item."""
     number: Number = Number("integer", 8)
-    """Of ``number``, and the container of ``bits``."""
+    """Type of a ``number``, or of the container of ``bits``."""
     size: Extent | None = None
-    """Of bytes, text, padding; the window of a struct; None when nothing limits it."""
+    """Size of bytes, text, padding or the window of a struct; None: unlimited."""
     times: Extent | None = None
-    """Of an array: how many follow each other (``count`` is taken: it is every tuple's)."""
+    """Length of an array. The name ``count`` is taken: every tuple has a method of that name."""
     condition: Template | None = None
-    """It is there only when this holds."""
+    """Condition for the presence of the item."""
     const: int | float | bool | bytes | None = None
-    """What must stand here, raw; another value means that the frame is another one."""
+    """Required raw value. Another value means another kind of frame."""
     scale: float = 1
     offset: float = 0
     """value = raw · scale + offset"""
     enum: tuple[tuple[int, str], ...] = ()
     """Raw number → word. A number without a word stays a number."""
     valid: tuple[float, float] | None = None
-    """Smallest and largest value, scaled; what is outside is a fault."""
+    """Smallest and largest scaled value; a value outside is a violation."""
     value: Template | None = None
-    """What to send, where nobody gives it."""
+    """Value to send when the caller gives none."""
     encoding: str = ""
-    """Of text; "" means the line's."""
+    """Encoding of text; "" means that of the connection."""
     pad: int = 0
-    """Byte that fills fixed sizes: behind text and bytes that are shorter."""
+    """Padding byte after text or bytes that are shorter than a fixed size."""
     until: bytes = b""
-    """What ends bytes or text whose size nobody says."""
+    """Terminator of bytes or text without a declared size."""
     trim: int | None = None
-    """A struct's window may leave out this byte at its end, as often as it likes."""
+    """Padding byte that the window of a struct may omit at its end, any number of times."""
     is_lsb_first: bool = False
-    """Of ``bits``: the first one is the least significant."""
+    """Whether the first one of ``bits`` is the least significant."""
     items: tuple["Item", ...] = ()
-    """Of ``struct``, and the parts of ``bits``."""
+    """Items of a ``struct``, or the parts of ``bits``."""
     switch: "Switch | None" = None
 
     @property
     def is_given(self) -> bool:
-        """Whether its value is a field when reading, and comes from outside when sending."""
+        """Whether its value is a field when reading, and an argument when sending."""
         return bool(self.id) and self.const is None and self.value is None
 
 
 class Switch(NamedTuple):
-    """What follows depends on what came before."""
+    """A choice of items by the value of an expression over earlier items."""
 
     by: Template
     cases: tuple[tuple[int | str, tuple[Item, ...]], ...]
     default: tuple[Item, ...] | None = None
-    """None: the frame is another one."""
+    """Items for any other value; None: another value means another kind of frame."""
 
 
 def packed_size(number: Number, count: Extent) -> int:
-    """Return the bytes of a packed array."""
+    """Return the size of a packed array, in bytes."""
     return number.bits * count.number // 8
 
 
 def case_key(text: str) -> int | str:
-    """Return the key of a case as it is compared: ``0x10`` is 16, ``idle`` a word."""
+    """Return a key of ``cases`` as a value: ``0x10`` is 16, ``idle`` a word."""
     try:
         return int(text, 0)
     except ValueError:
@@ -122,7 +122,7 @@ def case_key(text: str) -> int | str:
 
 
 def joined_name(outer: str, inner: str) -> str:
-    """Return the name of `inner` in the struct called `outer`; a private one stays private."""
+    """Return the name of `inner` in the struct called `outer`; a private name stays private."""
     if not outer:
         return inner
     if inner.startswith("_") and not outer.startswith("_"):
@@ -131,7 +131,7 @@ def joined_name(outer: str, inner: str) -> str:
 
 
 def scope_of(items: tuple[Item, ...]) -> Iterator[Item]:
-    """Yield every item whose id is known to the others: those of nameless structs and cases too."""
+    """Yield every item whose id is in scope, including those of nameless structs and cases."""
     for item in items:
         if item.switch is not None:
             for _, case in item.switch.cases:
@@ -149,8 +149,8 @@ def names_of(items: tuple[Item, ...], *, sent: bool = False) -> Iterator[str]:
     """Yield the names of all fields, nested ones included, in the order of the frame.
 
     Args:
-        items: of one level.
-        sent: leave out what is computed when sending, which nobody gives.
+        items: items of one level.
+        sent: leave out the values that URC computes when it sends.
     """
     for item in scope_of(items):
         if not item.id or item.const is not None or (sent and item.value is not None):
@@ -162,12 +162,12 @@ def names_of(items: tuple[Item, ...], *, sent: bool = False) -> Iterator[str]:
 
 
 def least_size(items: tuple[Item, ...]) -> int:
-    """Return the bytes that the items take at least."""
+    """Return the least number of bytes that the items take."""
     return sum(map(_least, items))
 
 
 def fixed_size(items: tuple[Item, ...]) -> int | None:
-    """Return the bytes that the items always take; None when it depends."""
+    """Return the number of bytes of the items; None when it varies."""
     sizes = [_fixed(item) for item in items]
     return None if None in sizes else sum(size for size in sizes if size)
 
@@ -207,9 +207,9 @@ def _least(item: Item) -> int:
 
 
 def derived_sizes(items: tuple[Item, ...]) -> Mapping[str, Template]:
-    """Return the items that are the size or count of a later one → how that one says it.
+    """Return the items that hold the size or count of a later one → formula in that later item.
 
-    When sending they are filled in from what they count.
+    When a frame is sent, URC computes their values from the data.
     """
     given = {
         one.id

@@ -1,6 +1,6 @@
-"""Where the values go that an output of a widget gives. Pure.
+"""Mapping of the output values of a widget to the arguments of a command. Pure.
 
-What checks a binding and what tells the page of it both ask here, so that they agree.
+The check of a binding and the page share this function, so that they agree.
 """
 
 from urc.model.driver import Command
@@ -11,10 +11,10 @@ __all__ = ["targets"]
 
 
 def targets(command: Command, port: Port, given: Given) -> dict[str, str]:
-    """Return argument of the command → argument of the output whose value it takes.
+    """Return argument of the command → argument of the output that supplies it.
 
-    A value goes where the binding says, else to the argument of its own name; the only value that
-    is not held goes to the only argument that is not set, whatever the two are called.
+    The binding decides. Without a binding, a value goes to the argument of the same name. A single
+    value that is not held goes to the only open argument, even if the names differ.
     """
     open_ones = [name for name in command.arguments if name not in given.fixed]
     if not port.is_held and not given.names and len(port.arguments) == 1 and len(open_ones) == 1:

@@ -1,11 +1,12 @@
-"""How a frame is read and written, as declared: a form, and what the form's parser made of it.
+"""Declarations of how frames are read and written: a form, and its parsed options.
 
-A *form* is one way of saying what is in a frame (``regex``, ``struct``, ``json`` …). Each form has
-a parser in `urc.config`, which fills `options`, and a factory in `urc.protocol`, which reads them;
-the two agree on what is in there, and nobody else looks.
+A *form* is one notation for the content of a frame (``regex``, ``struct``, ``json`` …). Each form
+has a parser in `urc.config`, which fills `options`, and a factory in `urc.protocol`, which reads
+them. The two agree on the content of `options`; no other module reads it.
 
-Reading a frame gives *fields*: name → raw value. A field that is named like a signal sets it; one
-whose name starts with ``_`` stays inside the document (conditions, correlation, command replies).
+Decoding gives *fields*: name → raw value. A field with the name of a signal sets that signal. A
+field whose name starts with ``_`` stays inside the document (conditions, correlation, command
+replies).
 """
 
 import json
@@ -34,53 +35,53 @@ __all__ = [
 
 
 class Envelope(NamedTuple):
-    """What goes over a transport that carries messages instead of bytes."""
+    """The unit of a transport that carries messages instead of bytes."""
 
     verb: str
-    """What the transport is asked to do (``publish``, ``call``, ``goal``, ``cancel``, ``request``),
-    or what it brings (``message``, ``response``, ``feedback``; the transport's own ``notice``)."""
+    """Operation. The driver sends ``publish``, ``call``, ``goal``, ``cancel`` and ``request``. The
+    transport delivers ``message``, ``response``, ``feedback`` and its own ``notice``."""
     attributes: Mapping[str, object] = NOTHING
-    """What addresses it: topic, type, method, path, headers, quality of service … What is answered
-    has an ``id``, and its answer the same; that one says ``ok``, and why not as ``reason``."""
+    """Address and options: topic, type, method, path, headers, quality of service … A request has
+    an ``id``, and its response the same one. A response has ``ok``, and on failure a ``reason``."""
     body: object = None
     """JSON-like data, or bytes."""
 
 
 NUMBERED: Final = frozenset(("call", "goal", "request"))
-"""Verbs of envelopes that are answered by a ``response`` with the same ``id``."""
+"""Verbs of requests. Each gets a ``response`` with the same ``id``."""
 
 Payload = bytes | Envelope
-"""One frame without its framing."""
+"""The content of one frame, without its framing."""
 
 
 class Count(NamedTuple):
-    """What a frame does to the counters of its connection."""
+    """The effect of a frame on the counters of its connection."""
 
     before: dict[str, int]
-    """Last number of each counter in the frame, when the frame leaves; none: not used so far."""
+    """Last number of each counter before the frame; a missing counter is unused so far."""
     after: dict[str, int]
-    """Number of each counter in the frame."""
+    """Last number of each counter after the frame."""
 
 
 class Numbered(NamedTuple):
-    """A frame with counters. It may leave only while its numbers are the next ones."""
+    """A frame with counters. It may be sent only while its numbers are the next ones."""
 
     data: Payload
     takes: Count
 
 
 class Series(NamedTuple):
-    """One frame, rendered once for each of the numbers that may be next when it leaves."""
+    """One frame, rendered once for each set of numbers that may be next when it is sent."""
 
     frames: tuple[Numbered, ...]
 
 
 class Counted(NamedTuple):
-    """A frame with counters, and how to make it again."""
+    """A frame with counters, and a function that renders it again."""
 
     numbered: Numbered
     again: Callable[[], Numbered | None]
-    """Renders it with the numbers that are next now; None: the frame is no longer possible."""
+    """Render the frame with the next numbers; None: the frame has become impossible."""
 
 
 class FramingSpec(NamedTuple):
@@ -88,26 +89,27 @@ class FramingSpec(NamedTuple):
 
     type: str = "delimiter"
     options: Mapping[str, object] = NOTHING
-    """As parsed by the loader: for ``delimiter``, ``tx`` and ``rx`` as bytes."""
+    """Parsed options; for ``delimiter``, `tx` and `rx` as bytes."""
     max_bytes: int = 65536
-    """Longest frame accepted; a longer one is dropped and counted."""
+    """Longest accepted frame, in bytes; a longer one is dropped and counted."""
     timeout_s: float | None = None
-    """Silence inside of a frame after which what there is of it is dropped; None: never."""
+    """Timeout within a frame, in seconds, after which an incomplete frame is dropped; None:
+    never."""
     strips_ansi: bool = False
-    """Whether the escape sequences of a terminal are taken out of what comes."""
+    """Whether terminal escape sequences are removed from received data."""
     sent: "FramingSpec | None" = None
-    """Of what URC sends, where that is framed otherwise than what comes; None: the same."""
+    """Framing of sent data, where it differs from that of received data; None: the same."""
 
 
 def size_of(payload: Payload) -> int:
-    """Return how many bytes a payload takes, of an envelope about."""
+    """Return the size of a payload in bytes; an estimate for an envelope."""
     if not isinstance(payload, Envelope):
         return len(payload)
     return 256 + (len(payload.body) if isinstance(payload.body, bytes) else 0)
 
 
 def traffic_of(payload: Payload) -> bytes:
-    """Return what is shown of a payload in the traffic: ``publish topic=/cmd_vel {"x":1}``."""
+    """Return a payload as the traffic view shows it: ``publish topic=/cmd_vel {"x":1}``."""
     if not isinstance(payload, Envelope):
         return payload
     words = [f"{name}={value}" for name, value in payload.attributes.items() if value is not None]
@@ -120,57 +122,58 @@ def traffic_of(payload: Payload) -> bytes:
 
 
 class Collect(NamedTuple):
-    """A value that is put together out of several frames."""
+    """A value that is collected from several frames."""
 
     value: Template
-    """What each frame adds, over its fields: one value, or a list of them, or bytes."""
+    """Expression over the fields of each frame: one value, a list of values, or bytes."""
     begin: Template | None = None
-    """Holds for the first frame of a new one."""
+    """Condition that marks the first frame of a new value."""
     end: Template | None = None
-    """Holds for the last frame. Without it, the first frame of the next one ends it."""
+    """Condition that marks the last frame. Without it, the first frame of the next value ends
+    it."""
     most: int = 4096
-    """Values, or bytes, in all."""
+    """Largest number of values, or of bytes, in total."""
 
 
 class ReadSpec(NamedTuple):
-    """How a frame becomes fields."""
+    """How a frame is decoded into fields."""
 
     form: str
-    """Row of the readers' table: ``regex`` …"""
+    """Row of the readers' table, such as ``regex``."""
     options: Mapping[str, object] = NOTHING
     fields: tuple[str, ...] = ()
-    """Every field that it can give, in the order of the frame; then the names of `sets`."""
+    """Names of all possible fields, in the order of the frame, then the names of `sets`."""
     conversions: Mapping[str, Conversion] = NOTHING
-    """Field → conversion of this frame alone; the signal's own comes after it."""
+    """Field → conversion for this frame; the conversion of the signal follows it."""
     sets: Mapping[str, Template] = NOTHING
     """Signal → expression over the converted fields."""
     when: Template | None = None
-    """Expression over the converted fields; the frame is another one where it is not true."""
+    """Condition over the converted fields; false means another kind of frame."""
     lines: int | Pattern | None = None
-    """The reply is that many frames, or all up to one that the pattern finds; joined by LF."""
+    """Number of frames in the reply, or a pattern that finds the last one. LF joins them."""
     topic: Template | None = None
-    """Over settings: where it comes from, on a transport that carries messages. None: anywhere."""
+    """Source topic, over settings, on a transport that carries messages; None: any topic."""
     collects: Mapping[str, Collect] = NOTHING
-    """Signal → how it is put together; these names are the last of `fields`."""
+    """Signal → rule that collects it; these names come last in `fields`."""
     head: Mapping[str, str] = NOTHING
-    """Field → header of an http answer in small letters, or ``status``."""
+    """Field → header of an HTTP response in lower case, or ``status``."""
     listen: Mapping[str, Value] = NOTHING
-    """How `topic` is listened to: type, throttle in seconds, quality of service …"""
+    """Subscription options of `topic`: type, throttle in seconds, quality of service …"""
 
 
 class WriteSpec(NamedTuple):
-    """How arguments become a frame."""
+    """How arguments are encoded into a frame."""
 
     form: str
-    """Row of the writers' table: ``text`` …; ``frames`` are several, each with its own."""
+    """Row of the writers' table, such as ``text``; ``frames`` has several specifications."""
     options: Mapping[str, object] = NOTHING
     names: frozenset[str] = frozenset()
     """Root names that its templates use."""
     settings: frozenset[str] = frozenset()
-    """Names used as ``settings.NAME``."""
+    """Names of the settings that its templates use, as ``settings.NAME``."""
 
 
 def each_of(send: WriteSpec) -> tuple[WriteSpec, ...]:
-    """Return the frames of `send`: itself, or all that go out together."""
+    """Return the frames of `send`: `send` itself, or all frames of a group."""
     frames = send.options.get("frames")
     return frames if send.form == "frames" and isinstance(frames, tuple) else (send,)

@@ -1,4 +1,4 @@
-"""A driver: what can be said to a robot, what it says back, and over which lines."""
+"""A driver: transports, signals, commands, messages and polls of one kind of robot."""
 
 from collections.abc import Mapping
 from typing import Final, Literal, NamedTuple
@@ -44,14 +44,15 @@ ScalarOrTemplate = bool | int | float | str | None | Template
 
 
 class Timeouts(NamedTuple):
-    """Every wait of a transport has one; seconds."""
+    """Timeouts of a transport, in seconds."""
 
     connect_s: float = 3.0
     reply_s: float = 2.0
     idle_s: float | None = None
-    """Close a line that has been silent this long; None = never."""
+    """Idle time after which the connection is closed; None: never."""
     on_connect_s: float | None = None
-    """For all steps of ``on_connect``; None: each has its own end, and all of them none."""
+    """Timeout for all steps of ``on_connect`` together; None: only the timeouts of the steps
+    count."""
 
 
 class Backoff(NamedTuple):
@@ -60,7 +61,7 @@ class Backoff(NamedTuple):
     initial_s: float = 0.25
     max_s: float = 5.0
     jitter: float = 0.2
-    """Share of each wait that is random, 0..1."""
+    """Random share of each wait, 0 to 1."""
 
 
 class TransportSpec(NamedTuple):
@@ -69,57 +70,59 @@ class TransportSpec(NamedTuple):
     name: str
     type: str
     options: Mapping[str, object] = NOTHING
-    """What the transport's own factory takes, e.g. ``host`` and ``port``: plain values, templates
-    over settings, and lists and mappings of them."""
+    """Options of the transport, such as ``host`` and ``port``: plain values, templates over
+    settings, and lists and mappings of them."""
     connection: Literal["persistent", "per_request"] = "persistent"
     framing: FramingSpec = FramingSpec()
     encoding: str = "utf-8"
-    """Python codec name of text on this line."""
+    """Python codec name of text on this connection."""
     timeouts: Timeouts = Timeouts()
     backoff: Backoff = Backoff()
     min_gap_s: float = 0.0
-    """Shortest time between two requests on this line."""
+    """Shortest time between two requests on this connection, in seconds."""
     queue: Queue = Queue()
     keepalive: Keepalive | None = None
     on_connect: tuple[Step, ...] = ()
-    """What makes a fresh connection usable; until then nothing else is sent on it."""
+    """Steps that make a new connection usable; other requests wait for their end."""
     on_close: tuple[Step, ...] = ()
-    """What is said before the line is closed in good order."""
+    """Steps before an orderly close of the connection."""
     stale_after_s: float | None = None
-    """Silence after which the line is told to be silent; None = never."""
+    """Silence after which the connection counts as stale, in seconds; None: never."""
     via: str = ""
-    """Transport that it goes through; "": none."""
+    """Name of the transport that tunnels this one; "" without a tunnel."""
     is_half_duplex: bool = False
-    """One side talks at a time: nothing but a stop may overtake an answer that the robot owes."""
+    """Whether only one side sends at a time. Until the robot has replied, only a stop may be
+    sent."""
     never_answers: bool = False
-    """The robot says nothing on this line, by design: its silence means nothing."""
+    """Whether the robot never sends on this connection, by design; its silence is then no sign of a
+    loss."""
     errors: tuple[Pattern, ...] = ()
-    """Answers that mean failure, whatever was asked."""
+    """Patterns of error replies to any request."""
     faults: tuple[ErrorReply, ...] = ()
-    """As `errors`, of any form."""
+    """Error replies to any request, read by any form."""
 
 
 class Reply(NamedTuple):
-    """What answers a request; a frame that matches one of `errors` means that it failed."""
+    """The reply to a request; a frame that matches one of `errors` reports a failure."""
 
     read: ReadSpec
     errors: tuple[Pattern, ...] = ()
     timeout_s: float | None = None
-    """None: the transport's ``timeouts.reply``."""
+    """Reply timeout, in seconds; None: ``timeouts.reply`` of the transport."""
     match: Template | None = None
-    """Whose answer it is: over the fields, the command's arguments, and ``seq.NAME``, the counters
-    in the request. None: answers come in the order of the requests."""
+    """Correlation over the fields, the arguments of the command, and ``seq.NAME``, the counters in
+    the request. None: replies arrive in the order of the requests."""
     stages: tuple[Stage, ...] = ()
-    """What must come after it until the request is done."""
+    """Further replies that complete the request."""
     faults: tuple[ErrorReply, ...] = ()
-    """Answers that mean failure, beside `errors`."""
+    """Error replies in addition to `errors`, read by any form."""
     framing: FramingSpec | None = None
-    """How the answer is cut; None: as everything else on the line."""
+    """Framing of the reply; None: the framing of the connection."""
     asides: Asides = Asides()
-    """What may come before its first answer."""
+    """Provisional replies that may precede the first reply."""
 
     def with_errors(self, errors: tuple[Pattern, ...], faults: tuple[ErrorReply, ...]) -> "Reply":
-        """Return the reply with more answers that mean failure, at every stage."""
+        """Return the reply with additional error replies, at every stage."""
         if not (errors or faults):
             return self
         return self._replace(
@@ -133,19 +136,19 @@ class Reply(NamedTuple):
 
     @property
     def names(self) -> set[str]:
-        """What a step that runs the request knows afterwards: each field as ``_field``."""
+        """Names that a step that runs the request provides: each field as ``_field``."""
         reads = (self.read, *(stage.read for stage in self.stages))
         return {f"_{name.lstrip('_')}" for read in reads for name in read.fields}
 
     @property
     def is_asked_again(self) -> bool:
-        """Whether the robot may ask for the request again, at any stage."""
+        """Whether the robot may ask for a retransmission of the request, at any stage."""
         asides = (self.asides, *(stage.asides for stage in self.stages))
         return any(one.resend is not None for one in asides)
 
 
 MOST_ELEMENTS: Final = 1024
-"""Of an array that is given to a command."""
+"""Largest number of elements in an array argument."""
 
 
 class Argument(NamedTuple):
@@ -161,22 +164,25 @@ class Argument(NamedTuple):
     default: Reading = None
     is_required: bool = True
     allows_control: bool = False
-    """Only for strings: control characters may pass (an argument can otherwise not end a frame)."""
+    """Whether a string may contain control characters. Otherwise no argument can end a frame."""
     description: str = ""
     of: ElementType = "number"
-    """Kind of the elements of an array, to each of which range and choices apply."""
+    """Type of the elements of an array; range and choices apply to each of them."""
     size: int | None = None
-    """Elements of an array; None: any number up to `MOST_ELEMENTS`."""
+    """Number of elements of an array; None: any number up to `MOST_ELEMENTS`."""
     confirm: Mapping[str, Confirm] = NOTHING
-    """Value, as it is written → the question before it is sent."""
+    """Value, as written → confirmation question for it."""
 
 
 STOPPED: Final = "STOP was pressed meanwhile: give it anew"
-"""Why what moves is not sent when it was wished before a stop."""
+"""Reason for refusing motion that was requested before a STOP."""
 
 
 class Command(NamedTuple):
-    """A named action. A command without a reply is done when its bytes are handed over."""
+    """A named action.
+
+    A command without a reply is done once its bytes have been handed to the transport.
+    """
 
     name: str
     transport: str
@@ -187,33 +193,33 @@ class Command(NamedTuple):
     description: str = ""
     priority: Priority = "normal"
     is_latest_only: bool = False
-    """A newer one takes the place of one that still waits to be sent."""
+    """Whether a newer call replaces a queued one."""
     rate_per_s: float | None = None
-    """How often it is sent on average; two may follow each other at once. None: no limit."""
+    """Average rate limit, in calls per second, with bursts of two; None: unlimited."""
     is_idempotent: bool = False
-    """Doing it twice is the same as once."""
+    """Whether a repetition has the same effect as one execution."""
     retries: int = 0
-    """How often it is sent again at most: after a timeout where it is idempotent, and when the
-    robot asks for it. 0: `RESENDS` times where the robot may ask."""
+    """Most retries: after a timeout of an idempotent command, or on request of the robot. 0:
+    `RESENDS` where the robot may ask."""
     retry: Retry = Retry()
-    """How long it waits before each of them."""
+    """Waits before the retries."""
     hold: Hold | None = None
     moves: bool = False
-    """It moves something by itself, with no hand that holds it; true of a sequence that runs what
-    does, or what is held."""
+    """Whether the command starts autonomous motion. True of a sequence that runs such a command or
+    a held one."""
     moves_if: Template | None = None
-    """Over its arguments: only then it does. None: whatever they are."""
+    """Condition for autonomous motion, over the arguments; None: always, if `moves`."""
     stops: bool = False
-    """It is given once when STOP is pressed."""
+    """Whether STOP sends this command, once."""
     confirm: Confirm | None = None
     requires: tuple[Requirement, ...] = ()
     verify: Verify | None = None
     steps: tuple[Step, ...] = ()
-    """Of a sequence: what it does instead of sending. `transport` is then the first that it uses,
-    and `send` is empty."""
+    """Steps of a sequence, instead of `send`, which is empty. `transport` is then the first one
+    that the sequence uses."""
 
     def moves_with(self, arguments: Mapping[str, object]) -> bool:
-        """Return whether it moves something with these; what cannot be told does."""
+        """Return whether these arguments start motion; True when `moves_if` cannot be evaluated."""
         if self.moves_if is None or not self.moves:
             return self.moves
         defaults = {name: one.default for name, one in self.arguments.items()}
@@ -224,38 +230,38 @@ class Command(NamedTuple):
 
 
 class Poll(NamedTuple):
-    """A request that is repeated for as long as the robot is connected."""
+    """A request that is repeated while the robot is connected."""
 
     name: str
-    """``polls.0``, or its ``name:``."""
+    """``polls.0``, or the value of ``name:``."""
     transport: str
     every_s: float
     send: WriteSpec
     reply: Reply | None = None
     phase_s: float = 0.0
-    """Delay of the first one after the connection."""
+    """Delay of the first request after the connection, in seconds."""
     run: str = ""
-    """Command whose `send` and `reply` these are; "" when they are the poll's own."""
+    """Command that supplies `send` and `reply`; "" when the poll declares its own."""
     arguments: Mapping[str, Reading] = NOTHING
-    """Of the command in `run`, defaults included."""
+    """Arguments of the command in `run`, defaults included."""
     when: Template | None = None
-    """Asked only while it holds, over fresh signals and settings."""
+    """Condition for the request, over fresh signals and settings."""
     priority: Priority = "low"
     offline: Offline | None = None
 
 
 class Message(NamedTuple):
-    """An incoming frame that answers nothing: which one it is, and which signals it sets."""
+    """An unsolicited frame: how it is recognised, and the signals that it sets."""
 
     name: str
     transport: str
     read: ReadSpec
     answer: WriteSpec | None = None
-    """What is sent back at once."""
+    """Frame that acknowledges the message at once."""
 
 
 class Driver(NamedTuple):
-    """Everything needed to talk to one kind of robot. Valid by construction of the loader."""
+    """The complete declaration of one kind of robot. The loader guarantees its validity."""
 
     transports: Mapping[str, TransportSpec] = NOTHING
     signals: Mapping[str, Signal] = NOTHING
@@ -263,10 +269,13 @@ class Driver(NamedTuple):
     messages: Mapping[str, Message] = NOTHING
     polls: tuple[Poll, ...] = ()
     discovery: tuple[str, ...] = ()
-    """Types of services by which such robots announce themselves: ``_rosbridge._tcp``."""
+    """DNS-SD service types that identify such robots: ``_rosbridge._tcp``."""
 
     def learnt(self, transport: str) -> frozenset[str]:
-        """Return the names that the login of a line reads: ``_nonce``; known while it is open."""
+        """Return the names that the login of a connection reads, such as ``_nonce``.
+
+        They are known while the connection is open.
+        """
         names: set[str] = set()
         for step in all_steps(self.transports[transport].on_connect):
             if isinstance(step, ExpectStep):

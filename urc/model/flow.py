@@ -29,99 +29,100 @@ __all__ = [
 ]
 
 RESENDS = 3
-"""How often a frame is sent again for a robot that asks, where ``retries`` does not say it."""
+"""Default number of retransmissions for a robot that asks, without ``retries``."""
 
 Priority = Literal["realtime", "high", "normal", "low"]
-"""``realtime`` waits for nothing: neither for the queue, nor for the gap, nor for an answer."""
+"""``realtime`` bypasses the queue, the gap between requests, and outstanding replies."""
 
 
 class Queue(NamedTuple):
-    """What may wait on one line."""
+    """Limits of the request queue of one connection."""
 
     in_flight: int = 1
-    """Requests that may wait for their answer at a time, 1 to 64."""
+    """Largest number of requests in flight at the same time, 1 to 64."""
     depth: int = 64
-    """Requests that may wait to be sent; one more is refused."""
+    """Largest number of queued requests; a further one is refused."""
     most_bytes: int | None = None
-    """Bytes of requests that wait for their answers, framing included; None: any number."""
+    """Largest number of unacknowledged request bytes, framing included; None: unlimited."""
 
 
 class Keepalive(NamedTuple):
-    """What is said when nothing else has been said for a while."""
+    """A frame that is sent when the connection has been idle for a while."""
 
     every_s: float
-    """How long the line may be without anything sent, in seconds."""
+    """Longest time without a sent frame, in seconds."""
     run: str = ""
-    """Command to run; "" when `send` says it."""
+    """Command to run; "" when `send` declares the frame."""
     send: WriteSpec | None = None
     watchdog_s: float | None = None
-    """After how long without a word the robot hangs up or stops, as its maker says."""
+    """Watchdog of the robot, in seconds: silence after which it closes the connection or stops,
+    according to its manufacturer."""
     after: tuple[str, ...] = ()
-    """Commands that the robot counts as a word; () for all that is sent."""
+    """Commands that reset the watchdog of the robot; () for all frames."""
 
 
 class ErrorReply(NamedTuple):
-    """An answer that means failure, read by any form."""
+    """A reply that reports a failure, read by any form."""
 
     read: ReadSpec
     text: Template | None = None
-    """What to tell people, over the answer's fields; None: the answer as it came."""
+    """Text for the operator, over the fields of the reply; None: the reply as received."""
 
 
 class Asides(NamedTuple):
-    """What a robot may say about a request before it answers."""
+    """Provisional replies that may precede the reply to a request."""
 
     resend: ReadSpec | None = None
-    """A frame by which it asks for the request again; None: it never does."""
+    """Frame that asks for a retransmission; None: not supported."""
     extend: ReadSpec | None = None
-    """A frame by which it says that it is busy; None: it never does."""
+    """Frame that reports a busy robot and extends the timeout; None: not supported."""
     extend_s: float = 600.0
-    """How long it may be busy in all, in seconds, 0.001 to 3600."""
+    """Longest total extension, in seconds, 0.001 to 3600."""
 
 
 class Stage(NamedTuple):
-    """A further answer to a request, after the first one."""
+    """A further reply to a request, after the first one."""
 
     read: ReadSpec
     errors: tuple[Pattern, ...] = ()
     faults: tuple[ErrorReply, ...] = ()
     timeout_s: float | None = None
-    """None: the transport's ``timeouts.reply``."""
+    """Reply timeout, in seconds; None: ``timeouts.reply`` of the transport."""
     asides: Asides = Asides()
 
 
 MOST_STOPS: Final = 11
-"""How often the stop of one motion is sent at most: where it may be lost, it is repeated."""
+"""Largest number of transmissions of a stop; on a lossy transport, the stop is repeated."""
 
 
 class Hold(NamedTuple):
-    """A command that means motion for as long as it is held."""
+    """A command that moves the robot only while its control is held."""
 
     repeat_s: float
-    """How often the newest values are sent, in seconds."""
+    """Period of the setpoints, in seconds."""
     release: Mapping[str, Reading] = NOTHING
-    """Arguments that stop the motion; those left out take their defaults."""
+    """Arguments that stop the motion; omitted ones take their defaults."""
     lease_s: float = 0.25
-    """How long the motion lasts when nothing is heard from whoever holds it: 0.1 to 1.0 s."""
+    """Lease of the motion without a renewal by the operator, 0.1 to 1.0 s."""
     watchdog_s: float | None = None
-    """How long the robot itself goes on after the last value, ``inf`` when it never stops by
-    itself; None: nobody has said. For the loader's rules alone."""
+    """Watchdog of the robot, in seconds: motion continues this long after the last value. ``inf``:
+    without end; None: unknown. Only the rules of the loader read it."""
     slew: Mapping[str, float] = NOTHING
-    """Argument → most that it may grow in a second, away from the value that stops the motion."""
+    """Argument → largest increase per second, away from the value that stops the motion."""
     on_stall: Literal["abort", "wait"] | None = None
-    """What becomes of a line that takes nothing while it moves; None: as is usual on its kind."""
+    """Reaction to a connection that stalls during motion; None: the default of its transport."""
     step_s: float | None = None
-    """How long a step takes at most, after which the robot stops by itself: nothing is sent to stop
-    it. None: it moves until it is stopped."""
+    """Longest duration of a step, in seconds, after which the robot stops by itself, so that no
+    stop is sent. None: the robot moves until it is stopped."""
 
 
 class Confirm(NamedTuple):
-    """A question before the command is sent."""
+    """A confirmation question before the command is sent."""
 
     level: Literal["normal", "hazardous"] = "normal"
     text: str = ""
     is_two_person: bool = False
-    """One person alone may not say yes: the engine refuses without a second name."""
+    """Whether the two-person rule applies: the engine refuses the command without a second name."""
 
 
 class Retry(NamedTuple):
@@ -131,31 +132,31 @@ class Retry(NamedTuple):
     max_s: float = 0.0
 
     def wait_s(self, tries: int) -> float:
-        """Return the wait after `tries` unanswered ones, 1 or more."""
+        """Return the wait after `tries` unanswered requests, 1 or more, in seconds."""
         return min(self.initial_s * 2.0 ** min(tries - 1, 32), self.max_s)
 
 
 class Requirement(NamedTuple):
-    """What must hold for a command to be sent."""
+    """A precondition for sending a command."""
 
     condition: Template
-    """Over fresh signals, settings and the command's arguments."""
+    """Condition over fresh signals, settings and the arguments of the command."""
     text: str
-    """What to tell people where it does not hold."""
+    """Text for the operator when the condition is false."""
 
 
 class Verify(NamedTuple):
-    """What must come true for a command to count as done."""
+    """A condition that confirms the effect of a command."""
 
     condition: Template
-    """Over settings, the command's arguments, and signals read after it was sent."""
+    """Condition over settings, the arguments, and signals that were read after the command."""
     within_s: float
 
 
 class Offline(NamedTuple):
-    """How a poll treats a robot, or a part of it, that does not answer."""
+    """Polling of a robot, or of a part of it, that does not reply."""
 
     after: int
-    """Misses in a row."""
+    """Number of missed replies in a row."""
     retry_s: float
-    """Period from then on, until it answers; in seconds."""
+    """Poll period until the next reply, in seconds."""

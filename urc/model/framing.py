@@ -1,7 +1,7 @@
-"""What a frame is made of: its constant bytes, length field, checksum, and where the payload is.
+"""Layout of a frame: constant bytes, length field, checksum, and the place of the payload.
 
-The loader resolves every default, so that a place here is a place: counted from the frame's first
-byte, or, when it is negative, from behind its last one.
+The loader resolves every default. A non-negative place counts from the first byte of the frame, a
+negative one from behind its last byte.
 """
 
 from collections.abc import Mapping
@@ -28,34 +28,34 @@ __all__ = [
 ]
 
 Spelling = Literal["raw", "hex", "HEX", "dec"]
-"""How a number stands in a frame: as bytes, or as digits (``HEX``: in capitals)."""
+"""Spelling of a number in a frame: raw bytes, or digits (``HEX``: in capitals)."""
 Digits = Literal["", "hex", "HEX", "base64"]
-"""How a frame spells its bytes, between its marks: "" as they are."""
+"""Spelling of the bytes between the start and end markers; "" for raw bytes."""
 
 
 class Window(NamedTuple):
-    """Part of a frame, as Python slices it."""
+    """A byte range of a frame, as a Python slice."""
 
     start: int = 0
     stop: int | None = None
 
 
 class Salt(NamedTuple):
-    """Bytes that only the two ends know, fed to the checksum behind the window."""
+    """Secret bytes that follow the range in the input of the checksum."""
 
     constant: bytes = b""
     offset: int = 0
-    """Place of the number that chooses among `table`."""
+    """Offset of the number that selects from `table`."""
     size: int = 1
     is_big: bool = False
     table: Mapping[Any, bytes] = NOTHING
     """Number → bytes."""
     otherwise: Literal["fault", "skip", "pass"] = "fault"
-    """What becomes of a frame whose number is not in the table: it is told and dropped, dropped
-    without a word, or taken with its checksum unchecked."""
+    """Treatment of a frame whose number is missing from the table: drop and report it, drop it
+    silently, or accept it without a check."""
 
     def number(self, frame: bytes | bytearray) -> int | None:
-        """Return the number that chooses the row; None when the frame is too short."""
+        """Return the number that selects the row; None when the frame is too short."""
         field = frame[self.offset : self.offset + self.size]
         if len(field) < self.size:
             return None
@@ -63,10 +63,10 @@ class Salt(NamedTuple):
 
 
 class ChecksumSpec(NamedTuple):
-    """A number over part of a frame that shows whether the frame is whole."""
+    """A number over part of a frame that detects damage."""
 
     algorithm: CrcSpec | FoldSpec | str
-    """A word stands for an algorithm without parameters: ``fletcher16``, ``adler32`` …"""
+    """Parameters, or the name of an algorithm without parameters: ``fletcher16``, ``adler32`` …"""
     bits: int
     over: Window
     at: int
@@ -74,104 +74,105 @@ class ChecksumSpec(NamedTuple):
     spelling: Spelling = "raw"
     salt: Salt = Salt()
     is_from_hex: bool = False
-    """Whether the window spells, in hex digits, the bytes that are summed up."""
+    """Whether the range holds hex digits, whose bytes enter the checksum."""
     closes: bool = False
-    """Whether a wrong one ends the connection instead of the frame alone."""
+    """Whether a mismatch closes the connection instead of dropping the frame."""
     before: bytes = b""
-    """Bytes that only the two ends know, fed to the checksum in front of the window."""
+    """Secret bytes that precede the range in the input of the checksum."""
 
     @property
     def size(self) -> int:
-        """Bytes that it takes in the frame."""
+        """Size of the checksum in the frame, in bytes."""
         return spelt_size(self.bits, self.spelling)
 
 
 class TrailSpec(NamedTuple):
-    """A checksum behind a text, in a place that only the text shows."""
+    """A checksum behind a text of variable length."""
 
     checksum: ChecksumSpec
-    """Its window is counted in the text without the checksum; `at` means nothing."""
+    """Parameters. The range counts in the text without the checksum; `at` is unused."""
     mark: bytes = b""
-    """Stands between the text and the checksum."""
+    """Separator between the text and the checksum."""
     is_padded: bool = True
-    """Whether its digits have leading zeros."""
+    """Whether the digits have leading zeros."""
     is_optional: bool = False
-    """Whether a text without the mark is good, too."""
+    """Whether a text without the separator is valid, too."""
     each: bytes = b""
-    """Separates the lines of a frame, each of which has a checksum of its own."""
+    """Separator of the lines of a frame, each of which has its own checksum."""
     skip: int = 0
-    """First lines that have none."""
+    """Number of first lines without a checksum."""
 
 
 class LengthSpec(NamedTuple):
-    """A number in the frame that says how long the frame is: field x `unit` + `adjust` bytes."""
+    """A length field. The size of the frame is field × `unit` + `adjust` bytes."""
 
     offset: int
     size: int
-    """Bytes that the number takes: digits, when it is spelt out."""
+    """Bytes of the field, or its digits when it is spelt out."""
     is_big: bool = True
     adjust: int = 0
     unit: int = 1
     bits: int = 64
-    """Lowest bits of the number that are the length; the others are the payload's."""
+    """Number of low bits that hold the length; the others belong to the payload."""
     spelling: Spelling = "raw"
     is_counted: bool = False
-    """`size` digits say how many digits follow, and those are the number."""
+    """Whether `size` digits give the number of digits that follow, which are the length."""
     until: bytes = b""
-    """What ends the number, which then has `size` digits at most."""
+    """Terminator of the field, which then has at most `size` digits."""
     flag_at: int = -1
-    """Place of a byte that says whether the number is a length; -1: it always is."""
+    """Offset of a flag byte that tells whether the field is a length; -1: it always is."""
     flag_mask: int = 0
-    """It is one where any of these bits is set; else the frame has `adjust` bytes."""
+    """Bits of the flag byte. If any is set, the field is a length; otherwise the frame has `adjust`
+    bytes."""
 
     @property
     def is_loose(self) -> bool:
-        """Whether its size is known from its own bytes alone."""
+        """Whether its own bytes determine its size."""
         return self.is_counted or bool(self.until)
 
 
 class EscapeSpec(NamedTuple):
-    """How bytes that mean something to the framing are hidden in its frames."""
+    """Byte stuffing: escape sequences for bytes with a meaning in the framing."""
 
     byte: int = 0
-    """Stands before a byte that is hidden."""
+    """Escape byte in front of a stuffed byte."""
     table: Mapping[Any, int] = NOTHING
-    """Byte that is hidden → byte that stands for it behind `byte`."""
+    """Stuffed byte → its replacement after `byte`."""
     xor: int | None = None
-    """Mask that made the table: whoever sends may hide other bytes, too."""
+    """XOR mask behind the table. A sender may stuff further bytes, too."""
     after: bytes = b""
-    """Behind this sequence `insert` is put in; `byte` and `table` then mean nothing."""
+    """Sequence after which `insert` is stuffed; `byte` and `table` are then unused."""
     insert: int = 0
     is_of_payload: bool = False
-    """Length and checksum count what is stuffed; otherwise, what it stands for."""
+    """Whether length and checksum count the stuffed bytes; otherwise, the original ones."""
 
 
 class FrameLayout(NamedTuple):
-    """Where everything is in a frame."""
+    """Places of all parts of a frame."""
 
     start: bytes = b""
     end: bytes = b""
     head: int = 0
-    """Bytes before the payload."""
+    """Size of the header in front of the payload, in bytes."""
     tail: int = 0
-    """Bytes behind the payload."""
+    """Size of the trailer behind the payload, in bytes."""
     size: int | None = None
-    """Of the whole frame, where it is always the same."""
+    """Size of the whole frame, if constant."""
     length: LengthSpec | None = None
     checksum: ChecksumSpec | None = None
-    """The last one: what is sent carries it when all others stand."""
+    """The last checksum; a sender computes it after all others."""
     checksums: tuple[ChecksumSpec, ...] = ()
     """Those before it."""
     escape: EscapeSpec | None = None
-    """Stuffing of the payload alone."""
+    """Byte stuffing of the payload alone."""
     trail: TrailSpec | None = None
-    """Checksum that is taken off before all others are looked at, and put on behind them."""
+    """Trailing checksum, removed before all other checks and added after all others."""
     digits: Digits = ""
-    """How what is between start and end is spelt; places and `checksums` count the bytes."""
+    """Spelling of the bytes between start and end; places and `checksums` count decoded bytes."""
 
 
 def spelt_size(bits: int, spelling: Spelling) -> int:
-    """Return how many bytes of a frame a number of `bits` bits takes."""
+    """Return the number of frame bytes of a number with `bits` bits."""
     size = (bits + 7) // 8
     if spelling == "raw":
         return size

@@ -1,4 +1,4 @@
-"""Interfaces: a picture of named slots. They know no transport and no signal of their own."""
+"""Interfaces: layouts of named slots, independent of transports and signals."""
 
 from collections.abc import Mapping
 from typing import Final, NamedTuple
@@ -8,20 +8,20 @@ from urc.model.values import NOTHING, Value
 __all__ = ["DEBUG", "Given", "Grid", "Interface", "Slot", "Tab", "WidgetUse"]
 
 DEBUG: Final = "debug"
-"""The interface that URC makes for every robot; no document may use its name."""
+"""The built-in interface of every robot; documents must not use its name."""
 
 
 class Given(NamedTuple):
-    """What an output of a widget gives to the arguments of its command."""
+    """Values that an output of a widget gives to the arguments of its command."""
 
     names: Mapping[str, str] = NOTHING
-    """Argument of the command → argument of the output, where they are not called the same."""
+    """Argument of the command → argument of the output, where the names differ."""
     fixed: Mapping[str, Value] = NOTHING
-    """Argument of the command → value that it always has."""
+    """Argument of the command → constant value."""
 
 
 class WidgetUse(NamedTuple):
-    """Which widget fills a slot, what its inputs are bound to, and its options."""
+    """The widget in a slot, with its bindings and options."""
 
     slot: str
     widget: str
@@ -31,20 +31,20 @@ class WidgetUse(NamedTuple):
     outputs: Mapping[str, str] = NOTHING
     """Output of the widget → command of the driver."""
     options: Mapping[str, object] = NOTHING
-    """Checked against the widget's own option schema, defaults filled in."""
+    """Options with defaults, validated against the schema of the widget."""
     title: str = ""
     given: Mapping[str, Given] = NOTHING
-    """Output of the widget → what goes where, for those that say so."""
+    """Output of the widget → its binding, where one is declared."""
     lists: Mapping[str, tuple[str, ...]] = NOTHING
-    """Input of the widget that takes many → signals of the driver, in order."""
+    """List input of the widget → signals of the driver, in order."""
     files: Mapping[str, str] = NOTHING
-    """File as an option names it → where it is."""
+    """File name in an option → path of the file."""
     pages: Mapping[str, tuple[str, ...]] = NOTHING
-    """Option → URLs of other people's pages that it names, as they were found to be right."""
+    """Option → validated URLs of third-party pages."""
 
 
 class Slot(NamedTuple):
-    """A rectangle of a grid; rows and columns are 0-based, spans at least 1."""
+    """A rectangle of a layout; rows and columns are 0-based, spans at least 1."""
 
     name: str
     row: int
@@ -54,7 +54,7 @@ class Slot(NamedTuple):
 
 
 class Grid(NamedTuple):
-    """One picture: how many rows and columns, and the slots in it."""
+    """One layout: numbers of rows and columns, and its slots."""
 
     rows: int
     columns: int
@@ -64,48 +64,48 @@ class Grid(NamedTuple):
 class Tab(NamedTuple):
     """One page of an interface.
 
-    `grids` has an entry per screen: ``wide``, ``tall``, ``phone``, ``low``.
+    `grids` has one layout per screen: ``wide``, ``tall``, ``phone``, ``low``.
     """
 
     name: str = ""
-    """"" of the only page of an interface without tabs."""
+    """Name of the page; "" for an interface without tabs."""
     title: str = ""
     grids: Mapping[str, Grid] = NOTHING
     left: Mapping[str, Grid] = NOTHING
-    """Pictures for who works with the left hand, by screen; those that are drawn."""
+    """Screen → declared left-handed layout."""
     is_mirrored: bool = True
-    """Whether that person sees the columns of the other pictures the other way round."""
+    """Whether all other layouts are mirrored for left-handed operators."""
 
 
 class Interface(NamedTuple):
-    """A named layout: its own grids, or several pages of them."""
+    """A named interface: its own layouts, or several pages of them."""
 
     name: str
     title: str = ""
     grids: Mapping[str, Grid] = NOTHING
-    """By screen; none when there are tabs."""
+    """Screen → layout; empty when there are tabs."""
     background: str = ""
-    """Slot that lies behind everything; "" when there is none."""
+    """Name of the slot behind all others; "" for no background."""
     widgets: Mapping[str, WidgetUse] = NOTHING
-    """Overrides of what the driver puts into a slot."""
+    """Overrides of the widgets of the driver, by slot."""
     summary: str = ""
     licence: str = ""
-    """SPDX identifier, as the document says."""
+    """SPDX identifier from the document."""
     author: str = ""
     left: Mapping[str, Grid] = NOTHING
-    """As of a tab."""
+    """Left-handed layouts, as in a tab."""
     is_mirrored: bool = True
     tabs: Mapping[str, Tab] = NOTHING
 
     @property
     def pages(self) -> tuple[Tab, ...]:
-        """Every page; never empty."""
+        """All pages of the interface; never empty."""
         only = Tab("", self.title, self.grids, self.left, self.is_mirrored)
         return tuple(self.tabs.values()) or (only,)
 
     @property
     def shown(self) -> tuple[str, ...]:
-        """Every slot that is shown, the background first, then in reading order; each once."""
+        """All visible slots, each once: the background first, then in reading order."""
         names = dict.fromkeys((self.background,) if self.background else ())
         for page in self.pages:
             for grid in (*page.grids.values(), *page.left.values()):

@@ -1,4 +1,4 @@
-"""A robot profile: one robot, its settings, its driver, its interfaces, its own tests."""
+"""A robot profile: settings, driver, interfaces and tests of one robot."""
 
 from collections.abc import Mapping
 from typing import Literal, NamedTuple
@@ -27,167 +27,167 @@ __all__ = [
 
 
 class Setting(NamedTuple):
-    """Something the operator fills in, or overrides by ``--set``."""
+    """A value that the operator fills in or overrides by ``--set``."""
 
     name: str
     type: Literal["string", "host", "port", "integer", "number", "boolean", "choice", "path"]
     title: str = ""
     default: Value = None
-    """None: must be filled in before Connect."""
+    """Default value; None: the operator has to fill it in before Connect."""
     choices: tuple[str, ...] = ()
     min: float | None = None
     max: float | None = None
     is_secret: bool = False
     description: str = ""
     is_required: bool = True
-    """Whether it must be filled in before Connect, where it has no default."""
+    """Whether a value is required before Connect, if there is no default."""
 
     @property
     def empty(self) -> Value:
-        """What it is in templates where it stays empty: no text, or nothing."""
+        """Value of an empty setting in templates: an empty text, or None."""
         return None if self.type in ("port", "integer", "number", "boolean") else ""
 
     def is_missing(self, value: Value) -> bool:
-        """Return whether `value` keeps the robot from being connected.
+        """Return whether `value` prevents the connection of the robot.
 
-        What a document gives counts as filled in, an empty text, too.
+        A value from a document counts as filled in, even an empty text.
         """
         return self.is_required and (value is None or (value == "" and self.default != ""))
 
 
 Fed = str | bytes | Envelope
-"""Text in the line's encoding, or bytes, or what goes over a transport that carries messages."""
+"""Text in the encoding of the connection, bytes, or an envelope."""
 
 
 def pieces_of(fed: Fed | tuple[Fed, ...]) -> tuple[Fed, ...]:
-    """Return what is fed, piece by piece: each comes by itself."""
+    """Return the pieces of the input; each arrives separately."""
     return (fed,) if isinstance(fed, (str, bytes, Envelope)) else fed
 
 
 class State(NamedTuple):
-    """What a test says of a signal beside its value."""
+    """The expected state of a signal, in addition to its value."""
 
     has_value: bool = False
-    """Whether `value` must be the signal's."""
+    """Whether `value` is compared."""
     value: Value | tuple[Value, ...] = None
     alarm: Alarm | None = None
-    """Which limit it must have passed, "" for none; None: whichever."""
+    """Expected alarm, "" for normal; None: any."""
     age: Literal["", "fresh", "stale", "never"] = ""
-    """Whether it must be fresh, old or never set; "": whichever."""
+    """Expected age: fresh, old or never set; "": any."""
 
 
 Expected = Value | tuple[Value, ...] | State
-"""What a signal must be; of an array, all its elements."""
+"""Expected value of a signal, or of all elements of an array."""
 
 
 class DialogueStep(NamedTuple):
-    """One step of a test: at most one thing that happens, then what must be so."""
+    """One step of a test: at most one action, then the expected results."""
 
     line: int = 1
-    """1-based, where it stands."""
+    """1-based line in the document."""
     column: int = 1
     """1-based."""
     source: str = ""
-    """The text of its line."""
+    """Text of the line in the document."""
     feed: Mapping[str, "Fed | tuple[Fed, ...]"] = NOTHING
-    """Transport → what the robot says."""
+    """Transport → input from the robot."""
     run: str = ""
-    """Command that is run."""
+    """Name of the command to run."""
     arguments: Mapping[str, Reading] = NOTHING
     wait_s: float | None = None
-    """Time that passes on the test's own clock."""
+    """Time that passes on the clock of the test, in seconds."""
     connects: str = ""
-    """Transport that becomes connected."""
+    """Name of the transport that connects."""
     closes: str = ""
-    """Transport whose connection the robot ends."""
+    """Name of the transport whose connection the robot closes."""
     leaves: bool = False
-    """The operator goes: all lines say their good-bye."""
+    """Whether the operator leaves: all connections close in order."""
     sent: Mapping[str, "Fed | tuple[Fed, ...]"] = NOTHING
-    """Transport → all that was sent there since a step last told it; () is nothing."""
+    """Transport → all output since the last check of it; () for no output."""
     expect: Mapping[str, Expected] = NOTHING
     reply: Mapping[str, Value | tuple[Value, ...]] | None = None
-    """Values of the reply to the command that ended first of those not told yet."""
+    """Expected reply values of the first completed command that no step has checked yet."""
     of: str = ""
-    """Command whose end `reply` or `fails` is about; "" for any."""
+    """Command of `reply` or `fails`; "" for any."""
     fails: str = ""
-    """What a failure must say."""
+    """Expected failure message."""
     closed: str = ""
-    """Transport that must have been closed from this side."""
+    """Name of the transport that URC has closed."""
 
 
 class DocumentTest(NamedTuple):
-    """A test that a document carries about itself."""
+    """A test that a document carries for itself."""
 
     name: str
     line: int
-    """1-based, where it stands in the document."""
+    """1-based line in the document."""
     feed: Mapping[str, "Fed | tuple[Fed, ...]"] = NOTHING
-    """Transport → what the robot says at once, or one after the other; see `pieces_of`."""
+    """Transport → input from the robot, in one piece or several; see `pieces_of`."""
     reply_to: int | str | None = None
-    """Index of the poll, or name of the command, that is waiting when the text arrives."""
+    """Index of the poll, or name of the command, that awaits the reply."""
     run: str | None = None
     """Command to run."""
     arguments: Mapping[str, Reading] = NOTHING
     expect: Mapping[str, Expected] = NOTHING
-    """Signal → what it is after it."""
+    """Signal → expected value after the test."""
     sent: Mapping[str, "Fed | tuple[Fed, ...]"] = NOTHING
-    """Transport → exact text sent, without what the framing adds; or every byte on the wire."""
+    """Transport → exact payload without framing, or all bytes on the wire."""
     fails: str | None = None
-    """What the failure must say, when the test is about a failure."""
+    """Expected failure message, for a test of a failure."""
     file: str = ""
-    """The document it stands in."""
+    """Path of the document."""
     column: int = 1
     """1-based."""
     source: str = ""
-    """The text of its line, for the caret."""
+    """Text of the line in the document, for error messages."""
     settings: Mapping[str, Value] = NOTHING
-    """Settings that differ from their defaults."""
+    """Setting → value, where it differs from the default."""
     steps: tuple[DialogueStep, ...] = ()
-    """One after the other, instead of all in one instant."""
+    """Steps in order, instead of a single instant."""
     polls: tuple[str, ...] = ()
-    """Polls that are asked while the steps are done, at their own times."""
+    """Names of the polls that run on schedule during the steps."""
     is_ready: bool = False
-    """Whether the lines are usable at once when the steps begin."""
+    """Whether the connections are ready before the first step."""
 
 
 class Reaction(NamedTuple):
-    """One thing that the emulated robot does; its attributes in the order of doing."""
+    """One reaction of the emulated robot; the attributes are in the order of execution."""
 
     after_s: float = 0.0
-    """Time since the one before."""
+    """Time since the previous reaction, in seconds."""
     sets: Mapping[str, Template | Reading] = NOTHING
-    """Signal or name of the robot's state → its new value, or a template for it."""
+    """Signal or state variable of the robot → its new value, or a template for it."""
     answers: bool = False
-    """Whether the answer that the driver declares for the request is given."""
+    """Whether the robot sends the reply that the driver declares for the request."""
     send: WriteSpec | None = None
-    """None: nothing of its own is said."""
+    """Frame to send; None: no frame."""
     message: str = ""
-    """Declared message that is said."""
+    """Name of the declared message to send."""
     framing: FramingSpec | None = None
-    """Of `send`; None: the line's own, or that of the reply to the request."""
+    """Framing of `send`; None: that of the connection, or of the reply to the request."""
     closes: bool = False
-    """Whether the robot ends the connection."""
+    """Whether the robot closes the connection."""
 
 
 class SimulatorRule(NamedTuple):
-    """What the emulated robot does with a frame that matches, or every so often."""
+    """A rule of the emulated robot, for matching frames or at fixed intervals."""
 
     transport: str
     match: Pattern | ReadSpec | None = None
-    """Frames that it takes: their text, or all that this reads."""
+    """Matching frames: a pattern of their text, or a form that reads them."""
     request: str = ""
-    """Command or poll whose frames it takes."""
+    """Command or poll whose frames match."""
     every_s: float | None = None
-    """Period of a rule that takes no frames."""
+    """Period of a timed rule, in seconds."""
     when: Template | None = None
-    """The rule is passed over where it does not hold."""
+    """Condition of the rule; the rule is skipped while it is false."""
     reactions: tuple[Reaction, ...] = (Reaction(),)
     name: str = ""
-    """By which other documents change it; "" for none."""
+    """Name by which other documents override the rule; "" for none."""
 
 
 class Profile(NamedTuple):
-    """One robot, ready to be connected once its settings are complete."""
+    """One robot, ready to connect once its settings are complete."""
 
     name: str
     title: str
@@ -196,17 +196,17 @@ class Profile(NamedTuple):
     settings: Mapping[str, Setting] = NOTHING
     driver: Driver = Driver()
     slots: Mapping[str, WidgetUse] = NOTHING
-    """The driver's part of the look: what fills each slot unless an interface says otherwise."""
+    """Slot → widget of the driver, unless an interface overrides it."""
     interfaces: Mapping[str, Interface] = NOTHING
-    """Never empty: without any, one named ``default`` is made."""
+    """Name → interface; never empty, since ``default`` is added if missing."""
     widgets: Mapping[str, Widget] = NOTHING
-    """Every widget the profile uses, by name."""
+    """Name → widget, for all widgets of the profile."""
     tests: tuple[DocumentTest, ...] = ()
     simulator: tuple[SimulatorRule, ...] = ()
     emulated: Mapping[str, Reading] = NOTHING
-    """Values with which the emulated robot begins: signals, and names of its own state."""
+    """Initial values of the emulated robot: signals and its own state variables."""
     world: WorldSpec | None = None
-    """Body and surroundings of the emulated robot; None: it has none."""
+    """Body and surroundings of the emulated robot; None: no world."""
     licence: str = ""
-    """SPDX identifier, as the document says."""
+    """SPDX identifier from the document."""
     author: str = ""

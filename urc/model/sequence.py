@@ -32,9 +32,9 @@ __all__ = [
 ]
 
 MAX_STEPS = 200
-"""Steps of one sequence, those in its branches included."""
+"""Largest number of steps in one sequence, including those in its branches."""
 MAX_STEPS_DONE = 10_000
-"""Steps that one run may do, every round of every ``repeat`` counted."""
+"""Largest number of steps in one run, counting every round of every ``repeat``."""
 MAX_STEP_S = 600.0
 """Longest wait of one step, in seconds."""
 
@@ -45,28 +45,28 @@ class SendStep(NamedTuple):
     transport: str
     send: WriteSpec
     is_secret: bool = False
-    """Its text must not appear in any message."""
+    """Whether the text must not appear in any message."""
 
 
 class ExpectStep(NamedTuple):
-    """Wait for a frame; its ``_fields`` are names in the steps that follow."""
+    """Wait for a frame; its ``_fields`` are names in the later steps."""
 
     transport: str
     read: ReadSpec
     errors: tuple[Pattern, ...] = ()
     faults: tuple[ErrorReply, ...] = ()
     timeout_s: float | None = None
-    """None: the transport's ``timeouts.reply``."""
+    """Reply timeout, in seconds; None: ``timeouts.reply`` of the transport."""
     otherwise: "tuple[Step, ...] | None" = None
-    """What to do when it does not come; None: fail."""
+    """Steps after a timeout; None: the sequence fails."""
     text: str = ""
-    """What to say when it does not come; "" for words of our own."""
+    """Message after a timeout; "" for a generated one."""
     framing: FramingSpec | None = None
-    """What cuts the line while it is waited for; None: the line's own."""
+    """Framing of the connection during the wait; None: unchanged."""
 
 
 class PromptStep(NamedTuple):
-    """Wait for text that nothing ends, as a prompt for a password."""
+    """Wait for text without a terminator, such as a password prompt."""
 
     transport: str
     pattern: Pattern
@@ -76,7 +76,7 @@ class PromptStep(NamedTuple):
 
 
 class WaitStep(NamedTuple):
-    """Do nothing for a while."""
+    """Pause for some time."""
 
     seconds: float
 
@@ -85,27 +85,27 @@ class UntilStep(NamedTuple):
     """Wait for a condition to come true."""
 
     condition: Template
-    """Over fresh signals, settings and what earlier steps have read."""
+    """Condition over fresh signals, settings and the fields that earlier steps have read."""
     timeout_s: float
     otherwise: "tuple[Step, ...] | None" = None
     text: str = ""
 
 
 class RepeatStep(NamedTuple):
-    """Do the same steps again and again, a bounded number of times."""
+    """Repeat the same steps, a bounded number of times."""
 
     body: "tuple[Step, ...]"
     times: int
-    """How often at most."""
+    """Largest number of rounds."""
     until: Template | None = None
-    """Asked after each round: no further one when it is true. None: all rounds are done."""
+    """Condition after each round that ends the loop; None: all rounds run."""
     otherwise: "tuple[Step, ...] | None" = None
-    """What to do when `until` is not true after the last round; None: fail."""
+    """Steps when `until` is still false after the last round; None: the sequence fails."""
     text: str = ""
 
 
 class RunStep(NamedTuple):
-    """Run a command, or another sequence, and wait until it is done."""
+    """Run a command or another sequence, and wait for its end."""
 
     command: str
     arguments: Mapping[str, Template | Value] = NOTHING
@@ -118,7 +118,7 @@ class SetStep(NamedTuple):
 
 
 class IfStep(NamedTuple):
-    """Choose between two ways on."""
+    """Choose between two branches."""
 
     condition: Template
     then: "tuple[Step, ...]"
@@ -146,7 +146,7 @@ Step = (
 
 
 def all_steps(steps: tuple[Step, ...]) -> Iterator[Step]:
-    """Yield the steps and those in their branches."""
+    """Yield the steps, including those in branches."""
     for step in steps:
         yield step
         if isinstance(step, IfStep):
@@ -160,7 +160,7 @@ def all_steps(steps: tuple[Step, ...]) -> Iterator[Step]:
 
 
 def most_steps(steps: tuple[Step, ...]) -> int:
-    """Return how many steps one run can do at most, both branches of a choice counted."""
+    """Return the largest number of steps in one run, counting both branches of a choice."""
     total = 0
     for step in steps:
         total += 1

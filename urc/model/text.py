@@ -1,4 +1,4 @@
-"""What the text forms make of their options; parsed by `urc.config`, read by `urc.protocol`."""
+"""Parsed options of the text forms; `urc.config` makes them, `urc.protocol` reads them."""
 
 from typing import Literal, NamedTuple
 
@@ -8,36 +8,36 @@ FieldKind = Literal["integer", "number", "word", "text", "rest", "hex"]
 
 
 class Hole(NamedTuple):
-    """A place in a pattern of fields, and the literal text before it."""
+    """A field in a pattern, and the literal text before it."""
 
     before: str
-    """Literal text; a run of blanks is one blank."""
+    """Literal text; a run of blanks counts as one blank."""
     name: str
-    """Of the field; "" for one that is skipped."""
+    """Name of the field; "" for a skipped one."""
     kind: FieldKind
     width: int = 0
-    """Characters that it always takes; 0: as many as belong to it."""
+    """Fixed width in characters; 0: variable."""
 
 
 JsonPath = tuple[str | int, ...]
-"""Names and list places, from the top of the document on."""
+"""Object keys and array indices, from the root of the document."""
 
 
 class XmlStep(NamedTuple):
-    """One element on the way."""
+    """One element on the path to a field."""
 
     tag: str
     """Local name, without its namespace."""
     place: int = 1
-    """Which one of that name and these attributes, from 1."""
+    """1-based position among the elements with this name and these attributes."""
     attributes: tuple[tuple[str, str], ...] = ()
-    """Name and value of each attribute that it must have."""
+    """Name and value of each required attribute."""
 
 
 class XmlPath(NamedTuple):
-    """Where a field is in an XML document."""
+    """The path of a field in an XML document."""
 
     steps: tuple[XmlStep, ...]
-    """From the root element on."""
+    """Elements of the path, from the root."""
     attribute: str = ""
     """Name of the attribute; "" for the text of the element."""

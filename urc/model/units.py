@@ -1,7 +1,7 @@
-"""Units of one kind, and how a value gets from one to another. Pure.
+"""Units by quantity, and the conversion of values between them. Pure.
 
-Only units that documents of robots use; the symbols are UCUM's where it has one that people write.
-A unit that is not here fits nothing but itself.
+The table has only the units of robot documents. Its symbols are those of UCUM where UCUM has a
+common one. An unknown unit converts only to itself.
 """
 
 import math
@@ -11,7 +11,7 @@ __all__ = ["Scale", "are_apart", "conversion", "quantity_of"]
 
 
 class Scale(NamedTuple):
-    """From one unit to another: ``value * factor + offset``."""
+    """A conversion between two units: ``value * factor + offset``."""
 
     factor: float
     offset: float = 0.0
@@ -24,7 +24,7 @@ class Scale(NamedTuple):
 _DEGREE: Final = math.pi / 180
 _NAUTICAL: Final = 1852.0
 
-# Kind → symbol → how it becomes the kind's SI unit.
+# Quantity → symbol → conversion to the SI unit of the quantity.
 _KINDS: Final[dict[str, dict[str, Scale]]] = {
     "length": {
         "m": Scale(1),
@@ -115,9 +115,9 @@ _KIND_OF: Final = {symbol: kind for kind, units in _KINDS.items() for symbol in 
 
 
 def conversion(have: str, want: str) -> Scale | None:
-    """Return how a value in the unit `have` becomes one in `want`; None when they don't fit.
+    """Return the conversion from the unit `have` to `want`; None when they don't fit.
 
-    The same symbol always fits, known or not.
+    A symbol always fits itself, known or not.
     """
     if have == want:
         return Scale(1)
@@ -129,14 +129,14 @@ def conversion(have: str, want: str) -> Scale | None:
 
 
 def are_apart(one: str, other: str) -> bool:
-    """Return whether a number surely means another thing in the other unit.
+    """Return whether the same number certainly means different values in the two units.
 
-    What has no unit may be in any.
+    A missing unit may mean any unit.
     """
     scale = conversion(one, other)
     return bool(one and other) and (scale is None or scale != (1.0, 0.0))
 
 
 def quantity_of(unit: str) -> str:
-    """Return what is measured in a unit, as ``length``; "" when nobody knows."""
+    """Return the quantity of a unit, such as ``length``; "" if it is unknown."""
     return _KIND_OF.get(unit, "")

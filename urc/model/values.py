@@ -1,7 +1,8 @@
-"""Signals: the named, typed values of a robot, and one reading of one of them.
+"""Signals: the named, typed values of a robot, and their samples.
 
-The model's values are named tuples: as frozen and as typed as frozen dataclasses, a tenth of their
-cost to define (every command pays it) and a third to make (every sample does).
+The values of the model are named tuples. They are as frozen and typed as frozen dataclasses. Their
+definition costs a tenth (every command line call pays it), and their construction a third (every
+sample pays it).
 """
 
 from collections.abc import Mapping
@@ -26,52 +27,52 @@ __all__ = [
 ]
 
 NOTHING: Final[Mapping[str, Any]] = MappingProxyType({})
-"""The default of every mapping."""
+"""An empty mapping, the default of every mapping attribute."""
 
 ElementType = Literal["integer", "number", "boolean", "string"]
-"""The words are JSON Schema's."""
+"""Element types, in the words of JSON Schema."""
 SignalType = Literal["integer", "number", "boolean", "string", "array", "object", "image", "blob"]
-"""What a signal may be: one value, several of one kind, a mapping, or bytes."""
+"""Types of a signal: one value, several values of one type, a mapping, or bytes."""
 Value = bool | int | float | str | None
-"""One plain value; None means the robot said "not available"."""
+"""One plain value; None means that the robot reports "not available"."""
 Reading = Value | bytes | tuple[Any, ...] | Mapping[str, Any]
-"""What a signal may hold: bytes for ``image`` and ``blob``, a tuple for ``array``."""
+"""A value of a signal: bytes for ``image`` and ``blob``, a tuple for ``array``."""
 Axes = Literal["", "FLU", "FRD", "ENU", "NED", "bearing"]
-"""Which way the axes point; "" says nothing of it."""
+"""Axis conventions; "" if undeclared."""
 Alarm = Literal["", "lolo", "low", "high", "hihi"]
-"""Which limit a value has passed; "" is normal."""
+"""The limit that a value has passed; "" for normal."""
 
 
 class Limits(NamedTuple):
-    """Alarm limits in the signal's unit; EPICS' names."""
+    """Alarm limits in the unit of the signal, with the names of EPICS."""
 
     lolo: float | None = None
     low: float | None = None
     high: float | None = None
     hihi: float | None = None
     hysteresis: float = 0.0
-    """How far a value must come back before the alarm ends, in the signal's unit."""
+    """Hysteresis of the alarm, in the unit of the signal."""
     for_s: float = 0.0
-    """How long a value must stay past a limit before the alarm begins, in seconds."""
+    """Time past a limit before the alarm begins, in seconds."""
 
 
 class Conversion(NamedTuple):
-    """From a raw field to the value that is meant; applied in the order of the attributes."""
+    """The conversion of a raw field to a value; the attributes apply in their order."""
 
     base: int = 0
-    """Of whole numbers that are written as text: 2 to 36. 0: text stays what it is."""
+    """Base of whole numbers in text, 2 to 36; 0: text stays text."""
     not_available: tuple[Value, ...] = ()
-    """Raw values that say "not available"."""
+    """Raw values that mean "not available"."""
     polynomial: tuple[float, ...] = ()
-    """Coefficients c0, c1, c2 …: value = c0 + c1·raw + c2·raw² …; () leaves the value alone."""
+    """Coefficients c0, c1, c2 …: value = c0 + c1·raw + c2·raw² …; () for no polynomial."""
     points: tuple[tuple[float, float], ...] = ()
-    """(raw, value) pairs, raw rising; linear between them, clamped outside."""
+    """(raw, value) pairs with rising raw values; linear between them, clamped outside."""
     states: tuple[tuple[str, str], ...] = ()
     """Raw text → word."""
 
 
 PLAIN = Conversion()
-"""Takes the raw value as it is."""
+"""The identity conversion."""
 
 
 class Signal(NamedTuple):
@@ -83,37 +84,38 @@ class Signal(NamedTuple):
     unit: str = ""
     """UCUM-like symbol as in documents: ``%``, ``m/s``, ``rad``, ``degC``."""
     min: float | None = None
-    """Smallest value the robot can mean; what is below is a fault, not a reading."""
+    """Smallest valid value; a smaller one is a violation and no sample."""
     max: float | None = None
     precision: int | None = None
-    """Digits after the decimal point that mean something."""
+    """Number of significant digits after the decimal point."""
     states: tuple[tuple[str, str], ...] = ()
-    """Raw text → word shown, for signals that are states."""
+    """Raw text → displayed word, for enumerated signals."""
     limits: Limits = Limits()
     stale_after_s: float = 0.0
-    """Age in seconds after which a reading is shown as old. Always > 0 in a loaded driver."""
+    """Age in seconds after which a sample is stale. Always > 0 in a loaded driver."""
     description: str = ""
     conversion: Conversion = PLAIN
-    """From what the robot says to the value in `unit`; of an array, each element's."""
+    """Conversion from the raw value to `unit`; for an array, of each element."""
     of: ElementType = "number"
-    """Kind of the elements of an array."""
+    """Type of the elements of an array."""
     size: int | None = None
-    """Elements of an array; most bytes of an image or blob."""
+    """Number of elements of an array; most bytes of an image or blob."""
     axes: Axes = ""
-    """Which way its axes point."""
+    """Axis convention of the value."""
     formula: Template | None = None
-    """What it is computed from, over other signals; None: frames set it."""
+    """Formula over other signals; None: frames set the signal."""
     deadband: float = 0.0
-    """A change smaller than this is no news, in `unit`; of an array, when every element's is."""
+    """Dead band in `unit`: smaller changes are not reported. An array is reported if any element
+    changes enough."""
     debounce_s: float = 0.0
-    """A value that lasts shorter than this is no news, in seconds."""
+    """Debounce time, in seconds: shorter-lived values are not reported."""
 
 
 class Sample(NamedTuple):
-    """One reading: the value, when its first byte arrived, and the limit it has passed."""
+    """One reading: the value, the arrival time of its first byte, and the passed limit."""
 
     signal: str
     value: Reading
     time_s: float
-    """Monotonic seconds, on the clock that was passed into the engine."""
+    """Monotonic time in seconds, from the clock of the engine."""
     alarm: Alarm = ""

@@ -1,4 +1,4 @@
-"""Widgets: what a folder's manifest says a graphic part takes and gives."""
+"""Widgets: declared inputs, outputs and options of graphic parts."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -14,36 +14,36 @@ class Port(NamedTuple):
 
     name: str
     types: tuple[str, ...] = ("number",)
-    """Signal types it accepts; of an output, types of the values it gives; () for any."""
+    """Signal types that an input accepts, or value types of an output; () for any."""
     unit: str = ""
-    """Unit it wants; "" takes any."""
+    """Required unit; "" accepts any."""
     quantity: str = ""
-    """Of an input: kind of unit it wants, in which values come as they are; "" takes any."""
+    """For an input: required quantity, in any of its units without conversion; "" accepts any."""
     unit_of: str = ""
-    """Input or output of the same widget that has to have the same unit; "" for none."""
+    """Input or output of the same widget with which the unit is shared; "" for none."""
     is_required: bool = True
     description: str = ""
     is_held: bool = False
-    """Of an output: it is given by holding, so it may be bound to motion, and to nothing else."""
+    """For an output: whether it is a hold-to-run control. It then takes only motion commands."""
     arguments: tuple[str, ...] = ()
-    """Of an output: names of the values that it gives along; of a held one each from -1 to 1."""
+    """For an output: names of its values; those of a held output range from -1 to 1."""
     of: tuple[str, ...] = ()
-    """Of an input that takes arrays: kinds of the elements it can show; () takes any."""
+    """For an array input: accepted element types; () for any."""
     size: int | None = None
-    """Of an input that takes arrays: how many elements they must have; None takes any."""
+    """For an array input: required number of elements; None for any."""
     is_many: bool = False
-    """Of an input: it takes a list of signals, each of which must fit."""
+    """For an input: whether it takes a list of signals, each of which must fit."""
     is_each: bool = False
-    """Of an input: each reading counts, not only the newest."""
+    """For an input: whether it receives every sample, not only the newest."""
     instead_of: tuple[str, ...] = ()
-    """Of an input: inputs and options of the same widget that mean nothing where it is bound."""
+    """For an input: inputs and options of the same widget that it replaces when bound."""
 
 
 class Widget(NamedTuple):
     """A widget as its ``widget.yaml`` declares it."""
 
     name: str
-    """Equal to the folder's name."""
+    """Name of the widget, equal to that of its folder."""
     title: str
     folder: Path
     inputs: Mapping[str, Port] = NOTHING
@@ -51,14 +51,14 @@ class Widget(NamedTuple):
     options: Mapping[str, object] = NOTHING
     """JSON Schema ``properties`` of its options."""
     needs: tuple[str, ...] = ()
-    """Inputs, outputs and options of which at least one must be given; () for none."""
+    """Inputs, outputs and options, at least one of which is required; () for none."""
     together: tuple[tuple[str, ...], ...] = ()
-    """Inputs or outputs that mean something only when all of a group are bound."""
+    """Groups of inputs or outputs that work only when all of a group are bound."""
     min_cells: tuple[int, int] = (1, 1)
     """Columns, rows."""
     is_gate: bool = False
-    """Whether it is a dead-man: while it does not stand, nothing is driven."""
+    """Whether it is a dead-man control: while it is released, no motion is sent."""
     summary: str = ""
     licence: str = ""
-    """SPDX identifier, as the manifest says."""
+    """SPDX identifier from the manifest."""
     author: str = ""

@@ -1,7 +1,7 @@
 """The small world of an emulated robot, as a document declares it.
 
-Lengths are metres, angles radians, times seconds, counted as REP 103 does: x ahead, y to the left,
-z up, angles to the left. What the robot can read of its world has the names in `READINGS`.
+Lengths are in metres, angles in radians, times in seconds. Directions follow REP-103: x forward, y
+left, z up, angles counter-clockwise. `READINGS` has the names of all sensor values.
 """
 
 from collections.abc import Mapping
@@ -38,7 +38,7 @@ INPUTS: Final[Mapping[str, tuple[str, ...]]] = {
     "swimmer": ("forward", "turn"),
     "quadrotor": ("flies", "forward", "sideways", "climb", "turn", "cut"),
 }
-"""Kind of body → what `drive` may tell it."""
+"""Type of body → its inputs for `drive`."""
 
 BODY_KEYS: Final[Mapping[str, tuple[str, ...]]] = {
     "track": ("differential", "tracks"),
@@ -53,7 +53,7 @@ BODY_KEYS: Final[Mapping[str, tuple[str, ...]]] = {
     "climb": ("quadrotor",),
     "hover": ("quadrotor",),
 }
-"""Key of a body → the kinds that have it; a key that is not here is for all."""
+"""Key of a body → the types with that key; a missing key is common to all types."""
 
 
 def _words(text: str) -> frozenset[str]:
@@ -78,7 +78,7 @@ READINGS: Final[Mapping[str, frozenset[str]]] = {
         " cliff_front_right drop"
     ),
 }
-"""What ``world.NAME`` gives; of those with parts, ``world.NAME.PART``."""
+"""Names under ``world.NAME``; for a group, the parts under ``world.NAME.PART``."""
 
 
 class Wall(NamedTuple):
@@ -93,7 +93,7 @@ class Wall(NamedTuple):
 
 
 class Box(NamedTuple):
-    """A box that stands along the axes, by its middle."""
+    """An axis-aligned box, given by its centre."""
 
     x: float
     y: float
@@ -106,12 +106,12 @@ class Box(NamedTuple):
 
 
 class PlanSpec(NamedTuple):
-    """What stands in the world."""
+    """Obstacles and ground of the world."""
 
     walls: tuple[Wall, ...] = ()
     boxes: tuple[Box, ...] = ()
     holes: tuple[Box, ...] = ()
-    """Where the ground is missing; their height and colour mean nothing."""
+    """Areas without ground; their height and colour are unused."""
     ground: Literal["floor", "grass", "water"] = "floor"
 
 
@@ -120,7 +120,7 @@ class BodySpec(NamedTuple):
 
     type: BodyType = "differential"
     radius: float = 0.18
-    """Of the circle that touches walls."""
+    """Radius of the collision circle."""
     speed: float = 1.0
     """Most, in m/s."""
     turn: float = 2.0
@@ -128,43 +128,43 @@ class BodySpec(NamedTuple):
     acceleration: float = 1.5
     """In m/s²."""
     turn_acceleration: float = 6.0
-    """In rad/s²; of `ackermann`, how fast the front wheels turn, in rad/s."""
+    """Limit in rad/s²; for `ackermann`, the steering rate of the front wheels in rad/s."""
     track: float | None = None
-    """From the left to the right wheel; None: 1.6 times the radius."""
+    """Distance from the left to the right wheel; None: 1.6 times the radius."""
     slip: float = 0.15
-    """Part of a turn that tracks lose."""
+    """Share of a turn that tracks lose to slip."""
     roughness: float = 0.01
-    """How much the ground rocks it, in rad."""
+    """Amplitude of the tilt from rough ground, in rad."""
     wheelbase: float = 0.4
     steer: float = 0.52
-    """How far the front wheels turn at most, in rad."""
+    """Largest steering angle of the front wheels, in rad."""
     joints: int = 8
     legs: int = 0
     amplitude: float = 0.7
-    """Of the wave at full drive, in rad."""
+    """Amplitude of the wave at full drive, in rad."""
     frequency: float = 1.0
-    """Of the wave at full drive, in Hz."""
+    """Frequency of the wave at full drive, in Hz."""
     climb: float = 0.8
     """Most, in m/s."""
     hover: float = 0.8
-    """Height to which it rises by itself once it flies."""
+    """Height after take-off."""
 
 
 class OdometrySpec(NamedTuple):
-    """How wrong the robot's own reckoning of its way is."""
+    """Error of the odometry of the robot."""
 
     scale: float = 0.01
-    """Share by which distances and turns are at most told wrong, always the same way."""
+    """Largest relative error of distances and turns, constant during a run."""
 
 
 class LaserSpec(NamedTuple):
-    """A scanner that turns at the height of the robot's middle."""
+    """A rotating laser scanner at the height of the centre of the robot."""
 
     rays: int = 36
     first: float = -pi
     """Direction of the first ray."""
     last: float = pi
-    """Direction after the last ray: the field of view is shared by all."""
+    """Direction after the last ray; the rays divide the field of view evenly."""
     max: float = 8.0
     """Farther is nothing."""
     noise: float = 0.01
@@ -172,63 +172,63 @@ class LaserSpec(NamedTuple):
 
 
 class CameraSpec(NamedTuple):
-    """A camera that looks ahead."""
+    """A camera that looks forward."""
 
     width: int = 320
     height: int = 240
     view: float = 1.2
-    """Angle from the left to the right edge."""
+    """Horizontal field of view."""
     up: float = 0.25
-    """Height of the eye above the robot's foot."""
+    """Height of the camera above the ground."""
     tilt: float = 0.0
-    """How far it looks up."""
+    """Upward tilt of the camera."""
     flip: Template | bool = False
     """Whether the picture is upside down."""
     mirror: Template | bool = False
 
 
 class BatterySpec(NamedTuple):
-    """What the robot lives on."""
+    """The battery of the robot."""
 
     capacity: float = 2.6
     """In A·h."""
     level: float = 90.0
-    """At the beginning, in %."""
+    """Initial level, in %."""
     full: float = 12.6
-    """Volts when it is full."""
+    """Voltage of the full battery."""
     empty: float = 10.2
-    """Volts when it is empty."""
+    """Voltage of the empty battery."""
     idle: float = 0.3
-    """Current while it stands, in A."""
+    """Current at standstill, in A."""
     drive: float = 2.0
-    """Current on top of it at full effort, in A."""
+    """Additional current at full effort, in A."""
 
 
 class Failsafe(NamedTuple):
-    """What the robot does by itself when commands stop."""
+    """The reaction of the robot to missing commands."""
 
     after_s: float
     without: tuple[str, ...]
-    """Commands of which none must have come for that long."""
+    """Commands that reset the timer of the fail-safe."""
     sets: Mapping[str, Template | Reading] = NOTHING
-    """State that changes then; without any the body is told to stand still."""
+    """State variables to set; if empty, the body stops."""
 
 
 class WorldSpec(NamedTuple):
-    """A robot's body, what moves it, and what its sensors tell."""
+    """A robot body, its inputs, and its sensors."""
 
     body: BodySpec = BodySpec()
     drive: Mapping[str, Template | float | bool] = NOTHING
-    """Input of the body → its value now."""
+    """Input of the body → its present value."""
     senses: Mapping[str, Template] = NOTHING
-    """Signal → what it is now."""
+    """Signal → its present value."""
     failsafe: Failsafe | None = None
     plan: PlanSpec | None = None
-    """None: the room that every robot has by itself."""
+    """Surroundings; None: the default room."""
     start: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    """x, y and the direction."""
+    """Initial x, y and direction."""
     datum: tuple[float, float, float] = (46.5191, 6.5668, 400.0)
-    """Latitude and longitude of x = y = 0 in degrees, and its height above the sea."""
+    """Latitude and longitude of x = y = 0 in degrees, and its altitude in metres."""
     seed: int = 1
     odometry: OdometrySpec = OdometrySpec()
     laser: LaserSpec = LaserSpec()

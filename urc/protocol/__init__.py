@@ -1,1 +1,1 @@
-"""Bytes to values and back: pure, no I/O, no clock."""
+"""Decoding and encoding of bytes, without I/O and without a clock."""

@@ -1,6 +1,6 @@
-"""What each kind of step does: `Step` → the function that a `Runner` calls.
+"""Actions of sequence steps: each kind of `Step` becomes a function for a `Runner`.
 
-Floor 3, pure. See `urc.protocol.steps` for the theory of operation.
+Pure. See `urc.protocol.steps` for the theory of operation.
 """
 
 from collections.abc import Iterator, Mapping
@@ -33,7 +33,7 @@ def build_program(
 def programs_of_lines(
     driver: Driver, builder: Builder, key: Literal["on_connect", "on_close"]
 ) -> dict[str, Program]:
-    """Compile what is said first, or last, on each line that has something to say."""
+    """Compile the login or the close sequence of each transport that declares one."""
     return {
         name: build_program(f"{name}.{key}", getattr(spec, key), frozenset((name,)), builder)
         for name, spec in driver.transports.items()
@@ -104,7 +104,7 @@ def _repeating(label: str, step: sequence.RepeatStep, builder: Builder) -> Actio
     body = _actions(f"{label}.repeat", step.body, builder)
     otherwise = _otherwise(label, step.otherwise, builder)
     until = step.until
-    text = step.text or f"{label}: it was not done after {step.times} rounds"
+    text = step.text or f"{label}: not done after {step.times} rounds"
 
     def rounds(is_done: list[bool]) -> Iterator[Action]:
         def look(runner: Runner, now: float) -> list[LineEvent]:
@@ -187,7 +187,7 @@ def _expecting(
         else _prompted(step, builder)
     )
     otherwise = _otherwise(label, step.otherwise, builder)
-    text = step.text or f"{label}: what it expects did not come within {answer.timeout_s:g} s"
+    text = step.text or f"{label}: no matching frame within {answer.timeout_s:g} s"
 
     def expect(runner: Runner, now: float) -> list[LineEvent]:
         line = runner.host.lines[step.transport]
@@ -209,13 +209,13 @@ def _prompted(step: sequence.PromptStep, builder: Builder) -> Answer:
 
 
 class _Nothing:
-    """Reads no frame: a prompt is none."""
+    """A reader for prompts, which are text outside of frames. It reads nothing."""
 
     def read(self, frame: Frame) -> None:
         return None
 
     def write(self, fields: Mapping[str, object]) -> bytes:
-        raise NotWritable("a prompt is no frame")
+        raise NotWritable("a prompt cannot be written: it is not a frame")
 
 
 def _running(step: sequence.RunStep) -> Action:

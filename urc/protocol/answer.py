@@ -1,8 +1,8 @@
-"""What an answer is, and how its frames are collected.
+"""Expected replies, and the collection of their frames.
 
-Floor 3, pure. A `Matcher` reads one kind of frame, an `Answer` is what a request waits for, and an
-`Ear` collects the frames of one answer: the transport's conversation (`urc.protocol.line`) offers
-it each frame that comes in.
+Pure. A `Matcher` reads one kind of frame. An `Answer` is the reply that a request expects. An `Ear`
+collects the frames of one reply: the conversation of the transport (`urc.protocol.line`) offers it
+each received frame.
 """
 
 from collections.abc import Callable, Mapping
@@ -29,23 +29,23 @@ __all__ = [
 ]
 
 Fields = Mapping[str, object]
-"""What a frame says: name → raw value."""
+"""Fields of a frame: name → raw value."""
 
 _MOST_COLLECTED: Final = 1 << 20
-"""Bytes that a reply of several frames may have."""
+"""Largest size of a reply of several frames, in bytes."""
 
 
 Aside = Literal["resend", "extend"]
-"""The request once more, or more time."""
+"""A provisional reply: it asks for a retransmission, or for more time."""
 
 
 class Matcher:
-    """Reads one kind of frame, and makes samples of its fields.
+    """A reader of one kind of frame, with the decoder of its fields.
 
     Args:
         reader: reads the fields of a frame.
-        decode: makes samples of fields, and lists refused values.
-        compiled: a function that does both for the most common frames.
+        decode: converts fields to samples, and lists the refused values.
+        compiled: a generated function that does both for the most common frames.
     """
 
     __slots__ = ("decode", "reader", "take")
@@ -54,14 +54,14 @@ class Matcher:
         self.reader = reader
         self.decode = decode
         self.take: Compiled = compiled or self._take
-        """Return samples and refused values, or None when the frame is another one."""
+        """Return samples and refused values, or None for another kind of frame."""
 
     def _take(self, frame: Frame, now: float) -> Taken | None:
         found = self.read(frame)
         return None if found is None else self.decode(found, now)
 
     def read(self, frame: Frame) -> Fields | None:
-        """Return the fields, or None when the frame is another one or no text at all."""
+        """Return the fields, or None for another kind of frame or undecodable text."""
         try:
             return self.reader.read(frame)
         except BadItem as error:
@@ -72,7 +72,7 @@ class Matcher:
 
 
 class Answer(NamedTuple):
-    """What one answer looks like, compiled."""
+    """One expected reply, compiled."""
 
     matcher: Matcher
     timeout_s: float
@@ -80,39 +80,39 @@ class Answer(NamedTuple):
     faults: tuple[tuple[Matcher, Template | None], ...] = ()
     lines: int | Pattern | None = None
     framing: Framing | None = None
-    """What cuts the line while a step waits for it; None: the line's own, or its request's."""
+    """Framing of the stream while a step waits; None: that of the connection or of the request."""
     asides: tuple[tuple[Aside, Matcher], ...] = ()
-    """What the robot may ask for instead of answering, and the frame by which it does."""
+    """Provisional replies: the kind of each, and the matcher that recognises it."""
     extend_s: float = 0.0
-    """For how long it may ask for more time, in all."""
+    """Longest total extension of the timeout, in seconds."""
     is_silence: bool = False
-    """The robot says nothing when it does what was asked: the time that passes is the answer."""
+    """Whether silence until the timeout counts as success."""
     takes_redirects: bool = False
-    """It reads where the robot sends whoever asks, so that this is no failure."""
+    """Whether the reply reads the target of a redirect, so that a redirect is no failure."""
 
 
 class Offer(NamedTuple):
-    """What an ear made of a frame."""
+    """The result of offering a frame to an expectation."""
 
     fields: Fields | None = None
-    """Of a whole answer; None: more is to come, or it is a refusal."""
+    """Fields of a complete reply; None: the reply is incomplete, or a refusal."""
     refusal: str = ""
-    """Why the robot refused, for people."""
+    """Refusal of the robot, as text for people."""
     told: tuple[Matcher, Fields] | None = None
-    """What a frame says that is no answer, for signals."""
+    """Matcher and fields of a provisional or error reply, for signals."""
     aside: Aside | None = None
-    """What the robot asks for instead of answering."""
+    """Provisional reply: a request for retransmission, or for more time."""
     dropped: str = ""
-    """What was collected before and belongs to no answer, for people."""
+    """Report of collected lines that were dropped, as text for people."""
 
 
 _MORE: Final = Offer()
 IsMine = Callable[[Fields], bool]
-"""Tells by its fields whether a frame is about the request that waits."""
+"""Predicate over fields: whether the frame belongs to the pending request."""
 
 
 class Ear:
-    """Collects the frames of one answer."""
+    """Collects the frames of one reply."""
 
     __slots__ = ("_lines", "_size", "answer", "owner")
 
@@ -123,7 +123,7 @@ class Ear:
         self._size = 0
 
     def offer(self, frame: Frame, is_mine: IsMine | None = None) -> Offer | None:
-        """Return what the frame means here, or None when it is no part of the answer."""
+        """Return the match result of a frame, or None when it is no part of the reply."""
         beside = self.beside(frame, is_mine)
         if beside is not None:
             return beside
@@ -135,10 +135,9 @@ class Ear:
         return Offer(found)
 
     def beside(self, frame: Frame, is_mine: IsMine | None = None) -> Offer | None:
-        """Return what the frame means when it takes the place of an answer, or None.
+        """Return the match result of a provisional or error reply, or None for other frames.
 
-        It asks for the request again, or for more time, or refuses. What names no request is about
-        the one that has waited longest.
+        A frame that names no request belongs to the oldest pending one.
         """
         for kind, matcher in self.answer.asides:
             fields = matcher.read(frame)
@@ -147,7 +146,7 @@ class Ear:
         return self._refusal(self._so_far(frame), is_mine)
 
     def _so_far(self, frame: Frame) -> Frame:
-        """Return what a refusal is looked for in: of a counted reply, all of it that has come."""
+        """Return the text that is searched for a refusal: all frames so far of a counted reply."""
         if not (self._lines and isinstance(self.answer.lines, int)):
             return frame
         if not isinstance(frame.payload, bytes):
@@ -155,12 +154,12 @@ class Ear:
         return Frame(b"\n".join((*self._lines, frame.payload)), frame.encoding)
 
     def _refusal(self, frame: Frame, is_mine: IsMine | None) -> Offer | None:
-        """Return why the robot refused, or None."""
-        for matcher, text in self.answer.faults:  # first: they say more
+        """Return the refusal of the robot, or None."""
+        for matcher, text in self.answer.faults:  # first: these give more detail
             fields = matcher.read(frame)
             if fields is not None and _is_about(fields, is_mine):
                 if _lacks(text, fields) and self.answer.matcher.read(frame) is not None:
-                    continue  # a good answer has some of these fields, too, but not the reason
+                    continue  # a valid reply may share some of these fields, but not the reason
                 return Offer(refusal=_told(text, fields, frame), told=(matcher, fields))
         for pattern in self.answer.errors:
             groups = _search(pattern, frame)
@@ -185,7 +184,7 @@ class Ear:
         if found is not None:
             self._lines, self._size = [], 0
             return Offer(found)
-        # A stray line in front of a counted reply must not shift it for ever.
+        # A stray line before a counted reply must not shift all later replies.
         return self._drop(1 if isinstance(lines, int) else len(self._lines), "nothing matches it")
 
     def _drop(self, count: int, why: str) -> Offer:
@@ -195,21 +194,21 @@ class Ear:
 
 
 class Listening(Protocol):
-    """Who put out an ear."""
+    """The owner of an expectation."""
 
     def heard(self, ear: Ear, offer: Offer, now: float) -> None:
-        """Take what came."""
+        """Process the match result."""
 
 
 class Heard(NamedTuple):
-    """Inside the engine: what somebody listened for has come."""
+    """Internal event of the engine: an expected frame has arrived."""
 
     ear: "Ear"
     offer: "Offer"
 
 
 def _is_about(fields: Fields, is_mine: IsMine | None) -> bool:
-    """Return whether a frame with `fields` is about the request; one without names none."""
+    """Return whether a frame with `fields` belongs to the request; without fields, it does."""
     return is_mine is None or not fields or is_mine(fields)
 
 
@@ -221,7 +220,7 @@ def _search(pattern: Pattern, frame: Frame) -> Mapping[str, str | None] | None:
 
 
 def _lacks(text: Template | None, fields: Fields) -> bool:
-    """Return whether the words for people need what the frame has not."""
+    """Return whether the error text needs fields that the frame lacks."""
     return text is not None and not text.names <= {*fields, "settings"}
 
 
@@ -235,7 +234,7 @@ def _told(text: Template | None, fields: Fields, frame: Frame) -> str:
 
 
 def shown(frame: Frame) -> str:
-    """Return a frame in messages for people: its text, or its first bytes."""
+    """Return a frame for messages to people: its text, or its first bytes."""
     try:
         return quoted(frame.text, most=80)
     except BadText:

@@ -1,7 +1,4 @@
-"""From what a driver declares to what can be asked: built once, when an engine is.
-
-Floor 3, pure.
-"""
+"""Compiles the declared requests of a driver, once for each engine. Pure."""
 
 from collections.abc import Mapping
 from functools import partial
@@ -70,7 +67,7 @@ class Builder:
         matchers: list[Matcher],
         context: CodecContext,
     ) -> None:
-        """Make a line of which some messages are answered, or collected."""
+        """Wrap the matchers of messages that are acknowledged or collected."""
         replies, kept = Replies(), list[Collector]()
         framing, name = build_framing(spec.framing), spec.name
         for place, (one, matcher) in enumerate(zip(messages, matchers, strict=True)):
@@ -90,11 +87,11 @@ class Builder:
         line.inbox.replies, line.inbox.collectors = replies, kept
 
     def _view(self, line: str, now: float, found: Mapping[str, object]) -> Mapping[str, object]:
-        """Return what the answer to a message knows: fields, signals and what the login learnt."""
+        """Return the namespace of an acknowledgement: fields, signals and names of the login."""
         return self._known.view(now, {**self.lines[line].learnt, **found})
 
     def command(self, command: Command) -> Ask:
-        """Return what a command asks."""
+        """Return the compiled request of a command."""
         ask = self._ask(
             command.name, command.transport, command.send, command.reply, command.arguments
         )
@@ -109,26 +106,29 @@ class Builder:
         )
 
     def poll(self, poll: Poll, label: str) -> Ask:
-        """Return what a poll asks."""
+        """Return the compiled request of a poll."""
         ask = self._ask(label, poll.transport, poll.send, poll.reply)
         return ask._replace(rank=RANKS[poll.priority], is_miss_harmless=poll.offline is not None)
 
     def plain(self, label: str, transport: str, send: WriteSpec) -> Ask:
-        """Return a frame that nothing answers."""
+        """Return a request that expects no reply."""
         return self._ask(label, transport, send, None)
 
     def step(self, label: str, step: SendStep) -> Ask:
-        """Return what a step sends; nothing passes it."""
+        """Return the request of a step.
+
+        Its normal rank lets no request of the same step overtake it.
+        """
         return self.plain(label, step.transport, step.send)._replace(rank=RANKS["normal"])
 
     def expected(self, step: ExpectStep) -> Answer:
-        """Return what a step waits for."""
+        """Return the reply that a step expects."""
         stage = Stage(step.read, step.errors, step.faults, step.timeout_s)
         answer = self._answer(step.transport, stage)
         return answer._replace(framing=step.framing and build_framing(step.framing))
 
     def reply_s(self, transport: str) -> float:
-        """Return how long an answer may take where nothing else is said."""
+        """Return the default reply timeout of a transport, in seconds."""
         return self.lines[transport].spec.timeouts.reply_s
 
     def _ask(
@@ -206,7 +206,7 @@ class Builder:
     def _message(self, read: ReadSpec, context: CodecContext) -> Matcher:
         matcher = self._matcher(read, context)
         if not context.is_compiled or read.topic is not None:
-            return matcher  # a compiled function knows no topics
+            return matcher  # compiled functions don't check topics
         compiled = build_fast_read(
             read, matcher.reader, self._readings, matcher.take, context.encoding
         )
@@ -217,7 +217,7 @@ class Builder:
 
 
 def _is_plain(reply: Reply) -> bool:
-    """Return whether a reply is one frame that says nothing but readings."""
+    """Return whether a reply is a single frame with samples and nothing else."""
     read = reply.read
     has_own = any(name.startswith("_") for name in read.fields)
     has_more = reply.errors or reply.faults or reply.stages or reply.match or reply.framing

@@ -1,8 +1,6 @@
-"""What a command involves: how long it may take at most, and over which lines.
+"""Bounds of a command: its longest duration, and the transports that it uses.
 
-Every wait of an engine has an end, and here they are added up.
-
-Floor 3, pure.
+Every wait of an engine has a timeout; these functions add them up. Pure.
 """
 
 from collections.abc import Callable, Mapping
@@ -26,15 +24,15 @@ from urc.model.sequence import (
 __all__ = ["GOOD_BYE_S", "calm_s", "lines_of", "longest_s", "needs_readings", "queue_limit_s"]
 
 GOOD_BYE_S: Final = 2.0
-"""What ``on_close`` may take in all."""
+"""Longest total duration of ``on_close``, in seconds."""
 
 
 def queue_limit_s(spec: TransportSpec, reply_s: float | None) -> float:
-    """Return how long a request may wait to be sent.
+    """Return the longest time of a request in the queue, in seconds.
 
     Args:
-        spec: the line.
-        reply_s: how long its first answer may take; None when nothing answers it.
+        spec: the transport.
+        reply_s: timeout of its first reply; None without a reply.
     """
     answer_s = spec.timeouts.reply_s if reply_s is None else reply_s
     steps_s = _steps_s(spec.on_connect, lambda step: _step_s(step, spec))
@@ -44,23 +42,23 @@ def queue_limit_s(spec: TransportSpec, reply_s: float | None) -> float:
 
 
 def longest_s(driver: Driver, name: str) -> float:
-    """Return the time in which the command or sequence `name` is over, whatever happens."""
+    """Return the longest duration of the command or sequence `name`, in seconds."""
     command = driver.commands.get(name)
     return 0.0 if command is None else _command_s(command, driver, frozenset())
 
 
 def calm_s(driver: Driver) -> float:
-    """Return how near a deadline may be that a frame or a command makes, or 0 if it may be at once.
+    """Return the shortest delay to a deadline that a frame or a command may set; 0 for none.
 
-    Answers, polls and silent lines make some. Sequences are not looked at, nor is what a framing
-    waits for.
+    Replies, polls and stale connections set deadlines. Sequences and framing timeouts are not
+    considered.
     """
     if any(one.verify or one.rate_per_s for one in driver.commands.values()):
         return 0.0
     if any(one.limits.for_s or one.deadband or one.debounce_s for one in driver.signals.values()):
         return 0.0
     if any(spec.keepalive or spec.min_gap_s for spec in driver.transports.values()):
-        return 0.0  # a gap may be nearly over when the next one comes
+        return 0.0  # a gap may be nearly over when the next request arrives
     waits = [poll.every_s for poll in driver.polls]
     for spec in driver.transports.values():
         waits += [spec.timeouts.reply_s, *filter(None, (spec.stale_after_s,))]
@@ -72,13 +70,13 @@ def calm_s(driver: Driver) -> float:
         times = (reply.timeout_s, *(stage.timeout_s for stage in reply.stages))
         waits += [time for time in times if time is not None]
         if reply.framing is not None:
-            return 0.0  # it may have waits of its own
+            return 0.0  # a sequence may have waits of its own
     return min(waits, default=0.0)
 
 
 def _command_s(command: Command, driver: Driver, outer: frozenset[str]) -> float:
     if command.name in outer:
-        return 0.0  # no sequence runs itself; whoever builds one by hand gets no endless loop
+        return 0.0  # loaded sequences never run themselves; hand-built ones might
     within_s = command.verify.within_s if command.verify is not None else 0.0
     if not command.steps:
         return _exchange_s(command, driver.transports[command.transport]) + within_s
@@ -94,7 +92,7 @@ def _command_s(command: Command, driver: Driver, outer: frozenset[str]) -> float
 
 
 def _steps_s(steps: tuple[Step, ...], one_s: Callable[[Step], float]) -> float:
-    """Return the longest time of `steps`, every round of a loop and both ways of a choice."""
+    """Return the longest duration of `steps`, counting every round and both branches."""
     total_s = 0.0
     for step in steps:
         total_s += one_s(step)
@@ -115,7 +113,7 @@ def _exchange_s(command: Command, spec: TransportSpec) -> float:
     once_s = queue_limit_s(spec, first_s) + first_s
     waits_s = sum(command.retry.wait_s(tries + 1) for tries in range(command.retries))
     times = 1 + (command.retries or RESENDS * reply.is_asked_again)
-    # A request that is asked for again begins at its first answer.
+    # A retransmitted request starts again at its first reply.
     stages_s = _stages_s(reply, spec) * (times if reply.is_asked_again else 1)
     return times * once_s + waits_s + stages_s
 
@@ -136,7 +134,7 @@ def _line_of(step: Step, transports: Mapping[str, TransportSpec]) -> TransportSp
 
 
 def _step_s(step: Step, spec: TransportSpec | None) -> float:
-    """Return the longest time of one step, its branches and what it runs aside."""
+    """Return the longest duration of one step, without its branches and commands."""
     if isinstance(step, WaitStep):
         return step.seconds
     if isinstance(step, UntilStep):
@@ -151,7 +149,7 @@ def _step_s(step: Step, spec: TransportSpec | None) -> float:
 
 
 def lines_of(name: str, driver: Driver) -> frozenset[str]:
-    """Return the lines that a sequence talks on by itself, those of nested ones included."""
+    """Return the transports that a sequence uses directly, including nested sequences."""
     found: set[str] = set()
     names, seen = [name], set[str]()
     while names:
@@ -170,7 +168,7 @@ def lines_of(name: str, driver: Driver) -> frozenset[str]:
 
 
 def needs_readings(driver: Driver) -> bool:
-    """Return whether anything in a driver depends on what was read before."""
+    """Return whether any part of a driver depends on earlier samples."""
     specs = driver.transports.values()
     return (
         any(

@@ -1,6 +1,6 @@
-"""Checksums: the number over part of a frame, checked when it comes in, written when it goes out.
+"""Checksums over part of a frame: verified on receipt, written when sending.
 
-Floor 3, pure. The arithmetic stands in `urc._sums`; nothing here takes more than linear time.
+Pure. `urc._sums` has the arithmetic. All operations take linear time.
 """
 
 import binascii
@@ -14,13 +14,13 @@ __all__ = ["BadFrame", "Checksum", "cut"]
 
 
 class BadFrame(UrcError):
-    """Bytes that are no frame."""
+    """Bytes that are not a valid frame."""
 
     def __init__(self, code: str, message: str, *, closes: bool = False) -> None:
         super().__init__(message)
         self.code = code
         self.closes = closes
-        """Whether the connection is to be given up."""
+        """Whether the connection must be closed."""
 
 
 class Checksum:
@@ -33,14 +33,14 @@ class Checksum:
         self._salt = _salter(spec.salt)
 
     def check(self, frame: bytes) -> None:
-        """Raise `BadFrame` unless the frame carries the right number."""
+        """Raise `BadFrame` unless the frame carries the right checksum."""
         place = self._place(frame)
         right = self.right(frame, self._window(frame, place))
         if right is not None:
             self.compare(frame[place : place + self.size], right)
 
     def put(self, frame: bytearray) -> None:
-        """Write the right number into its place; raise `BadFrame` when the frame has none."""
+        """Write the checksum into its place; raise `BadFrame` if the frame has no such place."""
         place = self._place(frame)
         right = self.right(frame, self._window(frame, place))
         if right is None:
@@ -48,9 +48,9 @@ class Checksum:
         frame[place : place + self.size] = right
 
     def right(self, frame: bytes | bytearray, window: bytes) -> bytes | None:
-        """Return what the frame has to carry, where the checksum is taken over `window`.
+        """Return the required checksum bytes, computed over `window`.
 
-        None: the salt is unknown, and the frame is taken as it is.
+        None: the salt is unknown, and the frame is accepted unchecked.
         """
         data = window
         if self.spec.is_from_hex:
@@ -65,21 +65,21 @@ class Checksum:
         return self._spelt(self._compute(data))
 
     def compare(self, found: bytes, right: bytes) -> None:
-        """Raise `BadFrame` unless `found` is `right`; capitals of hex digits make no difference."""
+        """Raise `BadFrame` unless `found` equals `right`; the case of hex digits is ignored."""
         spelling = self.spec.spelling
         if found == right or (spelling[0] in "hH" and found.upper() == right.upper()):
             return
         raise self.wrong(
-            f"the frame carries the checksum {_shown(found, spelling)}, but"
-            f" {_shown(right, spelling)} would be right; dropped"
+            f"the frame carries the checksum {_shown(found, spelling)},"
+            f" expected {_shown(right, spelling)}; dropped"
         )
 
     def wrong(self, message: str) -> BadFrame:
-        """Return the error of a frame with a wrong checksum."""
+        """Return the error for a frame with a wrong checksum."""
         return BadFrame("bad-checksum", message, closes=self.spec.closes)
 
     def saltless(self, frame: bytes | bytearray) -> BadFrame:
-        """Return the error of a frame that is to be sent and has no salt."""
+        """Return the error for a frame to be sent whose salt is unknown."""
         number = self.spec.salt.number(frame)
         return BadFrame("no-salt", f"the salt of the checksum's table has no row {number}")
 
@@ -90,7 +90,7 @@ class Checksum:
         return place
 
     def _window(self, frame: bytes | bytearray, place: int) -> bytes:
-        """Return what is summed up: the checksum's own bytes count as zeros."""
+        """Return the input of the checksum, with zeros in place of the checksum itself."""
         start, data = cut(frame, self.spec.over)
         stop = start + len(data)
         first, last = max(start, place), min(stop, place + self.size)
@@ -110,7 +110,7 @@ class Checksum:
 
 
 def cut(frame: bytes | bytearray, window: Window) -> tuple[int, bytes]:
-    """Return where `window` begins in `frame`, and its bytes; raise `BadFrame` when too short."""
+    """Return the start and the bytes of `window`; raise `BadFrame` when `frame` is too short."""
     start, stop, _ = slice(window.start, window.stop).indices(len(frame))
     if start > stop:
         raise BadFrame("short-frame", f"{len(frame)} bytes are too few for the checksum")
@@ -121,7 +121,7 @@ def _from_hex(digits: bytes) -> bytes:
     try:
         return binascii.unhexlify(digits)
     except binascii.Error:
-        raise BadFrame("bad-checksum", "the checksum is taken over what is no hex digits") from None
+        raise BadFrame("bad-checksum", "the checksum needs hex digits, found other bytes") from None
 
 
 def _salter(salt: Salt) -> Callable[[bytes | bytearray], bytes | None] | None:
@@ -136,7 +136,7 @@ def _salter(salt: Salt) -> Callable[[bytes | bytearray], bytes | None] | None:
         found = None if number is None else salt.table.get(number)
         if found is not None or (number is not None and salt.otherwise == "pass"):
             return found
-        # A frame without a code is dropped without a word: see `SKIPPED`.
+        # An empty code drops the frame silently: see `SKIPPED`.
         code = "" if salt.otherwise == "skip" and number is not None else "no-salt"
         raise BadFrame(code, f"the salt of the checksum's table has no row {number}")
 

@@ -1,7 +1,7 @@
-"""What a reader and a writer are, and what they are given.
+"""Interfaces of readers and writers, and their context.
 
-Floor 3, pure. A form is one way to say what is in a frame. It owns both directions, so that the
-emulated robot comes from the same declaration; `urc.protocol.forms` has the table of all forms.
+Pure. A form is one notation for the content of a frame. It works in both directions, so that the
+emulated robot uses the same declaration; `urc.protocol.forms` has the table of all forms.
 """
 
 from collections.abc import Mapping
@@ -17,40 +17,41 @@ __all__ = ["BadItem", "BadText", "CodecContext", "Frame", "NotWritable", "Reader
 
 
 class BadText(ValueError):
-    """A frame that is not text in the line's encoding; the message says where."""
+    """A frame that is not text in the encoding of the connection; the message says where."""
 
 
 class BadItem(BadText):
-    """A frame that is meant here, with a value that it cannot have; the message names the item."""
+    """A matching frame with an invalid value; the message names the item."""
 
 
 class NotWritable(UrcError):
-    """Values that cannot be put into this frame; the message names the one at fault."""
+    """Values that do not fit into this frame; the message names the invalid one."""
 
 
 class Frame:
-    """One frame as it came in; its text is decoded once, and only when somebody wants it."""
+    """One received frame; its text is decoded once, on first use."""
 
     __slots__ = ("_text", "attributes", "encoding", "fault", "payload", "topic", "was_text_wanted")
 
     fault: str
-    """Why a reader that knew it could not take it; unset when there was none."""
+    """Why a reader rejected a frame of its kind; unset without a reason."""
     was_text_wanted: bool
-    """A reader wanted text where there is none; unset when nobody did."""
+    """Whether a reader needed the text of an undecodable frame; unset before that."""
 
     def __init__(self, payload: Payload, encoding: str) -> None:
         self.payload = payload
         self.encoding = encoding
         self._text: str | None = None
         self.topic: str | None = None
-        """Where it comes from, on a transport that carries messages."""
+        """Source topic, on a transport that carries messages."""
         self.attributes: Mapping[str, object] = NOTHING
-        """Of the envelope that brought it: status, headers."""
-        # The fault is set when there is one: a line makes thousands of frames a second.
+        """Attributes of the envelope that contained it: status, headers."""
+        # `fault` stays unset until needed, because a connection makes thousands of frames per
+        # second.
 
     @property
     def text(self) -> str:
-        """The frame as text; raise `BadText` when it is none."""
+        """The frame as text; raises `BadText` when it is not text."""
         text = self._text
         if text is None:
             text = self._text = self._decoded()
@@ -58,7 +59,7 @@ class Frame:
 
     def _decoded(self) -> str:
         if not isinstance(self.payload, bytes):
-            raise BadText("a message is no text")
+            raise BadText("a message without text")
         try:
             return self.payload.decode(self.encoding)
         except UnicodeDecodeError as error:
@@ -68,25 +69,25 @@ class Frame:
 
 
 class CodecContext(NamedTuple):
-    """What a reader or writer must know of its line."""
+    """Properties of the connection that readers and writers need."""
 
     encoding: str = "utf-8"
     settings: Mapping[str, object] = NOTHING
-    """Values of the profile's settings, for ``when`` and ``set``."""
+    """Values of the settings of the profile, for ``when`` and ``set``."""
     fresh: Fresh = FIXED
-    """What is new in each frame that is written."""
+    """Sources of times and nonces for written frames."""
     is_compiled: bool = False
-    """Whether to compile functions of messages and commands, which pays in live sessions only."""
+    """Whether to generate functions for messages and commands, worthwhile only in live sessions."""
 
 
 class Reader(Protocol):
-    """Tells what is in a frame."""
+    """Reads the fields of a frame."""
 
     def read(self, frame: Frame) -> Mapping[str, object] | None:
-        """Return the fields, or None when the frame is another one; may raise `BadText`."""
+        """Return the fields, or None for another kind of frame; may raise `BadText`."""
 
     def write(self, fields: Mapping[str, object]) -> Payload:
-        """Return a frame that would be read as `fields`; raise `NotWritable` when none would."""
+        """Return a frame that reads as `fields`; raise `NotWritable` if there is no such frame."""
 
 
 class Writer(Protocol):
@@ -96,4 +97,4 @@ class Writer(Protocol):
         """Return the frame; raise `NotWritable` or `ExpressionError`."""
 
     def read(self, frame: Frame) -> Mapping[str, object] | None:
-        """Return the root names' values that give this frame, or None when none do."""
+        """Return the values of the root names that give this frame, or None if impossible."""

@@ -1,7 +1,4 @@
-"""Conditions of commands: what must hold before one is sent, and come true after it.
-
-Floor 3, pure.
-"""
+"""Conditions of commands: requirements before sending, and verification after the reply. Pure."""
 
 from collections.abc import Mapping
 from functools import partial
@@ -27,9 +24,9 @@ __all__ = [
 ]
 
 _MOST: Final = 256
-"""Commands that may wait at a time for something to come true."""
+"""Largest number of commands that await verification."""
 _BOTH: Final = 2
-"""People who must say yes where one is not enough."""
+"""People that the two-person rule asks for."""
 
 
 def why_not_allowed(
@@ -40,14 +37,14 @@ def why_not_allowed(
     *,
     stops: int | None = None,
 ) -> str:
-    """Return the first thing that a command requires and that does not hold, or "".
+    """Return the first unmet requirement of a command as text, or "".
 
     Args:
         command: as declared.
-        known: of the robot.
-        values: its arguments, checked.
+        known: state of the robot.
+        values: its checked arguments.
         now: the time.
-        stops: how often it had been stopped when this was asked for; None: that is now.
+        stops: number of stops when the command was requested; None: the request is new.
     """
     is_of_before = stops is not None and stops != known.stops
     if (known.latched or is_of_before) and command.moves_with(values):
@@ -62,7 +59,7 @@ def why_not_allowed(
 
 
 def questions(command: Command, values: Mapping[str, object]) -> tuple[Confirm, ...]:
-    """Return what people are asked before `command` is sent with these arguments.
+    """Return the confirmation questions of `command` with these arguments.
 
     Args:
         command: as declared.
@@ -80,7 +77,7 @@ def questions(command: Command, values: Mapping[str, object]) -> tuple[Confirm, 
 
 
 def is_guarded(command: Command) -> bool:
-    """Return whether `why_refused` may ever refuse it."""
+    """Return whether `why_refused` can ever refuse the command."""
     asked = [one for argument in command.arguments.values() for one in argument.confirm.values()]
     asked += [] if command.confirm is None else [command.confirm]
     return command.moves or bool(command.requires) or any(one.is_two_person for one in asked)
@@ -93,7 +90,7 @@ def why_refused(
     confirmed_by: tuple[str, ...],
     now: float,
 ) -> Outcome | None:
-    """Return why a command is not sent: what it requires, or who has not said yes to it."""
+    """Return why a command is not sent: an unmet requirement or a missing confirmation."""
     why_not = why_not_allowed(command, known, values, now)
     if why_not:
         return Outcome("not-allowed", why_not)
@@ -114,19 +111,19 @@ def exchange_of(
     known: Known,
     verifications: "Verifications",
 ) -> Exchange:
-    """Return one run of a command, to be submitted to its line.
+    """Return one run of a command, ready for the queue of its transport.
 
     Args:
-        command: no sequence.
-        ask: what it asks.
-        values: its arguments, checked.
-        sink: takes the outcome.
+        command: a command that is no sequence.
+        ask: its compiled request.
+        values: its checked arguments.
+        sink: receives the outcome.
         now: the time.
-        known: of the robot.
-        verifications: takes it when it is to come true after its answer.
+        known: state of the robot.
+        verifications: receives the run if the command is verified after the reply.
 
     Raises:
-        BadArgument: it cannot be written with these arguments.
+        BadArgument: the frame cannot be written with these arguments.
     """
     names = values if ask.is_local else {**known.names, **values}
     exchange = Exchange(
@@ -146,7 +143,7 @@ def exchange_of(
 
 
 def _written(value: object) -> str:
-    """Return a value as a document writes it as a key."""
+    """Return a value in the form of a document key."""
     if isinstance(value, bool):
         return "true" if value else "false"
     return f"{value:g}" if isinstance(value, float) else str(value)
@@ -160,13 +157,13 @@ class _Waiting(NamedTuple):
 
 
 class Verifications:
-    """Commands that are answered, and wait for what they say to come true."""
+    """Commands that have their reply and await their verification."""
 
     def __init__(self, known: Known) -> None:
         self._known = known
         self._waiting: list[_Waiting] = []
         self.has_news = False
-        """A reading came in, so it is worth to look."""
+        """Whether a new sample justifies another check."""
 
     @property
     def is_waiting(self) -> bool:
@@ -175,23 +172,23 @@ class Verifications:
 
     @property
     def is_full(self) -> bool:
-        """Whether no more may wait."""
+        """Whether no further verification can be added."""
         return len(self._waiting) >= _MOST
 
     @property
     def deadline(self) -> float | None:
-        """When the first of them has failed."""
+        """Time of the first timeout."""
         return min((one.due for one in self._waiting), default=None)
 
     def add(self, run: "CommandRun", outcome: Outcome, since: float, now: float) -> None:
-        """Wait for `run` to come true by readings made `since` it was sent."""
+        """Wait for samples after `since`, the time of sending, to verify `run`."""
         if run.verify is not None:
             due = now + run.verify.within_s
             self._waiting.append(_Waiting(run, since, due, outcome))
             self.has_news = True
 
     def look(self, now: float) -> list[LineEvent]:
-        """Return what to tell of those that have come true."""
+        """Return the events of the verified commands."""
         events: list[LineEvent] = []
         if not self.has_news:
             return events
@@ -206,7 +203,7 @@ class Verifications:
         return events
 
     def tick(self, now: float) -> list[LineEvent]:
-        """Return what to tell of those whose time is over."""
+        """Return the events of the verifications that have timed out."""
         events = self.look(now)
         for one in tuple(self._waiting):
             if one.due <= now and one.run.verify is not None:
@@ -218,12 +215,12 @@ class Verifications:
 
 
 class Plain:
-    """One run of a command that nothing verifies."""
+    """One run of a command without verification."""
 
     __slots__ = ("_sink",)
 
     def __init__(self, sink: Sink) -> None:
-        """Prepare; `sink` takes the outcome."""
+        """Initialise with `sink`, which receives the outcome."""
         self._sink = sink
 
     def ended(self, exchange: Exchange, outcome: Outcome, now: float) -> list[LineEvent]:
@@ -232,7 +229,7 @@ class Plain:
 
 
 class CommandRun:
-    """One run of a command that is verified."""
+    """One run of a command with verification."""
 
     __slots__ = ("_verifications", "sink", "values", "verify")
 
@@ -243,14 +240,14 @@ class CommandRun:
         sink: Sink,
         verifications: Verifications,
     ) -> None:
-        """Prepare; `sink` takes the outcome once it has been answered, and verified."""
+        """Initialise with `sink`, which receives the outcome after reply and verification."""
         self.verify = verify
         self.values = values
         self.sink = sink
         self._verifications = verifications
 
     def ended(self, exchange: Exchange, outcome: Outcome, now: float) -> list[LineEvent]:
-        """Tell the outcome, or wait for it to come true."""
+        """Deliver the outcome of a failure; otherwise wait for the verification."""
         if outcome.code or self.verify is None:
             return self.sink(outcome, now)
         self._verifications.add(self, outcome, exchange.sent_at, now)

@@ -1,6 +1,6 @@
-"""The connection of one transport: when it is up, when it is usable, and what ends with it.
+"""State of the connection of one transport: opening, readiness, and closing.
 
-Floor 3, pure. See `urc.protocol.line` for the theory of operation.
+Pure. See `urc.protocol.line` for the theory of operation.
 """
 
 from collections.abc import Callable
@@ -22,41 +22,41 @@ __all__ = ["Connection"]
 
 
 class Connection:
-    """What a line is made of, and what becomes of it when the transport comes and goes."""
+    """The parts of a conversation, and their handling of an opened or closed transport."""
 
     def __init__(self, spec: TransportSpec, messages: list[Matcher]) -> None:
         self.spec = spec
         self.is_per_request = spec.connection == "per_request"
-        """Whether each request brings its own connection."""
+        """Whether each request opens its own connection."""
         self.framing: Framing = build_framing(spec.framing)
         self.state: Literal["closed", "opening", "open"] = "closed"
         self.is_ready = False
-        """Whether anybody may talk here; else only those who make it so, or say good-bye."""
+        """Whether all requests may be sent; otherwise only those of the login and of the close."""
         self.last_sent = float("-inf")
-        """When something was last sent that counts."""
+        """Time of the last sent frame that resets the watchdog of the robot."""
         self.counting: frozenset[str] | None = None
-        """Names of requests that count as a word to the robot; None: all do."""
+        """Labels of requests that reset the watchdog of the robot; None: all."""
         self.counters = Counters()
         self.learnt: dict[str, object] = {}
-        """What the steps of this connection have read: ``_name`` → value."""
+        """Names read by the steps of this connection: ``_name`` → value."""
         self.on_ready: Callable[[], None] | None = None
-        """Called when anybody may talk here; must not call the line back."""
+        """Called when the connection is ready; must not call the conversation back."""
         self.on_refused: Callable[[str, str], None] | None = None
-        """Told a held command and why the robot refuses it; must not call the line back."""
+        """Called with a held command and the refusal of the robot; must not call back."""
         self._flights = Flights()
         self._outbox = Outbox(spec, self._flights, self._size_of)
         self.inbox = Inbox(spec, self.framing, messages)
         self.held = HeldReplies()
-        """Of the commands that move the robot for as long as they are held."""
+        """Replies to hold-to-run commands."""
         self.is_behind = False
-        """Whether something that came in waits for `go_on`."""
+        """Whether received frames wait for `go_on`."""
         self._askers: dict[object, object] = {}
-        """Numbers of requests that steps have made → who expects the answer, if anybody."""
+        """Numbers of requests made by steps → owner of the expected reply, if any."""
         self._is_leaving = False
         self._misses = 0
-        """Answers in a row that did not come."""
+        """Missing replies in a row."""
         self._silent_at: float | None = None
-        """When the line has said nothing for too long."""
+        """Time at which the connection counts as stale."""
 
     @property
     def is_open(self) -> bool:
@@ -65,12 +65,14 @@ class Connection:
 
     @property
     def is_silent(self) -> bool:
-        """Whether the robot has said nothing for longer than `stale_after` allows."""
+        """Whether the robot has been silent for longer than `stale_after`."""
         return self.is_open and self.spec.stale_after_s is not None and self._silent_at is None
 
     def opened(self, now: float) -> list[LineEvent]:
-        """Take note that the transport is connected, with nothing received on it yet."""
-        events = self._lose("the line was connected anew") if self.state == "open" else []
+        """Record a new connection, on which nothing has been received yet."""
+        events = (
+            self._lose("the connection was replaced by a new one") if self.state == "open" else []
+        )
         self._reset("open")
         self.last_sent = now
         self._hear(now)
@@ -79,7 +81,7 @@ class Connection:
         return events + self._pump(now)
 
     def ready(self, now: float) -> list[LineEvent]:
-        """Let everybody talk: the connection is as it must be."""
+        """Allow all requests: the login is complete."""
         self._get_ready()
         return [Ready(self.spec.name), *self._pump(now)]
 
@@ -89,7 +91,7 @@ class Connection:
             self.on_ready()
 
     def closed(self, reason: str, now: float) -> list[LineEvent]:
-        """Take note that the transport is not connected (any more)."""
+        """Record that the transport is not connected."""
         if self.state == "closed":
             return []
         events: list[LineEvent] = []
@@ -97,11 +99,11 @@ class Connection:
         if was_open and pending:
             text = f"the connection ended in the middle of a frame ({pending} bytes)"
             events.append(Fault(self.spec.name, "cut-frame", text))
-        events += self._lose(reason or "the robot hung up")
+        events += self._lose(reason or "the robot closed the connection")
         return events + self._pump(now)
 
     def give_up(self, reason: str, now: float) -> list[LineEvent]:
-        """Close the connection for a reason; what waits for it fails."""
+        """Close the connection for a reason; its requests fail."""
         if self.state == "closed":
             return []
         reason = self.inbox.secrets.hide(reason)
@@ -110,22 +112,22 @@ class Connection:
         return events + self._pump(now)
 
     def leave(self, now: float) -> list[LineEvent]:
-        """Begin to close in good order: say good-bye where that is declared, else close at once."""
+        """Begin an orderly close: run ``on_close`` if declared, otherwise close at once."""
         if self.state != "open":
             return []
         if self.spec.on_close:
             lost = self._lost()
             self.is_ready, self._is_leaving = False, True
-            return [*_disconnected(lost, "the line is being closed"), Leaving(self.spec.name)]
+            return [*_disconnected(lost, "the connection is being closed"), Leaving(self.spec.name)]
         return self.shut(now)
 
     def shut(self, now: float) -> list[LineEvent]:
-        """Close after the good-bye."""
-        events = self._lose("the line was closed")
+        """Close after the steps of ``on_close``."""
+        events = self._lose("the connection was closed")
         return [*events, Close(self.spec.name), *self._pump(now)]
 
     def _lose(self, reason: str) -> list[LineEvent]:
-        """Forget the connection; fail what it was for."""
+        """Discard the connection, and fail its requests."""
         lost = self._lost()
         for exchange in tuple(self._outbox):
             if exchange.is_privileged:
@@ -134,12 +136,12 @@ class Connection:
         return _disconnected(lost, self.inbox.secrets.hide(reason))
 
     def _lost(self) -> list[Exchange]:
-        """Take out the requests that end with this connection."""
+        """Remove the requests that end with this connection, and return them."""
         lost = self._flights.drain()
         if not self.is_per_request:
             return lost + self._outbox.drain()
         if not (self.is_ready or self._is_leaving):
-            for exchange in list(self._outbox)[:1]:  # it could not be made usable for this one
+            for exchange in list(self._outbox)[:1]:  # its connection did not become ready
                 self._outbox.remove(exchange)
                 lost.append(exchange)
         return lost
@@ -163,11 +165,11 @@ class Connection:
             self._silent_at = now + self.spec.stale_after_s
 
     def _size_of(self, exchange: Exchange) -> int:
-        """Return how many bytes a request takes on the wire."""
+        """Return the size of a request on the wire, in bytes."""
         raise NotImplementedError
 
     def _pump(self, now: float) -> list[LineEvent]:
-        """Do what a change of the connection allows or asks for."""
+        """Send and open as far as the new state of the connection allows."""
         raise NotImplementedError
 
 

@@ -1,7 +1,7 @@
-"""Conversions: from what a robot says to what it means, and back for the emulated robot.
+"""Conversions of raw values to values, and back for the emulated robot.
 
-Floor 3, pure. A conversion is a chain of small functions, made once when an engine is built. Each
-takes a raw value and returns the next one; None means "not available" and ends the chain.
+Pure. A conversion is a chain of small functions, built once for each engine. Each takes a raw value
+and returns the next one; None means "not available" and ends the chain.
 """
 
 import math
@@ -28,17 +28,17 @@ __all__ = [
 Step = Callable[[object], object]
 
 _LARGEST: Final = sys.float_info.max
-"""Whole numbers beyond it cannot be computed with."""
+"""Largest magnitude of whole numbers in conversions."""
 _DIGITS: Final = "0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZ"
 _ALL_ONES: Final = frozenset((1 << 8 * size) - 1 for size in range(1, 9))
 
 
 class BadValue(ValueError):
-    """A raw value that means nothing; the message says what was found and expected."""
+    """An invalid raw value; the message gives the found and the expected value."""
 
 
 class Unusable:
-    """Stands for a field that could not be converted; whoever needs it says why."""
+    """A marker for a field that could not be converted; its user reports the reason."""
 
     __slots__ = ("why",)
 
@@ -50,7 +50,7 @@ class Unusable:
 
 
 def build_conversion(conversion: Conversion) -> Step | None:
-    """Return the function from a raw value to a converted one, or None when there is none.
+    """Return the function from a raw value to a converted one, or None for no conversion.
 
     The function raises `BadValue`.
     """
@@ -69,9 +69,9 @@ def build_conversion(conversion: Conversion) -> Step | None:
 
 
 def build_inverse(conversion: Conversion) -> Step | None:
-    """Return the function from a converted value to a raw one, or None when there is none.
+    """Return the function from a converted value to a raw one, or None for no conversion.
 
-    The function raises `BadValue` for a value that no raw one gives.
+    The function raises `BadValue` for a value without a raw counterpart.
     """
     steps: list[Step] = []
     if conversion.states:
@@ -96,7 +96,7 @@ def build_inverse(conversion: Conversion) -> Step | None:
 
 
 def whole_of(raw: object) -> int:
-    """Return a raw value as a whole number; raise `BadValue` when it is none."""
+    """Return a raw value as a whole number; raise `BadValue` for any other value."""
     if isinstance(raw, int) and not isinstance(raw, bool):
         return raw
     if isinstance(raw, float) and raw.is_integer():
@@ -110,7 +110,7 @@ def whole_of(raw: object) -> int:
 
 
 def number_of(raw: object) -> float:
-    """Return a raw value as a number; raise `BadValue` when it is none."""
+    """Return a raw value as a number; raise `BadValue` for any other value."""
     if isinstance(raw, float):
         return raw
     if isinstance(raw, int) and not isinstance(raw, bool) and -_LARGEST <= raw <= _LARGEST:
@@ -124,7 +124,7 @@ def number_of(raw: object) -> float:
 
 
 def spelt(raw: object) -> str:
-    """Return a raw value as it is written in documents: ``true``, ``3``, ``2.5``."""
+    """Return a raw value as documents write it: ``true``, ``3``, ``2.5``."""
     if isinstance(raw, bool):
         return "true" if raw else "false"
     if isinstance(raw, float) and raw.is_integer():
@@ -133,7 +133,7 @@ def spelt(raw: object) -> str:
 
 
 def _is_plain(text: str) -> bool:
-    """Python's int and float take '1_0' and other scripts' digits, which no robot means."""
+    """Return whether a number is plain ASCII; Python also accepts '1_0' and foreign digits."""
     return text.isascii() and "_" not in text
 
 
@@ -183,7 +183,7 @@ def _to_base(base: int) -> Step:
 
 
 def _absent(values: tuple[Value, ...]) -> Step:
-    """Return the step that gives None for each of `values`, and for the numbers some words name."""
+    """Return the step that gives None for each of `values`, including named special numbers."""
     texts = {value for value in values if isinstance(value, str)}
     booleans = {value for value in values if isinstance(value, bool)}
     numbers = {
@@ -236,7 +236,7 @@ def _polynomial(coefficients: tuple[float, ...]) -> Step:
 def _line(offset: float, scale: float) -> Step:
     divisor = divisor_of(scale)
     if divisor:
-        # Adding before dividing keeps what decimals mean: (2512 - 4000) / 100 is -14.88 exactly.
+        # Adding before dividing keeps decimals exact: (2512 - 4000) / 100 is -14.88.
         shift = _tidy(offset * divisor)
         if isinstance(shift, int):
             return lambda raw: (number_of(raw) + shift) / divisor
@@ -247,7 +247,7 @@ def _line(offset: float, scale: float) -> Step:
 
 
 def divisor_of(scale: float) -> int:
-    """Return n when `scale` is 1/n, else 0: 3 / 10 is 0.3 to the last digit, 3 * 0.1 is not."""
+    """Return n when `scale` is 1/n, else 0: 3 / 10 is exactly 0.3, but 3 * 0.1 is not."""
     if not 0 < abs(scale) < 1:
         return 0
     divisor = round(1 / scale)
@@ -258,7 +258,7 @@ def _line_back(coefficients: tuple[float, ...]) -> Step:
     if len(coefficients) != 2 or not coefficients[1]:
 
         def refuse(value: object) -> object:
-            raise BadValue("only a scale and an offset can be turned round")
+            raise BadValue("only a scale and an offset can be inverted")
 
         return refuse
     offset, scale = coefficients
@@ -275,7 +275,7 @@ def _line_back(coefficients: tuple[float, ...]) -> Step:
 
 
 def _tidy(number: float) -> float:
-    """Return the whole number that `number` is but for rounding, else `number`."""
+    """Return the nearest whole number if `number` differs only by rounding, else `number`."""
     if not math.isfinite(number):
         return number
     nearest = round(number)
@@ -294,7 +294,7 @@ def _on_points(points: tuple[tuple[float, float], ...]) -> Step:
     def convert(raw: object) -> object:
         number = number_of(raw)
         if not rising:
-            raise BadValue("points that turn back cannot be turned round")
+            raise BadValue("non-monotonic points cannot be inverted")
         if number != number:
             return None
         if number <= places[0]:
@@ -315,7 +315,7 @@ def _words(states: tuple[tuple[str, str], ...]) -> Step:
     def convert(raw: object) -> object:
         word = words.get(spelt(raw))
         if word is None:
-            raise BadValue(f"{quoted(raw)} is none of the states {known}")
+            raise BadValue(f"{quoted(raw)} is not one of the states {known}")
         return word
 
     return convert
@@ -327,8 +327,8 @@ def _words_back(states: tuple[tuple[str, str], ...]) -> Step:
     def convert(value: object) -> object:
         raw = raws.get(value) if isinstance(value, str) else None
         if raw is None:
-            raise BadValue(f"{quoted(value)} is none of the states {', '.join(raws)}")
-        # A binary frame wants the number, and in text it reads the same.
+            raise BadValue(f"{quoted(value)} is not one of the states {', '.join(raws)}")
+        # A binary frame needs the number; in text, both forms are the same.
         return int(raw) if raw.isdecimal() and str(int(raw)) == raw else raw
 
     return convert

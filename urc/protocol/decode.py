@@ -1,8 +1,7 @@
-"""Raw fields of a frame → typed values.
+"""Decoding of raw fields into typed values.
 
-Floor 3, pure. Converters are made once per signal, when an engine is built; a value that is not of
-the declared type or range is a fault to be counted, never a reading: a wrong number on the screen
-is worse than an old one.
+Pure. Each engine builds the converters once per signal. A value of the wrong type or range is a
+counted violation and never a sample: a wrong number on the screen is worse than an old one.
 """
 
 import math
@@ -45,7 +44,7 @@ def build_converter(signal: Signal) -> Convert:
 def build_raw(signal: Signal) -> Callable[[object], object]:
     """Return the function from a value of `signal` back to a raw field, for the emulated robot.
 
-    The function raises `BadValue` for a value that no raw one gives.
+    The function raises `BadValue` for a value without a raw counterpart.
     """
     conversion = signal.conversion._replace(states=signal.states or signal.conversion.states)
     back = build_inverse(conversion)
@@ -68,7 +67,7 @@ def _usable(convert: Callable[[object], Reading]) -> Convert:
 
 
 def _element_converter(signal: Signal) -> Callable[[object], Value]:
-    """Return the function for one value, or for one element of an array."""
+    """Return the function for a single value, or for one element of an array."""
     kind = signal.of if signal.type == "array" else signal.type
     conversion = build_conversion(signal.conversion)
     typed = _typed_converter(signal, kind, rounds=bool(conversion))
@@ -84,7 +83,7 @@ def _typed_converter(
         states = dict(signal.states)
         word_of = _states_converter(states, is_number=kind in ("integer", "number"))
         if kind == "boolean" and _BOTH.issuperset(states.values()):
-            return lambda raw: _to_boolean(word_of(raw))  # the robot's own words for yes and no
+            return lambda raw: _to_boolean(word_of(raw))  # words of the robot for true and false
         return word_of
     if kind == "string":
         return _to_string
@@ -103,14 +102,14 @@ def _states_converter(states: Mapping[str, str], *, is_number: bool) -> Callable
         if word is None and is_number and isinstance(raw, str):
             word = states.get(_as_number(raw))
         if word is None:
-            raise BadValue(f"{quoted(raw)} is none of the states {known}")
+            raise BadValue(f"{quoted(raw)} is not one of the states {known}")
         return word
 
     return convert
 
 
 def _as_number(text: str) -> str:
-    """Return ``03`` as ``3``: a robot may pad its numbers, and a document does not."""
+    """Return ``03`` as ``3``: robots may pad numbers, documents do not."""
     try:
         return spelt(number_of(text))
     except BadValue:
@@ -122,7 +121,7 @@ def _to_string(raw: object) -> Value:
         return raw
     if isinstance(raw, (bool, int, float)):
         return spelt(raw)
-    raise BadValue(f"{quoted(raw)} is no text")
+    raise BadValue(f"{quoted(raw)} is not text")
 
 
 def _to_boolean(raw: object) -> Value:

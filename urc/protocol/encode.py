@@ -1,7 +1,6 @@
-"""Arguments of a command → checked values → bytes of one frame.
+"""Encoding of command arguments: checked values, then the bytes of one frame.
 
-Floor 3, pure. Checks stand here, on the server side of everything: a browser, a script and a test
-go through the same door.
+Pure. The server checks all arguments here, for browsers, scripts and tests alike.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -22,11 +21,11 @@ Encode = Callable[[Mapping[str, object]], Payload]
 """Namespace → bytes on the wire, framing included, or an envelope. Raises `BadArgument`."""
 
 _LARGEST = 1e308
-"""Not-a-number and infinity fail the comparison with it."""
+"""Bound for finite values; not-a-number and infinity fail the comparison."""
 
 
 class BadArgument(UrcError):
-    """A command that cannot be sent as asked; the message names the argument."""
+    """An invalid command argument; the message names it."""
 
 
 def build_encode(
@@ -35,9 +34,9 @@ def build_encode(
     context: CodecContext,
     arguments: Mapping[str, Argument] = NOTHING,
 ) -> Encode:
-    """Return the function that writes `send` and frames it; constants are made once.
+    """Return the function that writes and frames `send`; constant frames are made once.
 
-    Several frames are one piece of the stream: none goes out without the others.
+    Several frames are sent as one piece, so that none is sent alone.
     """
     if send.form == "frames":
         return _together([build_encode(one, framing, context, arguments) for one in each_of(send)])
@@ -84,7 +83,7 @@ def build_check(
 
 
 def check_arguments(command: Command, given: Mapping[str, object]) -> dict[str, Reading]:
-    """Return the arguments with defaults filled in, or raise `BadArgument` for the first fault."""
+    """Return the arguments with defaults filled in; raise `BadArgument` for an invalid one."""
     for name in given:
         if name not in command.arguments:
             known = ", ".join(command.arguments) or "none"
@@ -105,14 +104,14 @@ def _checked(argument: Argument, value: object) -> Reading:
 
 
 def _elements(argument: Argument, value: object) -> tuple[Value, ...]:
-    """Return the elements of an array, each checked as a value of its own."""
+    """Return the elements of an array, each checked as a single value."""
     name, wanted = argument.name, argument.size
     if not isinstance(value, (list, tuple)):
-        raise BadArgument(f"{name}: a list is expected, found {quoted(value)}")
+        raise BadArgument(f"{name}: expected a list, found {quoted(value)}")
     if wanted is not None and len(value) != wanted:
-        raise BadArgument(f"{name}: {wanted} elements are expected, found {len(value)}")
+        raise BadArgument(f"{name}: expected {wanted} elements, found {len(value)}")
     if len(value) > MOST_ELEMENTS:
-        raise BadArgument(f"{name}: {MOST_ELEMENTS} elements are the most, found {len(value)}")
+        raise BadArgument(f"{name}: expected at most {MOST_ELEMENTS} elements, found {len(value)}")
     return tuple(
         _one(argument._replace(name=f"{name}[{place}]", type=argument.of), element)
         for place, element in enumerate(value)
@@ -123,7 +122,7 @@ def _one(argument: Argument, value: object) -> Value:
     checked = _typed(argument, value)
     if argument.choices and checked not in argument.choices:
         choices = ", ".join(map(repr, argument.choices))
-        raise BadArgument(f"{argument.name}: {quoted(value)} is none of {choices}")
+        raise BadArgument(f"{argument.name}: {quoted(value)} is not one of {choices}")
     if isinstance(checked, (int, float)) and not isinstance(checked, bool):
         if argument.min is not None and checked < argument.min:
             raise BadArgument(f"{argument.name}: {checked} is below its minimum {argument.min}")
@@ -149,4 +148,4 @@ def _typed(argument: Argument, value: object) -> Value:
                     " the frame and start another"
                 )
             return value
-    raise BadArgument(f"{argument.name}: {argument.type} expected, found {quoted(value)}")
+    raise BadArgument(f"{argument.name}: expected {argument.type}, found {quoted(value)}")

@@ -1,23 +1,24 @@
 """The engine: the synchronous state machine of one driver.
 
-Floor 3, pure: no I/O, no clock, no callback, no task. Whoever owns a transport tells the engine
-what happened and when, and performs the events that come back. The live robot, the documents' own
-tests, replay and the simulator all use this one engine.
+Pure: no I/O, no clock, no callbacks, no tasks. The owner of a transport reports events with their
+times, and performs the returned events. Live robots, document tests, playback and the simulator
+share this engine.
 
     events = engine.start("wire", now)            # the transport is connected
-    events = engine.receive("wire", data, now)    # bytes came in
-    events = engine.closed("wire", "why", now)    # it is not connected any more, or never was
-    events = engine.command(request, now)         # somebody wants something
+    events = engine.receive("wire", data, now)    # bytes were received
+    events = engine.closed("wire", "why", now)    # the transport is not connected
+    events = engine.command(request, now)         # a command was requested
     events = engine.tick(now)                     # `engine.deadline` has come
-    events = engine.finish(now)                   # say good-bye; each line ends with a `Close`
+    events = engine.finish(now)                   # close in order; each connection ends with a
+        `Close`
 
-A `Close` among the events means that the engine has forgotten that connection: close it, and do
-not report it by `closed`.
+A returned `Close` means that the engine has discarded that connection. Close it, and do not report
+it by `closed`.
 
-Theory of operation. Lines, polls, commands and sequences do not call each other: a line says that a
-request has `Ended`, that something was `Heard`, or that it is `Leaving`, as events inside the list
-that it returns. `_settle` takes these out, tells those concerned, and lets sequences go on, until
-nothing is left but what the outside must perform.
+Theory of operation. Conversations, polls, commands and sequences do not call each other. A
+conversation returns internal events in its list: a request has `Ended`, an expected frame was
+`Heard`, or the conversation is `Leaving`. `_settle` removes these events, informs the owners, and
+advances the sequences, until only events for the outside remain.
 """
 
 from collections.abc import Mapping, Sequence
@@ -68,18 +69,18 @@ __all__ = ["Engine"]
 
 
 _PLAIN = frozenset((Send, Fault, Open, Ready, Replied, Failed))
-"""Events that the engine itself does not act upon."""
+"""Events that the engine passes on without acting."""
 
 
 class Engine:
-    """One driver at work. Not safe to re-enter; every verb returns a list of events.
+    """A running driver. Not re-entrant; every method returns a list of events.
 
     Args:
-        driver: as loaded; its patterns and templates are compiled already.
+        driver: as loaded; its patterns and templates are already compiled.
         settings: value of every setting of the profile.
-        fresh: the time of day, and randomness, for what is sent; fixed ones for tests.
-        is_compiled: compile a function for each message and command. A live session gains by it;
-            the test of a document is over too soon.
+        fresh: sources of time and randomness for sent frames; fixed ones for tests.
+        is_compiled: generate a function for each message and command. Worthwhile in live sessions,
+            but not in short document tests.
 
     Raises:
         BadArgument: a constant frame contains its own delimiter, or cannot be encoded.
@@ -126,13 +127,13 @@ class Engine:
         self._is_begun = False
         self._is_timed = self._schedule.keeps_alive or self.readings.is_timed
         self._is_watched = needs_readings(driver)
-        """Whether anything asks what the newest readings are."""
+        """Whether any condition reads the latest samples."""
 
-    # -- the verbs
+    # -- methods
 
     @property
     def deadline(self) -> float | None:
-        """When `tick` must be called at the latest; minus infinity before the first call."""
+        """Latest time for the next `tick`; minus infinity before the first call."""
         if not self._is_begun:
             return float("-inf")
         first: float | None = None
@@ -152,13 +153,13 @@ class Engine:
 
     @property
     def calm_s(self) -> float:
-        """Nothing that comes in, and no command, makes a deadline that is nearer than this."""
+        """Minimum delay to any deadline that received data or a command may set, in seconds."""
         return self._calm_s
 
     def start(self, transport: str, now: float) -> list[Event]:
-        """Take note that `transport` is connected."""
+        """Record that `transport` is connected."""
         line = self.lines[transport]
-        self._down(line, "the line was connected anew")
+        self._down(line, "the connection was replaced by a new one")
         events = line.opened(now)
         greeting = self._greetings.get(transport)
         if greeting is None:
@@ -179,24 +180,24 @@ class Engine:
         return self._settle(events, now) + self._ask(now)
 
     def closed(self, transport: str, reason: str, now: float) -> list[Event]:
-        """Take note that `transport` is not connected any more, or could not be."""
+        """Record that `transport` is not connected, or that connecting failed."""
         line = self.lines[transport]
         events = line.closed(reason, now)
-        self._down(line, reason or "the robot hung up")
+        self._down(line, reason or "the robot closed the connection")
         return self._settle(events, now)
 
     def receive(self, transport: str, data: Payload, now: float) -> list[Event]:
-        """Take bytes or an envelope that came in on `transport`."""
+        """Process bytes or an envelope received on `transport`."""
         return self._settle(self.lines[transport].receive(data, now), now)
 
     def command(self, request: Request, now: float) -> list[Event]:
-        """Run a command: queued, sent, answered by exactly one `Replied` or `Failed`."""
+        """Run a command. Exactly one `Replied` or `Failed` reports its end."""
         asked, people = Asked(request), request.confirmed_by
         events = self.run(request.command, request.arguments, asked, now, confirmed_by=people)
         return self._settle(events, now)
 
     def tick(self, now: float) -> list[Event]:
-        """Do everything that is due at `now`."""
+        """Process all deadlines up to `now`."""
         if not self._is_begun:
             self._is_begun = True
             self._schedule.begin(now)
@@ -214,9 +215,9 @@ class Engine:
         return told + self._ask(now)
 
     def latch(self, reason: str, now: float) -> list[Event]:
-        """End every sequence, and begin nothing that moves by itself; "" lets it be begun again.
+        """End every sequence, and refuse autonomous motion; "" allows it again.
 
-        What makes a line usable goes on: without it no stop would reach the robot.
+        Login sequences continue: without them, no stop would reach the robot.
         """
         self.known.latch(reason)
         if not reason:
@@ -227,13 +228,13 @@ class Engine:
         return self._settle([], now)
 
     def finish(self, now: float) -> list[Event]:
-        """Close every line in good order: each ends with a `Close`, after `GOOD_BYE_S` at most."""
+        """Close every connection in order: each ends with a `Close`, after `GOOD_BYE_S` at most."""
         events: list[LineEvent] = []
         self._schedule.stop()
         for line in self.lines.values():
             if line.is_open and not line.is_per_request:
                 was_ready = line.is_ready
-                self._down(line, "the line is being closed")
+                self._down(line, "the connection is being closed")
                 events += line.leave(now) if was_ready else line.shut(now)
         return self._settle(events, now)
 
@@ -252,7 +253,7 @@ class Engine:
     ) -> list[LineEvent]:
         """Run a command or sequence; its outcome goes to `sink`, exactly once.
 
-        It is not sent any more once `unless` says why.
+        It is not sent once `unless` returns a reason.
         """
         found = self._commands.get(command)
         if found is None:
@@ -271,7 +272,7 @@ class Engine:
         if program is None:
             return self._send(found, values, sink, now, privileged_on, unless)
         if any(runner.program is program for runner in self._runners):
-            return sink(Outcome("at-work", f"{command} is at work already"), now)
+            return sink(Outcome("at-work", f"{command} is already running"), now)
         runner = Runner(self, program, sink, privileged_on, confirmed_by)
         runner.wait_for_logins(now)
         self._begin(runner)
@@ -287,7 +288,7 @@ class Engine:
         unless: Unless | None,
     ) -> list[LineEvent]:
         if command.verify is not None and self._verifications.is_full:
-            return sink(Outcome("queue-full", "too many commands wait to be verified"), now)
+            return sink(Outcome("queue-full", "too many commands await verification"), now)
         ask = self._asks[command.name]
         try:
             exchange = exchange_of(command, ask, values, sink, now, self.known, self._verifications)
@@ -302,10 +303,10 @@ class Engine:
         for line in self._all_lines:
             line.is_scripted = True
 
-    # -- what follows from what
+    # -- handling of internal events
 
     def _settle(self, events: list[LineEvent], now: float) -> list[Event]:
-        """Act upon the events meant for the engine; return those meant for the outside."""
+        """Act on the internal events; return the events for the outside."""
         told: list[Event] = []
         pending = events
         while True:
@@ -325,9 +326,9 @@ class Engine:
                 return told
 
     def _act(self, event: LineEvent, told: list[Event], now: float) -> None:
-        """Act upon one event; add what it means for the outside to `told`."""
+        """Act on one event; append the resulting outside events to `told`."""
         if type(event) in _PLAIN:
-            told.append(event)  # type: ignore[arg-type]  # these are for the outside
+            told.append(event)  # type: ignore[arg-type]  # events for the outside
         elif isinstance(event, Ended):
             exchange, outcome = event
             for one in exchange.owner.ended(exchange, outcome, now):
@@ -341,7 +342,7 @@ class Engine:
             if isinstance(event, Samples):
                 self._note_readings(event.samples, now)
             elif isinstance(event, Close):
-                self._down(self.lines[event.transport], event.reason or "the line was closed")
+                self._down(self.lines[event.transport], event.reason or "the connection was closed")
             told.append(event)
 
     def _note_readings(self, samples: Sequence[Sample], now: float) -> None:
@@ -352,7 +353,7 @@ class Engine:
                 runner.look(now)
 
     def _advance(self, now: float) -> list[LineEvent]:
-        """Let sequences do steps until they must wait."""
+        """Advance the sequences until all of them wait."""
         pending: list[LineEvent] = []
         for runner in tuple(self._runners):
             pending += runner.advance(now)
@@ -371,7 +372,7 @@ class Engine:
         self._begin(Runner(self, self._good_byes[name], said, name, ends_at=now + GOOD_BYE_S))
 
     def _down(self, line: Line, reason: str) -> None:
-        """Take note that a connection is over: nothing begun on it may go on upon the next one."""
+        """End everything that was started on a lost connection."""
         name = line.spec.name
         for runner in self._runners:
             uses = name in runner.program.transports and not line.is_per_request
@@ -380,7 +381,7 @@ class Engine:
         self._schedule.down(line)
 
     def _ask(self, now: float) -> list[Event]:
-        """Submit the polls that are due, and what keeps lines alive."""
+        """Submit the due polls and keepalives."""
         told: list[Event] = []
         for events in self._schedule.ask(self.run, now):
             told += self._settle(events, now)

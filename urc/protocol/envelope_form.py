@@ -1,7 +1,7 @@
-"""The forms of what goes over a transport that carries messages: publish, call, goal, request.
+"""The form of envelopes: publish, call, goal, request.
 
-Floor 3, pure. An envelope is an address (attributes) and a body. The body is written by one of the
-other forms; JSON stays data, because such transports have an encoding of their own.
+Pure. An envelope has an address (attributes) and a body. Another form writes the body. JSON stays
+data, because such transports have an encoding of their own.
 """
 
 from collections.abc import Callable, Mapping
@@ -91,13 +91,13 @@ _WRITTEN: Final[Mapping[str, Callable[[str, bool], str]]] = {
 
 
 _ADDRESS: Final = ("topic", "service", "action", "method", "path", "url", "query")
-"""What tells an envelope from another one; the rest says how it goes there."""
+"""Attributes that identify an envelope; all others are delivery options."""
 _TEXTS: Final = ("query", "headers")
 """Mappings whose values are text on the wire."""
 
 
 class EnvelopeWriter:
-    """Writes an envelope; reads one back into the values of the names in it."""
+    """Writes an envelope, or reads one back into the values of its names."""
 
     def __init__(self, spec: WriteSpec, context: CodecContext) -> None:
         self._verb = cast("str", spec.options["verb"])
@@ -125,13 +125,13 @@ class EnvelopeWriter:
         return Envelope(self._verb, attributes, self._body and self._body.write(namespace))
 
     def read(self, frame: Frame) -> Mapping[str, object] | None:
-        """Return the names' values, or None when the envelope is another one."""
+        """Return the values of the names, or None for another envelope."""
         envelope = frame.payload
         if not isinstance(envelope, Envelope) or envelope.verb != self._verb:
             return None
         found: dict[str, object] = {}
         for name in _ADDRESS:
-            # A robot that was sent a URL sees its path.
+            # The robot receives a URL as its path.
             value = envelope.attributes.get("path" if name == "url" else name)
             if name == "path" and name in self._places and isinstance(value, str):
                 value = unquote(value)
@@ -149,7 +149,7 @@ class EnvelopeWriter:
         return None if said is None else {**found, **said}
 
     def _is_here(self, tree: Any, value: Any, found: dict[str, object]) -> bool:
-        """Return whether `value` is what `tree` gives; the names in it are put into `found`."""
+        """Return whether `value` matches `tree`; add the values of its names to `found`."""
         if isinstance(tree, Mapping):
             if not isinstance(value, Mapping) or tree.keys() != value.keys():
                 return False

@@ -1,4 +1,4 @@
-"""The plain forms: ``equals``, one text; ``raw``, the whole frame; ``any``, whatever comes."""
+"""The plain forms: ``equals`` for one text, ``raw`` for the whole frame, ``any`` for any frame."""
 
 from collections.abc import Mapping
 from typing import cast
@@ -23,13 +23,13 @@ class SilenceReader:
 
 
 class EqualsReader:
-    """Takes exactly one frame."""
+    """Matches exactly one frame."""
 
     def __init__(self, spec: ReadSpec, context: CodecContext) -> None:
         self._payload = encoded(cast("str", spec.options["text"]), context.encoding)
 
     def read(self, frame: Frame) -> Mapping[str, object] | None:
-        """Return no fields for that frame, None for any other."""
+        """Return no fields for that frame, or None for any other."""
         return NOTHING if frame.payload == self._payload else None
 
     def write(self, fields: Mapping[str, object]) -> Payload:
@@ -38,10 +38,10 @@ class EqualsReader:
 
 
 class AnyReader:
-    """Takes every frame: the answer to a request of which nothing is wanted but that it came."""
+    """Matches every frame, for replies whose content is irrelevant."""
 
     def __init__(self, spec: ReadSpec, context: CodecContext) -> None:
-        """There is nothing to declare."""
+        """Ignore both arguments: the form has no options."""
 
     def read(self, frame: Frame) -> Mapping[str, object] | None:
         """Return no fields."""
@@ -53,19 +53,19 @@ class AnyReader:
 
 
 class RawReader:
-    """Takes every frame of bytes, as one field."""
+    """Reads every frame of bytes as one field."""
 
     def __init__(self, spec: ReadSpec, context: CodecContext) -> None:
         self._field = cast("str", spec.options["field"])
 
     def read(self, frame: Frame) -> Mapping[str, object] | None:
-        """Return the frame's bytes; None where a message carries none."""
+        """Return the bytes of the frame; None for a message without bytes."""
         payload = frame.payload
         return {self._field: payload} if isinstance(payload, bytes) else None
 
     def write(self, fields: Mapping[str, object]) -> Payload:
-        """Return the bytes of the field; raise `NotWritable` when it holds none."""
+        """Return the bytes of the field; raise `NotWritable` for any other value."""
         value = fields.get(self._field)
         if not isinstance(value, bytes):
-            raise NotWritable(f"{self._field}: bytes expected, found {quoted(value)}")
+            raise NotWritable(f"{self._field}: expected bytes, found {quoted(value)}")
         return value

@@ -1,4 +1,4 @@
-"""What an engine asks for and tells: the only way anything leaves it."""
+"""Input and output events of an engine: its only interface to the outside."""
 
 from collections.abc import Callable, Mapping
 from typing import NamedTuple
@@ -21,58 +21,58 @@ __all__ = [
 
 
 class Request(NamedTuple):
-    """One command to run. One id, one answer: `Replied` or `Failed`."""
+    """One command to run. Exactly one `Replied` or `Failed` answers its id."""
 
     id: int
     command: str
     arguments: Mapping[str, Reading] = NOTHING
     confirmed_by: tuple[str, ...] = ()
-    """Who said yes to the question before it, who asks for it among them."""
+    """People who have confirmed the command, including the person who requested it."""
     on_sent: Callable[[Payload], None] | None = None
-    """Told what goes out for it, each time; not what is secret, nor what a sequence sends."""
+    """Callback for each sent payload, except secret ones and those of sequences."""
 
 
 class Open(NamedTuple):
-    """Connect this transport: a request waits for it (``connection: per_request``)."""
+    """Connect this transport for a waiting request (``connection: per_request``)."""
 
     transport: str
 
 
 class Send(NamedTuple):
-    """Hand these bytes, framing included, or this envelope to the transport."""
+    """Send these bytes, framing included, or this envelope."""
 
     transport: str
     data: Payload
     is_secret: bool = False
-    """Its text must not be shown or logged."""
+    """Whether its text must not be shown or logged."""
     counted: Counted | None = None
-    """The same frame, where others send frames with counters on this connection, too."""
+    """The same frame with its counters, on a connection that the guard shares."""
 
 
 class Close(NamedTuple):
-    """Close this transport; the engine is done with it or gives it up."""
+    """Close this transport; the engine has discarded its connection."""
 
     transport: str
     reason: str = ""
-    """"" for the normal end of a per-request connection."""
+    """Reason of a failure; "" for the normal end of a per-request connection."""
 
 
 class Ready(NamedTuple):
-    """The steps of a connection are done: its login has succeeded, and anybody may talk."""
+    """The login has succeeded: all requests may be sent."""
 
     transport: str
 
 
 class Samples(NamedTuple):
-    """Readings out of frames that came in one go: in their order, each with what it computes."""
+    """Samples of frames received together, in order, each with its computed signals."""
 
     transport: str
-    """"" when no frame brought them: time alone began an alarm."""
+    """Name of the transport; "" when an alarm began without a frame."""
     samples: tuple[Sample, ...]
 
 
 class Replied(NamedTuple):
-    """The request is done. `values` are the reply's groups by name."""
+    """The request has succeeded. `values` are the fields of the reply by name."""
 
     id: int
     command: str
@@ -80,7 +80,7 @@ class Replied(NamedTuple):
 
 
 class Failed(NamedTuple):
-    """The request is over without success."""
+    """The request has ended without success."""
 
     id: int
     command: str
@@ -92,7 +92,7 @@ class Failed(NamedTuple):
 
 
 class Fault(NamedTuple):
-    """Something on the wire was not as declared: counted and shown, never raised."""
+    """A protocol violation on the wire: counted and shown, never raised."""
 
     transport: str
     code: str

@@ -1,7 +1,7 @@
-"""One request, from whoever asks to its outcome.
+"""One request, from its owner to its outcome.
 
-Floor 3, pure. An `Ask` is what can be asked, compiled once; an `Exchange` is one such request, from
-the queue to its end. What it waits for is an `urc.protocol.answer.Answer`.
+Pure. An `Ask` is a request, compiled once. An `Exchange` is one execution of it, from the queue to
+its end. `urc.protocol.answer.Answer` describes the expected reply.
 """
 
 import re
@@ -34,10 +34,10 @@ __all__ = [
 
 
 class Outcome(NamedTuple):
-    """How a request ended."""
+    """The result of a request."""
 
     code: str = ""
-    """"" when it is done; else as in `urc.protocol.events.Failed`."""
+    """"" on success; otherwise a code of `urc.protocol.events.Failed`."""
     message: str = ""
     values: Mapping[str, Reading] = NOTHING
 
@@ -45,60 +45,61 @@ class Outcome(NamedTuple):
 DONE: Final = Outcome()
 _MISSING: Final = re.compile(r"'[A-Za-z_][A-Za-z0-9_]*' has no value here")
 new = tuple.__new__
-"""Makes a named tuple without the detour through its class, where each command needs one."""
+"""Makes a named tuple faster than its class does; every command needs one."""
 
 
 def untold(error: Exception) -> str:
-    """Return why something secret is not sent, without what would show it."""
+    """Return why a secret frame is not sent, without revealing the secret."""
     text = str(error)
     if _MISSING.fullmatch(text):
-        return text  # the name of what is missing, and nothing else
-    return "it cannot be written; the reason is not shown, because it is secret"
+        return text  # only the name of a missing value, and no secret
+    return "it cannot be written; the reason is secret"
 
 
 class Ask(NamedTuple):
-    """What can be asked, compiled once."""
+    """A request, compiled once."""
 
     label: str
-    """For messages: ``polls.0`` or the command's name."""
+    """Label in messages: ``polls.0`` or the name of the command."""
     encode: Encode
     answers: tuple[Answer, ...] = ()
-    """One for each stage; () when nothing answers."""
+    """Expected reply of each stage; () without a reply."""
     match: Template | None = None
     framing: Framing | None = None
-    """Of its answers; None: the line's own."""
+    """Framing of its replies; None: that of the connection."""
     rank: int = 2
     is_latest_only: bool = False
     bucket: Bucket | None = None
     retries: int = 0
-    """How often it is sent again at most."""
+    """Largest number of retries."""
     is_repeated: bool = False
-    """It is sent again when no answer comes, not only when the robot asks for it."""
+    """Whether a missing reply causes a retry, not only a request by the robot."""
     retry: Retry = Retry()
-    """How long it waits before it is sent again."""
+    """Waits before the retries."""
     has_counters: bool = False
     is_motion: bool = False
-    """It moves the robot: it must not wait until the line is usable and take effect then."""
+    """Whether it moves the robot. It then fails on a connection that is not ready, instead of
+    waiting."""
     learnt: frozenset[str] = frozenset()
-    """Names in it that the login of the line has read."""
+    """Names in its templates that the login reads."""
     is_fresh: bool = False
-    """It has the time in it, or bytes that are never sent twice."""
+    """Whether it contains the time or a nonce."""
     is_local: bool = False
-    """Its templates use nothing but its arguments, and counters."""
+    """Whether its templates use only its arguments and counters."""
     queue_s: float = 0.0
-    """How long it may wait to be sent."""
+    """Longest time in the queue, in seconds."""
     plain: Matcher | None = None
-    """Reads its only answer, where that is nothing but readings."""
+    """Reader of its only reply, if that consists of samples alone."""
     is_miss_harmless: bool = False
-    """Its missing answers say nothing about the line: somebody else counts them."""
+    """Whether missing replies say nothing about the connection, because the poll counts them."""
     is_numbered: bool = False
-    """It is an envelope that carries a number, and so does its answer."""
+    """Whether it is an envelope with a number, which its reply repeats."""
 
     def made(self, names: Mapping[str, object]) -> Payload | None:
-        """Return what is sent, as far as it is known now; None where it is made when it is sent.
+        """Return the payload, or None if it is rendered when it is sent.
 
         Raises:
-            BadArgument: it cannot be written with these names.
+            BadArgument: the payload cannot be written with these names.
         """
         if self.learnt:
             return None
@@ -109,7 +110,7 @@ class Ask(NamedTuple):
 
     @property
     def is_in_order(self) -> bool:
-        """Whether nothing but the order of the answers tells which of them is its own."""
+        """Whether only the order of the replies identifies its own."""
         return self.match is None and not self.is_numbered
 
 
@@ -117,27 +118,28 @@ class Owner(Protocol):
     """Who asked."""
 
     def ended(self, exchange: "Exchange", outcome: Outcome, now: float) -> "list[LineEvent]":
-        """Take note of the outcome; return what to tell."""
+        """Record the outcome; return the resulting events."""
 
 
 class Exchange:
     """One request, from the queue to its outcome."""
 
-    # What hardly any request sets stands in the class: one is made for every command.
+    # Rarely set attributes are class attributes, because every command makes an instance.
     numbers: Mapping[str, int] = NOTHING
-    """Of the counters in it."""
+    """Counter → number in the last rendered frame."""
     is_privileged = False
-    """It belongs to what makes the line usable, or says good-bye."""
+    """Whether it belongs to the login or the close, and may be sent before the connection is
+    ready."""
     is_secret = False
-    """Its text must not appear in any message."""
+    """Whether its text must not appear in any message."""
     condition: Callable[[float], str] | None = None
-    """Asked again before it is sent: returns why not, or ""."""
+    """Check before sending: returns why the request is not allowed, or ""."""
     unless: Callable[[], str] | None = None
-    """Asked then as well: returns why nobody wants it any more, or ""."""
+    """Check before sending: returns why the request is obsolete, or ""."""
     waits_until = float("-inf")
-    """It is not sent again before."""
+    """Earliest time of a retry."""
     on_sent: Callable[[Payload], None] | None = None
-    """Told what is sent."""
+    """Callback for each sent payload."""
 
     def __init__(
         self,
@@ -150,14 +152,14 @@ class Exchange:
         self.ask = ask
         self.owner = owner
         self.namespace = namespace
-        """What its templates know; without counters."""
+        """Names of its templates, without counters."""
         self.data = data
         """None: `Ask.made` leaves it to the moment of sending."""
         self.gives_up_at = gives_up_at
-        """When it fails for having waited too long to be sent."""
+        """Time at which it fails in the queue."""
         self.tries_left = ask.retries
         self.sent_at = gives_up_at
-        """When it was last sent."""
+        """Time of the last transmission."""
 
     def mark(
         self,
@@ -168,7 +170,7 @@ class Exchange:
         on_sent: Callable[[Payload], None] | None = None,
         unless: Callable[[], str] | None = None,
     ) -> "Exchange":
-        """Say what is special about it, and return it."""
+        """Set the rare attributes, and return the exchange."""
         self.on_sent = on_sent
         self.is_privileged = is_privileged
         self.is_secret = is_secret
@@ -177,35 +179,35 @@ class Exchange:
         return self
 
     def why_not(self, now: float) -> str:
-        """Return why it is not sent any more, or ""."""
+        """Return why it is not sent, or ""."""
         unwanted = self.unless() if self.unless is not None else ""
         return unwanted or (self.condition(now) if self.condition is not None else "")
 
     @property
     def rank(self) -> int:
-        """The lower, the sooner it is sent."""
+        """Priority rank; lower ranks are sent first."""
         return self.ask.rank
 
     @property
     def latest_key(self) -> str:
-        """Its name, when a newer one takes its place."""
+        """Label, if a newer request replaces it in the queue; otherwise ""."""
         return self.ask.label if self.ask.is_latest_only else ""
 
     @property
     def is_realtime(self) -> bool:
-        """Whether it waits for nothing."""
+        """Whether it bypasses the queue."""
         return self.ask.rank == REALTIME
 
 
 class Ended(NamedTuple):
-    """Inside the engine: a request is over."""
+    """Internal event of the engine: a request has ended."""
 
     exchange: Exchange
     outcome: Outcome
 
 
 class Leaving(NamedTuple):
-    """Inside the engine: the line is done with its connection, and wants to say good-bye."""
+    """Internal event of the engine: the conversation starts the steps of its close."""
 
     transport: str
 
@@ -214,7 +216,7 @@ LineEvent = Event | Ended | Heard | Leaving
 
 
 class Asked:
-    """Whoever waits for the answer to a request: a sink, and the owner of a plain exchange."""
+    """The sink for the outcome of a request, and the owner of a plain exchange."""
 
     __slots__ = ("_request",)
 
@@ -222,7 +224,7 @@ class Asked:
         self._request = request
 
     def __call__(self, outcome: Outcome, now: float) -> list[LineEvent]:
-        """Return the one answer."""
+        """Return the event that ends the request."""
         number, command = self._request.id, self._request.command
         if outcome.code:
             return [Failed(number, command, outcome.code, outcome.message)]
@@ -230,14 +232,14 @@ class Asked:
 
     @property
     def on_sent(self) -> Callable[[Payload], None] | None:
-        """Whoever is to be told what is sent for it."""
+        """Callback for each sent payload."""
         return self._request.on_sent
 
     def ended(self, exchange: Exchange, outcome: Outcome, now: float) -> list[LineEvent]:
-        """Return the one answer."""
+        """Return the event that ends the request."""
         return self(outcome, now)
 
 
 def expires_at(ask: Ask, now: float) -> float:
-    """Return when a request that is asked now has waited too long to be sent."""
+    """Return the time at which a new request fails in the queue."""
     return now + ask.queue_s

@@ -1,8 +1,8 @@
-"""One function made for one command: arguments → bytes, as fast as a format string by hand.
+"""Generated encoders: one function per command, from arguments to bytes.
 
-Floor 3. The function takes the case that happens: every argument a number of its type. For anything
-else it calls the closures (`urc.protocol.encode`), which are also the oracle of its tests. What is
-not sums, products and ``fixed`` over numbers has no such function.
+The function handles the common case: every argument is a number of its type. All other cases go to
+the closures of `urc.protocol.encode`, which are also the oracle of its tests. Only sums, products
+and ``fixed`` over numbers are supported.
 """
 
 import ast
@@ -28,14 +28,14 @@ _OPERATORS: Final[Mapping[str, ast.operator]] = {
     "_div": ast.Div(),
 }
 _IN_NUMBERS: Final = frozenset(b"0123456789+-.einfa")
-"""Bytes that a number may be written with."""
+"""Bytes that a written number may contain."""
 _MOST_DIGITS: Final = 20
 _LARGEST: Final = 1e308
-"""As in `urc.protocol.encode`: not-a-number and infinity fail the comparison with it."""
+"""Bound for finite values, as in `urc.protocol.encode`."""
 
 
 class _Unsupported(Exception):
-    """Part of a template that has no translation here."""
+    """Part of a template without a translation."""
 
 
 def build_fast_encode(
@@ -45,7 +45,7 @@ def build_fast_encode(
     encoding: str,
     slow: Encode,
 ) -> Encode | None:
-    """Return namespace → bytes on the wire, or None where only `slow` can do it."""
+    """Return the function from namespace to bytes on the wire, or None if it is unsupported."""
     if type(framing) is not DelimiterFraming or framing.seal is not None:
         return None
     names = sorted(template.names)
@@ -73,7 +73,7 @@ def _text_of(
     tx: bytes,
     encoding: str,
 ) -> str | None:
-    """Return the format string of a frame as source text, or None where it needs more than that."""
+    """Return the format string of a frame as source text, or None if it is unsupported."""
     whole = frozenset(variables[name] for name, kind in kinds.items() if kind == "integer")
     try:
         pieces = _pieces(ast.parse(template.python, mode="eval").body, variables, whole)
@@ -86,7 +86,7 @@ def _text_of(
 
 
 def _written(checks: list[str], text: str, encoding: str) -> list[str]:
-    """Return the lines that write `text` where all of `checks` hold."""
+    """Return the lines that write `text` if all of `checks` hold."""
     return [
         f"    if {' and '.join(checks)}:",
         "        try:",
@@ -99,7 +99,7 @@ def _written(checks: list[str], text: str, encoding: str) -> list[str]:
 def build_fast_check(
     arguments: Mapping[str, Argument], slow: Callable[[Mapping[str, object]], dict[str, Reading]]
 ) -> Callable[[Mapping[str, object]], dict[str, Reading]]:
-    """Return the check of a command's arguments; `slow` where one is left out, or no number."""
+    """Return the check of the arguments; it calls `slow` for missing or non-numeric ones."""
     kinds = {one.type for one in arguments.values()}
     if not arguments or kinds - {"number", "integer"}:
         return slow
@@ -119,7 +119,7 @@ def build_fast_check(
 
 
 def _range(variable: str, argument: Argument) -> str:
-    """Return the check that a variable is a value of the argument."""
+    """Return the check that a variable is a valid value of the argument."""
     low = -_LARGEST if argument.min is None else argument.min
     high = _LARGEST if argument.max is None else argument.max
     whole = f"type({variable}) is int"
@@ -128,13 +128,13 @@ def _range(variable: str, argument: Argument) -> str:
 
 
 def _check(variable: str, kind: str) -> str:
-    # Larger whole numbers go the slow way, which bounds what they are computed to.
+    # Larger whole numbers go to the closures, which bound intermediate results.
     whole = f"type({variable}) is int and -4611686018427387904 < {variable} < 4611686018427387904"
     return f"({whole})" if kind == "integer" else f"(type({variable}) is float or {whole})"
 
 
 def _tail(pieces: list[ast.expr], tx: bytes, encoding: str) -> str:
-    """Return the delimiter as text of the frame, if nothing in the frame can look like it."""
+    """Return the delimiter as text, unless the content of the frame may contain it."""
     literals = [one.value for one in pieces if isinstance(one, ast.Constant)]
     texts = [text.encode(encoding) for text in literals if isinstance(text, str)]
     if any(tx and tx in text for text in texts) or not _IN_NUMBERS.isdisjoint(tx):
@@ -146,7 +146,7 @@ def _tail(pieces: list[ast.expr], tx: bytes, encoding: str) -> str:
 
 
 def _pieces(node: ast.expr, variables: Mapping[str, str], whole: frozenset[str]) -> list[ast.expr]:
-    """Return the parts of a format string: texts, and numbers put into them."""
+    """Return the parts of a format string: texts and inserted numbers."""
     if isinstance(node, ast.Constant) and isinstance(node.value, str):
         return [node]
     if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
@@ -166,7 +166,7 @@ def _pieces(node: ast.expr, variables: Mapping[str, str], whole: frozenset[str])
 
 
 def _number(node: ast.expr, variables: Mapping[str, str]) -> ast.expr:
-    """Return Python for a number: arguments, constants and their sums and products."""
+    """Return a Python expression for a number: arguments, constants, sums and products."""
     if isinstance(node, ast.Subscript) and isinstance(node.slice, ast.Constant):
         return ast.Name(variables[str(node.slice.value)])  # only `ns[NAME]` has this form
     if isinstance(node, ast.Constant) and type(node.value) in (int, float):

@@ -1,8 +1,7 @@
-"""One function made for one kind of JSON document: bytes → samples.
+"""Generated JSON decoders: one function per kind of document, from bytes to samples.
 
-Floor 3, pure. As in `urc.protocol.fast_read`, for documents in which every field is there and of
-its type; a second function, made for the same paths, takes those in which some are missing or null.
-What is neither is left to the closures.
+Pure. As in `urc.protocol.fast_read`, for documents with every field present and of its type. A
+second function for the same paths handles missing or null fields. The closures handle all others.
 """
 
 from collections.abc import Iterator, Mapping
@@ -22,14 +21,14 @@ __all__ = ["build_fast_json"]
 def build_fast_json(
     spec: ReadSpec, plan: Plan, readings: Readings, slow: Compiled
 ) -> Compiled | None:
-    """Return the function, or None where only `slow` can read these documents."""
+    """Return the function, or None if these documents are unsupported."""
     names = [name for name in spec.fields if not name.startswith("_")]
     values: dict[str, Value] = {}
     for name in names:
         value = value_of(readings.signals[name], "json", True)
         if value is None:
             return None
-        # The decoder takes no other number than a finite one, but a product may be infinite.
+        # The decoder accepts finite numbers only, but a product may be infinite.
         values[name] = value._replace(is_finite=value.is_finite or value.convert in ("", "{r}"))
     raws = {name: f"r{place}" for place, name in enumerate(names)}
     lines = ["    try:", "        v = decode(payload)", "    except Otherwise:"]
@@ -40,7 +39,7 @@ def build_fast_json(
     checks = [of_json_type(values[name].signal.type, raws[name]) for name in names]
     lines += [f"    if not ({' and '.join(checks or ['True'])}):"]
     lines += ["        return careful(v, frame, now)"]
-    # Another structure or no document at all: the closures know which.
+    # Another structure or an invalid document: the closures tell them apart.
     otherwise = (DecodeError, UnicodeError, RecursionError)
     scope = {
         "AttributeError": AttributeError,
@@ -54,7 +53,7 @@ def build_fast_json(
 
 
 def _picks(want: Want, plan: Plan, variable: str, raws: Mapping[str, str]) -> Iterator[str]:
-    """Yield what goes down to the fields, as if all were there."""
+    """Yield the lines that read the fields, assuming that all are present."""
     for field in want.fields:
         if field in raws:
             yield f"        {raws[field]} = {variable}"
@@ -71,7 +70,7 @@ def _careful(
     readings: Readings,
     slow: Compiled,
 ) -> object:
-    """Return what takes a decoded document in which fields are missing or null."""
+    """Return the function for a decoded document with missing or null fields."""
     lines = [f"    {raw} = UNSET" for raw in raws.values()]
     lines += plan.picking("v", lambda field: f"{raws[field]} = " if field in raws else "")
     scope: dict[str, object] = {

@@ -1,8 +1,8 @@
-"""One function made for one kind of frame: text → samples, without anything in between.
+"""Generated text decoders: one function per kind of frame, from text to samples.
 
-Floor 3. As in `urc.protocol.fast_encode`, the function takes the case that happens: every field
-there, a value of its signal, within its range. At anything else it turns to the closures (`slow`),
-which read the frame again; they are also the oracle of its tests.
+As in `urc.protocol.fast_encode`, the function handles the common case: every field is present and a
+valid value of its signal. In all other cases the closures (`slow`) read the frame again; they are
+also the oracle of its tests.
 """
 
 from typing import TYPE_CHECKING, Final, cast
@@ -20,13 +20,13 @@ if TYPE_CHECKING:
 __all__ = ["build_fast_read"]
 
 _KEEPS_ASCII: Final = frozenset(("utf-8", "ascii", "latin-1"))
-"""Encodings in which ASCII text has its own bytes."""
+"""Encodings that keep the bytes of ASCII text."""
 
 
 def build_fast_read(
     spec: ReadSpec, reader: Reader, readings: Readings, slow: Compiled, encoding: str = "utf-8"
 ) -> Compiled | None:
-    """Return the function for frames of `spec`, or None where only `slow` can read them."""
+    """Return the function for frames of `spec`, or None if they are unsupported."""
     if spec.conversions or spec.sets or spec.when or spec.lines or spec.collects:
         return None
     if spec.form == "regex":
@@ -49,9 +49,9 @@ def build_fast_read(
 
 
 def _head_check(prefix: str, encoding: str) -> list[str]:
-    """Return the lines that refuse most frames which do not begin with `prefix`.
+    """Return the lines that reject most frames with another beginning than `prefix`.
 
-    Blanks at the beginning may be skipped, and other encodings may fail: these frames are read.
+    Leading blanks may be skipped, and other encodings may fail: such frames are read in full.
     """
     if not prefix or encoding not in _KEEPS_ASCII:
         return []
@@ -98,7 +98,7 @@ def _of_regex(
 def _of_pattern(
     holes: tuple[Hole, ...], tail: str, encoding: str, readings: Readings, slow: Compiled
 ) -> Compiled | None:
-    """Return the function for a pattern whose words are either fields or literals."""
+    """Return the function for a pattern in which every word is a field or a literal."""
     words = _words(holes, tail)
     kinds = {word.kind for word in words or () if isinstance(word, Hole)}
     if words is None or "hex" in kinds or encoding not in _KEEPS_ASCII:
@@ -110,16 +110,16 @@ def _of_pattern(
         place: word.encode(encoding) for place, word in enumerate(words) if isinstance(word, str)
     }
     if "word" in kinds:
-        # Only what is kept as text must be made into text.
+        # Only fields that stay text need decoding.
         lines = [*head, "    if not payload.isascii():", "        return slow(frame, now)"]
         lines += ["    text = payload.decode()", "    parts = text.split(' ')"]
         literals = {place: word for place, word in enumerate(words) if isinstance(word, str)}
         checks[0] = "text.isprintable()"
     checks += [f"parts[{place}] == {word!r}" for place, word in literals.items()]
     if "integer" in kinds:
-        checks.append("len(payload) <= 400")  # as many digits as the pattern itself takes
+        checks.append("len(payload) <= 400")  # the limit of digits in a pattern
     if kinds - {"word"}:
-        checks.append("95 not in payload")  # an underscore, which only Python's numbers take
+        checks.append("95 not in payload")  # an underscore, which only Python accepts in numbers
     lines += [f"    if not ({' and '.join(checks)}):", "        return slow(frame, now)"]
     values: list[Value] = []
     raws: list[str] = []
@@ -139,7 +139,7 @@ def _of_pattern(
 
 
 def _words(holes: tuple[Hole, ...], tail: str) -> list[str | Hole] | None:
-    """Return the words of a pattern, or None when a field is only a part of one."""
+    """Return the words of a pattern, or None when a field is only part of a word."""
     words: list[str | Hole] = []
     for place, hole in enumerate(holes):
         before = hole.before.lstrip() if place == 0 else hole.before
@@ -154,5 +154,5 @@ def _words(holes: tuple[Hole, ...], tail: str) -> list[str | Hole] | None:
 
 
 def _skipped(kind: FieldKind, raw: str) -> str:
-    """Return what must be tried of a field that nobody wants, so that other frames are told."""
+    """Return the check of a skipped field, which rejects other kinds of frames."""
     return {"integer": f"int({raw})", "number": f"float({raw})"}.get(kind, f"{raw}[0]")

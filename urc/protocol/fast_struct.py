@@ -1,8 +1,7 @@
-"""One function made for one kind of binary frame: bytes → samples.
+"""Generated binary decoders: one function per kind of frame, from bytes to samples.
 
-Floor 3, pure. As in `urc.protocol.fast_read`: it takes the case that happens, and turns to the
-closures at anything else, such as a value that is not valid. Frames of which not every item has its
-fixed place have no such function.
+Pure. As in `urc.protocol.fast_read`, the function handles the common case, and the closures all
+others, such as invalid values. Only frames whose items all have fixed places are supported.
 """
 
 from typing import cast
@@ -22,7 +21,7 @@ __all__ = ["build_fast_struct"]
 def build_fast_struct(
     spec: ReadSpec, encoding: str, readings: Readings, slow: Compiled
 ) -> Compiled | None:
-    """Return the function for frames of `spec`, or None where only `slow` can read them."""
+    """Return the function for frames of `spec`, or None if they are unsupported."""
     items = cast("tuple[Item, ...]", spec.options["items"])
     source = Lines()
     source.scope |= {"not_valid": not_valid, "BadItem": BadItem}
@@ -58,7 +57,7 @@ def build_fast_struct(
 
 
 def _numbers(items: tuple[Item, ...]) -> list[Item]:
-    """Return the whole numbers of the outermost level that are nothing but scaled."""
+    """Return the integers of the outermost level without conversions other than a scale."""
     return [
         item
         for item in items
@@ -71,7 +70,7 @@ def _numbers(items: tuple[Item, ...]) -> list[Item]:
 
 
 def _is_sure(item: Item | None, value: Value) -> bool:
-    """Return whether the item can only be a finite number of the signal's type."""
+    """Return whether the item is always a finite number of the type of the signal."""
     if item is None:
         return False
     if value.signal.type == "number":

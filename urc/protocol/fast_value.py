@@ -1,8 +1,8 @@
-"""What the functions made for one kind of frame share: how a raw field becomes a sample.
+"""Shared parts of the generated decoders: the way from a raw field to a sample.
 
-Floor 3. Source text, put together once when an engine is built: the conversions of the fields,
-their checks, and the samples. At anything else than a value of its signal, within its range, the
-function turns to the closures (`Slow`), which read the frame again.
+Each engine assembles the source text once: the conversions of the fields, their checks, and the
+samples. For a value outside the type or range of its signal, the function calls the closures
+(`Slow`), which read the frame again.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -18,7 +18,7 @@ __all__ = ["Compiled", "Taken", "Value", "finish", "of_json_type", "value_of"]
 
 Taken = tuple[list[Sample], Sequence[str]]
 Compiled = Callable[[Frame, float], "Taken | None"]
-"""A frame and the time → samples and refused values, or None for another frame."""
+"""Frame and time → samples and refused values, or None for another kind of frame."""
 
 _BEGIN: Final = (
     "    payload = frame.payload",
@@ -35,26 +35,26 @@ _JSON_TYPES: Final = {
 
 
 class Value(NamedTuple):
-    """How one field becomes a sample, in source text."""
+    """The conversion of one field to a sample, in source text."""
 
     signal: Signal
     convert: str
     """Expression over the raw text; "" for text as it is."""
     checks: tuple[str, ...]
-    """What must hold of the value, over ``{v}``."""
+    """Checks of the value, over ``{v}``."""
     raw_checks: tuple[str, ...] = ()
-    """What must hold of the raw text, over ``{r}``."""
+    """Checks of the raw text, over ``{r}``."""
     is_finite: bool = True
-    """Whether `checks` refuse what is infinite or no number."""
+    """Whether `checks` reject infinity and not-a-number."""
 
 
 def of_json_type(type_name: str, raw: str) -> str:
-    """Return the check that a raw value is one of the type, and no larger than it may be."""
+    """Return the check that a raw value has the type and lies within its bounds."""
     return _JSON_TYPES[type_name].format(r=raw)
 
 
 def value_of(signal: Signal, kind: str, is_plain: bool) -> Value | None:
-    """Return how raw text of a field becomes a value of `signal`; None when that is not simple."""
+    """Return the conversion of raw text to a value of `signal`; None when it is not simple."""
     conversion = signal.conversion
     if signal.deadband or signal.debounce_s:
         return None
@@ -94,7 +94,7 @@ def value_of(signal: Signal, kind: str, is_plain: bool) -> Value | None:
 
 
 def _scaled(coefficients: tuple[float, ...], number: str) -> str | None:
-    """Return the same arithmetic as `urc.protocol.convert` has for a scale and an offset."""
+    """Return the arithmetic of `urc.protocol.convert` for a scale and an offset."""
     if len(coefficients) != 2:
         return None
     offset, scale = coefficients
@@ -103,7 +103,7 @@ def _scaled(coefficients: tuple[float, ...], number: str) -> str | None:
         return f"{number} * {scale!r} + {offset!r}" if offset else f"{number} * {scale!r}"
     shift = offset * divisor
     if shift != round(shift):
-        return None  # the closures know whether that is only a matter of rounding
+        return None  # the closures know whether this is only a rounding error
     return f"({number} + {round(shift)}) / {divisor}" if shift else f"{number} / {divisor}"
 
 
@@ -116,7 +116,7 @@ def finish(
     slow: Compiled,
     skipped: Sequence[str] = (),
 ) -> Compiled:
-    """Add the conversions, their checks and the samples to `lines`, and make the function."""
+    """Add conversions, checks and samples to `lines`, and make the function."""
     names: dict[str, Any] = {
         **scope, "slow": slow, "bytes": bytes, "type": type, "float": float, "int": int,
         "new": tuple.__new__, "Sample": Sample,
@@ -139,7 +139,7 @@ def finish(
 
 
 def _conversions(values: Sequence[Value], raws: Sequence[str], shown: Sequence[str]) -> list[str]:
-    """Return what makes the values out of raw texts, and may fail."""
+    """Return the conversions of the raw texts, which may raise."""
     lines = [
         f"{name} = {(one.convert or '{r}').format(r=raw)}"
         for one, raw, name in zip(values, raws, shown, strict=True)
@@ -147,13 +147,13 @@ def _conversions(values: Sequence[Value], raws: Sequence[str], shown: Sequence[s
     ]
     open_ended = [name for one, name in zip(values, shown, strict=True) if not one.is_finite]
     if open_ended:
-        # Nothing times infinity or not-a-number is zero.
+        # Infinity and not-a-number times zero are not zero.
         lines.append(f"is_finite = ({' + '.join(open_ended)}) * 0 == 0")
     return lines
 
 
 def _checks(values: Sequence[Value], raws: Sequence[str], shown: Sequence[str]) -> list[str]:
-    """Return what must hold of them."""
+    """Return the checks of the values."""
     checks = [] if all(one.is_finite for one in values) else ["is_finite"]
     for one, raw, name in zip(values, raws, shown, strict=True):
         checks += [check.format(r=raw) for check in one.raw_checks]
@@ -166,7 +166,7 @@ def _checks(values: Sequence[Value], raws: Sequence[str], shown: Sequence[str]) 
 def _samples(
     values: Sequence[Value], shown: Sequence[str], readings: Readings, names: dict[str, Any]
 ) -> list[str]:
-    """Return the lines that make and return the samples; `names` gets what they call."""
+    """Return the lines that make and return the samples; add their helpers to `names`."""
     samples = []
     for one, value in zip(values, shown, strict=True):
         name, alarm = one.signal.name, "''"

@@ -1,8 +1,7 @@
-"""What is in flight on one line: sent, and not answered yet.
+"""Pending replies: the requests in flight on one connection.
 
-A `Flight` is one time that a request was sent.
-
-Floor 3, pure. See `urc.protocol.line` for the theory of operation.
+A `Flight` is one transmission of a request. Pure. See `urc.protocol.line` for the theory of
+operation.
 """
 
 from collections.abc import Mapping
@@ -19,7 +18,7 @@ __all__ = ["Flight", "Flights"]
 
 
 class Flight:
-    """One time that a request was sent, until its last answer has come or is given up."""
+    """One transmission of a request, until its last reply arrives or is given up."""
 
     __slots__ = (
         "_ear",
@@ -40,57 +39,58 @@ class Flight:
         self.stage = 0
         self._ear: Ear | None = None
         self.due = now + ask.answers[0].timeout_s
-        """When its answer is overdue; of one that is late: when it is not expected any more."""
+        """Time at which its reply is overdue. For a late one: time at which it is forgotten."""
         self.size = 0
-        """Bytes that it takes in front of the robot's reader."""
+        """Size in the receive buffer of the robot, in bytes."""
         self.since = now
-        """When its present answer began to be waited for."""
+        """Start of the wait for the present reply."""
         self.is_extended = False
-        """The robot has asked for more time for it."""
+        """Whether the robot has extended the timeout."""
         self.is_late = False
-        """It has failed, but its answer may still come and must not be taken for another's."""
+        """Whether it has timed out. Its reply may still arrive, and must not match another
+        request."""
         self.values: dict[str, Reading] = {}
         self.number: int | None = None
-        """What its answer carries; None: it is recognised otherwise."""
+        """Number that its reply repeats; None: its reply has no number."""
 
     @property
     def ear(self) -> Ear:
-        """Collects the frames of the present answer; a plain answer needs none."""
+        """Expectation of the present reply, created on demand, since a plain reply needs none."""
         if self._ear is None:
             self._ear = Ear(self.exchange.ask.answers[self.stage])
         return self._ear
 
     def answer(self, frame: Frame) -> Offer:
-        """Return what the frame means, which carries the number of this request."""
+        """Return the match result of a frame with the number of this request."""
         offer = self.ear.offer(frame)
         if offer is None:
-            return Offer(refusal=f"its answer is not as declared: {shown(frame)}")
+            return Offer(refusal=f"its reply does not match the declaration: {shown(frame)}")
         return offer
 
     def refused(self, frame: Frame, reason: str) -> Offer:
-        """Return why the robot refused: in the words of the driver, where it has some for it."""
+        """Return the refusal of the robot, with the text of the driver if it declares one."""
         offer = self.ear.offer(frame)
         return offer if offer is not None and offer.refusal else Offer(refusal=reason)
 
     def offer(self, frame: Frame, *, is_message: bool = False) -> Offer | None:
-        """Return what the frame means for this request, or None when it answers another one.
+        """Return the match result of a frame, or None when it belongs to another request.
 
-        A message `is_message`: it may take the place of an answer, but is none.
+        With `is_message`, only provisional and error replies count.
         """
         if self.number is not None:
-            return None  # its answer would carry it, see `answer`
+            return None  # its reply would carry the number, see `answer`
         is_mine = None if self.exchange.ask.match is None else self._is_mine
         return self.ear.beside(frame, is_mine) if is_message else self.ear.offer(frame, is_mine)
 
     def extend(self, now: float) -> None:
-        """Wait on, for as long as its answer may take, and as its robot may be busy."""
+        """Extend the timeout by one reply time, within the limit of the driver."""
         answer = self.ear.answer
         self.is_extended = True
         late_s = answer.timeout_s if self.is_late else 0.0
         self.due = min(now + answer.timeout_s, self.since + answer.extend_s + late_s)
 
     def waited(self, now: float) -> str:
-        """Return how long its answer has been waited for, for people."""
+        """Return the elapsed timeout as text for people."""
         answer = self.ear.answer
         if not self.is_extended:
             return f"within {answer.timeout_s:g} s"
@@ -99,7 +99,7 @@ class Flight:
         return f"within {answer.timeout_s:g} s after the robot said that it was busy"
 
     def next_stage(self, now: float) -> bool:
-        """Wait for the next answer; return whether there is one to come."""
+        """Start the wait for the next reply; return False after the last one."""
         answers = self.exchange.ask.answers
         self.stage += 1
         if self.stage == len(answers):
@@ -109,7 +109,7 @@ class Flight:
         return True
 
     def take(self, fields: Fields, samples: list[Sample]) -> None:
-        """Keep what an answer says: its readings, and what is the document's own."""
+        """Keep the samples and private fields of a reply."""
         for name, raw in fields.items():
             if name.startswith("_"):
                 self.values[name[1:]] = _plain(raw)
@@ -130,37 +130,37 @@ class Flight:
 
 
 class Flights(list[Flight]):
-    """In the order of sending; those that are late stay until nobody expects them any more."""
+    """Transmissions in the order of sending. Late ones stay until they are forgotten."""
 
     __slots__ = ()
 
     def drain(self) -> list[Exchange]:
-        """Forget all; return the requests that still waited for an answer."""
+        """Remove all; return the requests that still waited for a reply."""
         waited = [flight.exchange for flight in self if not flight.is_late]
         self.clear()
         return waited
 
     @property
     def waiting(self) -> int:
-        """How many wait for an answer, real-time ones aside."""
+        """Number of pending replies, without real-time requests."""
         return sum(1 for flight in self if not flight.is_late and not flight.exchange.is_realtime)
 
     @property
     def size(self) -> int:
-        """How many bytes the robot may not have read yet: of all that it has not answered."""
+        """Unacknowledged bytes, which may still be in the receive buffer of the robot."""
         return sum(flight.size for flight in self if not flight.exchange.is_realtime)
 
     @property
     def deadline(self) -> float | None:
-        """When the first of them is overdue."""
+        """Time of the first timeout."""
         if len(self) == 1:
             return self[0].due
         return min((flight.due for flight in self), default=None)
 
     def may_confuse(self, exchange: Exchange) -> bool:
-        """Return whether a late answer may still come that could be taken for the one to this.
+        """Return whether a late reply could be taken for the reply to this request.
 
-        A late answer to the very same request, sent before, is as good as the one to come.
+        A late reply to an earlier transmission of the same request is as good as a new one.
         """
         if not (exchange.ask.answers and exchange.ask.is_in_order):
             return False
@@ -173,40 +173,40 @@ class Flights(list[Flight]):
         )
 
     def again(self, exchange: Exchange) -> Flight | None:
-        """Return the flight of `exchange` that still waits; None when it is not sent again."""
+        """Return the pending transmission of `exchange`, or None."""
         return next((one for one in self if one.exchange is exchange and not one.is_late), None)
 
     def has(self, label: str) -> bool:
-        """Return whether a request of that name waits for its answer."""
+        """Return whether a request with that label awaits its reply."""
         return any(flight.exchange.ask.label == label and not flight.is_late for flight in self)
 
     def overdue(self, now: float) -> list[Flight]:
-        """Return those whose time is over."""
+        """Return the transmissions whose timeout has passed."""
         return [flight for flight in self if flight.due <= now] if self else []
 
     def framing(self) -> Framing | None:
-        """Return what cuts the stream while an answer brings its own framing."""
+        """Return the framing of a pending reply that declares its own, or None."""
         for flight in self:
             if flight.exchange.ask.framing is not None:
                 return flight.exchange.ask.framing
         return None
 
     def collects_lines(self) -> bool:
-        """Return whether any frame at all may be part of an answer."""
+        """Return whether any frame at all may be part of a reply."""
         return any(flight.ear.answer.lines is not None for flight in self)
 
     def plain(self) -> Flight | None:
-        """Return the only one, where its answer is expected and is nothing but readings."""
+        """Return the only transmission, if its reply is pending and consists of samples alone."""
         if len(self) != 1 or self[0].is_late or self[0].exchange.ask.plain is None:
             return None
         return self[0]
 
     def numbered(self, number: object) -> Flight | None:
-        """Return the one whose answer carries `number`."""
+        """Return the transmission whose reply carries `number`."""
         return next((one for one in self if one.number is not None and one.number == number), None)
 
     def offer(self, frame: Frame, *, is_message: bool = False) -> tuple[Flight, Offer] | None:
-        """Return whose answer the frame is and what it means, or None when it answers nobody."""
+        """Return the transmission that a frame answers with the match result, or None."""
         if len(self) == 1:
             only = self[0].offer(frame, is_message=is_message)
             return None if only is None else (self[0], only)
@@ -217,7 +217,8 @@ class Flights(list[Flight]):
                 is_realtime = flight.exchange.is_realtime
                 if has_first_realtime if is_realtime else has_first:
                     continue
-                # What is late may never come, and silence never does: they block no other answer.
+                # Late replies may never arrive, and silence never does: neither blocks other
+                # replies.
                 if not (flight.is_late or flight.ear.answer.is_silence):
                     has_first_realtime |= is_realtime
                     has_first |= not is_realtime
@@ -227,7 +228,7 @@ class Flights(list[Flight]):
             offer = flight.offer(frame, is_message=is_message)
             if offer is not None:
                 return flight, offer
-        for flight in collecting:  # last: any frame at all could be one of its lines
+        for flight in collecting:  # last: any frame could be one of its lines
             offer = flight.offer(frame, is_message=is_message)
             if offer is not None:
                 return flight, offer
@@ -235,7 +236,7 @@ class Flights(list[Flight]):
 
 
 def _plain(raw: object) -> Reading:
-    """Return a raw value as something that a reply may carry."""
+    """Return a raw value as a valid reply value."""
     if isinstance(raw, (list, tuple)):
         return tuple(map(_plain, raw))
     if raw is None or isinstance(raw, (bool, int, float, str, bytes, Mapping)):

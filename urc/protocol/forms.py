@@ -1,7 +1,7 @@
-"""The forms of what is in a frame, in both directions: the tables, and a reader or writer of them.
+"""Tables of the forms, in both directions, and the construction of readers and writers.
 
-Floor 3, pure. A row of `READERS` or `WRITERS` is a factory ``(spec, context) -> reader`` (or
-writer), called once when an engine is built; `urc.protocol.codec` says what those are.
+Pure. A row of `READERS` or `WRITERS` is a factory ``(spec, context) -> reader`` (or writer). Each
+engine calls it once; `urc.protocol.codec` has the interfaces.
 """
 
 from urc.model.codec import ReadSpec, WriteSpec

@@ -1,6 +1,6 @@
-"""One frame: from payload to all its bytes and back, as its layout says.
+"""Conversion between a payload and its frame, according to the frame layout.
 
-Floor 3, pure. A `Seal` is one layout at work; framings cut the stream and leave the rest to it.
+Pure. A `Seal` implements one layout. The framings only find the frames in the stream.
 """
 
 import binascii
@@ -17,7 +17,7 @@ __all__ = ["BadFrame", "LengthField", "Seal", "length_of"]
 
 
 class Seal:
-    """Wraps payloads into frames and unwraps them: constants, length and checksum."""
+    """Wraps and unwraps payloads: constants, length field and checksum."""
 
     def __init__(self, layout: FrameLayout) -> None:
         self.layout = layout
@@ -35,10 +35,10 @@ class Seal:
             and not self._is_text
         )
         self.open = generate_open(layout, self._open) if is_plain else self._open
-        """Frame → payload; raises `BadFrame` when the checksum is wrong or lacks its place."""
+        """Frame → payload; raises `BadFrame` for a wrong or missing checksum."""
 
     def _open(self, frame: bytes) -> bytes:
-        """Return the payload; raise `BadFrame` when the checksum is wrong or lacks its place."""
+        """Return the payload; raise `BadFrame` for a wrong or missing checksum."""
         if self._is_text:
             frame = self._read(frame)
         for checksum in self._checksums:
@@ -52,9 +52,9 @@ class Seal:
         return payload if self._stuffing is None else self._stuffing.unstuff(payload)
 
     def close(self, payload: bytes) -> bytes:
-        """Return the frame around `payload`; raise `BadFrame` when there can be none.
+        """Return the frame around `payload`; raise `BadFrame` if the payload does not fit.
 
-        Bytes that neither the payload nor the layout names are zeros.
+        Bytes outside the payload and the fields of the layout are zeros.
         """
         layout = self.layout
         if self._stuffing is not None:
@@ -66,7 +66,7 @@ class Seal:
         if layout.size is not None and len(frame) != layout.size:
             wanted = layout.size - layout.head - layout.tail
             raise BadFrame(
-                "wrong-size", f"{len(payload)} bytes found, where a frame holds exactly {wanted}"
+                "wrong-size", f"expected {wanted} bytes of payload, found {len(payload)}"
             )
         start, end = layout.start, layout.end
         if start:
@@ -80,7 +80,7 @@ class Seal:
         return self._spelt(bytes(frame)) if self._is_text else bytes(frame)
 
     def _read(self, frame: bytes) -> bytes:
-        """Return the frame with its trailing checksum taken off and its digits read."""
+        """Return the frame without its trailing checksum and with its digits decoded."""
         start, end = self.layout.start, self.layout.end
         if len(frame) < len(start) + len(end):
             raise BadFrame("short-frame", f"{len(frame)} bytes are too few for this kind of frame")
@@ -90,7 +90,7 @@ class Seal:
         return start + _bytes_of(content, self.layout.digits) + end
 
     def _spelt(self, frame: bytes) -> bytes:
-        """Return the frame as it is on the line; the inverse of `_read`."""
+        """Return the frame in its wire form; the inverse of `_read`."""
         start, end = self.layout.start, self.layout.end
         content = _digits_of(frame[len(start) : len(frame) - len(end)], self.layout.digits)
         if self._trail is not None:
@@ -108,7 +108,7 @@ def _bytes_of(text: bytes, digits: Digits) -> bytes:
     except binascii.Error:
         noun = "base64" if digits == "base64" else "pairs of hex digits"
         shown = ascii(text[:40].decode("latin-1"))
-        raise BadFrame("bad-digits", f"{noun} are expected in the frame, found {shown}") from None
+        raise BadFrame("bad-digits", f"expected {noun} in the frame, found {shown}") from None
 
 
 def _digits_of(data: bytes, digits: Digits) -> bytes:
@@ -121,21 +121,21 @@ def _digits_of(data: bytes, digits: Digits) -> bytes:
 
 
 def length_of(spec: LengthSpec) -> "LengthField | SpeltLength":
-    """Return the field of that kind."""
+    """Return the length field for `spec`."""
     return SpeltLength(spec) if spec.is_loose else LengthField(spec)
 
 
 class LengthField:
-    """The number that says how long its frame is."""
+    """The length field of a frame."""
 
     def __init__(self, spec: LengthSpec) -> None:
         self._spec = spec
         self.end = max(spec.offset + spec.size, spec.flag_at + 1)
-        """How many bytes of a frame must be there to read it."""
+        """Number of frame bytes needed to read it."""
         self._mask = (1 << min(spec.bits, 8 * spec.size)) - 1
 
     def total(self, data: bytes | bytearray, at: int) -> int:
-        """Return the size of the frame at `at`; negative when the field is no number."""
+        """Return the size of the frame at `at`, in bytes; negative for an invalid length field."""
         spec = self._spec
         if spec.flag_at >= 0 and not data[at + spec.flag_at] & spec.flag_mask:
             return spec.adjust
@@ -156,7 +156,7 @@ class LengthField:
         """Write the size of `frame` into it, before the place `stop`.
 
         Raises:
-            BadFrame: there is no room for the field, or it cannot say the size.
+            BadFrame: the field has no room, or cannot represent the size.
         """
         spec = self._spec
         number, left = divmod(len(frame) - spec.adjust, spec.unit)
@@ -165,14 +165,14 @@ class LengthField:
             if number or left:
                 text = f"a frame without the flag has {spec.adjust} bytes, found {len(frame)}"
                 raise BadFrame("wrong-size", text)
-            return  # what stands there is the payload's
+            return  # the bytes there belong to the payload
         if left:
             raise BadFrame("wrong-size", f"the frame is counted in {spec.unit} bytes; {left} over")
         if self.end > stop or number < 0:
             raise BadFrame("wrong-size", f"{len(frame)} bytes are too few for this kind of frame")
         if spec.spelling == "raw":
             if number > self._mask:
-                raise BadFrame("wrong-size", f"the length field cannot say {number}")
+                raise BadFrame("wrong-size", f"the length field cannot hold {number}")
             order: Literal["big", "little"] = "big" if spec.is_big else "little"
             kept = int.from_bytes(frame[place], order) & ~self._mask
             frame[place] = (kept | number).to_bytes(spec.size, order)
@@ -180,5 +180,5 @@ class LengthField:
         form = b"%0*d" if spec.spelling == "dec" else b"%0*x"
         digits = form % (spec.size, number)
         if len(digits) > spec.size:
-            raise BadFrame("wrong-size", f"the length field cannot say {number}")
+            raise BadFrame("wrong-size", f"the length field cannot hold {number}")
         frame[place] = digits.upper() if spec.spelling == "HEX" else digits

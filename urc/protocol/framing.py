@@ -1,7 +1,7 @@
-"""Framings: how a byte stream is cut into frames, and frames are made into bytes.
+"""Framings: the conversion between byte streams and frames.
 
-Floor 3, pure. This is their table, and how one is built of what a document says: a family is
-imported when it is used. `urc.protocol.framings.base` says what a framing is.
+Pure. This module has the table of framings and builds one from its declaration; a family is
+imported on first use. `urc.protocol.framings.base` has the interfaces.
 """
 
 from typing import NamedTuple
@@ -48,7 +48,7 @@ def build_framing(spec: FramingSpec) -> Framing:
 
 
 def _of_type(spec: FramingSpec) -> Framing:
-    """Return the framing of the table; one that hides its marks is stuffed as a whole."""
+    """Return the framing of the table; with byte stuffing of all bytes, an `EscapedFraming`."""
     if isinstance(spec.options.get("escape"), EscapeSpec):
         from urc.protocol.framings.escaped import EscapedFraming
 

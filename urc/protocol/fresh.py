@@ -1,7 +1,7 @@
-"""What is new in each frame: the time of day, and bytes that nobody can foresee.
+"""Times and nonces of sent frames.
 
-Floor 3, pure. Both come from sources that are given: a clock and a generator for a robot, fixed
-ones for tests, so that the same document gives the same frames.
+Pure. Both come from injected sources: a clock and a generator for a robot, fixed ones for tests.
+The same document then always gives the same frames in tests.
 """
 
 from collections.abc import Callable
@@ -19,12 +19,12 @@ class Fresh(NamedTuple):
     """The sources of time and randomness."""
 
     unix_s: Callable[[], float]
-    """Seconds since 1970, UTC."""
+    """Function that returns the seconds since 1970, UTC."""
     random: Callable[[int], bytes]
-    """So many bytes, never the same twice."""
+    """Size → random bytes that never repeat."""
 
     def names(self) -> dict[str, object]:
-        """Return what the templates of one frame know: asked twice, it is the same."""
+        """Return the namespace of one frame, with a constant time and nonce."""
         made: dict[int, bytes] = {}
 
         def nonce(size: int) -> bytes:
@@ -41,4 +41,4 @@ def fixed_bytes(size: int) -> bytes:
 
 
 FIXED: Final = Fresh(lambda: FIXED_UNIX_S, fixed_bytes)
-"""For tests of frames."""
+"""Fixed sources for tests of frames."""

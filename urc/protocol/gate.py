@@ -1,6 +1,6 @@
-"""What may be sent, and when: the queue of a line, rates, counters.
+"""Admission of frames: the queue of a connection, rate limits, counters.
 
-Floor 3, pure. Everything is bounded, and everything that is dropped is given back to be told of.
+Pure. Everything is bounded, and dropped requests are returned so that they can be reported.
 """
 
 from bisect import insort, insort_left
@@ -13,15 +13,15 @@ from urc.model.flow import Priority
 __all__ = ["RANKS", "REALTIME", "Bucket", "Counters", "Draw", "Made", "Waiting"]
 
 RANKS: Final[dict[Priority, int]] = {"realtime": 0, "high": 1, "normal": 2, "low": 3}
-"""Of two that wait, the one with the lower rank goes first."""
+"""Priority → rank; the lower rank is sent first."""
 REALTIME: Final = 0
 
 
 class Bucket:
-    """A rate: the generic cell rate algorithm, with one period of tolerance.
+    """A rate limiter: the generic cell rate algorithm, with one period of tolerance.
 
-    A sender that was quiet may send twice at once; over any longer time it keeps its rate. A
-    shortest gap would be no rate: whoever came a moment too early would lose half a period.
+    After a pause, two calls may pass at once; the long-term rate stays constant. A minimum gap
+    would lower the rate: a call slightly too early would lose half a period.
     """
 
     __slots__ = ("_next_s", "_period_s")
@@ -29,35 +29,35 @@ class Bucket:
     def __init__(self, rate_per_s: float) -> None:
         self._period_s = 1 / rate_per_s
         self._next_s = float("-inf")
-        """When the next one is due by the rate itself."""
+        """Time at which the next call is due by the rate itself."""
 
     @property
     def free_at(self) -> float:
-        """When the next one may go."""
+        """Earliest time of the next call."""
         return self._next_s - self._period_s
 
     def take(self, now: float) -> None:
-        """Count one that goes."""
+        """Count one call."""
         self._next_s = max(self._next_s, now) + self._period_s
 
 
 Stand = tuple[tuple[str, int], ...]
-"""How counters stand: their last numbers, by name in the order of the names."""
+"""Last numbers of the counters, as pairs sorted by name."""
 Made = dict[Stand, Numbered]
 
 
 class Draw:
-    """The counters of one frame: asked twice for the same one, it gives the same number."""
+    """The counters of one frame; the same counter always gives the same number."""
 
     __slots__ = ("_last", "values")
 
     def __init__(self, last: Mapping[str, int]) -> None:
         self._last = last
         self.values: dict[str, int] = {}
-        """Counter → number that the frame carries."""
+        """Counter → number in the frame."""
 
     def __call__(self, name: str, low: int, high: int) -> int:
-        """Return the number after the last one that was sent; after `high` comes `low`."""
+        """Return the number after the last sent one; `low` follows `high`."""
         if name not in self.values:
             last = self._last.get(name, high)
             self.values[name] = last + 1 if low <= last < high else low
@@ -65,7 +65,7 @@ class Draw:
 
     @property
     def count(self) -> Count:
-        """What the frame does to the counters."""
+        """The effect of the frame on the counters."""
         before = {name: self._last[name] for name in self.values if name in self._last}
         return Count(before, dict(self.values))
 
@@ -73,34 +73,34 @@ class Draw:
 class Counters:
     """The counters of one connection.
 
-    Numbers are allotted in the order in which frames leave. A line that only the engine writes to
-    has that order by itself. A line whose motion is written by the guard is *shared*: there the
-    engine only proposes numbers, and is told how the counters stand.
+    Numbers are assigned in the order of transmission. A connection with the engine as its only
+    writer has that order by itself. A connection on which the guard sends motion is *shared*: the
+    engine only proposes numbers, and learns the true values later.
     """
 
     __slots__ = ("_known", "_last", "ahead", "counted", "is_shared")
 
     def __init__(self) -> None:
         self._last: Mapping[str, int] = {}
-        """How they stand once all that was sent has left."""
+        """Counter values once all frames have been transmitted."""
         self._known: Mapping[str, int] = {}
-        """How they stood when that was last known for sure."""
+        """Last confirmed counter values."""
         self.ahead = 0
-        """Frames that were counted since then."""
+        """Frames counted since the last confirmation."""
         self.is_shared = False
         self.counted: Callable[[], None] | None = None
-        """Called when a frame was counted; must not count any."""
+        """Callback after a counted frame; it must not count any."""
 
     def draw(self) -> Draw:
-        """Return the numbers of the next frame; nothing is counted yet."""
+        """Return the numbers of the next frame without counting it."""
         return Draw(self._last)
 
     def draw_urgent(self) -> Draw:
-        """Return the numbers of a frame that overtakes all that is still on its way."""
+        """Return the numbers of a frame that overtakes all pending ones."""
         return Draw(self._known)
 
     def count(self, draw: Draw) -> None:
-        """Count the frame that was made with `draw`."""
+        """Count the frame that was rendered with `draw`."""
         if not draw.values:
             return
         self._last = {**self._last, **draw.values}
@@ -112,11 +112,11 @@ class Counters:
             self.counted()
 
     def told(self, stand: Mapping[str, int], *, is_settled: bool) -> None:
-        """Take how shared counters stand.
+        """Update shared counters with confirmed values.
 
         Args:
-            stand: counter → the last number that has left.
-            is_settled: whether nothing that was counted here is still on its way.
+            stand: counter → last transmitted number.
+            is_settled: whether all counted frames have been transmitted.
         """
         self._known = dict(stand)
         if is_settled:
@@ -126,9 +126,9 @@ class Counters:
         """Render a frame for each of the next numbers, and for the first of a new connection.
 
         Args:
-            encode: renders it.
-            length: how many.
-            made: frames that need not be rendered again; takes those of this series.
+            encode: renders a frame.
+            length: number of frames.
+            made: cache of rendered frames; receives those of this series.
         """
         frames: dict[Stand, Numbered] = {}
         for begin, most in ((self._known, length + self.ahead), ({}, length)):
@@ -146,34 +146,34 @@ class Counters:
         return Series(tuple(frames.values()))
 
     def is_near(self, made: Made, most: int) -> bool:
-        """Return whether a series was made for `most` numbers before the next one, or fewer."""
+        """Return whether at most `most` numbers have been used since the series was rendered."""
         key = tuple(sorted(self._known.items()))
         place = next((at for at, one in enumerate(made) if one == key), most)
         return place + self.ahead < most
 
     def begin(self) -> None:
-        """Begin anew, as each connection does. Shared counters begin when that is told."""
+        """Reset the counters for a new connection. Shared counters wait for their confirmation."""
         if not self.is_shared:
             self._last = self._known = {}
 
 
 class Rankable(Protocol):
-    """What may wait."""
+    """An item of a priority queue."""
 
     @property
     def rank(self) -> int:
-        """The lower, the sooner."""
+        """Priority rank; lower ranks are sent first."""
 
     @property
     def latest_key(self) -> str:
-        """Those with the same key replace each other; "" for those that do not."""
+        """Key of requests that replace each other; "" for no replacement."""
 
 
 Item = TypeVar("Item", bound=Rankable)
 
 
 class Waiting(list[Item]):
-    """What waits to be sent, the first to go first; those of one rank in the order they came."""
+    """A priority queue; requests of equal rank keep their order of arrival."""
 
     __slots__ = ("_depth",)
 
@@ -182,11 +182,11 @@ class Waiting(list[Item]):
         self._depth = depth
 
     def put(self, item: Item) -> Item | None:
-        """Take `item`; return the one that had to make room, which may be `item` itself."""
+        """Add `item`; return the item that was displaced, possibly `item` itself."""
         if item.latest_key:
             for place, other in enumerate(self):
                 if other.latest_key == item.latest_key:
-                    self[place] = item  # keeps the place, so that it cannot starve
+                    self[place] = item  # keep the place, so that updates cannot starve it
                     return other
         crowded_out: Item | None = None
         if len(self) >= self._depth:
@@ -197,11 +197,11 @@ class Waiting(list[Item]):
         return crowded_out
 
     def put_back(self, item: Item) -> None:
-        """Take what was sent before and must be sent again, ahead of its rank."""
+        """Add a request for a retry, in front of its rank."""
         insort_left(self, item, key=_rank)
 
     def drain(self) -> list[Item]:
-        """Take all out and return them."""
+        """Remove and return all items."""
         items = list(self)
         self.clear()
         return items

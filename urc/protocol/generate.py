@@ -1,9 +1,8 @@
-"""Functions made at load for one declaration: source text → function, seen in tracebacks.
+"""Functions generated from source text, once per declaration, with readable tracebacks.
 
-Floor 3. Whatever stands in the source is written by the modules that call `function_of`, out of
-names of their own and `repr()` of constants; nothing of a document gets into it in any other way.
-The source is registered with `linecache` for as long as the function lives, so that a traceback
-shows the generated line.
+The callers of `function_of` build the source from fixed names and from the `repr()` of constants.
+No other text of a document enters it. `linecache` holds the source during the lifetime of the
+function, so that a traceback shows the generated line.
 """
 
 import weakref
@@ -22,19 +21,19 @@ def function_of(
     """Return the function whose body is `lines`.
 
     Args:
-        name: of the function, a Python identifier.
-        arguments: as in a ``def``.
-        lines: of the body, indented by four blanks and more.
-        scope: the only names that it sees beside its arguments.
+        name: name of the function, a Python identifier.
+        arguments: parameter list, as in a ``def``.
+        lines: lines of the body, indented by at least four blanks.
+        scope: the only names that it sees besides its arguments.
     """
     import linecache  # what is made is made late, so that what makes it is imported late
 
     source = "\n".join([f"def {name}({arguments}):", *lines, ""])
     file = f"<generated {name} {next(_numbers)}>"
     made: dict[str, Any] = {"__builtins__": {}, **scope}
-    exec(compile(source, file, "exec"), made)  # noqa: S102  # see the module's own words
+    exec(compile(source, file, "exec"), made)  # noqa: S102  # see the module docstring
     linecache.cache[file] = (len(source), None, source.splitlines(keepends=True), file)
     function: Callable[..., Any] = made[name]
-    # With its engine goes the function, and with the function its source.
+    # Remove the source together with the function, whose lifetime is that of its engine.
     weakref.finalize(function, linecache.cache.pop, file, None).atexit = False
     return function

@@ -1,6 +1,6 @@
-"""What stands in the head of an http answer: its status and its headers, as fields.
+"""Status and headers of an HTTP response, as fields.
 
-Floor 3, pure. Wraps the reader of the body, in both directions.
+Pure. The reader wraps the reader of the body, in both directions.
 """
 
 from collections.abc import Mapping
@@ -13,28 +13,28 @@ from urc.protocol.codec import Frame, NotWritable, Reader
 __all__ = ["LOCATION", "STATUS", "HeadReader", "is_redirect"]
 
 STATUS: Final = "status"
-"""The name of the status among those of headers."""
+"""Name of the status among the headers."""
 _REDIRECTS: Final = 3
-"""First digit of their status."""
+"""First digit of redirect statuses."""
 LOCATION: Final = "location"
-"""The header by which a robot says where to ask next."""
+"""Header with the target of a redirect."""
 
 
 def is_redirect(frame: Frame) -> bool:
-    """Return whether an answer sends whoever asked elsewhere."""
+    """Return whether a response is a redirect."""
     status = frame.attributes.get(STATUS)
     return isinstance(status, int) and status // 100 == _REDIRECTS
 
 
 class HeadReader:
-    """Reads the body by another form, and the head beside it; a missing header is no field."""
+    """Reads the status and headers, and delegates the body. A missing header gives no field."""
 
     def __init__(self, reader: Reader, spec: ReadSpec) -> None:
         self._reader = reader
         self._head = dict(spec.head)
 
     def read(self, frame: Frame) -> Mapping[str, object] | None:
-        """Return the fields, or None when the frame is another one."""
+        """Return the fields, or None for another kind of frame."""
         found = self._reader.read(frame)
         if found is None:
             return None
@@ -47,14 +47,14 @@ class HeadReader:
         return {**found, **{field: value for field, value in head.items() if value is not None}}
 
     def write(self, fields: Mapping[str, object]) -> Payload:
-        """Return the answer that would be read as `fields`; raise `NotWritable`."""
+        """Return the response that reads as `fields`; raise `NotWritable`."""
         body = self._reader.write({k: v for k, v in fields.items() if k not in self._head})
         if not isinstance(body, bytes):
-            raise NotWritable("only an answer of http has a head")
+            raise NotWritable("only an HTTP response has a status and headers")
         named = {name: fields[field] for field, name in self._head.items() if field in fields}
         status = named.pop(STATUS, 200)
         if not isinstance(status, int):
-            status = 200  # something plausible that is no status
+            status = 200  # a default for values that are no status
         headers = {name: text_of(value) for name, value in named.items()}
         attributes = {"ok": status < 400, "status": status, "headers": headers}
         return Envelope("response", attributes, body)

@@ -1,15 +1,14 @@
-"""What the robot says to frames of motion: taken, or refused.
+"""Replies to frames of motion: acknowledgements and refusals.
 
-Floor 3, pure. Frames of motion do not go through the queue of their line, so nothing is in flight
-for them, and nobody waits. But a robot that answers each of them does so here: an acknowledgement
-is taken and is no stray frame, and a refusal ends the motion. A refusal counts also where the robot
-says it by itself, as a controller does whose guard was opened.
+Pure. Frames of motion bypass the queue of their connection, so they have no pending reply. A robot
+that replies to each frame is handled here: an acknowledgement is no stray frame, and a refusal ends
+the motion. An unsolicited refusal counts as well, such as that of a controller with an open guard.
 
-Where one side talks at a time, frames of motion wait for an answer that the robot owes, and what
-waits in the queue of the line waits for theirs. Both waits are short: an answer that was lost must
-not keep a robot from being driven. A stop does not come by here, and waits for nothing.
+In half duplex, frames of motion wait for an outstanding reply, and queued requests wait for the
+replies to motion. Both waits are short, because a lost reply must not prevent motion. A stop
+bypasses this module and never waits.
 
-A command listens from its first frame on, for as long as an answer may take after the newest one.
+A command expects replies from its first frame on, until the reply timeout of the newest frame.
 """
 
 from collections.abc import Mapping
@@ -23,12 +22,12 @@ from urc.protocol.word import Word
 __all__ = ["LONGEST_WAIT_S", "HeldReplies", "Refusal"]
 
 LONGEST_WAIT_S: Final = 0.1
-"""For an answer that is owed, on a line where one side talks at a time."""
+"""Longest wait for an outstanding reply in half duplex, in seconds."""
 _NOTHING: Mapping[str, object] = {}
 
 
 class Refusal(NamedTuple):
-    """The robot does not do what is held."""
+    """A refusal of a held command by the robot."""
 
     command: str
     offer: Offer
@@ -41,13 +40,14 @@ class _Listening:
 
     def __init__(self, answer: Answer, match: Template | None) -> None:
         self.ear = Ear(answer)
-        # Which of many frames a number belongs to is not known: any of them counts.
+        # Many frames are pending, so a number cannot be assigned to one of them: any number
+        # matches.
         self._match = None if match is None or "seq" in match.names else match
         self.names = _NOTHING
         self.until_s = float("-inf")
 
     def is_mine(self, fields: Fields) -> bool:
-        """Return whether a frame is about this command, by what it carries."""
+        """Return whether the fields of a frame belong to this command."""
         if self._match is None:
             return True
         names: dict[str, object] = dict(self.names)
@@ -59,21 +59,21 @@ class _Listening:
 
 
 class HeldReplies:
-    """The held commands of one line that the robot answers."""
+    """The held commands of one connection that have replies."""
 
     def __init__(self) -> None:
         self._all: dict[str, _Listening] = {}
         self._until_s = float("-inf")
         self.owed_until_s = float("-inf")
-        """Until when the robot may owe an answer to a frame of motion."""
+        """End of the wait for a reply to motion."""
         self._waits_since_s: float | None = None
 
     def add(self, command: str, answer: Answer, match: Template | None) -> None:
-        """Listen for the answers to a command, once it has been given."""
+        """Expect the replies to a command, once it has been sent."""
         self._all[command] = _Listening(answer, match)
 
     def gave(self, command: str, names: Mapping[str, object], now: float) -> None:
-        """Take note that a frame of a command goes out, made of `names`."""
+        """Record that a frame of a command is sent, with its `names`."""
         one = self._all.get(command)
         if one is not None:
             self.owed_until_s = now + min(one.ear.answer.timeout_s, LONGEST_WAIT_S)
@@ -82,18 +82,18 @@ class HeldReplies:
             self._until_s = max(self._until_s, one.until_s)
 
     def forget(self) -> None:
-        """Forget a connection: what comes on the next one answers nothing of this one."""
+        """Discard the state of a closed connection."""
         self._until_s = self.owed_until_s = float("-inf")
         self._waits_since_s = None
         for one in self._all.values():
             one.until_s = float("-inf")
 
     def must_wait(self, now: float, *, is_owed: bool) -> bool:
-        """Return whether a frame of motion has to wait, on a line where one side talks at a time.
+        """Return whether a frame of motion has to wait in half duplex.
 
         Args:
             now: the time.
-            is_owed: whether the robot owes an answer to anything else.
+            is_owed: whether another reply is outstanding.
         """
         if not is_owed and now >= self.owed_until_s:
             self._waits_since_s = None
@@ -106,11 +106,11 @@ class HeldReplies:
         return False
 
     def is_listening(self, now: float) -> bool:
-        """Return whether an answer to a frame of motion may come."""
+        """Return whether a reply to a frame of motion may still arrive."""
         return now < self._until_s
 
     def refusals(self, frame: Frame, now: float) -> list[Refusal]:
-        """Return the commands that a frame refuses: all that it may be about."""
+        """Return all held commands that a frame may refuse."""
         found = [
             Refusal(name, offer)
             for name, one in self._listening(now)
@@ -121,12 +121,12 @@ class HeldReplies:
         return found
 
     def refuse(self, frame: Frame, reason: str, now: float) -> list[Refusal]:
-        """Return what an answer refuses that is known as a refusal: in words of the driver."""
+        """Return the refusals of a known error reply, with the texts of the driver."""
         plain = [Refusal(name, Offer(refusal=reason)) for name, _ in self._listening(now)]
         return self.refusals(frame, now) or plain
 
     def accepted(self, frame: Frame, now: float) -> tuple[Answer, Offer] | None:
-        """Return what an acknowledgement says, or None when the frame is none."""
+        """Return the match result of an acknowledgement, or None for other frames."""
         for _, one in self._listening(now):
             offer = one.ear.offer(frame, one.is_mine)
             if offer is not None:

@@ -16,7 +16,7 @@ _PLAIN = re.compile(r"\s*([A-Za-z_][A-Za-z0-9_]*)\s*(?:\|\s*([a-z0-9]+)\s*)?")
 
 
 class BytesWriter:
-    """Writes pieces one behind the other; reads back those that are a name with a width."""
+    """Writes concatenated pieces; reads back the pieces that are a name with a width."""
 
     def __init__(self, spec: WriteSpec, context: CodecContext) -> None:
         self._pieces = cast("tuple[bytes | Template, ...]", spec.options["pieces"])
@@ -37,7 +37,9 @@ class BytesWriter:
         if isinstance(value, int):
             if 0 <= value <= 255:
                 return bytes((value,))
-            raise NotWritable(f"{template.source.strip()}: {value} is no byte, 0 to 255")
+            raise NotWritable(
+                f"{template.source.strip()}: expected a byte, 0 to 255, found {value}"
+            )
         if isinstance(value, str):
             try:
                 return value.encode(self._encoding)
@@ -46,10 +48,12 @@ class BytesWriter:
                 raise NotWritable(
                     f"{quoted(wrong)} cannot be written in {self._encoding}"
                 ) from None
-        raise NotWritable(f"{template.source.strip()}: {str(value)[:40]} is neither byte nor text")
+        raise NotWritable(
+            f"{template.source.strip()}: {str(value)[:40]} is neither a byte nor text"
+        )
 
     def read(self, frame: Frame) -> Mapping[str, object] | None:
-        """Return the values of ``{{ name | u16be }}`` and the like, or None for another frame."""
+        """Return the values of pieces like ``{{ name | u16be }}``, or None for another frame."""
         data, at = frame.payload, 0
         if not isinstance(data, bytes):
             return None
@@ -81,7 +85,7 @@ class BytesWriter:
         return found if at == len(data) else None
 
     def _end(self, data: bytes, at: int, place: int) -> int:
-        """Return where a piece of unknown size ends: before the next constant, else at the end."""
+        """Return the end of a piece of variable size: the next constant, or the end of data."""
         for piece in self._pieces[place + 1 :]:
             if isinstance(piece, bytes):
                 return data.find(piece, at)

@@ -1,6 +1,6 @@
-"""What comes in on one line and answers no request.
+"""Received frames of one connection that are no replies.
 
-Floor 3, pure. See `urc.protocol.line` for the theory of operation.
+Pure. See `urc.protocol.line` for the theory of operation.
 """
 
 from collections import deque
@@ -54,14 +54,14 @@ class Secrets:
 
 
 new = tuple.__new__
-"""Makes a named tuple without the detour through its class: this is done for every frame."""
+"""Makes a named tuple faster than its class does; every frame needs one."""
 _SHOWN_BYTES = 20
-"""Of a frame that nothing matches."""
+"""Bytes of an unknown frame that messages show."""
 _NO_MATCH = "nothing declared matches "
 
 
 class Inbox:
-    """The stream of one line: cut into frames, and told by messages and those who listen."""
+    """The received stream of one connection: framing, messages and expectations."""
 
     def __init__(self, spec: TransportSpec, framing: Framing, messages: list[Matcher]) -> None:
         self._spec = spec
@@ -72,17 +72,20 @@ class Inbox:
         self._cut(framing)
         self.secrets = Secrets()
         self.replies = Replies()
-        """What messages are answered with, until it is told."""
+        """Acknowledgements of messages that wait to be sent."""
         self.collectors: list[Collector] = []
-        """What messages put together, to be forgotten with the connection."""
+        """Collectors of messages, cleared with the connection."""
         self._ears: list[Ear] = []
         self._prompt: tuple[Pattern, Ear] | None = None
         self.is_listening = False
-        """Whether anybody waits for a frame or a prompt."""
+        """Whether an expectation waits for a frame or a prompt."""
         self._stray: tuple[float, str] = (float("-inf"), "")
 
     def reset(self, *, is_new: bool) -> None:
-        """Forget a connection. Its secrets are kept until there `is_new` one, for late messages."""
+        """Clear the state of a connection.
+
+        Secrets stay until the next connection, for late messages.
+        """
         self._stream = Stream()
         self._cut(self._framing)
         self._ears.clear()
@@ -95,23 +98,23 @@ class Inbox:
             self.secrets = Secrets()
 
     def cut_by(self, framing: Framing) -> None:
-        """Let `framing` cut what comes next, beginning with what is left of the stream."""
+        """Use `framing` from now on, beginning with the remaining bytes."""
         if framing is not self._cut_by:
             self._cut(framing)
 
     @property
     def has_more(self) -> bool:
-        """Whether bytes are left that may be frames."""
+        """Whether bytes remain that may contain frames."""
         return self._stream.at < len(self._stream.data)
 
     def _cut(self, framing: Framing) -> None:
         self._cut_by = framing
         self.decoder: Decoder = framing.decoder(self._stream)
         self.is_timed = getattr(type(self.decoder), "deadline", None) is not StreamDecoder.deadline
-        """Whether time alone may complete a frame."""
+        """Whether a timeout alone may complete a frame."""
 
     def tell(self, frame: Frame, now: float) -> list[LineEvent]:
-        """Return what a frame says that answers no request."""
+        """Return the events of a frame that is no reply."""
         heard = self._listeners(frame, now) if self._ears else None
         told = self.message(frame, now)
         if heard is None and told is None:
@@ -121,10 +124,10 @@ class Inbox:
         return told or [] if heard is None else heard + (told or [])
 
     def came_since(self, since: float, instead: str) -> str:
-        """Return what to add to "it did not come": what came in its place; "" for nothing.
+        """Return an addition to "no answer": the frame that arrived instead, or "".
 
         Args:
-            since: when the waiting began.
+            since: start of the wait.
             instead: what the frame is not: "no answer to home".
         """
         time_s, text = self._stray
@@ -134,23 +137,23 @@ class Inbox:
         return f"; {shown} came, which is {instead}" if shown != text else f"; {text}"
 
     def listen(self, ear: Ear) -> None:
-        """Let `ear` have the frames that answer no request."""
+        """Add an expectation for frames that are no replies."""
         self._ears.append(ear)
         self.is_listening = True
 
     @property
     def framing(self) -> Framing | None:
-        """What cuts the stream for those that listen; None: they are content with the line's."""
+        """Framing of the expectations; None: that of the connection."""
         return next((ear.answer.framing for ear in self._ears if ear.answer.framing), None)
 
     def look_for(self, pattern: Pattern, ear: Ear) -> list[LineEvent]:
-        """Let `ear` have the text that `pattern` finds after the last whole frame."""
+        """Look for `pattern` in the text after the last whole frame, for `ear`."""
         self._prompt = (pattern, ear)
         self.is_listening = True
         return self.look()
 
     def unlisten(self, ear: Ear) -> None:
-        """Nobody listens there any more."""
+        """Remove an expectation."""
         self._ears = [one for one in self._ears if one is not ear]
         if self._prompt is not None and self._prompt[1] is ear:
             self._prompt = None
@@ -158,11 +161,11 @@ class Inbox:
 
     @property
     def is_prompted(self) -> bool:
-        """Whether somebody waits for a prompt."""
+        """Whether an expectation waits for a prompt."""
         return self._prompt is not None
 
     def look(self) -> list[LineEvent]:
-        """Look for the prompt that somebody waits for."""
+        """Look for the expected prompt."""
         if self._prompt is None:
             return []
         pattern, ear = self._prompt
@@ -177,7 +180,7 @@ class Inbox:
         return [Heard(ear, Offer({}))]
 
     def message(self, frame: Frame, now: float) -> list[LineEvent] | None:
-        """Return what a declared message makes of the frame, or None when it is none."""
+        """Return the events of a declared message, or None for other frames."""
         taken = self.messages.take(frame, now)
         return None if taken is None else self.told(*taken)
 
@@ -189,7 +192,7 @@ class Inbox:
         return None
 
     def _said(self, ear: Ear, offer: Offer, now: float) -> list[LineEvent]:
-        """Return what to tell of a frame that an ear takes."""
+        """Return the events of a frame that matches an expectation."""
         events: list[LineEvent] = self.dropped(offer)
         if offer.fields is not None:
             events += self.samples(ear.answer.matcher, offer.fields, now)[0]
@@ -201,12 +204,12 @@ class Inbox:
         return events
 
     def answered(self, asker: object, frame: Frame, refusal: str, now: float) -> list[LineEvent]:
-        """Return what the answer to a request of `asker` says to the step that expects it.
+        """Return the events of a reply to a request of `asker`, for the step that expects it.
 
         Args:
-            asker: the sequence that made the request; nobody else hears the answer.
-            frame: the answer.
-            refusal: why the robot refused; "" where it did not.
+            asker: the sequence that made the request; only it receives the reply.
+            frame: the reply.
+            refusal: the refusal of the robot; "" for none.
             now: the time.
         """
         ear = next((one for one in self._ears if one.owner is asker), None)
@@ -217,15 +220,15 @@ class Inbox:
         if refusal and not is_redirected and (offer is None or not offer.refusal):
             offer = Offer(refusal=refusal)
         if offer is None:
-            offer = Offer(refusal=f"its answer is not as declared: {shown(frame)}")
+            offer = Offer(refusal=f"its reply does not match the declaration: {shown(frame)}")
         return self._said(ear, offer, now)
 
     def dropped(self, offer: Offer) -> list[LineEvent]:
-        """Return what to say of lines that turned out to be no answer."""
+        """Return the events for collected lines that were no reply."""
         return [Fault(self._spec.name, "no-match", offer.dropped)] if offer.dropped else []
 
     def _unknown(self, frame: Frame) -> Fault:
-        """Return what to say of a frame that nothing declared matches."""
+        """Return the violation for an unknown frame."""
         fault = getattr(frame, "fault", "")
         if fault:
             return Fault(self._spec.name, "bad-value", self.secrets.hide(fault))
@@ -244,14 +247,14 @@ class Inbox:
     def samples(
         self, matcher: Matcher, found: Fields, now: float
     ) -> tuple[list[LineEvent], list[Sample]]:
-        """Return what to tell of a frame's fields, and the readings among them."""
+        """Return the events for the fields of a frame, and their samples."""
         samples, refused = matcher.decode(found, now)
         return self.told(samples, refused), samples
 
     def told(self, samples: list[Sample], refused: Sequence[str]) -> list[LineEvent]:
-        """Return what to tell of readings, and of values that are none.
+        """Return the events for samples and refused values.
 
-        A good frame without values is told of, too: it shows that the line lives.
+        A valid frame without values gives an event, too: it shows that the robot is alive.
         """
         if not refused and not self.replies:
             return [new(Samples, (self._name, tuple(samples)))]

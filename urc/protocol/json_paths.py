@@ -1,10 +1,9 @@
-"""The form ``json`` in the reading direction: fields out of a document, by paths.
+"""The form ``json`` for reading: fields of a document, found by paths.
 
-Theory of operation. Plain paths become types of our own for `msgspec`, with a place for each step
-that some path takes; its decoder then skips whatever no path wants, and the fields are picked out
-by a function made for these paths (`urc.protocol.generate`). Where a document has a list for a
-mapping or the like, that decoder refuses it, and the document is decoded whole and walked step by
-step; the same is done for JMESPath. Both ways give the same fields for the same document.
+Theory of operation. Plain paths become `msgspec` types with a member for each step of a path. Its
+decoder skips everything else, and a generated function picks the fields (`urc.protocol.generate`).
+If a document has another structure, that decoder raises an error; the document is then decoded
+whole and walked step by step. JMESPath always uses the second way. Both ways give the same fields.
 """
 
 import json
@@ -25,7 +24,7 @@ _Find = Callable[[Any], object]
 
 
 class JsonReader:
-    """Reads what the paths lead to; writes a document in which they lead there."""
+    """Reads the values at the paths; writes a document with values at the paths."""
 
     def __init__(self, spec: ReadSpec, context: CodecContext) -> None:
         paths = cast("Mapping[str, object]", spec.options["paths"])
@@ -43,16 +42,16 @@ class JsonReader:
         self._encoding = context.encoding
 
     def read(self, frame: Frame) -> Mapping[str, object] | None:
-        """Return the fields found, or None when there is none or the frame is no document."""
+        """Return the found fields, or None for no fields or an invalid document."""
         if self.pick is not None and isinstance(frame.payload, bytes):
             try:
                 return self.pick(frame.payload)
             except (msgspec.DecodeError, RecursionError, UnicodeDecodeError):
-                pass  # not as the paths would have it: look at the whole document
+                pass  # another structure: decode the whole document
         return self.read_whole(frame)
 
     def read_whole(self, frame: Frame) -> Mapping[str, object] | None:
-        """Do what `read` does without the types made for the paths."""
+        """Return the same fields as `read`, without the generated types."""
         document = self._document(frame)
         if document is _MISSING:
             return None
@@ -60,20 +59,20 @@ class JsonReader:
         return {name: value for name, value in found.items() if value is not _MISSING} or None
 
     def write(self, fields: Mapping[str, object]) -> Payload:
-        """Return a document with `fields` where their paths lead."""
+        """Return a document with `fields` at their paths."""
         root: dict[str, Any] = {}
         for name in fields.keys() & self._finders.keys() - self._paths.keys():
-            raise NotWritable(f"{name}: a search in a document cannot be turned round")
-        for name, path in self._paths.items():  # as declared: some readers want the kind first
+            raise NotWritable(f"{name}: a search in a document cannot be inverted")
+        for name, path in self._paths.items():  # in order: some readers need the kind first
             if name in fields:
                 _put(root, path, fields[name])
         try:
             payload = json.dumps(root, separators=(",", ":"), default=_plain).encode("utf-8")
         except (TypeError, ValueError, RecursionError) as error:
-            raise NotWritable(f"no JSON for these values: {error}") from None
+            raise NotWritable(f"these values cannot be written as JSON: {error}") from None
         found = self.read(Frame(payload, self._encoding))
         if found is None or not fields.keys() <= found.keys():
-            raise NotWritable("nothing to write, or two paths that exclude each other")
+            raise NotWritable("nothing to write, or two paths exclude each other")
         return payload
 
     def _document(self, frame: Frame) -> object:
@@ -88,7 +87,7 @@ class JsonReader:
         except (msgspec.DecodeError, RecursionError, UnicodeError):
             pass
         try:
-            return json.loads(text)  # takes NaN, which robots written in Python send
+            return json.loads(text)  # accepts NaN, which some robots written in Python send
         except (ValueError, RecursionError):
             return _MISSING
 
@@ -121,12 +120,12 @@ def _searcher(expression: Any) -> _Find:
 
 
 def _put(root: dict[str, Any], path: JsonPath, value: object) -> None:
-    """Set the value at `path`, making what leads there."""
+    """Set the value at `path`, creating the parents."""
     holder: Any = root
     for step, after in zip(path, (*path[1:], None), strict=True):
         if isinstance(step, int):
             if not isinstance(holder, list):
-                return  # another path wants something else here; `write` sees that it is missing
+                return  # another path needs another type here; `write` sees the missing value
             holder += [None] * (step + 1 - len(holder))
         elif not isinstance(holder, dict):
             return
@@ -146,4 +145,4 @@ def _plain(value: object) -> object:
         return bytes_text(value)
     if isinstance(value, Mapping):
         return dict(value)
-    raise TypeError(f"{type(value).__name__} has no JSON")
+    raise TypeError(f"{type(value).__name__} cannot be written as JSON")

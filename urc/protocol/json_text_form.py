@@ -1,4 +1,4 @@
-"""The form ``json`` of what is sent: JSON text, with typed values in the places of templates."""
+"""The form ``json`` for sending: JSON text, with typed values in the places of templates."""
 
 import json
 from collections.abc import Mapping
@@ -18,7 +18,7 @@ class JsonWriter:
     def __init__(self, spec: WriteSpec, context: CodecContext) -> None:
         self._tree: Any = spec.options["tree"]
         self._encoding = context.encoding
-        # What ASCII lacks is written as \uXXXX, which every line can carry.
+        # Other characters become \uXXXX in ASCII, which every connection can carry.
         is_ascii = context.encoding != "utf-8"
         self._encode = json.JSONEncoder(
             ensure_ascii=is_ascii, allow_nan=False, separators=(",", ":")
@@ -41,13 +41,13 @@ class JsonWriter:
             raise NotWritable("JSON has no infinite number and no not-a-number") from None
 
     def value(self, namespace: Mapping[str, object]) -> object:
-        """Return what `write` writes, as data; raise `NotWritable` or `ExpressionError`."""
+        """Return the data of `write`; raise `NotWritable` or `ExpressionError`."""
         value = filled(self._tree, namespace)
         self._text(value)
         return value
 
     def completed(self, value: object) -> object:
-        """Return a message of ROS with zeros for what was left out of it, as a bridge reads it."""
+        """Return a ROS message with zeros for missing members, as a bridge reads it."""
         return _completed(self._tree, value)
 
     def read(self, frame: Frame) -> Mapping[str, object] | None:
@@ -62,7 +62,7 @@ class JsonWriter:
 
 
 def filled(tree: Any, namespace: Mapping[str, object]) -> Any:
-    """Return `tree` with the values of its templates."""
+    """Return `tree` with its templates evaluated."""
     if isinstance(tree, Template):
         return tree.evaluate(namespace)
     if isinstance(tree, dict):
@@ -81,7 +81,7 @@ def _completed(tree: Any, value: Any) -> Any:
 
 
 def matches(tree: Any, value: Any, found: dict[str, object]) -> bool:
-    """Return whether `value` is what `tree` gives; plain names' values are put into `found`."""
+    """Return whether `value` matches `tree`; add the values of plain names to `found`."""
     if isinstance(tree, Template):
         name = tree.source.strip().removeprefix("{{").removesuffix("}}").strip()
         if name.isidentifier() and name in tree.names:
@@ -101,5 +101,5 @@ def matches(tree: Any, value: Any, found: dict[str, object]) -> bool:
             and len(tree) == len(value)
             and all(matches(*pair, found) for pair in zip(tree, value, strict=True))
         )
-    # 0 and 0.0 are one number to everybody who writes JSON; true is none
+    # JSON writers treat 0 and 0.0 as the same number, but true is different
     return isinstance(tree, bool) is isinstance(value, bool) and bool(tree == value)

@@ -1,6 +1,6 @@
-"""Types made for a set of paths, and the function that picks the fields out of them.
+"""Generated types for a set of paths, and the function that picks the fields.
 
-Floor 3, private to `urc.protocol.json_paths`.
+Private to `urc.protocol.json_paths`.
 """
 
 from collections.abc import Callable, Iterator, Mapping
@@ -15,20 +15,20 @@ from urc.protocol.generate import function_of
 __all__ = ["Plan", "Want", "build_pick", "plan_of"]
 
 _LISTS_TO = 64
-"""Places of a list up to which it is decoded by type; longer ones are mostly not wanted."""
+"""Largest array index that is decoded by type; longer arrays are rarely needed."""
 
 
 class _Shape:
-    """What a place of the document must be for the paths that go through it."""
+    """The required type at one place of the document."""
 
     def __init__(self) -> None:
         self.names: dict[str, _Shape] = {}
         self.element: _Shape | None = None
-        """Of a list: all its elements together."""
+        """Shape of all elements of an array."""
         self.is_leaf = False
 
     def below(self, step: str | int) -> "_Shape":
-        """Return the shape of the next place, made when there is none."""
+        """Return the shape after one step, created if missing."""
         if isinstance(step, str):
             return self.names.setdefault(step, _Shape())
         if self.element is None:
@@ -36,7 +36,7 @@ class _Shape:
         return self.element
 
     def is_plain(self) -> bool:
-        """Return whether it is one kind of thing, all the way down."""
+        """Return whether the shape has a single type, at every level."""
         kinds = self.is_leaf + bool(self.names) + (self.element is not None)
         inner = [*self.names.values(), *([self.element] if self.element else [])]
         return (
@@ -47,34 +47,34 @@ class _Shape:
 
 
 class Want:
-    """Which fields are at a place, and which steps lead on from it."""
+    """The fields at one place, and the steps from it."""
 
     def __init__(self, shape: _Shape) -> None:
         self.shape = shape
-        """What is at the place."""
+        """Shape at the place."""
         self.fields: list[str] = []
         self.steps: dict[str | int, Want] = {}
 
 
 class Plan(NamedTuple):
-    """How the fields of some paths are taken out of a document."""
+    """The plan for extracting the fields of some paths from a document."""
 
     decode: Callable[[bytes], Any]
-    """Raises `msgspec.DecodeError` for a document of another structure."""
+    """Decode a document; raises `msgspec.DecodeError` for another structure."""
     want: Want
 
     def access(self, want: Want, step: str | int) -> str:
-        """Return what leads from a place by `step`, in source text."""
+        """Return the source text that accesses `step` of a place."""
         if isinstance(step, int):
             return f"[{step}]"
         return f".f{list(want.shape.names).index(step)}"
 
     def picking(self, variable: str, begin: Callable[[str], str]) -> Iterator[str]:
-        """Yield lines that take the fields out of `variable`, as far as they are there.
+        """Yield lines that take the present fields out of `variable`.
 
         Args:
-            variable: holds what was decoded.
-            begin: returns what stands before the value of a field; "" for none that is wanted.
+            variable: the decoded value.
+            begin: returns the text before the value of a field; "" skips the field.
         """
         yield from self._picking(self.want, variable, "    ", begin)
 
@@ -103,7 +103,7 @@ class Plan(NamedTuple):
 
 
 def plan_of(paths: Mapping[str, JsonPath]) -> Plan | None:
-    """Return the plan, or None where types cannot say what the paths want."""
+    """Return the plan, or None if types cannot express the paths."""
     shape = _Shape()
     want = Want(shape)
     for name, path in paths.items():
@@ -121,7 +121,7 @@ def plan_of(paths: Mapping[str, JsonPath]) -> Plan | None:
 
 
 def build_pick(plan: Plan) -> Callable[[bytes], dict[str, object] | None]:
-    """Return bytes → fields found.
+    """Return the function from bytes to found fields.
 
     The function raises `msgspec.DecodeError` for a document of another structure.
     """

@@ -1,7 +1,6 @@
-"""What is known of the robot right now: the names of conditions.
+"""State of the robot, as the namespace of conditions.
 
-Floor 3, pure. An old reading is no knowledge: a condition over a signal that is stale, or was never
-read, does not hold.
+Pure. A stale reading counts as unknown: a condition over a stale or never read signal is false.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
@@ -13,20 +12,20 @@ __all__ = ["Known", "View"]
 
 
 class Known:
-    """The newest reading of every signal."""
+    """The newest sample of every signal."""
 
     def __init__(self, signals: Mapping[str, Signal], names: Mapping[str, object]) -> None:
         self._signals = signals
         self.names = names
-        """What is known beside signals: ``settings``."""
+        """Names in addition to the signals: ``settings``."""
         self.latched = ""
-        """Why nothing may be begun that moves by itself; "" while it may."""
+        """Reason for refusing autonomous motion; "" if it is allowed."""
         self.stops = 0
-        """How often it was stopped: what moves and was asked for before is not sent."""
+        """Number of stops. Motion that was requested before a stop is not sent."""
         self._last: dict[str, Sample] = {}
 
     def latch(self, reason: str) -> None:
-        """Take note of a stop, or of its reset: ""."""
+        """Record a stop, or its reset with ""."""
         self.latched = reason
         self.stops += reason != ""
 
@@ -36,7 +35,7 @@ class Known:
             self._last[sample.signal] = sample
 
     def reading(self, name: str, now: float, since: float) -> Sample | None:
-        """Return the newest reading, unless it is stale at `now` or older than `since`."""
+        """Return the newest sample, unless it is stale at `now` or older than `since`."""
         sample = self._last.get(name)
         if sample is None or sample.time_s < since:
             return None
@@ -54,8 +53,8 @@ class Known:
 
         Args:
             now: the time.
-            names: what goes before signals of the same name, such as arguments.
-            since: readings before it do not count.
+            names: names with precedence over signals, such as arguments.
+            since: time of the oldest valid sample.
         """
         return View(self, now, names, since)
 
@@ -67,7 +66,7 @@ class Known:
         *,
         since: float = float("-inf"),
     ) -> bool:
-        """Return whether `condition` is true; what cannot be told is not."""
+        """Return whether `condition` is true; False if it cannot be evaluated."""
         try:
             return bool(condition.evaluate(self.view(now, names, since=since)))
         except ExpressionError:
@@ -75,7 +74,7 @@ class Known:
 
 
 class View(Mapping[str, object]):
-    """A namespace: given names, then settings, then fresh signals."""
+    """A namespace: given names first, then settings, then fresh signals."""
 
     __slots__ = ("_known", "_names", "_now", "_since")
 

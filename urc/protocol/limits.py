@@ -1,8 +1,8 @@
-"""Which limit a value has passed, from one reading to the next.
+"""Alarm states of signals, from one sample to the next.
 
-Floor 3, pure: time is passed in. A limit is passed at its very value; once its alarm has begun, it
-ends ``hysteresis`` inside. With ``for`` the alarm begins only when the value has stayed past the
-limit for that long, even if no further reading comes: `Judge.deadline` says when to look again.
+Pure: time is passed in. A value at the limit is past it. The alarm ends at a distance of
+``hysteresis`` inside the limit. With ``for``, the alarm begins when the value has stayed past the
+limit for that time, even without a further sample: `Judge.deadline` gives the time.
 """
 
 from urc.model.values import Alarm, Limits, Reading
@@ -10,13 +10,13 @@ from urc.model.values import Alarm, Limits, Reading
 __all__ = ["Judge"]
 
 _LEVELS: tuple[Alarm, ...] = ("lolo", "hihi", "low", "high")
-"""The graver ones first."""
+"""Alarm levels, the more serious ones first."""
 _LOWER = ("lolo", "low")
 _DEEPER = {"lolo": "low", "hihi": "high"}
 
 
 class Judge:
-    """Owns the alarm state of one signal."""
+    """The alarm state of one signal."""
 
     __slots__ = ("_due", "_for_s", "_levels", "_within", "alarm")
 
@@ -28,16 +28,16 @@ class Judge:
             (level, limit) for level in _LEVELS if (limit := getattr(limits, level)) is not None
         ]
         self._due: dict[Alarm, float] = {}
-        """Level that the value is past → when its alarm begins."""
+        """Passed level → time at which its alarm begins."""
 
     @property
     def deadline(self) -> float | None:
-        """When `tick` may begin an alarm; None when only a reading can change anything."""
+        """Time at which `tick` may begin an alarm; None when only a sample can change the state."""
         active = (self.alarm, _DEEPER.get(self.alarm, ""))
         return min((due for level, due in self._due.items() if level not in active), default=None)
 
     def judge(self, value: Reading, now: float) -> Alarm:
-        """Take a reading and return its alarm."""
+        """Process a value and return its alarm."""
         span = _span(value)
         if span is None:
             self._due.clear()
@@ -49,7 +49,8 @@ class Judge:
             is_lower = level in _LOWER
             past = lowest <= limit if is_lower else highest >= limit
             if not past and level in held:
-                # Past "lolo" one is past "low" as well, so coming back from it keeps "low" alive.
+                # A value past "lolo" is past "low", too, so returning from "lolo" keeps "low"
+                # active.
                 back = self._within
                 past = lowest < limit + back if is_lower else highest > limit - back
             if not past:
@@ -59,14 +60,14 @@ class Judge:
         return self.tick(now)
 
     def tick(self, now: float) -> Alarm:
-        """Return the alarm of the newest reading at `now`."""
+        """Return the alarm of the newest sample at `now`."""
         begun = (level for level in _LEVELS if self._due.get(level, now + 1) <= now)
         self.alarm = next(begun, "")
         return self.alarm
 
 
 def _span(value: Reading) -> tuple[float, float] | None:
-    """Return the smallest and largest number in a reading; None when there is none."""
+    """Return the smallest and largest number in a value; None without numbers."""
     if isinstance(value, bool):
         return None
     if isinstance(value, (int, float)):

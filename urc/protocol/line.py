@@ -2,18 +2,19 @@
 
 Pure: time is passed in. Two callbacks, `on_ready` and `on_refused`, concern motion.
 
-Theory of operation. A line is closed, opening or open. An open line becomes *ready* after the steps
-of ``on_connect``, and stops being ready before those of ``on_close``. While it is not ready, it
-sends only the privileged exchanges of these steps. A persistent line is opened from outside. A
-per-request line asks for a connection (`Open`) when something waits, and for its end (`Close`) when
-nothing does.
+Theory of operation. A connection is closed, opening or open. An open connection becomes *ready*
+after the steps of ``on_connect``, and stops being ready before those of ``on_close``. While it is
+not ready, it sends only the privileged exchanges of these steps. The session opens a persistent
+connection. A per-request conversation asks for a connection (`Open`) when a request waits, and for
+its end (`Close`) afterwards.
 
-Requests in flight are kept in the order of sending. A frame is offered to them, the oldest first. A
-request with a correlation takes its own answer only. Of the others only the oldest may take it,
-because answers come in order; real-time requests have an order of their own. A request whose answer
-is overdue stays in flight as *late* for one more reply time. A frame for it is dropped, so that the
-next request does not take it. Until then nothing is sent whose answer could be confused with it.
-After `MISSES_UNTIL_CLOSED` missing answers in a row the line is closed and opened again.
+Requests in flight are kept in the order of sending. A received frame is offered to each of them,
+the oldest first. A request with a correlation takes its own reply only. Of the others only the
+oldest may take the frame, because replies arrive in order; real-time requests have an order of
+their own. A request whose reply is overdue stays in flight as *late* for one more reply time. A
+frame that matches it is dropped, so that the next request does not take it. Until then, requests
+with confusable replies wait. After `MISSES_UNTIL_CLOSED` missing replies in a row the connection is
+closed and opened again.
 """
 
 from collections.abc import Mapping, Sequence
@@ -45,9 +46,9 @@ __all__ = ["Line"]
 new = tuple.__new__
 """Makes a named tuple faster than its class does, for events of every command."""
 MISSES_UNTIL_CLOSED = 3
-"""Missing answers in a row after which a line is given up."""
+"""Missing replies in a row after which the connection is closed."""
 MOST_IN_FLIGHT = 256
-"""Requests that wait for answers, late and real-time ones included."""
+"""Largest number of pending replies, including late and real-time ones."""
 
 
 class Line(Connection):
@@ -57,17 +58,17 @@ class Line(Connection):
         super().__init__(spec, messages)
         self._gap_s = spec.min_gap_s
         self.is_scripted = False
-        """Whether a sequence is at work, which may wait for the next frame."""
+        """Whether a sequence is running, which may wait for the next frame."""
         self._free_at = float("-inf")
-        """When something may be sent again, once the answer to motion has come."""
+        """Earliest time of the next request, once the reply to motion has arrived."""
         self._may_recut = False
-        """Whether an answer brings its own framing, or did before the last bytes came."""
+        """Whether a reply has a framing of its own, or had one before the last bytes."""
         self._number = 0
-        """Of the last envelope whose answer carries it; never used twice."""
+        """Number of the last envelope with a reply; never reused."""
 
     @property
     def deadline(self) -> float | None:
-        """When `tick` has something to do, or None."""
+        """Time at which `tick` has work, or None."""
         flights = self._flights
         due = None if not flights else flights[0].due if len(flights) == 1 else flights.deadline
         if not (self._outbox or self._silent_at or self.inbox.is_timed):
@@ -81,22 +82,22 @@ class Line(Connection):
         return soonest(times)
 
     def has(self, label: str) -> bool:
-        """Return whether a request of that name waits or is in flight."""
+        """Return whether a request with that label is queued or in flight."""
         if not (self._flights or self._outbox):
             return False
         return self._flights.has(label) or self._outbox.has(label)
 
-    # -- motion, whose frames are sent elsewhere
+    # -- motion, whose frames bypass the queue
 
     def motion_must_wait(self, now: float) -> bool:
-        """Return whether a frame of motion has to wait for an answer that the robot owes."""
+        """Return whether a frame of motion has to wait for an outstanding reply."""
         if not self.spec.is_half_duplex:
             return False
         is_owed = any(not one.is_late for one in self._flights)
         return self.held.must_wait(now, is_owed=is_owed)
 
     def gave_motion(self, command: str, names: Mapping[str, object], now: float) -> None:
-        """Take note that a frame of motion goes out, made of `names`."""
+        """Record that a frame of motion is sent, with its `names`."""
         self.held.gave(command, names, now)
         if self.spec.is_half_duplex and now < self.held.owed_until_s:
             self._free_at = now + self._gap_s
@@ -105,7 +106,7 @@ class Line(Connection):
     # -- sending
 
     def submit(self, exchange: Exchange, now: float) -> list[LineEvent]:
-        """Queue a request, and send it at once when the line is free."""
+        """Queue a request, or send it at once if possible."""
         is_shared = self.is_ready and not self.is_per_request
         if is_shared and self._outbox.is_free(exchange, now):
             return self._send(exchange, now)
@@ -115,7 +116,7 @@ class Line(Connection):
         may_pass = self.is_ready or exchange.is_privileged
         if exchange.is_realtime and may_pass and not self.is_per_request:
             if len(self._flights) >= MOST_IN_FLIGHT:
-                text = f"{MOST_IN_FLIGHT} requests wait for their answers already"
+                text = f"{MOST_IN_FLIGHT} requests already wait for their replies"
                 return [Ended(exchange, Outcome("queue-full", text))]
             return self._send(exchange, now) + self._pump(now)
         most = self.spec.queue.most_bytes
@@ -134,13 +135,13 @@ class Line(Connection):
         if self.state != "open":
             return "the robot is not connected"
         if self._is_leaving:
-            return "the line is being closed"
+            return "the connection is being closed"
         if exchange.ask.is_motion:
             return "the robot is not ready: the steps of its connection are not done"
-        return ""  # it waits for them, as long as for any other turn
+        return ""  # it waits in the queue for the login
 
     def _pump(self, now: float) -> list[LineEvent]:
-        """Send the requests whose turn it is; open and close a per-request line as needed."""
+        """Send the requests that are due; open and close a per-request connection as needed."""
         events: list[LineEvent] = []
         if self.is_behind:
             return events
@@ -204,11 +205,11 @@ class Line(Connection):
         return sent
 
     def _freshen(self, exchange: Exchange) -> None:
-        """Write a repeated request again, with the same numbers but new nonces and times."""
+        """Render a repeated request again, with the same numbers but new nonces and times."""
         draw = self.counters.draw()
         draw.values.update(exchange.numbers)
         names = {**self.learnt, **exchange.namespace, COUNTERS: draw}
-        with suppress(BadArgument):  # it could be written before; what it has is better than none
+        with suppress(BadArgument):  # the earlier rendering succeeded, and remains usable
             exchange.data = exchange.ask.encode(names)
 
     def _size_of(self, exchange: Exchange) -> int:
@@ -218,10 +219,10 @@ class Line(Connection):
         try:
             return size_of(exchange.ask.encode(names))
         except BadArgument:
-            return 0  # it is told when it is sent
+            return 0  # the error is reported when the request is sent
 
     def _as_sent(self, exchange: Exchange, number: int | None) -> Payload:
-        """Return the frame of a request, and hide its secrets from now on."""
+        """Return the payload of a request, and register its secrets for redaction."""
         data = exchange.data
         assert data is not None  # noqa: S101 - it was made just before
         if exchange.is_secret:
@@ -231,19 +232,19 @@ class Line(Connection):
         return data
 
     def _count_again(self, exchange: Exchange, number: int | None) -> Numbered | None:
-        """Make the frame of a request again: another frame has used up its numbers."""
+        """Render the frame of a request again: another frame has used up its numbers."""
         try:
             made = written(exchange, self.counters, self.learnt)
         except BadArgument:
-            return None  # its answer does not come, which is told in time
+            return None  # its reply times out, which is reported
         return made._replace(data=self._as_sent(exchange, number))
 
     # -- receiving
 
     def listen(self, ear: Ear, now: float) -> list[LineEvent]:
-        """Let `ear` have the frames that answer no request, cut by its own framing if it has one.
+        """Add an expectation for frames that are no replies, with its own framing if it has one.
 
-        Bytes that the line's framing has left may be whole frames of that one.
+        Remaining bytes of the connection may be whole frames in that framing.
         """
         self.inbox.listen(ear)
         if ear.answer.framing is None:
@@ -252,7 +253,7 @@ class Line(Connection):
         return self.go_on(now) if self.inbox.has_more else []
 
     def receive(self, data: Payload, now: float) -> list[LineEvent]:
-        """Take bytes or an envelope from the transport."""
+        """Process bytes or an envelope from the transport."""
         if self.state != "open":
             return []
         if self.spec.stale_after_s is not None:
@@ -269,7 +270,7 @@ class Line(Connection):
     def go_on(self, now: float) -> list[LineEvent]:
         """Process received frames, up to the first that a sequence may have waited for.
 
-        Later frames may be for the next step, which has to listen first.
+        Later frames may belong to the next step, which has to register its expectation first.
         """
         inbox = self.inbox
         events: list[LineEvent] = []
@@ -286,17 +287,17 @@ class Line(Connection):
                 return events
             if inbox.has_more:
                 events += self._ahead(now)
-        # What waits may depend on what has just come in: that is to be known before it is sent.
+        # Queued requests may depend on the new samples, so process these first.
         self.is_behind = bool(events) and bool(self._outbox)
         if inbox.is_prompted:
             events += inbox.look()
         return events + self._pump(now) if self._outbox or self.is_per_request else events
 
     def _ahead(self, now: float) -> list[LineEvent]:
-        """Take messages off the front of the stream, and tell their readings together.
+        """Process messages at the front of the stream, and report their samples together.
 
-        Frame by frame, a flood of short lines costs almost twice as much (decision 27). The batch
-        ends with the awaited answer, with a refused value, or before a frame that is no message.
+        Frame by frame, a flood of short frames costs almost twice as much (decision 27). The batch
+        ends with the expected reply, with a refused value, or before a frame that is no message.
         """
         inbox, decoder, flight = self.inbox, self.inbox.decoder, self._flights.plain()
         if self.is_scripted or self._may_recut or inbox.is_listening:
@@ -330,13 +331,13 @@ class Line(Connection):
         return events
 
     def _recut(self) -> None:
-        """Choose what cuts the stream now: an answer, or a step, may bring its own framing."""
+        """Choose the framing: a pending reply or a step may have its own."""
         framing = (self._flights.framing() if self._flights else None) or self.inbox.framing
         self._may_recut = framing is not None
         self.inbox.cut_by(framing or self.framing)
 
     def tick(self, now: float) -> list[LineEvent]:
-        """Handle every deadline up to `now`."""
+        """Process every deadline up to `now`."""
         events: list[LineEvent] = []
         if self.state == "open":
             for frame in self.inbox.decoder.tick(now):
@@ -364,7 +365,7 @@ class Line(Connection):
         if plain is not None:
             return self._plain(plain, frame, now)
         if self._flights:
-            # Any frame may be one of a reply's lines, so what has a name of its own goes first.
+            # Any frame may be a line of a reply, so messages have precedence.
             message = self.inbox.message(frame, now) if self._flights.collects_lines() else None
             answered = self._flights.offer(frame, is_message=message is not None)
             if answered is not None:
@@ -376,9 +377,9 @@ class Line(Connection):
         return self.inbox.tell(frame, now) if of_motion is None else of_motion
 
     def _plain(self, flight: Flight, frame: Frame, now: float) -> list[LineEvent]:
-        """Take a frame while the only request in flight expects nothing but readings.
+        """Process a frame while the only pending reply consists of samples.
 
-        Most requests are of this kind. `_answer` takes the replies of all others.
+        Most requests are of this kind. `_answer` processes the replies of all others.
         """
         matcher = flight.exchange.ask.plain
         taken = None if matcher is None else matcher.take(frame, now)
@@ -395,7 +396,7 @@ class Line(Connection):
         events.append(new(Ended, (flight.exchange, new(Outcome, ("", "", values)))))
         return events + self.leave(now) if self.is_per_request and self.is_ready else events
 
-    # -- answers: in time, too late, or none
+    # -- replies: in time, late, or missing
 
     def _envelope(self, envelope: Envelope, now: float) -> list[LineEvent]:
         frame = frame_of(envelope, self.spec.encoding)
@@ -416,7 +417,7 @@ class Line(Connection):
         if flight is None:
             if number is None and self.held.is_listening(now):
                 return self._motion_response(frame, attributes, now)
-            # Of a step, or nobody's: it was told already that it is late.
+            # The reply belongs to a step, or its request has already timed out.
             asker = self._askers.pop(number, None)
             return [] if asker is None else self.inbox.answered(asker, frame, reason, now)
         if reason and flight.ear.answer.takes_redirects and is_redirect(frame):
@@ -434,7 +435,7 @@ class Line(Connection):
         return self._motion_refused(self.held.refuse(frame, reason, now), frame, now)
 
     def _of_motion(self, frame: Frame, now: float) -> list[LineEvent] | None:
-        """Return the events of an answer to motion, or None for other frames."""
+        """Return the events of a reply to motion, or None for other frames."""
         owed_until_s = self.held.owed_until_s
         told = self._told_of_motion(frame, now)
         if self.held.owed_until_s < owed_until_s and self.spec.is_half_duplex:
@@ -446,7 +447,7 @@ class Line(Connection):
         if refused:
             return self._motion_refused(refused, frame, now)
         if self.inbox.is_listening:
-            return None  # a sequence waits for a frame, and may mean this one
+            return None  # a sequence waits for a frame, and may match this one
         message = self.inbox.message(frame, now)
         accepted = self.held.accepted(frame, now) if message is None else None
         if accepted is None:
@@ -473,26 +474,26 @@ class Line(Connection):
     def _answer(
         self, flight: Flight, offer: Offer, frame: Frame | None, now: float
     ) -> list[LineEvent]:
-        """Return the events of a frame that means `offer` for a request.
+        """Return the events of a frame with the match result `offer` for a request.
 
-        A frame about the request that does not answer it may be a message as well. Without a
-        `frame`, its message has been told already.
+        A provisional reply may be a message as well. Without a `frame`, its message has already
+        been reported.
         """
         exchange = flight.exchange
         events: list[LineEvent] = self.inbox.dropped(offer) if offer.dropped else []
         if offer.fields is None and not (offer.refusal or offer.aside):
-            return events  # more is to come
+            return events  # more lines follow
         if offer.fields is None and frame is not None:
             events += self.inbox.message(frame, now) or ()
         if flight.is_late:
-            # It is as good as the answer to the same request, sent again.
+            # It also answers a retransmission of the same request.
             again = self._flights.again(exchange)
             if again is not None:
                 again.is_late = True
             elif exchange in self._outbox:
                 self._outbox.remove(exchange)
             elif offer.aside == "extend":
-                flight.extend(now)  # its answer is still to come, and still nobody else's
+                flight.extend(now)  # its reply is still pending, and still matches no other request
                 return events
             else:
                 return [*events, self._late(flight)]
@@ -510,7 +511,7 @@ class Line(Connection):
             return [*events, Fault(self.spec.name, "sent-again", text), *self._send(exchange, now)]
         if offer.aside:
             times = 1 + exchange.ask.retries
-            text = f"the robot asks for {exchange.ask.label} again, and has got it {times} times"
+            text = f"the robot asks for {exchange.ask.label} again after {times} transmissions"
             outcome = Outcome("refused", text)
         elif offer.fields is None:
             outcome = Outcome("refused", self.inbox.secrets.hide(offer.refusal))
@@ -523,16 +524,16 @@ class Line(Connection):
             outcome = Outcome(values=flight.values)
         self._flights.remove(flight)
         events.append(Ended(exchange, outcome))
-        # One connection, one request: the next one waits for a connection of its own.
+        # Each request has its own connection: close after the reply.
         return events + self.leave(now) if self.is_per_request and self.is_ready else events
 
     def _late(self, flight: Flight) -> Fault:
         self._flights.remove(flight)
-        text = f"the answer to {flight.exchange.ask.label} came too late and was dropped"
+        text = f"the answer to {flight.exchange.ask.label} was late and has been dropped"
         return Fault(self.spec.name, "late-reply", text)
 
     def _silent(self, flight: Flight, now: float) -> list[LineEvent]:
-        """Take the silence of the robot for its answer."""
+        """Treat the silence of the robot as success."""
         if flight.next_stage(now):
             return []
         self._flights.remove(flight)
@@ -541,7 +542,7 @@ class Line(Connection):
 
     def _overdue(self, flight: Flight, now: float) -> list[LineEvent]:
         if flight not in self._flights:
-            return []  # the line was given up for another one
+            return []  # the connection was closed because of another request
         if flight.is_late:
             self._flights.remove(flight)
             return []
@@ -552,7 +553,7 @@ class Line(Connection):
         came = self.inbox.came_since(exchange.sent_at, f"no answer to {exchange.ask.label}")
         text += came
         if came and exchange.ask.match is None and len(self._flights) > 1:
-            text += "; answers that come in another order than their requests need 'match'"
+            text += "; replies in another order than their requests need 'match'"
         events: list[LineEvent] = [Fault(self.spec.name, "reply-timeout", text)]
         flight.is_late = True
         flight.due = now + reply_s

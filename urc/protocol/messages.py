@@ -1,6 +1,6 @@
-"""The messages of one line: which of them a frame is.
+"""Declared messages of one connection. Pure.
 
-Floor 3, pure. The first declared message that takes a frame has it.
+The first declared message that accepts a frame takes it.
 """
 
 from collections.abc import Sequence
@@ -13,7 +13,7 @@ __all__ = ["Messages"]
 
 
 class Messages:
-    """The messages of one line, in the order of the document."""
+    """The messages of one connection, in the order of the document."""
 
     def __init__(self, declared: Sequence[Matcher]) -> None:
         self.declared = tuple(declared)
@@ -21,7 +21,7 @@ class Messages:
     def take(self, frame: Frame, now: float) -> Taken | None:
         """Return the samples and refused values of a frame, or None when it is no message.
 
-        `Frame.fault` is set when a message knew the frame and could not take it.
+        `Frame.fault` is set when a message recognised the frame but rejected its content.
         """
         for one in self.declared:
             taken = one.take(frame, now)

@@ -1,8 +1,8 @@
-"""Frames opened by one generated function per layout: checksum looked at, payload cut out.
+"""Generated frame decoders: one function per layout checks the checksum and cuts out the payload.
 
-Floor 3, pure. For the layouts of most protocols: a raw checksum of 8, 16 or 32 bits near the end,
-over what is before it. All others, and every frame that is not as it should be, are left to the
-general way, which says what is wrong; tests hold the two together.
+Pure. They support the layouts of most protocols: a raw checksum of 8, 16 or 32 bits near the end,
+over the bytes before it. The general decoder handles all other layouts and every invalid frame, and
+reports the error; tests compare the two.
 """
 
 import binascii
@@ -18,11 +18,11 @@ __all__ = ["generate_open"]
 Open = Callable[[bytes], bytes]
 
 _CCITT: Final = {CrcSpec(16, 0x1021): 0, CrcSpec(16, 0x1021, 0xFFFF): 0xFFFF}
-"""What the standard library computes without a function of ours in between → its start."""
+"""Checksums with a direct function in the standard library → start value."""
 
 
 def generate_open(layout: FrameLayout, slow: Open) -> Open:
-    """Return the function from a frame to its payload; `slow` is the general one."""
+    """Return the function from a frame to its payload; `slow` is the general decoder."""
     spec = layout.checksum
     if spec is not None and not _is_common(spec):
         return slow

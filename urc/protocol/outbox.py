@@ -1,6 +1,6 @@
-"""What waits to be sent on one line, and when it may go.
+"""The request queue of one connection, and the time of the next request.
 
-Floor 3, pure. See `urc.protocol.line` for the theory of operation.
+Pure. See `urc.protocol.line` for the theory of operation.
 """
 
 from collections.abc import Callable, Mapping
@@ -16,7 +16,7 @@ __all__ = ["Outbox", "written"]
 
 
 class Outbox(Waiting[Exchange]):
-    """The queue of one line, with its shortest gap and its limit of requests in flight."""
+    """The queue of one connection, with its shortest gap and its limit of requests in flight."""
 
     __slots__ = ("_flights", "_limit", "_spec", "next_send", "size_of")
 
@@ -27,37 +27,37 @@ class Outbox(Waiting[Exchange]):
         self._spec = spec
         self._flights = flights
         self.size_of = size_of
-        """Bytes that a request takes on the wire."""
+        """Function that returns the size of a request on the wire, in bytes."""
         self._limit = spec.queue.in_flight if spec.connection == "persistent" else 1
         self.next_send = float("-inf")
-        """Before this time the shortest gap since the last request is not over."""
+        """End of the shortest gap after the last request."""
 
     def take(self, exchange: Exchange) -> tuple[Exchange, Outcome] | None:
-        """Take a request; return the one that had to make room, and what becomes of it."""
+        """Queue a request; return the displaced one with its outcome, or None."""
         gone = self.put(exchange)
         if gone is None:
             return None
         if gone is not exchange and gone.latest_key and gone.latest_key == exchange.latest_key:
-            return gone, Outcome("superseded", "a newer one took its place before it was sent")
-        text = f"{self._spec.queue.depth} requests are waiting on {self._spec.name} already"
+            return gone, Outcome("superseded", "a newer request replaced it before it was sent")
+        text = f"{self._spec.queue.depth} requests already wait on {self._spec.name}"
         return gone, Outcome("queue-full", text)
 
     def has(self, label: str) -> bool:
-        """Return whether a request of that name waits."""
+        """Return whether a request with that label is queued."""
         return any(exchange.ask.label == label for exchange in self)
 
     def sent(self, exchange: Exchange, now: float) -> None:
-        """Count a request that goes out now."""
+        """Record that a request is sent now."""
         self.next_send = now + self._spec.min_gap_s
         if exchange.ask.bucket is not None:
             exchange.ask.bucket.take(now)
 
     def next(self, now: float, *, is_ready: bool) -> Exchange | None:
-        """Return what is to be sent now, still in its place.
+        """Return the next request to send, without removing it.
 
         Args:
             now: the time.
-            is_ready: whether anybody may talk; else only what is privileged.
+            is_ready: whether the connection is ready; otherwise only privileged requests count.
         """
         if not self:
             return None
@@ -72,27 +72,27 @@ class Outbox(Waiting[Exchange]):
         return None
 
     def _has_room(self, exchange: Exchange) -> bool:
-        """Return whether the robot's buffer takes it beside what it has not answered yet."""
+        """Return whether the request fits into the buffer of the robot."""
         most = self._spec.queue.most_bytes
         return most is None or self._flights.size + self.size_of(exchange) <= most
 
     def is_free(self, exchange: Exchange, now: float) -> bool:
-        """Return whether `exchange` may be sent at once, past an empty queue."""
+        """Return whether `exchange` may bypass the empty queue."""
         if self or self._flights or now < self.next_send:
             return False
         return self._has_room(exchange) and _free_at(exchange) <= now
 
     def wants_line(self, now: float) -> bool:
-        """Return whether something could go if there were a connection."""
+        """Return whether a request waits only for a connection."""
         return any(_free_at(exchange) <= now for exchange in self)
 
     def may_send_at(self, *, is_ready: bool) -> float | None:
-        """Return when time alone lets something be sent; None when only an answer does."""
+        """Return the time at which a request may be sent; None when it waits for a reply."""
         if not self or self._flights.waiting >= self._limit:
             return None
         first: float | None = None
         barred_from = float("inf")
-        """What has no room holds up what is behind it from the time at which it could go."""
+        """A request without room in the buffer blocks those behind it once it is due."""
         for exchange in self:
             if not (is_ready or exchange.is_privileged) or self._flights.may_confuse(exchange):
                 continue
@@ -105,21 +105,21 @@ class Outbox(Waiting[Exchange]):
 
 
 def _free_at(exchange: Exchange) -> float:
-    """Return when its rate lets it go, and the wait before it is sent again."""
+    """Return the earliest time by its rate limit and by the wait before a retry."""
     bucket = exchange.ask.bucket
     return exchange.waits_until if bucket is None else max(bucket.free_at, exchange.waits_until)
 
 
 def written(exchange: Exchange, counters: Counters, learnt: Mapping[str, object]) -> Numbered:
-    """Make a frame with the next numbers of its counters; sent again, it keeps them.
+    """Render a frame with the next numbers of its counters; a retry keeps its numbers.
 
     Args:
-        exchange: of an ask that is made late.
-        counters: of the connection.
-        learnt: what its login has read.
+        exchange: a request that is rendered when it is sent.
+        counters: counters of the connection.
+        learnt: names read by the login.
 
     Raises:
-        BadArgument: it cannot be written with these numbers, which are used up nevertheless.
+        BadArgument: the frame cannot be written; its numbers are used up nevertheless.
     """
     draw = counters.draw()
     count = Count({}, {})

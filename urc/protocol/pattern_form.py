@@ -1,7 +1,7 @@
-"""The form ``pattern``: the frame as it is written, with holes for its fields.
+"""The form ``pattern``: literal text with typed fields.
 
-A pattern becomes a regular expression that runs in linear time by construction: every repeat is
-possessive, and is over characters that cannot follow it.
+A pattern becomes a regular expression with linear running time by construction: every repeat is
+possessive, over characters that cannot follow it.
 """
 
 import re
@@ -18,7 +18,7 @@ from urc.protocol.texts import encoded, field_text
 __all__ = ["CASTS", "PatternReader", "pattern_source"]
 
 _BLANK: Final = r"\s\x1c-\x1f"
-"""What Python's `split` and `float` take for blanks in ASCII text."""
+"""ASCII characters that `split` and `float` of Python treat as blanks."""
 _SOURCES: Final[Mapping[FieldKind, str]] = {
     "integer": r"[+-]?[0-9]{1,400}+",
     "number": r"[+-]?(?:(?:[0-9]++(?:\.[0-9]*+)?|\.[0-9]++)(?:[eE][+-]?[0-9]++)?"
@@ -43,27 +43,28 @@ _FILLERS: Final[Mapping[FieldKind, object]] = {"integer": 0, "number": 0, "hex":
 
 
 class PatternReader:
-    """Reads typed fields out of text, and writes the text with fields put in."""
+    """Reads typed fields from text, and writes text with the values of the fields."""
 
     def __init__(self, spec: ReadSpec, context: CodecContext) -> None:
         self._holes = cast("tuple[Hole, ...]", spec.options["holes"])
         self._tail = cast("str", spec.options["tail"])
         self._start = _start(self._holes, self._tail)
-        """What the text begins with, blanks aside; "" where that is not known."""
+        """First literal word; "" if it is unknown."""
         self._match: Callable[[str], re.Match[str] | None] | None = None
-        """Made when first used: a driver has many patterns, and a test needs one or two."""
+        """Regular expression, compiled on first use: a driver has many patterns, a test needs
+        few."""
         self._casts = [
             (place, hole.name, _cast_of(hole))
             for place, hole in enumerate(self._holes, 1)
             if hole.name
         ]
         self._words = _words(self._holes, self._tail)
-        """Its words, where it is made of nothing else: they need no expression of their own."""
+        """Words of the pattern, if it consists of whole words and needs no regular expression."""
         self._has_widths = any(hole.width for hole in self._holes)
         self._encoding = context.encoding
 
     def read(self, frame: Frame) -> Mapping[str, object] | None:
-        """Return the fields, numbers as numbers."""
+        """Return the fields, with numbers converted."""
         return self._read(frame.text)
 
     def _read(self, text: str) -> dict[str, object] | None:
@@ -81,11 +82,11 @@ class PatternReader:
             return {name: cast_to(found[place]) for place, name, cast_to in self._casts}
         try:
             return {name: cast_to(found[place]) for place, name, cast_to in self._casts}
-        except ValueError:  # there is something else in a column
+        except ValueError:  # another value in a fixed-width column
             return None
 
     def write(self, fields: Mapping[str, object]) -> Payload:
-        """Return the pattern with `fields` in its holes."""
+        """Return the text of the pattern with the values of `fields`."""
         pieces = []
         for hole in self._holes:
             value = fields.get(hole.name) if hole.name else None
@@ -101,7 +102,7 @@ class PatternReader:
 
 
 def _words(holes: tuple[Hole, ...], tail: str) -> list[str | Hole] | None:
-    """Return the literal words and the holes, or None when a hole is only a part of a word."""
+    """Return the literal words and the fields, or None when a field is only part of a word."""
     words: list[str | Hole] = []
     for place, hole in enumerate(holes):
         before = hole.before.lstrip() if place == 0 else hole.before
@@ -114,7 +115,7 @@ def _words(holes: tuple[Hole, ...], tail: str) -> list[str | Hole] | None:
         return None
     if not holes:
         return None
-    # Several blanks in a row, or other ones than the space, are meant as they are written.
+    # Several blanks in a row, and blanks other than the space, stay literal.
     literals = [holes[0].before.lstrip(), *(hole.before for hole in holes[1:]), tail]
     is_plain = all(" ".join(text.split()) == text.strip(" ") for text in literals)
     is_single = not any("  " in text for text in literals)
@@ -122,7 +123,7 @@ def _words(holes: tuple[Hole, ...], tail: str) -> list[str | Hole] | None:
 
 
 def _by_words(words: list[str | Hole], found: list[str]) -> dict[str, object] | None:
-    """Return the fields of a text that is made of these words, or None when it is another one."""
+    """Return the fields of a text that consists of these words, or None for another text."""
     if len(found) != len(words):
         return None
     fields: dict[str, object] = {}
@@ -139,14 +140,14 @@ def _by_words(words: list[str | Hole], found: list[str]) -> dict[str, object] | 
 
 
 def _start(holes: tuple[Hole, ...], tail: str) -> str:
-    """Return the first literal word of a pattern, "" where it begins otherwise."""
+    """Return the first literal word of a pattern; "" if it begins with a field."""
     if holes and holes[0].width:
         return ""
     return (holes[0].before if holes else tail).lstrip().partition(" ")[0]
 
 
 def pattern_source(holes: tuple[Hole, ...], tail: str) -> str:
-    """Return the regular expression of a pattern, with a group for each hole."""
+    """Return the regular expression of a pattern, with a group for each field."""
     befores = [hole.before for hole in holes]
     pieces = [] if holes and holes[0].width else [rf"[{_BLANK}]*+"]
     for place, hole in enumerate(holes):
@@ -167,7 +168,7 @@ def _literal(text: str) -> str:
 def _field(kind: FieldKind, after: str) -> str:
     if kind in _SOURCES:
         return _SOURCES[kind]
-    # A word or text ends where what follows it can begin.
+    # A word or text ends before the first character that can follow it.
     stop = _BLANK if after[:1] == " " else re.escape(after[:1])
     if kind == "word":
         return rf"[^{_BLANK}{'' if after[:1] == ' ' else stop}]++"
@@ -175,7 +176,7 @@ def _field(kind: FieldKind, after: str) -> str:
 
 
 def _cast_of(hole: Hole) -> Callable[[str], object]:
-    """Return the function from text to value; a column that is empty has none."""
+    """Return the function from text to value; an empty column has no value."""
     cast_to = CASTS[hole.kind]
     if not hole.width:
         return cast_to
@@ -185,7 +186,7 @@ def _cast_of(hole: Hole) -> Callable[[str], object]:
         if hole.kind in ("word", "text"):
             return inner or None
         if not inner.isascii() or "_" in inner:
-            raise ValueError(text)  # Python's own numbers take more than robots mean
+            raise ValueError(text)  # int() and float() accept more than robots mean
         return cast_to(inner) if inner else None
 
     return column

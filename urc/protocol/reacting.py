@@ -1,8 +1,8 @@
-"""What a message does beside setting signals: collect over several frames, and be answered.
+"""Effects of messages besides their samples: collection over several frames, and acknowledgement.
 
-Floor 3, pure. Both hang on the step from fields to samples, which is done exactly once for a frame
-that is a message. What is collected is forgotten with the connection; what is answered waits in
-`Replies` until the line tells of the frame.
+Pure. Both hook into the step from fields to samples, which runs exactly once per message. Collected
+values are cleared with the connection. Acknowledgements wait in `Replies` until the conversation
+has reported the frame.
 """
 
 from collections.abc import Callable, Mapping
@@ -19,15 +19,15 @@ from urc.protocol.readings import Decode
 __all__ = ["Collector", "Replies", "answering", "collecting"]
 
 MOST_REPLIES: Final = 256
-"""Answers that are made before they are told; a frame makes one at most."""
+"""Largest number of pending acknowledgements; each frame makes at most one."""
 
 
 class Replies(list[Payload | Counted]):
-    """Answers to messages, in their order, that are still to be sent."""
+    """Pending acknowledgements of messages, in order."""
 
 
 class Collector:
-    """One value that is put together out of several frames."""
+    """One value that is collected from several frames."""
 
     def __init__(self, spec: Collect) -> None:
         self._spec = spec
@@ -36,12 +36,12 @@ class Collector:
         self.forget()
 
     def forget(self) -> None:
-        """Begin as on a fresh connection: without a mark, the first frame is the first part."""
+        """Reset for a new connection: without ``begin``, the first frame is the first part."""
         self._parts = [] if self._spec.begin is None else None
         self._size = 0
 
     def take(self, names: Mapping[str, object]) -> object:
-        """Take the fields of a frame; return the whole when it is complete, else None."""
+        """Process the fields of a frame; return the complete value, or None."""
         spec, whole = self._spec, None
         if spec.begin is not None and _holds(spec.begin, names):
             if spec.end is None and self._parts is not None:
@@ -71,11 +71,11 @@ def _holds(condition: Template | None, names: Mapping[str, object]) -> bool:
     try:
         return condition is not None and bool(condition.evaluate(names))
     except ExpressionError:
-        return False  # it asks for a field that only another frame has
+        return False  # it reads a field of another frame
 
 
 def _joined(parts: list[object]) -> object:
-    """Return bytes as bytes, lists as one list, and all else as a list."""
+    """Return bytes joined, lists joined, and other values as a list."""
     if parts and all(isinstance(part, bytes) for part in parts):
         return b"".join(part for part in parts if isinstance(part, bytes))
     whole: list[object] = []
@@ -87,7 +87,7 @@ def _joined(parts: list[object]) -> object:
 def collecting(
     collectors: Mapping[str, Collector], settings: Mapping[str, object], decode: Decode
 ) -> Decode:
-    """Return `decode` with what is collected as fields beside those of the frame."""
+    """Return a variant of `decode` that adds the collected values to the fields."""
 
     def decode_collected(found: Mapping[str, object], now: float) -> object:
         names = {"settings": settings, **found}
@@ -98,7 +98,7 @@ def collecting(
                 fields[name] = whole
         return decode(fields, now)
 
-    return decode_collected  # type: ignore[return-value]  # what `decode` returns
+    return decode_collected  # type: ignore[return-value]  # the result of `decode`
 
 
 def answering(
@@ -108,14 +108,14 @@ def answering(
     replies: Replies,
     decode: Decode,
 ) -> Decode:
-    """Return `decode` that makes the answer to the frame as well.
+    """Return a variant of `decode` that also makes the acknowledgement of the frame.
 
     Args:
-        encode: what the answer is.
-        names: the time and the fields → what its expressions know.
-        counters: of the connection; None where the answer counts nothing.
-        replies: takes the answer.
-        decode: what becomes of the fields.
+        encode: renders the acknowledgement.
+        names: returns the namespace for a time and fields.
+        counters: counters of the connection; None without counters in the frame.
+        replies: receives the acknowledgement.
+        decode: converts the fields to samples.
     """
 
     def decode_answered(found: Mapping[str, object], now: float) -> tuple[list[object], list[str]]:

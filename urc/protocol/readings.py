@@ -1,7 +1,7 @@
-"""The readings of one engine: fields → samples, with alarms and with what is computed from them.
+"""Samples of one engine: conversion of fields, alarms, and computed signals.
 
-Floor 3, pure: time is passed in. One `Readings` belongs to one engine, so a signal that several
-frames set has one alarm state, and a computed signal sees the newest value of each of its inputs.
+Pure: time is passed in. Each engine has one `Readings`. A signal that several frames set has one
+alarm state, and a computed signal reads the newest value of each input.
 """
 
 from collections.abc import Callable, Iterable, Mapping
@@ -17,7 +17,7 @@ from urc.protocol.steady import Steady
 __all__ = ["Decode", "Readings"]
 
 Decode = Callable[[Mapping[str, object], float], tuple[list[Sample], list[str]]]
-"""Fields of a frame and the time → the samples, and a line for each value that was refused."""
+"""Fields of a frame and the time → samples, and one text for each refused value."""
 
 
 class _Computed(NamedTuple):
@@ -25,18 +25,18 @@ class _Computed(NamedTuple):
     formula: Template
     inputs: tuple[str, ...]
     spare: frozenset[str]
-    """Inputs that need not have been read."""
+    """Optional inputs: the formula works without them."""
     shortest_s: float
-    """Age at which the first of its inputs is old."""
+    """Shortest ``stale_after`` of its inputs, in seconds."""
     convert: Convert
 
 
 class Readings:
-    """The newest value of every signal that something computes from, and every alarm's state.
+    """The newest values of the inputs of formulas, and the alarm states of all signals.
 
     Args:
         signals: as loaded: no computed signal depends on itself.
-        names: what formulas know beside signals, such as ``settings``.
+        names: names for formulas besides signals, such as ``settings``.
     """
 
     def __init__(
@@ -60,9 +60,9 @@ class Readings:
         self._kept = frozenset((*inputs, *self._timed))
 
     def decoder(self, fields: Iterable[str]) -> Decode:
-        """Return the function that turns the fields of one kind of frame into samples.
+        """Return the function that converts the fields of one kind of frame to samples.
 
-        Fields whose name starts with ``_`` are the document's own and become no samples.
+        Fields whose name starts with ``_`` are private to the document and give no samples.
         """
         converters = {name: self._converter(name) for name in fields if not name.startswith("_")}
 
@@ -89,11 +89,11 @@ class Readings:
         return decode
 
     def put(self, values: Mapping[str, object], now: float) -> tuple[list[Sample], list[str]]:
-        """Take values that no frame brought, as a decoder takes fields."""
+        """Convert values from another source than a frame, as a decoder converts fields."""
         return self.decoder(values)(values, now)
 
     def alarm(self, name: str, value: Reading, now: float) -> Alarm:
-        """Take a reading and return which limit it has passed."""
+        """Update the alarm state of a signal, and return it."""
         judge = self._judges.get(name)
         return "" if judge is None else judge.judge(value, now)
 
@@ -102,17 +102,17 @@ class Readings:
         return name in self._judges
 
     def keeps(self, name: str) -> bool:
-        """Return whether something rests on the signal, so that `follow` must know of it."""
+        """Return whether a formula or a timed alarm uses the signal, for `follow`."""
         return name in self._kept
 
     @property
     def is_timed(self) -> bool:
-        """Whether time alone can make news."""
+        """Whether time alone can change a sample."""
         return bool(self._timed or self._steady)
 
     @property
     def deadline(self) -> float | None:
-        """When `tick` may have news; None when only a reading can."""
+        """Time at which `tick` may have samples; None when only a frame can change them."""
         if not self._timed and not self._steady:
             return None
         times = [self._judges[name].deadline for name in self._timed]
@@ -120,9 +120,9 @@ class Readings:
         return min((time for time in times if time is not None), default=None)
 
     def tick(self, now: float) -> list[Sample]:
-        """Return what time alone has made news by `now`, each sample as old as it is.
+        """Return the samples that time alone has changed by `now`, with their original times.
 
-        The newest one of each signal whose alarm begins, and those that have lasted long enough.
+        They are the newest samples of signals with a new alarm, and debounced values.
         """
         samples: list[Sample] = []
         if self._steady:
@@ -138,7 +138,7 @@ class Readings:
         return samples
 
     def follow(self, samples: list[Sample], refused: list[str], now: float) -> None:
-        """Add to `samples` everything that is computed from one of them."""
+        """Append to `samples` all signals that are computed from them."""
         changed = set()
         for taken in samples:
             if taken.signal in self._kept:
@@ -160,7 +160,7 @@ class Readings:
                 changed.add(computed.name)
 
     def _told(self, sample: Sample, now: float) -> Sample | None:
-        """Return what is told of a reading; None when it is no news yet."""
+        """Return the sample to report; None while dead band or debounce suppress it."""
         steady = self._steady.get(sample.signal)
         return sample if steady is None else steady.take(sample, now)
 
@@ -170,7 +170,7 @@ class Readings:
             self._namespace[sample.signal] = sample.value
 
     def _compute(self, computed: _Computed, now: float) -> Sample | None:
-        """Return the sample, or None while an input that it needs has never been read."""
+        """Return the sample, or None while a required input has never been read."""
         time_s, is_absent = now, False
         for name in computed.inputs:
             sample = self._last.get(name)
@@ -178,7 +178,7 @@ class Readings:
                 if name in computed.spare:
                     continue
                 return None
-            # As old as the first of its inputs to grow old: never fresh over a dead one.
+            # A computed sample becomes stale together with the first of its inputs.
             left_s = self.signals[name].stale_after_s - computed.shortest_s
             time_s = min(time_s, sample.time_s + left_s)
             is_absent |= sample.value is None
@@ -196,7 +196,7 @@ class Readings:
         return self._converters[name]
 
     def _in_order(self) -> Iterable[_Computed]:
-        """Yield the computed signals, each after those that it uses."""
+        """Yield the computed signals, each after its inputs."""
         waiting = {name: one for name, one in self.signals.items() if one.formula is not None}
         while waiting:
             ready = [

@@ -12,19 +12,19 @@ from urc.protocol.texts import encoded, field_text
 __all__ = ["RegexReader"]
 
 _WIDEST: Final = 16
-"""Characters of a number that is spelt in other ways."""
+"""Longest respelt number, in characters."""
 _PLACES: Final = 6
 
 
 class RegexReader:
-    """Reads text by a pattern; writes the shortest text that the pattern takes."""
+    """Reads text by a pattern; writes the shortest matching text."""
 
     def __init__(self, spec: ReadSpec, context: CodecContext) -> None:
         self._pattern = cast("Pattern", spec.options["pattern"])
         self._encoding = context.encoding
 
     def read(self, frame: Frame) -> Mapping[str, object] | None:
-        """Return the named groups; one that took no part is left out."""
+        """Return the named groups, without those that did not take part in the match."""
         found = self._pattern.search(frame.text)
         if found is None:
             return None
@@ -40,7 +40,7 @@ class RegexReader:
         return encoded(text, self._encoding)
 
     def _text(self, name: str, value: object) -> str:
-        """Return a field as its group wants it: numbers with leading zeros or fixed decimals."""
+        """Return a field as its group requires it: with leading zeros or fixed decimals."""
         text = field_text(value)
         is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
         if not is_number or len(text) > _WIDEST or name not in self._pattern.groups:
@@ -55,7 +55,7 @@ class RegexReader:
 
 
 def _padded(text: str) -> Iterator[str]:
-    """Yield other spellings of a number: with zeros in front, a sign, more or fewer decimals."""
+    """Yield other spellings of a number: with leading zeros, a sign, more or fewer decimals."""
     own = len(text.partition(".")[2])
     number = float(text)
     for places in (*range(own, -1, -1), *range(own + 1, _PLACES + 1)):

@@ -1,7 +1,7 @@
-"""Where a sequence stands, and what people want of it: pause, one more step, go on, end.
+"""Control of a running sequence: pause, single step, resume, abort.
 
-Floor 3, pure. People pull at any time; the sequence obeys between two of its steps, so that what
-one step has begun is never left in the middle.
+Pure. Requests may arrive at any time. The sequence obeys between two steps, so that no step is
+interrupted.
 """
 
 from typing import Final, Literal
@@ -9,35 +9,36 @@ from typing import Final, Literal
 __all__ = ["PAUSE_S", "Pull", "Reins"]
 
 PAUSE_S: Final = 600.0
-"""A sequence that is paused for longer ends: it keeps others from running."""
+"""Longest pause, in seconds: a paused sequence blocks other sequences."""
 
 Pull = Literal["pause", "step", "resume", "abort"]
-"""``step``: one step of the outermost ones, and pause again; told before it begins, it begins
-paused."""
+"""A request of the operator. ``step`` runs one outermost step and pauses again. Before the start,
+it makes the sequence start paused."""
 
 
 class Reins:
-    """Of one sequence, which runs once at a time."""
+    """The control state of one sequence, which runs once at a time."""
 
     __slots__ = ("_halt", "count", "is_aborted", "is_paused", "is_running", "of", "place", "reason")
 
     def __init__(self, of: int) -> None:
-        """Begin at rest; `of` is how many steps it has, without those inside of others."""
+        """Initialise at rest; `of` is the number of outermost steps."""
         self.of = of
         self.place = 0
-        """Steps that were begun."""
+        """Number of started steps."""
         self.is_running = False
         self.is_paused = False
         self.is_aborted = False
         self.reason = ""
-        """Why it ended without success; "" when it did not."""
+        """Reason of a failure; "" otherwise."""
         self.count = 0
-        """Grows with each change of the above."""
+        """Change counter of all attributes above."""
         self._halt: Literal["", "now", "next", "outer"] = ""
-        """now: before any step; outer: before an outermost one; next: after one more of those."""
+        """Next pause. now: before any step; outer: before an outermost one; next: after one more of
+        those."""
 
     def pull(self, what: Pull) -> None:
-        """Take what somebody wants."""
+        """Apply a request of the operator."""
         match what:
             case "pause":
                 self._halt = "now" if self.is_running else ""
@@ -51,26 +52,26 @@ class Reins:
     # -- for the runner
 
     def begin(self) -> None:
-        """Take note that it begins."""
+        """Record the start."""
         self.place, self.reason = 0, ""
         self.is_running, self.is_paused, self.is_aborted = True, False, False
         self.count += 1
 
     def step(self) -> None:
-        """Take note that one more of the outermost steps begins."""
+        """Record the start of another outermost step."""
         self.place += 1
         self.count += 1
         if self._halt == "next":
             self._halt = "outer"
 
     def end(self, reason: str) -> None:
-        """Take note that it is over."""
+        """Record the end."""
         self._halt, self.reason = "", reason
         self.is_running, self.is_paused, self.is_aborted = False, False, False
         self.count += 1
 
     def halts(self, *, is_outermost: bool) -> bool:
-        """Return whether the next step must wait; from then on it is paused."""
+        """Return whether the next step must wait; if so, the sequence is paused."""
         is_over = is_outermost and self.place == self.of
         is_wanted = self._halt == "now" or (self._halt == "outer" and is_outermost)
         if is_over or not is_wanted:
@@ -80,7 +81,7 @@ class Reins:
         return True
 
     def goes_on(self) -> bool:
-        """Return whether it was paused, and is not any more."""
+        """Return whether a pause has just ended."""
         if not self.is_paused or self._halt not in ("", "next"):
             return False
         self.is_paused = False

@@ -1,7 +1,4 @@
-"""What is asked again and again: polls, and what keeps a line alive.
-
-Floor 3, pure.
-"""
+"""Repeated requests: polls and keepalives. Pure."""
 
 from collections.abc import Callable, Iterator, Mapping
 from functools import partial
@@ -19,16 +16,16 @@ from urc.protocol.steps import Sink
 __all__ = ["KeptAlive", "PollState", "Schedule"]
 
 Run = Callable[[str, Mapping[str, object], Sink, float], list[LineEvent]]
-"""Runs a command: its name, its arguments, who has the outcome, and the time."""
+"""Function that runs a command: name, arguments, sink of the outcome, time."""
 
 
 class PollState:
-    """One poll at work."""
+    """The state of one poll."""
 
     def __init__(self, poll: Poll, ask: Ask, line: Line, known: Known) -> None:
         self.poll = poll
         self.due: float | None = None
-        """When it is next asked; None while its line is not up."""
+        """Time of the next request; None while its connection is down."""
         self._ask = ask
         self._line = line
         self._known = known
@@ -37,24 +34,25 @@ class PollState:
         self._is_offline = False
 
     def begin(self, now: float) -> None:
-        """Take note that its line is up."""
+        """Start polling on a ready connection."""
         self._misses, self._is_offline = 0, False
         self.due = now + self.poll.phase_s
 
     def stop(self) -> None:
-        """Take note that its line is down."""
+        """Stop polling on a lost connection."""
         self.due = None
 
     def ask(self, now: float) -> list[LineEvent]:
-        """Ask if it is due. One that still waits for its turn is not asked twice."""
+        """Submit the request if it is due, unless the last one is still queued."""
         if self.due is None or self.due > now:
             return []
         every_s = self.poll.every_s
         if self._is_offline and self.poll.offline is not None:
             every_s = self.poll.offline.retry_s
-        # Kept on its own grid of times, so that polls neither drift nor bunch up after a pause.
+        # Requests keep to a fixed grid of times, so that polls neither drift nor bunch up after a
+        # pause.
         self.due += ((now - self.due) // every_s + 1) * every_s
-        if self.due <= now:  # a period too small for the digits of the clock
+        if self.due <= now:  # the period is below the resolution of the clock
             self.due = now + every_s
         if self._line.has(self._ask.label):
             return []
@@ -64,7 +62,7 @@ class PollState:
         return _submit(self._line, self._ask, self, self._names, now)
 
     def ended(self, exchange: Exchange, outcome: Outcome, now: float) -> list[LineEvent]:
-        """Count misses; tell of a robot that refuses."""
+        """Count missed replies; report refusals."""
         if outcome.code == "timed-out" and self.poll.offline is not None:
             self._misses += 1
             if self._misses >= self.poll.offline.after:
@@ -76,7 +74,7 @@ class PollState:
             if self._is_offline and self.due is not None:
                 self.due = now + self.poll.every_s
             self._is_offline = False
-        # A poll comes again by itself, so only a robot that refuses it is worth a line.
+        # The next poll follows anyway, so only refusals are reported.
         if outcome.code in ("refused", "bad-argument"):
             text = f"{self._ask.label}: {outcome.message}"
             return [Fault(self.poll.transport, outcome.code, text)]
@@ -84,15 +82,15 @@ class PollState:
 
 
 class KeptAlive:
-    """What is said on one line when nothing else has been said for a while."""
+    """The keepalive of one connection."""
 
     def __init__(self, keepalive: Keepalive, line: Line, ask: Ask | None, known: Known) -> None:
-        """Prepare.
+        """Initialise the keepalive.
 
         Args:
             keepalive: as declared.
-            line: whose it is.
-            ask: None when a command is run.
+            line: its connection.
+            ask: its request; None when it runs a command.
             known: the names of its templates.
         """
         self._keepalive = keepalive
@@ -104,18 +102,18 @@ class KeptAlive:
 
     @property
     def deadline(self) -> float | None:
-        """When it must speak; None while it has, or the line is not up."""
+        """Time of the next keepalive; None while one is pending or the connection is down."""
         if not self._line.is_ready or self._is_asked:
             return None
-        # One that could not be sent, because it is not allowed, is not tried again at once.
+        # A refused keepalive is not retried at once.
         return max(self._line.last_sent, self._spoke_at) + self._keepalive.every_s
 
     def forget(self) -> None:
-        """Take note that the line is up anew."""
+        """Reset for a new connection."""
         self._is_asked = False
 
     def speak(self, run: Callable[[str], list[LineEvent]], now: float) -> list[LineEvent]:
-        """Speak if it is due; `run` runs a command and calls `done`."""
+        """Send a keepalive if it is due; `run` runs a command and calls `done`."""
         due = self.deadline
         if due is None or due > now:
             return []
@@ -125,17 +123,17 @@ class KeptAlive:
         return _submit(self._line, self._ask, self, self._known.names, now)
 
     def ended(self, exchange: Exchange, outcome: Outcome, now: float) -> list[LineEvent]:
-        """Take note that it has been said."""
+        """Record that the keepalive was sent."""
         return self.done(outcome, now)
 
     def done(self, outcome: Outcome, now: float) -> list[LineEvent]:
-        """Take note that the command has been run; a failure of it shows by itself."""
+        """Record the end of the command; it reports its own failures."""
         self._is_asked = False
         return []
 
 
 class Schedule:
-    """All polls of one driver, and what keeps its lines alive."""
+    """All polls and keepalives of one driver."""
 
     def __init__(self, driver: Driver, builder: Builder, known: Known) -> None:
         self._lines = builder.lines
@@ -153,12 +151,12 @@ class Schedule:
 
     @property
     def keeps_alive(self) -> bool:
-        """Whether any line is kept alive."""
+        """Whether any connection has a keepalive."""
         return bool(self._kept_alive)
 
     @property
     def next_poll(self) -> float | None:
-        """When the next poll is due."""
+        """Time of the next poll."""
         first: float | None = None
         for poll in self._polls:
             due = poll.due
@@ -168,17 +166,17 @@ class Schedule:
 
     @property
     def next_words(self) -> list[float | None]:
-        """When each line is spoken to at the latest, to keep it alive."""
+        """Latest time of the next keepalive of each connection."""
         return [one.deadline for one in self._kept_alive.values()]
 
     def begin(self, now: float) -> None:
-        """Begin the polls that bring their own connections."""
+        """Start the polls of per-request connections."""
         for poll in self._polls:
             if self._lines[poll.poll.transport].is_per_request:
                 poll.begin(now)
 
     def up(self, line: Line, now: float) -> None:
-        """Take note that a line is usable."""
+        """Start polls and keepalive of a ready connection."""
         name = line.spec.name
         if name in self._kept_alive:
             self._kept_alive[name].forget()
@@ -188,7 +186,7 @@ class Schedule:
                     poll.begin(now)
 
     def down(self, line: Line) -> None:
-        """Take note that a line is not usable any more."""
+        """Stop the polls of a lost connection."""
         if not line.is_per_request:
             for poll in self._polls:
                 if poll.poll.transport == line.spec.name:
@@ -200,7 +198,7 @@ class Schedule:
             poll.stop()
 
     def ask(self, run: Run, now: float) -> Iterator[list[LineEvent]]:
-        """Submit what is due, one after the other: what comes of one is settled before the next."""
+        """Submit due requests one by one; each is settled before the next."""
         for poll in self._polls:
             if poll.due is not None and poll.due <= now:
                 yield poll.ask(now)
@@ -210,7 +208,7 @@ class Schedule:
 
 
 def _counting(keepalive: Keepalive, driver: Driver) -> frozenset[str] | None:
-    """Return the names of requests that keep a line alive; None for all."""
+    """Return the labels of requests that count as keepalives; None for all."""
     if not keepalive.after:
         return None
     named = {*keepalive.after, keepalive.run}

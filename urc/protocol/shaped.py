@@ -1,6 +1,6 @@
-"""What stands beside a form: conversions of this frame's fields, ``set`` and ``when``.
+"""Field conversions of one frame, ``set`` and ``when``.
 
-Floor 3, pure. Wraps the reader of the form, in both directions.
+Pure. The reader wraps the reader of the form, in both directions.
 """
 
 from collections.abc import Mapping
@@ -16,7 +16,7 @@ __all__ = ["ShapedReader"]
 
 
 class ShapedReader:
-    """Reads as the form does, then converts, asks ``when``, and adds what ``set`` computes."""
+    """Reads by the form, converts the fields, checks ``when``, and adds the values of ``set``."""
 
     def __init__(self, inner: Reader, spec: ReadSpec, context: CodecContext) -> None:
         self._inner = inner
@@ -36,7 +36,7 @@ class ShapedReader:
         self._encoding = context.encoding
 
     def read(self, frame: Frame) -> Mapping[str, object] | None:
-        """Return the fields, or None when the frame is another one."""
+        """Return the fields, or None for another kind of frame."""
         raw = self._inner.read(frame)
         if raw is None:
             return None
@@ -61,7 +61,7 @@ class ShapedReader:
         return found
 
     def _is_meant(self, namespace: Mapping[str, object]) -> bool:
-        # As in 'match', text is equal to the number that it spells.
+        # As in 'match', text equals the number that it spells.
         names = {
             name: Word(value) if isinstance(value, str) else value
             for name, value in namespace.items()
@@ -69,10 +69,10 @@ class ShapedReader:
         try:
             return self._when is not None and bool(self._when.evaluate(names))
         except ExpressionError:
-            return False  # it asks for a field that only another frame has
+            return False  # it reads a field of another frame
 
     def write(self, fields: Mapping[str, object]) -> Payload:
-        """Return a frame that is read as `fields`, those of ``set`` aside."""
+        """Return a frame that reads as `fields`, except for those of ``set``."""
         raw: dict[str, object] = {}
         for name, value in fields.items():
             if name in self._sets:
@@ -84,12 +84,12 @@ class ShapedReader:
                 raise NotWritable(f"{name}: {error}") from None
         payload = self._inner.write(raw)
         if self._when is not None and self.read(frame_of(payload, self._encoding)) is None:
-            raise NotWritable(f"{self._when.source!r} is not true of these values")
+            raise NotWritable(f"{self._when.source!r} is not true for these values")
         return payload
 
 
 def _without_value(error: ExpressionError, operands: list[object]) -> Unusable | None:
-    """Return what an expression gives that could not be computed: None where an operand is."""
+    """Return the result of a failed expression: the first unusable operand, None, or the error."""
     for operand in operands:
         if isinstance(operand, Unusable):
             return operand

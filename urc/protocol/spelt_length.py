@@ -1,7 +1,7 @@
-"""Length fields that do not say beforehand how many digits they have: ``#3512``, ``512:``.
+"""Length fields with a variable number of digits: ``#3512``, ``512:``.
 
-Floor 3, pure. What is behind the field moves with it, so its number says nothing about the bytes
-before: the frame ends the number's bytes, and what is adjusted, behind the field.
+Pure. The payload moves with the field, so the number counts only bytes after the field: `adjust` is
+relative to its end.
 """
 
 from urc.model.framing import LengthSpec
@@ -11,16 +11,16 @@ __all__ = ["SpeltLength"]
 
 
 class SpeltLength:
-    """A number in digits, behind a digit that counts them or before a mark that ends them."""
+    """A length in digits, after a digit that counts them or before a terminator."""
 
     def __init__(self, spec: LengthSpec) -> None:
         self._spec = spec
         self._base = 10 if spec.spelling == "dec" else 16
         self.end = spec.offset + (spec.size + 1 if spec.is_counted else 1 + len(spec.until))
-        """How many bytes of a frame must be there at least."""
+        """Least number of frame bytes needed to read it."""
 
     def total(self, data: bytes | bytearray, at: int) -> int | None:
-        """Return the size of the frame at `at`; negative when there is no number, None: not yet."""
+        """Return the size of the frame at `at`; negative if invalid, None if incomplete."""
         digits = self._digits(data, at)
         if digits is None:
             return None
@@ -29,7 +29,7 @@ class SpeltLength:
         return -1 if number < 0 else behind + number * self._spec.unit + self._spec.adjust
 
     def head(self, frame: bytes) -> int:
-        """Return where the payload of a whole frame begins."""
+        """Return the offset of the payload in a whole frame."""
         digits = self._digits(frame, 0)
         if digits is None:
             raise BadFrame("short-frame", f"{len(frame)} bytes are too few to hold the length")
@@ -37,24 +37,24 @@ class SpeltLength:
         return end + len(self._spec.until)
 
     def before(self, payload: bytes, tail: int) -> bytes:
-        """Return the field of a frame with that payload and `tail` bytes behind it.
+        """Return the length field for that payload and `tail` bytes behind it.
 
         Raises:
-            BadFrame: the field cannot say the size.
+            BadFrame: the field cannot represent the size.
         """
         spec = self._spec
         number, left = divmod(len(payload) + tail - spec.adjust, spec.unit)
         if left or number < 0:
-            raise BadFrame("wrong-size", f"the length field cannot say {len(payload)} bytes")
+            raise BadFrame("wrong-size", f"the length field cannot hold {len(payload)} bytes")
         text = b"%d" % number if self._base == 10 else b"%x" % number
         text = text.upper() if spec.spelling == "HEX" else text
         count = b"%d" % len(text) if self._base == 10 else b"%X" % len(text)
         if len(text) > spec.size if spec.until else len(count) > spec.size:
-            raise BadFrame("wrong-size", f"the length field cannot say {number}")
+            raise BadFrame("wrong-size", f"the length field cannot hold {number}")
         return text + spec.until if spec.until else count.rjust(spec.size, b"0") + text
 
     def _digits(self, data: bytes | bytearray, at: int) -> slice | None:
-        """Return where the digits are; nothing between them when there are none."""
+        """Return the range of the digits, possibly empty; None if incomplete."""
         spec = self._spec
         first = at + spec.offset
         if spec.until:
@@ -72,7 +72,7 @@ class SpeltLength:
 
 
 def _number(digits: bytes, base: int) -> int:
-    """Return the number, or -1 when it is none."""
+    """Return the number, or -1 for an invalid one."""
     if not digits.isalnum() or len(digits) > 16:
         return -1
     try:

@@ -1,6 +1,6 @@
-"""Readings that are no news: changes too small, and flips too short.
+"""Dead band and debounce of samples.
 
-Floor 3, pure: time is passed in. See ``deadband`` and ``debounce`` of a signal.
+Pure: time is passed in. See ``deadband`` and ``debounce`` of a signal.
 """
 
 from urc.model.values import Reading, Sample, Signal
@@ -9,7 +9,7 @@ __all__ = ["Steady"]
 
 
 class Steady:
-    """What was last told of one signal, and what may become so."""
+    """The last reported sample of one signal, and the pending one."""
 
     __slots__ = ("_band", "_pending", "_settle_s", "_since", "_told")
 
@@ -19,15 +19,15 @@ class Steady:
         self._told: Sample | None = None
         self._pending: Sample | None = None
         self._since = 0.0
-        """When the value of `_pending` was first read."""
+        """Time of the first sample with the value of `_pending`."""
 
     @property
     def deadline(self) -> float | None:
-        """When `tick` has something to tell."""
+        """Time at which `tick` has a sample to report."""
         return None if self._pending is None else self._since + self._settle_s
 
     def take(self, sample: Sample, now: float) -> Sample | None:
-        """Return what to tell of a reading: itself, the last one read anew, or nothing yet."""
+        """Return the sample to report: the new one, an update of the last one, or None."""
         told = self._told
         if told is not None and sample.alarm == told.alarm and self._is_same(sample, told):
             self._pending = None
@@ -41,7 +41,7 @@ class Steady:
         return self.tick(now)
 
     def tick(self, now: float) -> Sample | None:
-        """Return the reading that has lasted long enough by `now`, if there is one."""
+        """Return the pending sample if its value has lasted long enough by `now`, else None."""
         due = self.deadline
         if self._pending is None or due is None or now < due:
             return None

@@ -1,9 +1,9 @@
-"""Sequences at work: ordered steps on the lines of one engine.
+"""Execution of sequences: ordered steps on the connections of one engine.
 
-Floor 3, pure. Each step becomes a function when the engine is built; a `Runner` calls them one
-after the other until one must wait: for an answer, a frame, a prompt, a condition, or time. Whoever
-owns the engine's verbs settles what comes of it and calls `advance` again. Every loop has a number
-of rounds and every wait an end, so every sequence has one.
+Pure. Each step becomes a function when the engine is built. A `Runner` calls them in order until
+one must wait: for a reply, a frame, a prompt, a condition, or time. The engine settles the events
+and calls `advance` again. Every loop is bounded and every wait has a timeout, so every sequence
+ends.
 """
 
 from collections.abc import Callable, Iterator, Mapping
@@ -21,13 +21,13 @@ from urc.protocol.reins import PAUSE_S, Reins
 __all__ = ["Action", "Host", "Program", "Runner", "Sink", "Unless"]
 
 Sink = Callable[[Outcome, float], list[LineEvent]]
-"""Takes the outcome and the time; returns what to tell."""
+"""Receives the outcome and the time; returns the resulting events."""
 Unless = Callable[[], str]
-"""Returns why what was asked for is not wanted any more, or ""."""
+"""Returns why the request is obsolete, or ""."""
 
 
 class Host(Protocol):
-    """What a sequence needs of its engine."""
+    """The interface of the engine for sequences."""
 
     lines: Mapping[str, Line]
     known: Known
@@ -57,13 +57,13 @@ class Program(NamedTuple):
     label: str
     actions: tuple[Action, ...]
     transports: frozenset[str]
-    """Lines that it talks on by itself."""
+    """Transports that the sequence uses directly."""
     reins: Reins
-    """Where it stands, and what people want of it; one run at a time holds them."""
+    """Control state; only one run at a time uses it."""
 
 
 class Runner:
-    """One sequence at work."""
+    """One run of a sequence."""
 
     def __init__(
         self,
@@ -74,24 +74,24 @@ class Runner:
         confirmed_by: tuple[str, ...] = (),
         ends_at: float | None = None,
     ) -> None:
-        """Prepare to run.
+        """Initialise a run.
 
         Args:
             host: the engine.
-            program: what to do.
-            sink: takes the outcome, once.
-            privileged_on: line whose connection this sequence makes usable or ends; "" for none.
-            confirmed_by: people who said yes to it, and so to all that it runs.
-            ends_at: when all of it ends, done or not; None: when its last step does.
+            program: the compiled sequence.
+            sink: receives the outcome, once.
+            privileged_on: name of the transport for a login or close sequence; "" for others.
+            confirmed_by: people who have confirmed the sequence and thus all its commands.
+            ends_at: deadline of the whole run; None for no deadline.
         """
         self.host = host
         self.program = program
         self.privileged_on = privileged_on
         self.confirmed_by = confirmed_by
         self.variables: dict[str, object] = {}
-        """What the robot said, by ``_field``."""
+        """Fields of replies, as ``_field``."""
         self.due: float | None = None
-        """When the present wait ends."""
+        """End of the present wait."""
         self.ends_at = ends_at
         self.is_waiting = False
         self._sink: Sink | None = sink
@@ -103,30 +103,30 @@ class Runner:
         self._otherwise: tuple[Action, ...] | None = None
         self._late_text = ""
         self._logins: list[Line] = []
-        """Lines whose logins it waits for before its first step."""
+        """Connections whose logins must complete before the first step."""
         program.reins.begin()
 
     @property
     def is_over(self) -> bool:
-        """Whether its outcome has been told."""
+        """Whether the outcome has been delivered."""
         return self._sink is None
 
     @property
     def can_go_on(self) -> bool:
-        """Whether `advance` has something to do."""
+        """Whether `advance` has work."""
         if self._logins and all(line.is_ready for line in self._logins):
             return not self.is_over
         return not self.is_over and (self._outcome is not None or not self.is_waiting)
 
     @property
     def deadline(self) -> float | None:
-        """When `expire` must be called."""
+        """Time for the next `expire`."""
         if self.due is None or self.ends_at is None:
             return self.ends_at if self.due is None else self.due
         return min(self.due, self.ends_at)
 
     def advance(self, now: float) -> list[LineEvent]:
-        """Do steps until one must wait or all are done."""
+        """Run steps until one must wait or all are done."""
         events: list[LineEvent] = []
         if self._logins and all(line.is_ready for line in self._logins):
             self._logins = []
@@ -153,7 +153,7 @@ class Runner:
         return events
 
     def wait_for_logins(self, now: float) -> None:
-        """Do no step before the connections that are open are usable; a command waits as long."""
+        """Wait for the logins of all open connections, no longer than a queued command would."""
         lines = (self.host.lines[name] for name in self.program.transports)
         self._logins = [
             line
@@ -163,11 +163,11 @@ class Runner:
         ]
         if self._logins:
             limit_s = max(queue_limit_s(line.spec, None) for line in self._logins)
-            self._late_text = "the steps of the connection were not done in time"
+            self._late_text = "the login of the connection did not finish in time"
             self.sleep(now + limit_s)
 
     def _obey(self) -> None:
-        """Do what people want of it."""
+        """Apply the requests of the operator."""
         reins = self.program.reins
         if reins.is_aborted:
             self.stop("aborted", "somebody ended it")
@@ -175,7 +175,7 @@ class Runner:
             self._resume()
 
     def expire(self, now: float) -> None:
-        """Take note that the wait has ended by itself."""
+        """Handle the end of the present wait."""
         if self.ends_at is not None and self.ends_at <= now:
             self.stop("timed-out", "it took too long")
             return
@@ -204,23 +204,23 @@ class Runner:
             self._outcome = Outcome(code, reason)
 
     def why_over(self) -> str:
-        """Return why nothing more of it is to be sent, or ""."""
+        """Return why its further frames are obsolete, or ""."""
         return self._outcome.message if self._outcome is not None else ""
 
-    # -- told by the engine
+    # -- called by the engine
 
     def look(self, now: float) -> None:
-        """Take note of what has come true: something was read, or the wait has just begun."""
+        """Check the awaited condition after new samples, or at the start of the wait."""
         if self._awaited is not None and self.host.known.holds(self._awaited, now, self.variables):
             self._awaited = None
             self._resume()
 
     def ended(self, exchange: Exchange, outcome: Outcome, now: float) -> list[LineEvent]:
-        """Take note that what a step sent is sent, or cannot be."""
+        """Record the outcome of a sent frame."""
         return self.done(outcome, now)
 
     def done(self, outcome: Outcome, now: float) -> list[LineEvent]:
-        """Take note of the outcome of what a step has begun."""
+        """Record the outcome of a command that a step has run."""
         if outcome.code:
             self.stop(outcome.code, outcome.message)
         self.variables |= {f"_{name}": value for name, value in outcome.values.items()}
@@ -228,7 +228,7 @@ class Runner:
         return []
 
     def heard(self, ear: Ear, offer: Offer, now: float) -> None:
-        """Take what was waited for."""
+        """Process the match result of the expected frame."""
         self._listening = None
         if offer.refusal:
             self.stop("refused", offer.refusal)
@@ -237,10 +237,10 @@ class Runner:
         self.variables |= {name: raw for name, raw in fields.items() if name.startswith("_")}
         self._resume()
 
-    # -- for actions
+    # -- for the actions
 
     def names(self, now: float) -> Mapping[str, object]:
-        """Return the namespace of its expressions."""
+        """Return the namespace of the expressions."""
         return self.host.known.view(now, self.variables)
 
     def push(self, actions: Iterator[Action]) -> None:
@@ -252,7 +252,7 @@ class Runner:
         self.is_waiting, self.due = True, due
 
     def begin(self) -> None:
-        """Wait until `done` is called."""
+        """Wait for the call of `done`."""
         self.is_waiting = True
 
     def listen(
@@ -264,7 +264,7 @@ class Runner:
         otherwise: tuple[Action, ...] | None,
         text: str,
     ) -> None:
-        """Wait from `now` until `due` for what `ear` hears."""
+        """Wait from `now` until `due` for a match of `ear`."""
         self._listening = (line, ear)
         self._began_at = now
         self._otherwise, self._late_text = otherwise, text

@@ -1,6 +1,6 @@
-"""The bytes of one connection while they are cut, and how often they may be looked at.
+"""The receive buffer of one connection, and the budget for scanning bytes again.
 
-Floor 3, pure; for `urc.protocol.framing`.
+Pure; for `urc.protocol.framing`.
 """
 
 from typing import Final
@@ -9,20 +9,20 @@ __all__ = ["Credit", "Stream"]
 
 
 class Stream:
-    """The bytes of one connection that no frame has taken yet."""
+    """The received bytes of one connection that no frame has consumed yet."""
 
     __slots__ = ("at", "data")
 
     def __init__(self, data: bytearray | None = None) -> None:
         self.data = bytearray() if data is None else data
         self.at = 0
-        """Where the bytes begin that are not taken yet."""
+        """Offset of the first unconsumed byte."""
 
     def __len__(self) -> int:
         return len(self.data) - self.at
 
     def push(self, data: bytes) -> None:
-        """Add bytes at the end, and let go of those that are taken."""
+        """Append bytes, and discard the consumed ones."""
         if self.at:
             del self.data[: self.at]
             self.at = 0
@@ -30,9 +30,9 @@ class Stream:
 
 
 class Credit:
-    """How many bytes may be looked at a second time: a few for each that the stream moves on.
+    """Budget of bytes that may be scanned a second time; it grows with each consumed byte.
 
-    So all work together is at most `RATE` + 1 times the bytes of the stream, and `MOST` once.
+    The total work is thus at most `RATE` + 1 times the bytes of the stream, plus `MOST` once.
     """
 
     RATE: Final = 8
@@ -43,16 +43,16 @@ class Credit:
 
     @property
     def is_full(self) -> bool:
-        """Whether nothing more can be earned."""
+        """Whether the budget is at its maximum."""
         return self._left >= self.MOST
 
     def earn(self, count: int) -> None:
-        """Take note that the stream has moved on by `count` bytes."""
+        """Increase the budget for `count` consumed bytes."""
         if self._left < self.MOST:
             self._left = min(self.MOST, self._left + self.RATE * count)
 
     def spend(self, count: int) -> bool:
-        """Return whether `count` bytes may be looked at again, and take them off."""
+        """Return whether `count` bytes may be scanned again, and reduce the budget."""
         if self._left < count:
             return False
         self._left -= count

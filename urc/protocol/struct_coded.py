@@ -1,9 +1,9 @@
-"""Numbers of a struct that are no plain bytes: variable lengths, decimal digits, odd widths.
+"""Numbers of a struct with encodings of their own: variable lengths, decimal digits, odd widths.
 
-Floor 3, pure. ``varint`` is LEB128 as Protocol Buffers have it, ``zigzag`` their signed form;
-``bcd`` has a decimal digit in each half of a byte; ``f32cdab`` has its words of 16 bits swapped,
-and ``u14by7le`` seven bits in each byte; packed arrays have numbers of any width one behind the
-other without regard to bytes. All are bounded to 64 bits.
+Pure. ``varint`` is LEB128 as in Protocol Buffers, ``zigzag`` their signed form. ``bcd`` has a
+decimal digit in each half of a byte. ``f32cdab`` has swapped words of 16 bits, and ``u14by7le``
+seven bits in each byte. Packed arrays have consecutive numbers of any width, across byte
+boundaries. All numbers are bounded to 64 bits.
 """
 
 from collections.abc import Callable, Mapping
@@ -30,15 +30,15 @@ Out = dict[str, Any]
 Step = Callable[[bytes, int, int, Out], int]
 
 FAULT: Final = ""
-"""No item is called that: `out` keeps the first fault there."""
+"""Key of the first invalid item in `out`; no item has this name."""
 
 
 class OtherFrame(Exception):
-    """These bytes are another frame."""
+    """The bytes are another kind of frame."""
 
 
 def note(out: Out, name: str, meaning: Callable[[Any], Any], raw: Any) -> None:
-    """Put the value that `raw` means into `out`, or its fault."""
+    """Put the decoded value of `raw` into `out`, or its error."""
     try:
         out[name] = meaning(raw)
     except BadItem as error:
@@ -46,15 +46,15 @@ def note(out: Out, name: str, meaning: Callable[[Any], Any], raw: Any) -> None:
 
 
 def coded_reader(number: Number) -> Callable[[bytes, int, int], tuple[Any, int]]:
-    """Return the function from data, begin and end to the raw number, and where it ends.
+    """Return the function from data, begin and end to the raw number and its end.
 
-    It raises `OtherFrame` when there is no such number.
+    It raises `OtherFrame` for an invalid number.
     """
     return reader_of(number, OtherFrame)
 
 
 def coded_writer(number: Number, name: str) -> Callable[[Any], bytes]:
-    """Return the function from a raw number, which fits, to its bytes."""
+    """Return the function from a raw number, which must fit, to its bytes."""
     if number.kind == "float" and number.are_words_swapped:
         write = number_writer(number._replace(are_words_swapped=False), name)
         return lambda raw: words_turned(write(raw))
@@ -62,7 +62,7 @@ def coded_writer(number: Number, name: str) -> Callable[[Any], bytes]:
 
 
 def coded_step(item: Item) -> Step:
-    """Return what reads such a number."""
+    """Return the step that reads such a number."""
     read, meaning, const, name = coded_reader(item.number), meaning_of(item), item.const, item.id
 
     def step(data: bytes, at: int, end: int, out: Out) -> int:
@@ -78,7 +78,7 @@ def coded_step(item: Item) -> Step:
 
 
 def packed_step(item: Item, count: Extent) -> Step:
-    """Return what reads an array of numbers of any width."""
+    """Return the step that reads an array of numbers of any width."""
     size, shifts = packed_size(item.number, count), _shifts(item, count)
     order = "little" if item.is_lsb_first else "big"
     mask = (1 << item.number.bits) - 1
@@ -104,7 +104,7 @@ def _shifts(item: Item, count: Extent) -> list[int]:
 
 
 def packed_writer(item: Item, count: Extent) -> Callable[[Mapping[str, Any], bool], bytes]:
-    """Return the function from a scope, and whether what is missing is zero, to the array."""
+    """Return the function from a scope, and whether missing values are zero, to the array."""
     size, shifts = packed_size(item.number, count), _shifts(item, count)
     checked, mask, name = checked_raw(item), (1 << item.number.bits) - 1, item.id
     zero = (
@@ -118,7 +118,7 @@ def packed_writer(item: Item, count: Extent) -> Callable[[Mapping[str, Any], boo
                 raise NotWritable(f"{name!r} has no value here")
             values = [zero] * count.number
         if not isinstance(values, (list, tuple)):
-            raise NotWritable(f"{name}: a list is expected, found {quoted(values)}")
+            raise NotWritable(f"{name}: expected a list, found {quoted(values)}")
         if len(values) != count.number:
             text = f"{name}: expected {count.number} items, found {len(values)}"
             raise NotWritable(text)

@@ -1,7 +1,7 @@
-"""The lines of a function for one struct, while they are collected.
+"""Builder for the source text of a generated struct function.
 
-Floor 3, pure. WARNING: the lines are compiled and run. Whatever goes into them is the text of this
-package, a repr() of a constant, or a name made by `Lines.bind`; never text of a document.
+Pure. WARNING: the lines are compiled and run. They may contain only text of this package, the
+`repr()` of a constant, or a name made by `Lines.bind`; never text of a document.
 """
 
 from collections.abc import Callable
@@ -19,11 +19,11 @@ class Lines:
 
     def __init__(self) -> None:
         self.scope: dict[str, Any] = dict(BUILTINS)
-        """What the function sees beside its argument."""
+        """Global names of the function."""
         self.lines: list[str] = []
 
     def bind(self, word: str, value: object) -> str:
-        """Return a name, made of `word`, under which the function sees `value`."""
+        """Bind `value` to a new global name that starts with `word`; return the name."""
         name = f"_{word}{len(self.scope) - len(BUILTINS)}"
         self.scope[name] = value
         return name

@@ -1,7 +1,4 @@
-"""A binary frame that is being written, and the places in it that are filled in later.
-
-Floor 3, pure.
-"""
+"""A binary frame under construction, with gaps that are filled in later. Pure."""
 
 from typing import Any, NamedTuple
 
@@ -15,11 +12,11 @@ __all__ = ["GAP", "LARGEST_FRAME", "Gap", "Pen", "Scope", "evaluate", "solved"]
 
 Scope = dict[str, Any]
 LARGEST_FRAME = 1 << 20
-"""Bytes; as the longest frame of a framing."""
+"""Largest frame in bytes, equal to the limit of the framings."""
 
 
 GAP = "gap of "
-"""In front of an item's id, which has no space: key of its gap in a scope."""
+"""Prefix of the scope key of a gap, before the item id; ids contain no space."""
 
 
 class Gap(NamedTuple):
@@ -28,12 +25,12 @@ class Gap(NamedTuple):
     at: int
     item: Item
     container: Number
-    """The bytes that it lies in, at `shift`."""
+    """Number type of the bytes that contain it, at `shift`."""
     shift: int = 0
 
 
 class Pen:
-    """A frame that is being written."""
+    """A binary frame under construction."""
 
     __slots__ = ("bytes", "late")
 
@@ -43,13 +40,13 @@ class Pen:
         """Computed items that need the whole frame."""
 
     def put(self, data: bytes) -> None:
-        """Add bytes; raise `NotWritable` when there are too many."""
+        """Append bytes; raise `NotWritable` when the frame becomes too long."""
         if len(self.bytes) + len(data) > LARGEST_FRAME:
             raise NotWritable(f"the frame would have more than {LARGEST_FRAME} bytes")
         self.bytes += data
 
     def insert(self, at: int, data: bytes, scope: Scope) -> None:
-        """Put bytes in front of what is there from `at` on; what waits to be filled moves along."""
+        """Insert bytes at `at`; later gaps move with their bytes."""
         self.bytes[at:at] = data
         self.late = [(_moved(gap, at, len(data)), one, inner) for gap, one, inner in self.late]
         for name, value in scope.items():
@@ -73,7 +70,7 @@ def _moved(gap: Gap, at: int, by: int) -> Gap:
 
 
 def evaluate(template: Template, scope: Scope) -> Any:
-    """Return the value of an expression over a scope; raise `NotWritable`."""
+    """Return the value of an expression over a scope; raise `NotWritable` on an error."""
     try:
         return template.evaluate(scope)
     except ExpressionError as error:
@@ -81,7 +78,7 @@ def evaluate(template: Template, scope: Scope) -> Any:
 
 
 def solved(expression: Template, only: str, number: int, name: str) -> int:
-    """Return the value of the one name in `expression` for which it gives `number`."""
+    """Return the value of `only` for which the linear `expression` equals `number`."""
     at_zero = evaluate(expression, {only: 0})
     slope = evaluate(expression, {only: 1}) - at_zero
     solution = round((number - at_zero) / slope) if slope else 0

@@ -1,11 +1,10 @@
 """Struct items read by closures: bytes → fields.
 
-Floor 3, pure. The readable form of what `urc.protocol.struct_source` makes faster for runs of fixed
-items; tests hold the two together. Theory of operation: every item becomes a step
-``(data, at, end, out) -> after``, which takes its bytes from `at`, never looks at or behind `end`,
-puts its value into `out`, and raises `OtherFrame` where the bytes are no such frame. A value that
-the frame may not have is noted under the name "" and the rest is still read: only a frame that fits
-to its end has a fault, another one is simply another one.
+Pure. This is the readable version of `urc.protocol.struct_source`, which is faster for runs of
+fixed items; tests compare the two. Theory of operation: every item becomes a step ``(data, at, end,
+out) -> after``. A step reads its bytes from `at`, never at or behind `end`, and puts its value into
+`out`. It raises `OtherFrame` for another kind of frame. An invalid value is recorded under the name
+"", and the rest is still read: only a frame that matches to its end counts as invalid.
 """
 
 from collections.abc import Callable, Mapping
@@ -45,17 +44,17 @@ __all__ = [
 Out = dict[str, Any]
 Step = Callable[[bytes, int, int, Out], int]
 Amount = Callable[[bytes, int, int, Out], tuple[int, int]]
-"""How many, and where what is counted begins; -1: up to the end."""
+"""Returns a number of units and the start of the counted data; -1: up to the end."""
 
 BitPart = tuple[Item, int, int, int, Callable[[Any], Any]]
-"""A part of ``bits``: shift, mask, sign bit or 0, and meaning."""
+"""A part of ``bits``: shift, mask, sign bit or 0, and decoding function."""
 
 
 def read_frame(steps: tuple[Step, ...], data: object) -> Mapping[str, object] | None:
-    """Return the fields of `data`, or None when it is another frame.
+    """Return the fields of `data`, or None for another kind of frame.
 
     Raises:
-        BadItem: it is this frame, with a value that it cannot have.
+        BadItem: the frame matches, but has an invalid value.
     """
     if not isinstance(data, bytes):
         return None
@@ -130,7 +129,7 @@ def _number_step(item: Item, encoding: str) -> Step:
 
 
 def const_of(item: Item) -> Any:
-    """Return the constant as it is read: 0.1 in 32 bits is not quite 0.1."""
+    """Return the constant as it is read: 0.1 in 32 bits is not exactly 0.1."""
     if item.const is None or item.kind != "number":
         return item.const
     return plain_reader(item.number)(number_writer(item.number, item.id)(item.const), 0)
@@ -160,7 +159,7 @@ def _bits_step(item: Item, encoding: str) -> Step:
 
 
 def bit_parts(item: Item) -> list[BitPart]:
-    """Return each part of ``bits`` with its shift, mask, sign bit (0: none) and meaning."""
+    """Return each part of ``bits``: shift, mask, sign bit (0: none), decoding function."""
     parts = []
     left = item.number.bits
     for part in item.items:
@@ -212,7 +211,7 @@ def _padding_step(item: Item, encoding: str) -> Step:
 
 
 def build_amount(extent: Extent | None, name: str) -> Amount:
-    """Return the function that says how many, out of what was read before."""
+    """Return the function that computes a size or count from earlier items."""
     if extent is None or extent.kind == "rest":
         return lambda data, at, end, out: (-1, at)
     if extent.kind == "fixed":
@@ -220,7 +219,7 @@ def build_amount(extent: Extent | None, name: str) -> Amount:
         return lambda data, at, end, out: (number, at)
     if extent.prefix is not None:
         return _prefix_amount(extent)
-    assert extent.expression is not None  # noqa: S101  # the loader made it so
+    assert extent.expression is not None  # noqa: S101  # guaranteed by the loader
     evaluate = _evaluator(extent.expression)
 
     def amount(data: bytes, at: int, end: int, out: Out) -> tuple[int, int]:
@@ -228,20 +227,23 @@ def build_amount(extent: Extent | None, name: str) -> Amount:
         if isinstance(found, float) and found.is_integer():
             found = int(found)
         if not isinstance(found, int) or found < 0:
-            raise BadItem(f"{name}: {quoted(found)} is no size")
+            raise BadItem(f"{name}: {quoted(found)} is not a size")
         return found, at
 
     return amount
 
 
 def _prefix_amount(extent: Extent) -> Amount:
-    assert extent.prefix is not None  # noqa: S101  # the caller has looked
+    assert extent.prefix is not None  # noqa: S101  # checked by the caller
     read = coded_reader(extent.prefix)
     return lambda data, at, end, out: read(data, at, end)
 
 
 def _array_step(item: Item, count: Extent, encoding: str) -> Step:
-    """Read items one after another; each takes a byte at least, so that the frame bounds them."""
+    """Read consecutive items.
+
+    Each takes at least one byte, so the size of the frame bounds them.
+    """
     single = item._replace(times=None)
     if item.kind == "packed":
         return packed_step(single, count)
@@ -329,7 +331,7 @@ def _body(steps: tuple[Step, ...]) -> Step:
 
 
 def _windowed(steps: tuple[Step, ...], item: Item) -> Step:
-    """Read a struct inside of a window that it must fill, up to what may be trimmed."""
+    """Read a struct that must fill its window, except for trimmed bytes."""
     body, amount = _body(steps), build_amount(item.size, item.id)
     trim, full = item.trim, least_size(item.items)
 

@@ -1,6 +1,6 @@
-"""Which items of a struct are fixed, so that one `struct.Struct` takes a run of them apart.
+"""Runs of fixed struct items, each of which one `struct.Struct` unpacks.
 
-Floor 3, pure; for the generators of `urc.protocol.struct_source` and `.struct_source_write`.
+Pure; for the generators of `urc.protocol.struct_source` and `.struct_source_write`.
 """
 
 from collections.abc import Iterator
@@ -14,7 +14,7 @@ from urc.protocol.struct_read import BitPart, bit_parts
 __all__ = ["Leaf", "Run", "runs_of"]
 
 MOST_IN_A_RUN = 256
-"""Values of one `struct.Struct`; a longer array is read by its closure."""
+"""Most values of one `struct.Struct`; closures read longer arrays."""
 
 
 class Leaf(NamedTuple):
@@ -22,16 +22,16 @@ class Leaf(NamedTuple):
 
     item: Item
     name: str
-    """Of its field, outer structs included; "" for none."""
+    """Name of its field, including outer structs; "" for none."""
     outer: str
     """Name of the structs around it."""
     code: str
-    """Letters for `struct`; "x" takes no value."""
+    """Format characters for `struct`; "x" takes no value."""
     endian: Literal["", "big", "little"] = ""
     values: int = 1
 
     def bit_parts(self) -> list[BitPart]:
-        """Return the parts of ``bits``, called as their fields."""
+        """Return the parts of ``bits``, with the names of their fields."""
         outer = self.outer
         return [
             (part._replace(id=joined_name(outer, part.id) if part.id else ""), at, mask, sign, told)
@@ -40,20 +40,20 @@ class Leaf(NamedTuple):
 
 
 class Run(NamedTuple):
-    """Fixed items of one byte order, one behind the other."""
+    """Consecutive fixed items of one byte order."""
 
     leaves: tuple[Leaf, ...]
 
     @property
     def struct(self) -> Struct:
-        """What takes them apart."""
+        """The `struct.Struct` that unpacks the run."""
         endian = next((leaf.endian for leaf in self.leaves if leaf.endian), "big")
         codes = "".join(leaf.code for leaf in self.leaves)
         return Struct(("<" if endian == "little" else ">") + codes)
 
 
 def _leaves(item: Item, outer: str) -> list[Leaf] | None:
-    """Return the parts of a fixed item, or None when it is none."""
+    """Return the parts of a fixed item, or None for other items."""
     if item.condition is not None or item.switch is not None:
         return None
     name = joined_name(outer, item.id) if item.id else ""

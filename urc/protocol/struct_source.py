@@ -1,8 +1,8 @@
 """Struct items read by one generated function per declaration.
 
-Floor 3, pure. Runs of fixed items become one `struct.Struct` each and straight lines of Python;
-whatever is not fixed is left to the closures of `urc.protocol.struct_read`. The closures alone are
-the oracle: tests hold both to the same result for the same bytes.
+Pure. Each run of fixed items becomes one `struct.Struct` and straight-line Python. The closures of
+`urc.protocol.struct_read` read all other items. They are also the oracle of the tests, which
+require the same result for the same bytes.
 """
 
 from collections.abc import Callable, Mapping
@@ -21,9 +21,9 @@ Read = Callable[[Frame], Mapping[str, object] | None]
 
 
 def generate_read(items: tuple[Item, ...], encoding: str) -> Read:
-    """Return the function from a frame to its fields; None for another frame.
+    """Return the function from a frame to its fields, or to None for another kind of frame.
 
-    It raises `BadItem` for this frame with a value that it cannot have.
+    It raises `BadItem` for a matching frame with an invalid value.
     """
     source = Lines()
     source.scope |= {"FAULT": FAULT, "not_valid": not_valid, "BadItem": BadItem}
@@ -51,16 +51,16 @@ def _is_open_end(item: Item) -> bool:
 def add_fixed(
     source: Lines, items: tuple[Item, ...], encoding: str, data: str
 ) -> tuple[list[str], dict[str, str]] | None:
-    """Add the unpacking of a frame in which everything has its place, or nothing where it has not.
+    """Add the unpacking of a frame whose items all have fixed places, or return None.
 
     Args:
-        source: the function, which returns None where the frame is another one.
-        items: of the frame.
-        encoding: of texts that name none.
+        source: the function, which returns None for another kind of frame.
+        items: items of the frame.
+        encoding: default encoding of texts.
         data: the variable that holds the frame.
 
     Returns:
-        The lines that go on from there, and field → expression, valid behind these lines.
+        The lines that follow, and field → expression that is valid after these lines.
     """
     has_open_end = bool(items) and _is_open_end(items[-1])
     parts = list(runs_of(items[:-1] if has_open_end else items))
@@ -68,7 +68,7 @@ def add_fixed(
     if len(runs) < len(parts):
         return None
     size = sum(run.struct.size for run in runs)
-    # A message of another transport is a tuple of three: only there the length is not enough.
+    # An `Envelope` is a tuple of three: only for other sizes does the length exclude it.
     kind = f"type({data}) is not bytes or " if size <= 3 else ""
     source.add(f"if {kind}len({data}) {'<' if has_open_end else '!='} {size}: return None")
     lines: list[str] = []
@@ -80,7 +80,7 @@ def add_fixed(
         for number, leaf in enumerate(run.leaves):
             names = _variables(place, number, leaf)
             _add_leaf(source, leaf, names, encoding, lines, fields)
-    # Each is ``'name': expression``; what is in a name is no blank and no colon.
+    # Each is ``'name': expression``; a name contains neither a blank nor a colon.
     return lines, {
         name.strip("'\""): value for name, _, value in (field.partition(": ") for field in fields)
     }
@@ -91,7 +91,7 @@ def _variables(place: int, number: int, leaf: Leaf) -> list[str]:
 
 
 def _add_unpack(source: Lines, run: Run, place: int, where: str) -> None:
-    """Add the unpacking of a run, and the look at its constants."""
+    """Add the unpacking of a run, and the check of its constants."""
     names = [
         name for number, leaf in enumerate(run.leaves) for name in _variables(place, number, leaf)
     ]
@@ -184,7 +184,7 @@ def _scaled(item: Item, raw: str) -> str:
 
 
 def _add_mixed(source: Lines, parts: list[Run | Item], encoding: str, has_open_end: bool) -> None:
-    """Fixed runs as above; what lies between them is a closure's."""
+    """Unpack fixed runs directly; call the closures for the items between them."""
     source.scope["OtherFrame"] = OtherFrame
     source.add("if type(data) is not bytes: return None")
     source.add("end = len(data)")
@@ -214,7 +214,7 @@ def _add_mixed(source: Lines, parts: list[Run | Item], encoding: str, has_open_e
 
 
 def _add_noted(source: Lines, lines: list[str], fields: list[str]) -> None:
-    """Add what one item gives; its fault is kept until the whole frame has shown to fit."""
+    """Add the value of one item; an error is kept until the whole frame has matched."""
     if not fields:
         return
     depth = 1

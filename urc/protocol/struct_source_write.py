@@ -1,7 +1,7 @@
 """Struct items written by one generated function per declaration.
 
-Floor 3, pure. The other direction of `urc.protocol.struct_source`: declarations of fixed items
-only; all others, and all values that are not as they should be, are left to the closures.
+Pure. This is the reverse of `urc.protocol.struct_source`. It supports only declarations of fixed
+items; closures handle all other items and all invalid values.
 """
 
 import struct
@@ -32,8 +32,8 @@ Write = Callable[[Mapping[str, object]], bytes]
 def generate_write(items: tuple[Item, ...], encoding: str) -> Write:
     """Return the function from arguments to the frame; it raises `NotWritable`.
 
-    The generated lines take values as they should be. Whatever goes wrong there is tried again by
-    the closures, which round, convert, and say which value is at fault.
+    The generated lines expect valid values. After an error, the closures try again: they round,
+    convert, and name the invalid value.
     """
     steps = build_write_steps(items, encoding, is_lenient=False)
 
@@ -61,7 +61,7 @@ def generate_write(items: tuple[Item, ...], encoding: str) -> Write:
 
 
 def _is_quick(leaf: Leaf) -> bool:
-    """Whether an item can be written without looking at the others."""
+    """Return whether an item can be written independently of the others."""
     item = leaf.item
     inner = item.items if item.kind == "bits" else (item,)
     if any(one.value is not None for one in inner):

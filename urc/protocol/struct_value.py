@@ -1,7 +1,7 @@
-"""What the raw number, bytes or text of one struct item means, and back.
+"""Conversion between the raw form of one struct item and its value.
 
-Floor 3, pure. Shared by the closures and by the generator's slow paths. Raw is what lies in the
-frame; a value is what fields and arguments have: scaled, and a word where the item has an enum.
+Pure. The closures and the slow paths of the generator share it. The raw form is in the frame. The
+value is in fields and arguments: scaled, and a word if the item has an enum.
 """
 
 import struct
@@ -28,7 +28,7 @@ __all__ = [
 
 
 def divisor_of(scale: float) -> int:
-    """Return n where `scale` is 1/n, else 0: to divide by ten is exact where times 0.1 is not."""
+    """Return n when `scale` is 1/n, else 0: x / 10 is exact, x * 0.1 is not."""
     if not 1e-15 < abs(scale) < 1:
         return 0
     divisor = round(1 / scale)
@@ -36,7 +36,7 @@ def divisor_of(scale: float) -> int:
 
 
 def meaning_of(item: Item) -> Callable[[Any], Any]:
-    """Return the function from raw to value; it raises `BadItem` for what is not valid."""
+    """Return the function from raw form to value; it raises `BadItem` for an invalid value."""
     words, scale, offset, valid = dict(item.enum), item.scale, item.offset, item.valid
     divisor = divisor_of(scale)
 
@@ -56,12 +56,12 @@ def meaning_of(item: Item) -> Callable[[Any], Any]:
 
 
 def not_valid(name: str, value: object, valid: tuple[float, float]) -> BadItem:
-    """Return the fault of a value outside of its ``valid``."""
+    """Return the error for a value outside its ``valid`` range."""
     return BadItem(f"{name}: expected {valid[0]:g} to {valid[1]:g}, found {quoted(value)}")
 
 
 def raw_of(item: Item) -> Callable[[Any], Any]:
-    """Return the function from value to raw; it raises `NotWritable`.
+    """Return the function from value to raw form; it raises `NotWritable`.
 
     Whole numbers are rounded to the nearest one, halves to the even one.
     """
@@ -73,10 +73,10 @@ def raw_of(item: Item) -> Callable[[Any], Any]:
     def raw(value: Any) -> Any:
         if isinstance(value, str):
             if value not in numbers:
-                raise NotWritable(f"{name}: {_wanted(item)} expected, found {quoted(value)}")
+                raise NotWritable(f"{name}: expected {_wanted(item)}, found {quoted(value)}")
             value = numbers[value]
         elif not isinstance(value, (int, float)):
-            raise NotWritable(f"{name}: {_wanted(item)} expected, found {quoted(value)}")
+            raise NotWritable(f"{name}: expected {_wanted(item)}, found {quoted(value)}")
         elif isinstance(value, int) and value.bit_length() > 1000:
             raise NotWritable(f"{name}: {quoted(value)} is too large")
         if valid is not None and not valid[0] <= value <= valid[1]:
@@ -95,7 +95,7 @@ def raw_of(item: Item) -> Callable[[Any], Any]:
 
 
 def fitting(number: Number, value: int | float, name: str) -> int | float | bool:
-    """Return `value` as `number` holds it, or raise `NotWritable`."""
+    """Return `value` in the type of `number`; raise `NotWritable` if it does not fit."""
     if number.kind == "float":
         try:
             return float(value)
@@ -104,10 +104,10 @@ def fitting(number: Number, value: int | float, name: str) -> int | float | bool
     if number.kind == "boolean":
         if value in (0, 1):
             return bool(value)
-        raise NotWritable(f"{name}: true or false expected, found {quoted(value)}")
+        raise NotWritable(f"{name}: expected true or false, found {quoted(value)}")
     if isinstance(value, float):
         if not abs(value) < 1e30:  # not-a-number fails every comparison
-            raise NotWritable(f"{name}: a whole number is expected, found {quoted(value)}")
+            raise NotWritable(f"{name}: expected a whole number, found {quoted(value)}")
         value = round(value)
     if not number.least <= value <= number.most:
         sign = "signed " if number.is_signed else ""
@@ -126,27 +126,27 @@ def _wanted(item: Item) -> str:
 
 
 def checked_raw(item: Item) -> Callable[[Any], tuple[Any, Any]]:
-    """Return the function from a value to the raw number, and to the value as it is read again."""
+    """Return the function from a value to the raw number and its value after reading back."""
     raw_from, meaning = raw_of(item), meaning_of(item)
 
     def checked(value: Any) -> tuple[Any, Any]:
         raw = raw_from(value)
         try:
             return raw, meaning(raw)
-        except BadItem as error:  # rounding took it out of its range
+        except BadItem as error:  # rounding has moved it out of range
             raise NotWritable(str(error)) from None
 
     return checked
 
 
 def number_writer(number: Number, name: str) -> Callable[[Any], bytes]:
-    """Return the function from a raw number, which fits, to its bytes."""
+    """Return the function from a raw number, which must fit, to its bytes."""
     pack = plain_writer(number)
 
     def write(raw: Any) -> bytes:
         try:
             return pack(raw)
-        except (OverflowError, struct.error):  # a float too large for its 16 or 32 bits
+        except (OverflowError, struct.error):  # the float is too large for 16 or 32 bits
             text = f"{name or 'a number'}: {quoted(raw)} does not fit into f{number.bits}"
             raise NotWritable(text) from None
 
@@ -163,7 +163,7 @@ def text_of_bytes(item: Item, encoding: str) -> Callable[[bytes], object]:
 
     def text(raw: bytes) -> str:
         if is_padded:
-            # Behind the first NUL of a C string there may be anything.
+            # After the first NUL of a C string, any bytes may follow.
             raw = raw.rstrip(pad) if item.pad else raw.partition(pad)[0]
         try:
             return raw.decode(codec)
@@ -182,7 +182,7 @@ def bytes_of_text(item: Item, encoding: str) -> Callable[[object], bytes]:
         if isinstance(value, bytes):
             raw = value
         elif not isinstance(value, str):
-            raise NotWritable(f"{name}: text is expected, found {quoted(value)}")
+            raise NotWritable(f"{name}: expected text, found {quoted(value)}")
         elif item.kind == "bytes":
             raw = hex_bytes(value, name)
         else:
@@ -192,7 +192,7 @@ def bytes_of_text(item: Item, encoding: str) -> Callable[[object], bytes]:
                 wrong = error.object[error.start]
                 raise NotWritable(f"{name}: {quoted(wrong)} does not exist in {codec}") from None
         if item.until and item.until in raw:
-            raise NotWritable(f"{name}: {quoted(raw)} contains what ends it, {quoted(item.until)}")
+            raise NotWritable(f"{name}: {quoted(raw)} contains its terminator {quoted(item.until)}")
         return raw
 
     return encode
@@ -200,7 +200,7 @@ def bytes_of_text(item: Item, encoding: str) -> Callable[[object], bytes]:
 
 def fixed_bytes(item: Item) -> Callable[[bytes], bytes]:
     """Return the function that pads bytes to their fixed size."""
-    assert item.size is not None  # noqa: S101  # the caller has looked
+    assert item.size is not None  # noqa: S101  # checked by the caller
     name, size, pad = item.id or item.kind, item.size.number, bytes((item.pad,))
     ends_at_nul = item.kind == "text" and not item.pad
 
@@ -215,8 +215,8 @@ def fixed_bytes(item: Item) -> Callable[[bytes], bytes]:
 
 
 def hex_bytes(text: str, name: str) -> bytes:
-    """Return the bytes that hex digits stand for."""
+    """Return the bytes of a string of hex digits."""
     try:
         return bytes.fromhex(text)
     except ValueError:
-        raise NotWritable(f"{name}: hex digits are expected, found {quoted(text)}") from None
+        raise NotWritable(f"{name}: expected hex digits, found {quoted(text)}") from None

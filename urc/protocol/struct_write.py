@@ -1,9 +1,9 @@
 """Struct items written by closures: values → bytes.
 
-Floor 3, pure. The other direction of `urc.protocol.struct_read`. Theory of operation: every item
-becomes a step ``(pen, scope)`` that puts its bytes behind what is there. What is known only later
-leaves a gap that is filled in: the size of a text that follows (its `Gap` waits in the scope), and
-expressions over the size of the whole frame (`Pen.late`).
+Pure. This is the reverse of `urc.protocol.struct_read`. Theory of operation: every item becomes a
+step ``(pen, scope)`` that appends its bytes. Values that are known only later leave a gap that is
+filled in: the size of a following text (its `Gap` waits in the scope), and expressions over the
+size of the whole frame (`Pen.late`).
 """
 
 from collections.abc import Callable, Mapping
@@ -45,25 +45,25 @@ WriteStep = Callable[[Pen, Scope], None]
 
 
 class Rules(NamedTuple):
-    """What the steps of one scope share."""
+    """Shared context of the steps of one scope."""
 
     encoding: str
     derived: Mapping[str, Template]
-    """Items that are filled in from what they count → how that says it."""
+    """Items whose values are derived from the data → formula of the size or count."""
     is_lenient: bool
-    """A value that is missing is zero, as for a robot of which only some values matter."""
+    """Whether missing values are zero, for an emulated robot that sets only some of them."""
 
 
 def build_write_steps(
     items: tuple[Item, ...], encoding: str, *, is_lenient: bool
 ) -> tuple[WriteStep, ...]:
-    """Return the steps of a scope of its own."""
+    """Return the steps of a separate scope."""
     rules = Rules(encoding, derived_sizes(items), is_lenient)
     return tuple(_build(item, rules) for item in items)
 
 
 def write_frame(steps: tuple[WriteStep, ...], namespace: Mapping[str, object]) -> bytes:
-    """Return the frame with the values of `namespace`; raise `NotWritable` when there is none."""
+    """Return the frame with the values of `namespace`; raise `NotWritable` if impossible."""
     pen = Pen()
     scope: Scope = dict(namespace)
     for step in steps:
@@ -85,7 +85,7 @@ def _build(item: Item, rules: Rules) -> WriteStep:
 
 
 def _conditional(step: WriteStep, item: Item, condition: Template, rules: Rules) -> WriteStep:
-    # What depends on the frame that is yet to be written is there when its value is.
+    # An item whose condition depends on the unfinished frame is present if it has a value.
     is_known = not condition.names & (FRAME_NAMES | rules.derived.keys())
     names = tuple(names_of((item,)))
 
@@ -102,7 +102,7 @@ def _conditional(step: WriteStep, item: Item, condition: Template, rules: Rules)
 
 def _given(item: Item, scope: Scope, rules: Rules, zero: object) -> Any:
     """Return the value of `item`: computed, given, or zero."""
-    # An answer repeats the number of its request, which is computed in the request alone.
+    # A reply repeats the number of its request, which only the request computes.
     is_repeated = rules.is_lenient and bool(item.id) and scope.get(item.id) is not None
     if item.value is not None and not is_repeated:
         return evaluate(item.value, scope)
@@ -115,7 +115,7 @@ def _given(item: Item, scope: Scope, rules: Rules, zero: object) -> Any:
 
 
 def _raw_number(item: Item, rules: Rules) -> Callable[[Scope], Any]:
-    """Return the function from a scope to the raw number; the scope then has it as it is read."""
+    """Return the function from a scope to the raw number; it stores the value in the scope."""
     checked, zero, name = checked_raw(item), _zero_of(item), item.id
 
     def raw_number(scope: Scope) -> Any:
@@ -128,7 +128,7 @@ def _raw_number(item: Item, rules: Rules) -> Callable[[Scope], Any]:
 
 
 def _deferral(item: Item, rules: Rules) -> Callable[[Pen, Scope, Gap], None] | None:
-    """Return what to do with the gap of a number that is known only later, or None."""
+    """Return the handler for the gap of a number that is known only later, or None."""
     value = item.value
     if value is None and item.id in rules.derived:
         return lambda pen, scope, gap: scope.__setitem__(GAP + item.id, gap)
@@ -164,7 +164,7 @@ def _coded_step(item: Item, rules: Rules) -> WriteStep:
 
 
 def _zero_of(item: Item) -> float:
-    """Return zero, or the valid value that is nearest to it."""
+    """Return zero, or the nearest valid value."""
     zero = item.offset if item.id else 0
     if item.valid is None:
         return zero
@@ -210,7 +210,7 @@ def _text_step(item: Item, rules: Rules) -> WriteStep:
 
 
 def _finisher(item: Item, rules: Rules) -> Callable[[Pen, Scope, Any], None]:
-    """Return the function that puts bytes in their size: padded, counted or ended."""
+    """Return the function that writes bytes in their size: padded, counted or terminated."""
     name, size = item.id or item.kind, item.size
     if size is None or item.const is not None:
         return lambda pen, scope, raw: pen.put(raw + item.until)
@@ -226,7 +226,7 @@ def _finisher(item: Item, rules: Rules) -> Callable[[Pen, Scope, Any], None]:
 
 
 def _put_size(pen: Pen, scope: Scope, extent: Extent, number: int, name: str, rules: Rules) -> None:
-    """Say `number` where the reader will look for it, or check what was said."""
+    """Write `number` where the reader expects it, or check a constant size."""
     if extent.prefix is not None:
         pen.put(coded_writer(extent.prefix, name)(int(fitting(extent.prefix, number, name))))
     elif extent.kind == "fixed":
@@ -254,7 +254,7 @@ def _padding_step(item: Item, rules: Rules) -> WriteStep:
     def pad(pen: Pen, scope: Scope) -> None:
         number = 0 if expression is None else evaluate(expression, scope)
         if not isinstance(number, int) or not 0 <= number <= LARGEST_FRAME:
-            raise NotWritable(f"padding: {quoted(number)} is no size")
+            raise NotWritable(f"padding: {quoted(number)} is not a size")
         pen.put(bytes((item.pad,)) * number)
 
     return pad
@@ -278,11 +278,11 @@ def _array_step(item: Item, count: Extent, rules: Rules) -> WriteStep:
         zeros = missing * (count.number if count.kind == "fixed" else 0)
         values = _given(item, scope, rules, zeros)
         if not isinstance(values, (list, tuple)):
-            raise NotWritable(f"{name}: a list is expected, found {quoted(values)}")
+            raise NotWritable(f"{name}: expected a list, found {quoted(values)}")
         _put_size(pen, scope, count, len(values), name, rules)
         for value in values:
             if is_struct and not isinstance(value, Mapping):
-                raise NotWritable(f"{name}: a mapping is expected, found {quoted(value)}")
+                raise NotWritable(f"{name}: expected a mapping, found {quoted(value)}")
             inner: Scope = {**value, **_outer(scope)} if is_struct else {item.id: value}
             for step in steps:
                 step(pen, inner)
@@ -291,9 +291,10 @@ def _array_step(item: Item, count: Extent, rules: Rules) -> WriteStep:
 
 
 def _records_step(item: Item, count: Extent, rules: Rules) -> WriteStep:
-    """Write nameless structs, as of a list of records of which each sets its own signals.
+    """Write nameless structs, one for each record of a list with its own signals.
 
-    There is one for each case whose fields are all given; without a switch, there is one in all.
+    There is one struct for each case with a complete set of fields; without a switch, there is
+    exactly one.
     """
     own = rules._replace(derived={**rules.derived, **derived_sizes(item.items)})
     body = _struct_step(item._replace(times=None), own)
@@ -336,12 +337,12 @@ def _struct_step(item: Item, rules: Rules) -> WriteStep:
 
 
 def _outer(scope: Scope) -> Scope:
-    """Return what a struct knows of a scope that is not its own."""
+    """Return the names of an outer scope that a struct may use."""
     return {name: scope[name] for name in OUTER_NAMES if name in scope}
 
 
 def _windowed(body: WriteStep, item: Item, size: Extent, rules: Rules) -> WriteStep:
-    """Write a struct, and what its window needs: its size in front of it, no trimmed bytes."""
+    """Write a struct and its window: the size in front, without trimmed bytes."""
     full, name = least_size(item.items), item.id or "a struct"
     is_variable = size.prefix is not None and size.prefix.is_variable
     gap = bytes(size.prefix.size) if size.prefix and not is_variable else b""
@@ -356,7 +357,7 @@ def _windowed(body: WriteStep, item: Item, size: Extent, rules: Rules) -> WriteS
         number = len(pen.bytes) - start
         if size.kind == "fixed":
             if number != size.number:
-                raise NotWritable(f"{name}: it has {number} bytes, its size is {size.number}")
+                raise NotWritable(f"{name}: it has {number} bytes, expected {size.number}")
         elif size.prefix is not None and is_variable:
             pen.insert(start, coded_writer(size.prefix, name)(number), scope)
         elif size.prefix is not None:

@@ -1,8 +1,8 @@
-"""Byte stuffing by declaration: bytes that mean something to the framing, hidden in its frames.
+"""Declared byte stuffing: escape sequences for bytes with a meaning in the framing.
 
-Floor 3, pure. Three ways cover what robots do: an escape byte before the byte it stands for
-(HDLC and PPP: 7D and the byte xor 20; a table, as SLIP has one), an escape byte that is doubled
-(DLE DLE), and a byte put in behind a sequence (FF FF FD is followed by one more FD).
+Pure. Three methods cover common robots. An escape byte precedes a replaced byte (HDLC and PPP: 7D
+and the byte xor 20; a table, as in SLIP). An escape byte is doubled (DLE DLE). A byte is inserted
+after a sequence (FF FF FD is followed by another FD).
 """
 
 import re
@@ -18,15 +18,15 @@ _ANY: Final = range(256)
 
 
 class Stuffing:
-    """One way of stuffing, in both directions; each takes linear time."""
+    """One method of byte stuffing, in both directions; each takes linear time."""
 
     def __init__(self, spec: EscapeSpec) -> None:
         self.spec = spec
         self.escape = bytes((spec.byte,))
         self.is_doubled = not spec.after and spec.table.get(spec.byte) == spec.byte
-        """Whether the escape byte itself may be the begin of a mark."""
+        """Whether the escape byte itself may begin a marker."""
         self.meant = _meant(spec)
-        """Byte behind the escape → byte that both stand for."""
+        """Byte after the escape → decoded byte of the pair."""
         if spec.after:
             self._plain, self._inserted = spec.after, bytes((spec.insert,))
             self._pair = re.compile(re.escape(spec.after) + b"(.?)", re.DOTALL)
@@ -40,14 +40,14 @@ class Stuffing:
             }
 
     def stuff(self, data: bytes) -> bytes:
-        """Return `data` as it goes over the line."""
+        """Return `data` in its wire form."""
         if self.spec.after:
             return data.replace(self._plain, self._plain + self._inserted)
         written = self._written
         return self._hidden.sub(lambda found: written[found[0]], data)
 
     def unstuff(self, data: bytes) -> bytes:
-        """Return what `data` stands for; raise `BadFrame` where it stands for nothing."""
+        """Return the original bytes of `data`; raise `BadFrame` for invalid stuffing."""
         if self.spec.after:
             return self._pair.sub(self._before, data) if self._plain in data else data
         return self._pair.sub(self._one, data) if self.escape in data else data
@@ -62,29 +62,29 @@ class Stuffing:
 
     @staticmethod
     def _refuse(shown: bytes) -> NoReturn:
-        text = f"{shown.hex(' ')} is not stuffed as this framing says; the frame is dropped"
+        text = f"{shown.hex(' ')} is invalid byte stuffing for this framing; the frame is dropped"
         raise BadFrame("bad-stuffing", text)
 
 
 def _meant(spec: EscapeSpec) -> Mapping[int, int]:
     if spec.xor is not None:
-        # Any byte may be hidden; who sends chooses which ones are.
+        # A sender may escape any byte.
         return {second: second ^ spec.xor for second in _ANY}
     return {second: plain for plain, second in spec.table.items()}
 
 
 class Unstuffer:
-    """Takes the stuffing out of bytes that are still coming in, one after another."""
+    """Decodes byte stuffing incrementally, byte by byte."""
 
     def __init__(self, stuffing: Stuffing) -> None:
         self._stuffing = stuffing
         self.plain = bytearray()
         self._is_escaped = False
         self._tail = b""
-        """Newest bytes, as long as the sequence behind which a byte is put in."""
+        """Newest bytes, as many as the sequence before an inserted byte."""
 
     def take(self, byte: int) -> bool:
-        """Take one byte of the line; return False when it cannot stand here."""
+        """Process one byte; return False when it is invalid here."""
         spec = self._stuffing.spec
         if spec.after:
             if self._is_escaped:
@@ -108,5 +108,5 @@ class Unstuffer:
 
     @property
     def is_between(self) -> bool:
-        """Whether the byte that comes next belongs to what was taken."""
+        """Whether the next byte completes an escape."""
         return self._is_escaped

@@ -1,4 +1,4 @@
-"""The form ``text``: a template, as written under ``send:``."""
+"""The form ``text``: a template, as under ``send:``."""
 
 import re
 from collections.abc import Mapping
@@ -16,18 +16,18 @@ _NAME = re.compile(
     r"\s*([A-Za-z_][A-Za-z0-9_]*)\s*"
     r"(?:\|\s*(?:fixed|round|int|float|string|pad|trim|join)\s*(?:\([^()]*\))?\s*)*"
 )
-"""What a name may go through and still be read back: nothing but its way of being written."""
+"""A name with formatting filters only, so that its value can be read back."""
 
 
 class TextWriter:
-    """Writes a rendered template; reads one back where its expressions are plain names."""
+    """Writes a rendered template; reads one back if its expressions are plain names."""
 
     def __init__(self, spec: WriteSpec, context: CodecContext) -> None:
         self._template = cast("Template", spec.options["template"])
         self._encoding = context.encoding
 
     def write(self, namespace: Mapping[str, object]) -> Payload:
-        """Return the rendered text in the line's encoding."""
+        """Return the rendered text in the encoding of the connection."""
         text = text_of(self._template.evaluate(namespace))
         try:
             return text.encode(self._encoding)
@@ -36,9 +36,9 @@ class TextWriter:
             raise NotWritable(f"{quoted(wrong)} cannot be written in {self._encoding}") from None
 
     def read(self, frame: Frame) -> Mapping[str, object] | None:
-        """Return what stands in the places of the plain names, as text.
+        """Return the text in the places of the plain names.
 
-        A counter's number is there as ``seq.NAME``. Where a hole could end in several places, it
+        The number of a counter has the key ``seq.NAME``. If a field could end in several places, it
         ends at the first.
         """
         try:
@@ -76,10 +76,10 @@ class TextWriter:
 
 
 class _Piece(NamedTuple):
-    """A hole and the literal text after it; the first piece has no hole."""
+    """A field and the literal text after it; the first piece has no field."""
 
     name: str
-    """What stands in the hole; "" when that cannot be told."""
+    """Name of the field; "" if it is unknown."""
     literal: str
 
 

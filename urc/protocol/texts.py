@@ -1,4 +1,4 @@
-"""How values stand in text, for every form that writes text."""
+"""Text forms of values, for every form that writes text."""
 
 import re
 from collections.abc import Mapping
@@ -13,7 +13,7 @@ _COUNTER = re.compile(r"\s*seq\s*\(\s*['\"]([a-z][a-z0-9_]*)['\"][^()]*\)\s*")
 
 
 def counter_in(expression: str) -> str:
-    """Return the name of the counter that an expression is, and nothing else; "" when none."""
+    """Return the name of the counter if the expression is a single counter, else ""."""
     found = _COUNTER.fullmatch(expression)
     return found[1] if found else ""
 
@@ -28,7 +28,7 @@ def field_text(value: object) -> str:
 
 
 def encoded(text: str, encoding: str) -> bytes:
-    """Return the text in the line's encoding; raise `NotWritable` when it has no such bytes."""
+    """Return the text in the given encoding; raise `NotWritable` if it cannot be encoded."""
     try:
         return text.encode(encoding)
     except UnicodeEncodeError as error:
@@ -36,7 +36,7 @@ def encoded(text: str, encoding: str) -> bytes:
 
 
 def written_differently(fields: Mapping[str, object], found: Mapping[str, object] | None) -> str:
-    """Return which of `fields` a written frame does not read back to, or ""."""
+    """Return the first of `fields` that a written frame does not read back, or ""."""
     for name, value in fields.items():
         if found is None or field_text(found.get(name)) != field_text(value):
             return name

@@ -1,7 +1,4 @@
-"""Points in time.
-
-Floor 3, pure.
-"""
+"""Points in time. Pure."""
 
 from collections.abc import Iterable
 
@@ -9,7 +6,7 @@ __all__ = ["soonest"]
 
 
 def soonest(times: Iterable[float | None]) -> float | None:
-    """Return the first of `times`, of which None is never."""
+    """Return the earliest of `times`, where None means never."""
     first: float | None = None
     for time in times:
         if time is not None and (first is None or time < first):

@@ -1,7 +1,7 @@
-"""Topics: what a driver listens to on a transport that carries messages.
+"""Topics and subscriptions of a driver on a transport that carries messages.
 
-Floor 3, pure. A topic may have wildcards as in MQTT (version 5.0, section 4.7): ``+`` stands for
-one level, ``#`` at the end for all that follow.
+Pure. A topic may have wildcards as in MQTT (version 5.0, section 4.7): ``+`` stands for one level,
+``#`` at the end for all following levels.
 """
 
 import re
@@ -18,11 +18,14 @@ from urc.protocol.codec import CodecContext, Frame, NotWritable, Reader
 __all__ = ["TopicReader", "frame_of", "listened", "matches", "topic_of"]
 
 FEEDBACK = "/feedback"
-"""What follows the name of an action in the topic of its feedback."""
+"""Suffix of the feedback topic of an action."""
 
 
 class TopicReader:
-    """Reads by another form what comes on one topic; a wildcard's topic is the field ``_topic``."""
+    """Reads the messages of one topic by another form.
+
+    With wildcards, the field ``_topic`` has the actual topic.
+    """
 
     def __init__(self, reader: Reader, spec: ReadSpec, context: CodecContext) -> None:
         self._reader = reader
@@ -31,7 +34,7 @@ class TopicReader:
         self._is_plain = not _WILD.search(self._topic)
 
     def read(self, frame: Frame) -> Mapping[str, object] | None:
-        """Return the fields, or None when the frame is of another topic, or another one."""
+        """Return the fields, or None for another topic or another kind of message."""
         topic = frame.topic
         if topic != self._topic if self._is_plain else topic is None or not self._fits(topic):
             return None
@@ -39,7 +42,7 @@ class TopicReader:
         return found if found is None or self._is_plain else {**found, "_topic": topic}
 
     def write(self, fields: Mapping[str, object]) -> Payload:
-        """Return the message that would be read as `fields`; raise `NotWritable`."""
+        """Return the message that reads as `fields`; raise `NotWritable`."""
         topic = str(fields.get("_topic") or _WILD.sub("x", self._topic))
         if not self._fits(topic):
             raise NotWritable(f"{topic!r} is not a topic of {self._topic!r}")
@@ -51,7 +54,7 @@ _WILD = re.compile(r"(?<![^/])[+#](?![^/])")
 
 
 def matches(topic: str) -> Callable[[str], bool]:
-    """Return the function that tells whether a name is one of `topic`, wildcards included."""
+    """Return the function that tells whether a name matches `topic`, wildcards included."""
     if not _WILD.search(topic):
         return lambda name: name == topic
     levels = topic.split("/")
@@ -76,7 +79,7 @@ def topic_of(spec: ReadSpec, settings: Mapping[str, object]) -> str:
 
 
 def frame_of(payload: Payload, encoding: str) -> Frame:
-    """Return what came in as a frame: bytes that an envelope carries are its payload."""
+    """Return a received payload as a frame; the bytes of an envelope become its payload."""
     if not isinstance(payload, Envelope):
         return Frame(payload, encoding)
     attributes, body = payload.attributes, payload.body
@@ -92,9 +95,9 @@ def frame_of(payload: Payload, encoding: str) -> Frame:
 def listened(
     driver: Driver, transport: str, settings: Mapping[str, object]
 ) -> dict[str, Mapping[str, Value]]:
-    """Return topic → how it is listened to, for all that a driver reads on a transport.
+    """Return topic → subscription options, for all topics of a driver on a transport.
 
-    Of two that listen to one topic, the first says how, and the other adds what it left out.
+    For repeated topics, the first options take precedence, and later ones add missing keys.
     """
     topics: dict[str, dict[str, Value]] = {}
     for read in _reads(driver, transport):

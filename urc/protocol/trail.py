@@ -1,7 +1,7 @@
-"""Checksums that stand behind a text, where only the text shows the place.
+"""Checksums behind a text of variable length.
 
-Floor 3, pure. A `Trail` takes the checksum off what is between the marks of a frame, and puts it
-on; what is left has fixed places again.
+Pure. A `Trail` removes the checksum from the content between the markers of a frame, or adds it.
+The remaining content has fixed places.
 """
 
 from urc.model.framing import TrailSpec
@@ -16,12 +16,12 @@ class Trail:
     def __init__(self, spec: TrailSpec, start: bytes) -> None:
         self._spec = spec
         self._before = b"" if spec.each else start
-        """Bytes of the frame in front of the text, which places count too."""
+        """Bytes of the frame in front of the text, included in places."""
         self._checksum = Checksum(spec.checksum)
         self._size = self._checksum.size
 
     def take_off(self, text: bytes) -> bytes:
-        """Return `text` without checksums; raise `BadFrame` when one is wrong or missing."""
+        """Return `text` without checksums; raise `BadFrame` for a wrong or missing one."""
         spec = self._spec
         if not spec.each:
             return self._checked(text)
@@ -32,7 +32,7 @@ class Trail:
         )
 
     def put_on(self, text: bytes) -> bytes:
-        """Return `text` with its checksums; raise `BadFrame` when there can be none."""
+        """Return `text` with its checksums; raise `BadFrame` if they cannot be computed."""
         spec = self._spec
         if not spec.each:
             return self._sealed(text)
@@ -56,14 +56,14 @@ class Trail:
         return content
 
     def _parted(self, text: bytes) -> tuple[bytes, bytes] | None:
-        """Return content and checksum; None when there is no checksum and none is needed."""
+        """Return content and checksum; None for a missing optional checksum."""
         spec, size = self._spec, self._size
         if not spec.mark:
             if len(text) < size:
                 raise BadFrame("short-frame", f"{len(text)} bytes are too few for the checksum")
             return text[:-size], text[-size:]
         if spec.checksum.spelling == "raw":
-            # Raw bytes may look like the mark: only their place tells.
+            # Raw bytes may contain the separator: only the place is reliable.
             content, digits = text[: -size - len(spec.mark)], text[-size:]
             is_marked = text[:-size].endswith(spec.mark)
         else:
@@ -74,7 +74,7 @@ class Trail:
         if spec.is_optional:
             return None
         mark_text = ascii(spec.mark.decode("latin-1"))
-        raise self._checksum.wrong(f"the frame has no {mark_text} with a checksum behind; dropped")
+        raise self._checksum.wrong(f"the frame has no {mark_text} followed by a checksum; dropped")
 
     def _sealed(self, text: bytes) -> bytes:
         right = self._right(text)

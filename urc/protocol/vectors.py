@@ -1,8 +1,7 @@
-"""Values of many parts: arrays, objects, and bytes such as images.
+"""Composite values: arrays, objects, and bytes such as images.
 
-Floor 3, pure. What comes in may be JSON-like data, bytes, or text: the elements of an array may
-stand in text with blanks, commas or semicolons between them, and bytes may stand in text as base64.
-Everything is bounded by the frame it came in.
+Pure. The input is JSON-like data, bytes, or text. The elements of an array in text are separated by
+blanks, commas or semicolons; bytes in text are base64. The size of the frame bounds everything.
 """
 
 import re
@@ -19,9 +18,9 @@ __all__ = ["MAX_BYTES", "MAX_ELEMENTS", "array_converter", "bytes_converter", "b
 __all__ += ["elements_of", "object_converter"]
 
 MAX_ELEMENTS = 65536
-"""Elements of one array."""
+"""Largest number of elements in one array."""
 MAX_BYTES = 1 << 24
-"""Bytes of one image or blob that declares no ``size``."""
+"""Largest image or blob without a declared ``size``, in bytes."""
 _BETWEEN = re.compile(r"[\s,;]+")
 _AROUND = " \t\r\n[]()"
 
@@ -29,7 +28,7 @@ _AROUND = " \t\r\n[]()"
 def array_converter(
     signal: Signal, element: Callable[[object], Value]
 ) -> Callable[[object], Reading]:
-    """Return the function from raw elements to a tuple of values, each made by `element`."""
+    """Return the function from raw elements to a tuple of values, each converted by `element`."""
     wanted = signal.size
 
     def convert(raw: object) -> Reading:
@@ -37,9 +36,9 @@ def array_converter(
             return None
         items = elements_of(raw)
         if wanted is not None and len(items) != wanted:
-            raise BadValue(f"{len(items)} elements, {wanted} are expected")
+            raise BadValue(f"expected {wanted} elements, found {len(items)}")
         if len(items) > MAX_ELEMENTS:
-            raise BadValue(f"{len(items)} elements, {MAX_ELEMENTS} are the most")
+            raise BadValue(f"expected at most {MAX_ELEMENTS} elements, found {len(items)}")
         values = []
         for place, item in enumerate(items):
             try:
@@ -52,7 +51,7 @@ def array_converter(
 
 
 def elements_of(raw: object) -> list[object] | tuple[object, ...]:
-    """Return the elements in a list, in bytes, or in text between blanks, commas or semicolons."""
+    """Return the elements of a list, of bytes, or of separated text."""
     if isinstance(raw, (list, tuple)):
         return raw
     if isinstance(raw, (bytes, bytearray)):
@@ -60,14 +59,14 @@ def elements_of(raw: object) -> list[object] | tuple[object, ...]:
     if isinstance(raw, str):
         inner = raw.strip(_AROUND)
         return list(_BETWEEN.split(inner)) if inner else []
-    raise BadValue(f"{quoted(raw)} is no list")
+    raise BadValue(f"{quoted(raw)} is not a list")
 
 
 def object_converter(raw: object) -> Reading:
-    """Return a mapping as it is."""
+    """Return a mapping unchanged; raise `BadValue` for any other value."""
     if raw is None or isinstance(raw, Mapping):
         return raw
-    raise BadValue(f"{quoted(raw)} has no named parts")
+    raise BadValue(f"{quoted(raw)} is not a mapping")
 
 
 def bytes_converter(signal: Signal) -> Callable[[object], Reading]:
@@ -84,12 +83,12 @@ def bytes_converter(signal: Signal) -> Callable[[object], Reading]:
         elif isinstance(raw, (list, tuple)):
             data = _from_numbers(raw)
         else:
-            raise BadValue(f"{quoted(raw)} is neither bytes nor their base64")
+            raise BadValue(f"{quoted(raw)} is neither bytes nor base64")
         if len(data) > most:
-            raise BadValue(f"{len(data)} bytes, {most} are the most")
+            raise BadValue(f"expected at most {most} bytes, found {len(data)}")
         if signal.type == "image" and pixels(data) > MAX_PIXELS:
             width, height = picture_size(data) or (0, 0)
-            raise BadValue(f"a picture of {width} by {height} pixels; {MAX_PIXELS} are the most")
+            raise BadValue(f"an image of {width} by {height} pixels; the limit is {MAX_PIXELS}")
         return data
 
     return convert
@@ -104,11 +103,11 @@ def _from_base64(text: str) -> bytes:
     try:
         return a2b_base64(text, strict_mode=True)
     except (Base64Error, ValueError):
-        raise BadValue(f"{quoted(text)} is no base64") from None
+        raise BadValue(f"{quoted(text)} is not base64") from None
 
 
 def _from_numbers(numbers: list[object] | tuple[object, ...]) -> bytes:
     try:
-        return bytes(numbers)  # type: ignore[arg-type]  # checked by what it raises
+        return bytes(numbers)  # type: ignore[arg-type]  # the handlers below check it
     except (TypeError, ValueError):
-        raise BadValue(f"{quoted(numbers)} is no list of bytes") from None
+        raise BadValue(f"{quoted(numbers)} is not a list of bytes") from None

@@ -1,13 +1,10 @@
-"""Text off the wire in a correlation.
-
-Floor 3, pure.
-"""
+"""Received text in a correlation. Pure."""
 
 __all__ = ["Word"]
 
 
 class Word(str):
-    """Text off the wire: equal to a number when it is that number, as ``_id == id`` means it."""
+    """Received text that equals the number it spells, so that ``_id == id`` works."""
 
     __slots__ = ()
 

@@ -1,7 +1,7 @@
-"""The form ``xml``: fields out of a document, by the elements that lead to them.
+"""The form ``xml``: fields of a document, found by element paths.
 
-The standard library's parser does the work. A document with a type declaration is refused before
-it is parsed: without one there are no entities, so nothing can swell, and nothing is ever fetched.
+The parser of the standard library does the work. A document with a document type declaration is
+rejected before parsing: entities cannot expand, and external resources are never loaded.
 """
 
 from collections.abc import Iterator, Mapping
@@ -17,18 +17,18 @@ from urc.protocol.texts import encoded, field_text, written_differently
 __all__ = ["XmlReader"]
 
 _MAX_DEPTH = 100
-"""Elements inside each other; nobody's robot needs more."""
+"""Largest nesting depth of elements."""
 
 
 class XmlReader:
-    """Reads texts and attributes; writes a document that has them."""
+    """Reads texts and attributes; writes a document with these values."""
 
     def __init__(self, spec: ReadSpec, context: CodecContext) -> None:
         self._paths = dict(cast("Mapping[str, XmlPath]", spec.options["paths"]))
         self._encoding = context.encoding
 
     def read(self, frame: Frame) -> Mapping[str, object] | None:
-        """Return the fields found, or None when there is none or the text is no document."""
+        """Return the fields found, or None for no fields or an invalid document."""
         return self._read(frame.text)
 
     def _read(self, text: str) -> dict[str, object] | None:
@@ -53,11 +53,11 @@ class XmlReader:
                 root = ElementTree.Element(path.steps[0].tag, dict(path.steps[0].attributes))
             _put(root, path, field_text(value))
         if root is None:
-            raise NotWritable("a document without any of its fields says nothing")
+            raise NotWritable("a document needs at least one of its fields")
         text = ElementTree.tostring(root, encoding="unicode")
         wrong = written_differently(fields, self._read(text))
         if wrong:
-            raise NotWritable(f"{wrong}: {quoted(fields[wrong])} cannot stand in a document")
+            raise NotWritable(f"{wrong}: {quoted(fields[wrong])} cannot be written into a document")
         return encoded(text, self._encoding)
 
 

@@ -152,7 +152,7 @@ def test_wrong_checksum_says_what_would_be_right() -> None:
     """The profile author sees both numbers."""
     [fault] = framing(NMEA).decoder().feed(GGA + b"48\r\n")
     assert fault == FrameFault(
-        "bad-checksum", "the frame carries the checksum '48', but '47' would be right; dropped"
+        "bad-checksum", "the frame carries the checksum '48', expected '47'; dropped"
     )
 
 
@@ -178,36 +178,36 @@ def test_salt_of_an_unknown_message_drops_it() -> None:
 
 
 REFUSED = [
-    ("{ type: fixed, size: 3 }", b"ab", "2 bytes found, where a frame holds exactly 3"),
+    ("{ type: fixed, size: 3 }", b"ab", "expected 3 bytes of payload, found 2"),
     ("{ type: length, length: { offset: 0, size: 1, adjust: 1 }, max: 1000 }", bytes(256),
-     "the length field cannot say 256"),
+     "the length field cannot hold 256"),
     ("{ type: length, length: { offset: 0, size: 2, as: dec, adjust: 2 } }", bytes(100),
-     "the length field cannot say 100"),
+     "the length field cannot hold 100"),
     ("{ type: length, length: { offset: 0, size: 1, unit: 4, adjust: 1 } }", bytes(3),
      "the frame is counted in 4 bytes; 3 over"),
     ("{ type: length, length: { offset: 0, size: 1, adjust: 5 } }", b"",
      "1 bytes are too few for this kind of frame"),
-    ("{ type: slip }", b"", "nothing at all is no frame of SLIP"),
+    ("{ type: slip }", b"", "SLIP cannot send an empty frame"),
     ("{ type: slip, max: 4 }", b"12345", "a frame of 5 bytes is longer than 4"),
     ("{ type: cobs, max: 4 }", b"12345", "a frame of 5 bytes is longer than 4"),
     ("{ type: brackets, open: '<', close: '>' }", b"a>b",
-     "b'a>b' contains b'>', which marks a frame"),
+     "b'a>b' contains b'>', a marker of the framing"),
     ("{ type: brackets, open: '~', close: '~' }", b"",
-     "nothing between two marks that are the same is no frame"),
+     "an empty frame cannot be sent between two equal markers"),
     ("{ type: json }", b'{"a": 1', "b'{\"a\": 1' is not one JSON object or array"),
     ("{ type: json }", b"{}{}", "b'{}{}' is not one JSON object or array"),
     ("{ type: xml }", b"<a/><b/>", "b'<a/><b/>' is not one XML element"),
     ("{ type: xml }", b"<a></b>", "b'<a></b>' is not one XML element"),
     ("{ type: xml }", b"go", "b'go' is not one XML element"),
     ("{ type: regex, pattern: '[a-z]+;' }", b"ab;c;",
-     "b'ab;c;' makes no frame that the pattern of the framing takes"),
+     "b'ab;c;' does not match the pattern of the framing"),
     ("{ type: regex, pattern: '[a-z]+;', tx: LF }", b"a\nb", "b'a\\nb' contains b'\\n': it would be"
      " two frames"),
     ("{ type: switch, cases: [{ first: 1, framing: { type: fixed, size: 2 } }] }", b"\x02\x03",
-     "no case of the framing begins as b'\\x02\\x03' does"),
+     "no case of the framing begins like b'\\x02\\x03'"),
     (NMEA, b"$A\r\nB*", "b'$A\\r\\nB*' contains the delimiter b'\\r\\n': it would be two frames"),
     ("{ type: datagram, checksum: { algorithm: sum8, from_hex: true } }", b"xy",
-     "the checksum is taken over what is no hex digits"),
+     "the checksum needs hex digits, found other bytes"),
 ]  # fmt: skip
 
 

@@ -44,7 +44,7 @@ def test_a_frame_is_sent_again_three_times_where_nothing_else_is_said() -> None:
         talk.says("Resend:1")
     assert talk.sent == ["N1 G0"] * 4
     assert talk.outcomes == {1: "refused"}
-    assert talk.messages[-1] == "the robot asks for move again, and has got it 4 times"
+    assert talk.messages[-1] == "the robot asks for move again after 4 transmissions"
 
 
 def test_retries_bound_how_often_a_frame_is_sent_again() -> None:

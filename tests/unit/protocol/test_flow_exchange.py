@@ -362,8 +362,7 @@ sequences: { dock: [{ expect: '^DOCKED$' }] }
     talk.says("DOCKING")
     talk.at(4.5)
     assert talk.messages[-1] == (
-        "dock.0: what it expects did not come within 0.5 s; 'DOCKING' came, which is not what it"
-        " expects"
+        "dock.0: no matching frame within 0.5 s; 'DOCKING' came, which is not what it expects"
     )
 
 
@@ -382,8 +381,8 @@ commands:
     talk.says("A1")
     talk.at(0.5)
     assert any(
-        one == "no answer to volts within 0.5 s; 'A1' came, which is no answer to volts; answers"
-        " that come in another order than their requests need 'match'"
+        one == "no answer to volts within 0.5 s; 'A1' came, which is no answer to volts; replies"
+        " in another order than their requests need 'match'"
         for one in talk.messages
     ), talk.messages
 

@@ -93,7 +93,7 @@ def test_steps_are_repeated_until_a_condition_is_true() -> None:
 @pytest.mark.parametrize(
     ("name", "rounds", "outcome", "sent", "message"),
     [
-        ("ask", 3, "failed", [], "ask.0: it was not done after 3 rounds"),
+        ("ask", 3, "failed", [], "ask.0: not done after 3 rounds"),
         ("insist", 2, "done", ["HELP"], ""),
         ("complain", 1, "failed", [], "it is stuck"),
     ],

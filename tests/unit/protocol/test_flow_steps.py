@@ -112,7 +112,7 @@ commands: { ping: { send: PING } }
 @pytest.mark.parametrize(
     ("chunks", "until", "reason"),
     [
-        ((), 0.5, "close wire: wire.on_connect.0: what it expects did not come within 0.5 s"),
+        ((), 0.5, "close wire: wire.on_connect.0: no matching frame within 0.5 s"),
         ((b"login: ",), 2.0, "close wire: it asks for no password"),
         (
             (b"login: ", b"password: ", b"DENIED s3cret-word\n"),
@@ -276,7 +276,7 @@ def test_a_sequence_is_not_run_twice_at_a_time() -> None:
     talk.run("arm")
     talk.run("arm")
     assert talk.outcomes == {2: "at-work"}
-    assert talk.messages == ["arm is at work already"]
+    assert talk.messages == ["arm is already running"]
 
 
 def test_a_sequence_does_not_go_on_upon_a_new_connection() -> None:

@@ -70,7 +70,7 @@ def test_what_is_no_such_number_is_another_frame(source: str, data: str) -> None
         ("struct: [{ id: a, type: u4, count: 2 }]", {"a": [1]}, "expected 2 items, found 1"),
         ("struct: [{ id: a, type: u4, count: 2 }]", {"a": [1, 16]}, "hold 0 to 15"),
         ("struct: [{ id: a, type: u4, count: 2 }]", {}, "has no value"),
-        ("struct: [{ id: a, type: u4, count: 2 }]", {"a": 1}, "a list is expected"),
+        ("struct: [{ id: a, type: u4, count: 2 }]", {"a": 1}, "expected a list"),
     ],
 )
 def test_what_does_not_fit_is_not_sent(source: str, arguments: dict[str, Any], words: str) -> None:

@@ -70,7 +70,7 @@ def test_a_missing_mark_is_named() -> None:
     """So an author learns that it is `optional` that is missing."""
     found = framing(MARLIN).decoder().feed(b"ok\n")
     assert isinstance(found[0], FrameFault)
-    assert found[0].message == "the frame has no '*' with a checksum behind; dropped"
+    assert found[0].message == "the frame has no '*' followed by a checksum; dropped"
 
 
 @pytest.mark.parametrize(

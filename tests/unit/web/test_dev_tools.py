@@ -182,7 +182,7 @@ def test_a_preview_is_what_would_be_sent(robot: Driver) -> None:
     [
         ({}, "go needs the argument 'speed'"),
         ({"speed": 3}, "speed: 3 is above its maximum 2"),
-        ({"speed": "fast"}, "speed: number expected, found 'fast'"),
+        ({"speed": "fast"}, "speed: expected number, found 'fast'"),
         ({"speed": 1, "name": "a\nb"}, "control characters"),
         ({"speed": 1, "colour": "red"}, "go has no argument 'colour'"),
     ],

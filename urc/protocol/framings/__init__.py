@@ -1,1 +1,1 @@
-"""The framings beside the delimiter, one module a family; each is imported when it is used."""
+"""All framings, one module per family; each is imported on first use."""

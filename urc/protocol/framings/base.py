@@ -1,13 +1,13 @@
-"""What a framing is, and what all framings share.
+"""Interfaces and shared code of the framings.
 
-Floor 3, pure. Each framing owns both directions, so that the emulated robot is the same
-declaration turned round (`reversed`).
+Pure. Each framing works in both directions, so that the emulated robot uses the same declaration
+(`reversed`).
 
-Theory of operation. A decoder takes frames off the front of a `Stream`, one a call, and leaves the
-rest there: so another decoder may go on with it when a reply brings its own framing. It is bounded:
-what is held back never outgrows the longest frame. It is linear: what it has looked at, it does not
-look at again, or only as often as `Credit` allows. After bytes that are no frame it says so once,
-and goes on where the next frame may begin.
+Theory of operation. A decoder removes frames from the front of a `Stream`, one per call, and leaves
+the rest there: another decoder can continue when a reply has its own framing. Memory is bounded:
+the buffer never exceeds the longest frame. Time is linear: bytes are scanned once, or again only
+within the budget of `Credit`. After invalid bytes the decoder reports one violation, and continues
+where the next frame may begin.
 """
 
 from collections.abc import Callable
@@ -32,7 +32,7 @@ __all__ = [
 ]
 
 SKIPPED: Final = ""
-"""Code of a frame that is to be dropped without a word; only a `switch` sees it."""
+"""Code of a frame that is dropped silently; only a `switch` sees it."""
 Open = Callable[[bytes], bytes]
 
 
@@ -41,62 +41,62 @@ class FramingError(UrcError):
 
 
 class FrameFault(NamedTuple):
-    """Bytes that were no frame."""
+    """Bytes that are not a valid frame."""
 
     code: str
     """``frame-too-long``, ``bad-checksum``, ``no-frame`` …"""
     message: str
     closes: bool = False
-    """Whether the connection is to be given up."""
+    """Whether the connection must be closed."""
 
 
 class Decoder(Protocol):
-    """Cuts one stream. Made anew for each connection, so nothing stale survives."""
+    """Cuts one stream. Each connection has a new one, without old data."""
 
     @property
     def pending(self) -> int:
-        """Bytes held back because their frame is not complete."""
+        """Buffered bytes of an incomplete frame."""
 
     @property
     def deadline(self) -> float | None:
-        """When `tick` may complete a frame by silence alone; None when only bytes can."""
+        """Time at which `tick` may complete a frame; None when only bytes can."""
 
     def feed(self, data: bytes, now: float = 0.0) -> list[bytes | FrameFault]:
-        """Take bytes and return the frames that are now complete, in order."""
+        """Append bytes and return the completed frames, in order."""
 
     def push(self, data: bytes, now: float = 0.0) -> None:
-        """Take bytes, to be cut by `next`."""
+        """Append bytes for `next`."""
 
     def next(self, now: float = 0.0) -> bytes | FrameFault | None:
-        """Return one frame or fault and take it off the stream; None when none is complete."""
+        """Remove one frame or violation from the stream and return it; None if incomplete."""
 
     def tick(self, now: float) -> list[bytes | FrameFault]:
         """Return the frames that the silence until `now` has completed."""
 
 
 class Framing(Protocol):
-    """One way of cutting, with its options."""
+    """One method of cutting frames, with its options."""
 
     def encode(self, payload: bytes) -> bytes:
-        """Return the bytes of one frame; raise `FramingError` when it cannot be told apart."""
+        """Return the bytes of one frame; raise `FramingError` if it would be ambiguous."""
 
     def decoder(self, stream: Stream | None = None) -> Decoder:
-        """Return a fresh decoder, of what is in `stream` already and what will be fed."""
+        """Return a new decoder for the bytes in `stream` and all that follow."""
 
     def reversed(self) -> "Framing":
-        """Return the same framing seen from the other end of the line."""
+        """Return the same framing for the other end of the connection."""
 
 
 class StreamDecoder:
-    """What the decoders share. One of them adds `next`."""
+    """Shared code of the decoders. A subclass adds `next`."""
 
     def __init__(self, stream: Stream | None, max_bytes: int) -> None:
         self._stream = Stream() if stream is None else stream
         self._max_bytes = max_bytes
         self._is_lost = False
-        """Whether the bytes since the last frame were none: that is told once."""
+        """Whether the bytes since the last frame are invalid, which is reported once."""
         self._is_case = False
-        """Whether a `switch` chooses anew behind each frame."""
+        """Whether a `switch` chooses a case after each frame."""
 
     @property
     def pending(self) -> int:
@@ -109,15 +109,15 @@ class StreamDecoder:
         return None
 
     def push(self, data: bytes, now: float = 0.0) -> None:
-        """Take bytes, to be cut by `next`."""
+        """Append bytes for `next`."""
         self._stream.push(data)
 
     def next(self, now: float = 0.0) -> bytes | FrameFault | None:
-        """Return one frame or fault, or None when there is none yet."""
+        """Return one frame or violation, or None if incomplete."""
         raise NotImplementedError
 
     def feed(self, data: bytes, now: float = 0.0) -> list[bytes | FrameFault]:
-        """Take bytes and return the frames that are now complete, in order."""
+        """Append bytes and return the completed frames, in order."""
         self.push(data, now)
         frames: list[bytes | FrameFault] = []
         while (frame := self.next(now)) is not None:
@@ -125,22 +125,22 @@ class StreamDecoder:
         return frames
 
     def tick(self, now: float) -> list[bytes | FrameFault]:
-        """Return the frames that silence has completed: none."""
+        """Return an empty list: silence completes no frames."""
         return []
 
     def restart(self) -> None:
-        """Forget what was seen of the stream: one case of a `switch` has a frame begin here."""
+        """Reset the state: a `switch` begins a frame of this case here."""
         self._is_lost = False
         self._is_case = True
 
     def _refused(self, error: BadFrame) -> FrameFault | None:
-        """Return the fault of a frame that was cut, or None when nobody wants to know of it."""
+        """Return the violation for an invalid frame, or None if it is dropped silently."""
         if error.code == SKIPPED and not self._is_case:
             return None
         return FrameFault(error.code, str(error), error.closes)
 
     def _before(self, mark: bytes) -> int:
-        """Return how many bytes stand before the next `mark`, or before what may become one."""
+        """Return the number of bytes before the next `mark`, or before its possible beginning."""
         stream, data = self._stream, self._stream.data
         found = data.find(mark, stream.at)
         if found < 0:
@@ -150,16 +150,16 @@ class StreamDecoder:
         return found - stream.at
 
     def _skip(self, count: int) -> FrameFault | None:
-        """Let go of bytes that begin no frame; return a fault for the first of their run."""
+        """Discard bytes that begin no frame; return a violation for the first of them."""
         stream = self._stream
         first = stream.data[stream.at : stream.at + 1]
         stream.at += count
         return self._lost(
-            "no-frame", f"bytes from {first.hex()} on begin no frame; skipped up to the next one"
+            "no-frame", f"bytes from {first.hex()} on begin no frame; skipped up to the next frame"
         )
 
     def _lost(self, code: str, message: str, *, closes: bool = False) -> FrameFault | None:
-        """Return a fault, or None when the run of bytes that are no frame is told already."""
+        """Return a violation, or None if this run of invalid bytes has already been reported."""
         if self._is_lost:
             return None
         self._is_lost = True
@@ -167,13 +167,13 @@ class StreamDecoder:
 
 
 def seal_of(spec: FramingSpec) -> Seal | None:
-    """Return what wraps the payloads of `spec`, or None when they are the frames themselves."""
+    """Return the frame codec of `spec`, or None when payloads are the frames themselves."""
     layout = cast("FrameLayout | None", spec.options.get("layout"))
     return None if layout is None or layout == FrameLayout() else Seal(layout)
 
 
 def sealed(seal: Seal | None, payload: bytes, max_bytes: int) -> bytes:
-    """Return the frame around `payload`; raise `FramingError` when it cannot be one."""
+    """Return the frame around `payload`; raise `FramingError` if it cannot be framed."""
     try:
         frame = payload if seal is None else seal.close(payload)
     except BadFrame as error:

@@ -1,4 +1,4 @@
-"""Frames that end with fixed bytes: ``delimiter``."""
+"""The framing ``delimiter``: frames that end with fixed bytes."""
 
 from typing import NamedTuple, cast
 
@@ -42,21 +42,21 @@ class DelimiterFraming(NamedTuple):
         return frame + self.tx
 
     def decoder(self, stream: Stream | None = None) -> Decoder:
-        """Return a fresh decoder."""
+        """Return a new decoder."""
         return DelimiterDecoder(
             stream, self.rx, self.max_bytes, None if self.seal is None else self.seal.open
         )
 
     def reversed(self) -> "DelimiterFraming":
-        """Return the same framing seen from the other end of the line."""
+        """Return the same framing for the other end of the connection."""
         return self._replace(tx=self.rx, rx=self.tx)
 
 
 class DelimiterDecoder(StreamDecoder):
-    """Remembers how far it has searched, so a frame that drips in costs linear time.
+    """A decoder that remembers its search position, so that slow frames take linear time.
 
-    A frame that is too long is dropped as a whole, reported once, and the stream goes on behind the
-    next delimiter.
+    A frame that is too long is dropped and reported once; decoding continues after the next
+    delimiter.
     """
 
     def __init__(
@@ -73,19 +73,20 @@ class DelimiterDecoder(StreamDecoder):
         self._open = opened
         self._skips_empty = skips_empty
         self._searched = 0
-        """How many bytes of the stream are known to have no delimiter."""
+        """Number of scanned bytes without a delimiter."""
         self._is_skipping = False
         self._credit: Credit | None = None
-        """Of a case of a `switch`: there a frame that is too long costs its first byte only."""
+        """Budget within a case of a `switch`, where a frame that is too long costs only its first
+        byte."""
 
     def restart(self) -> None:
-        """Let a frame of a `switch` begin here."""
+        """Reset the state: a `switch` begins a frame here."""
         super().restart()
         self._searched = 0
         self._credit = self._credit or Credit()
 
     def next(self, now: float = 0.0) -> bytes | FrameFault | None:
-        """Return one frame or fault, or None when there is none yet."""
+        """Return one frame or violation, or None if incomplete."""
         stream, delimiter = self._stream, self._delimiter
         while stream.at < len(stream.data):
             start = stream.at
@@ -110,9 +111,9 @@ class DelimiterDecoder(StreamDecoder):
         return None
 
     def ahead(self) -> list[bytes]:
-        """Return the complete frames, if several, and leave them in the stream.
+        """Return the complete frames, if several, without removing them from the stream.
 
-        The list is empty if a frame needs a closer look. `skip` takes the frames that were used.
+        The list is empty if a frame needs a check. `skip` removes the used frames.
         """
         stream, delimiter = self._stream, self._delimiter
         if self._open or self._credit or self._is_skipping or self._skips_empty:
@@ -125,7 +126,7 @@ class DelimiterDecoder(StreamDecoder):
         return frames if max(map(len, frames)) <= self._max_bytes else []
 
     def skip(self, count: int, size: int) -> None:
-        """Take the first `count` frames of `ahead`, which have `size` bytes in all."""
+        """Remove the first `count` frames of `ahead`, which have `size` bytes in total."""
         if count:
             self._stream.at += size + count * len(self._delimiter)
             self._searched = 0
@@ -139,7 +140,7 @@ class DelimiterDecoder(StreamDecoder):
             return self._refused(error)
 
     def _wait(self, credit: Credit | None) -> FrameFault | None:
-        """Keep what may yet become a frame."""
+        """Keep the bytes that may become a frame."""
         stream, keep = self._stream, len(self._delimiter) - 1
         fault = None
         if credit is not None and len(stream) >= self._max_bytes + len(self._delimiter):
@@ -150,7 +151,7 @@ class DelimiterDecoder(StreamDecoder):
             self._is_skipping = True
             fault = self._too_long()
         if self._is_skipping:
-            # Only what may be the beginning of a delimiter is still of interest.
+            # Only a partial delimiter needs to be kept.
             stream.at = max(stream.at, len(stream.data) - keep)
         self._searched = max(0, len(stream) - keep)
         return fault

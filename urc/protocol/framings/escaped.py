@@ -1,10 +1,10 @@
-"""Framings whose marks are hidden inside of the frame by an escape: stuffed as a whole.
+"""Framings with byte stuffing of the whole content, including markers.
 
-Theory of operation. Marks (start, end, delimiter) go over the line as they are; what stands between
-them is stuffed behind everything else: length and checksum count what it stands for. Where every
-mark is hidden, its first occurrence is the mark itself, and the ordinary search finds it. A doubled
-escape byte may begin a mark, so there the escapes are gone through one by one. A frame that says
-its length is unstuffed byte by byte, until there is as much as it says.
+Theory of operation. Markers (start, end, delimiter) are sent unchanged. The content between them is
+stuffed last: length and checksum count the original bytes. If every marker is escaped, its first
+occurrence is genuine, and the ordinary search finds it. A doubled escape byte may begin a marker,
+so these decoders process the escapes one by one. A frame with a length field is decoded byte by
+byte until its length is reached.
 """
 
 from functools import partial
@@ -31,7 +31,7 @@ __all__ = ["EscapedFraming"]
 
 
 class EscapedFraming(NamedTuple):
-    """Start, stuffed content, end; of a delimited frame the end may differ with the direction."""
+    """Start, stuffed content, end; a delimited frame may have another end in each direction."""
 
     seal: Seal
     stuffing: Stuffing
@@ -54,17 +54,17 @@ class EscapedFraming(NamedTuple):
         start, end = self.seal.layout.start, self.seal.layout.end
         inner = frame[len(start) : len(frame) - len(end)]
         if not inner:
-            raise FramingError("nothing between two marks is no frame")
+            raise FramingError("an empty frame cannot be sent between two markers")
         content = self.stuffing.stuff(inner)
         if self.stuffing.spec.after and self.seal.length is None and self.tx in content:
-            raise FramingError(f"{payload!r} contains what ends a frame, {self.tx!r}")
+            raise FramingError(f"{payload!r} contains the end of a frame, {self.tx!r}")
         is_bare = self.stuffing.is_doubled and start == self.stuffing.escape
         if is_bare and inner[:1] in (start, end[1:]):
-            raise FramingError(f"{payload!r} would look like a mark behind {start.hex()}")
+            raise FramingError(f"{payload!r} would look like a marker after {start.hex()}")
         return start + content + self.tx
 
     def decoder(self, stream: Stream | None = None) -> Decoder:
-        """Return a fresh decoder."""
+        """Return a new decoder."""
         layout = self.seal.layout
         if isinstance(self.seal.length, LengthField):
             return _LengthDecoder(stream, self, self.seal.length)
@@ -72,17 +72,17 @@ class EscapedFraming(NamedTuple):
             return _DoubledDecoder(stream, self)
         most = 2 * self.max_bytes
         if not layout.start or layout.start == self.rx:
-            # One mark may end a frame and begin the next.
+            # One marker may end a frame and begin the next.
             return DelimiterDecoder(stream, self.rx, most, self.opened, skips_empty=True)
         marked = partial(self.opened_between, layout.start, layout.end)
         return BracketsDecoder(stream, layout.start, layout.end, marked, most)
 
     def reversed(self) -> "EscapedFraming":
-        """Return the same framing seen from the other end of the line."""
+        """Return the same framing for the other end of the connection."""
         return self._replace(tx=self.rx, rx=self.tx)
 
     def opened(self, content: bytes) -> bytes:
-        """Return the payload of what stood between the marks; raise `BadFrame`."""
+        """Return the payload of the content between the markers; raise `BadFrame`."""
         layout = self.seal.layout
         frame = layout.start + self.stuffing.unstuff(content) + layout.end
         if len(frame) > self.max_bytes:
@@ -91,12 +91,12 @@ class EscapedFraming(NamedTuple):
         return self.seal.open(frame)
 
     def opened_between(self, start: bytes, end: bytes, frame: bytes) -> bytes:
-        """Return the payload of a frame with its marks; raise `BadFrame`."""
+        """Return the payload of a frame with its markers; raise `BadFrame`."""
         return self.opened(frame[len(start) : len(frame) - len(end)])
 
 
 class _DoubledDecoder(StreamDecoder):
-    """Frames that end with an escape byte and another one, as DLE ETX, among doubled ones."""
+    """Decodes frames that end with an escape sequence such as DLE ETX."""
 
     def __init__(self, stream: Stream | None, framing: EscapedFraming) -> None:
         super().__init__(stream, 2 * framing.max_bytes)
@@ -104,7 +104,7 @@ class _DoubledDecoder(StreamDecoder):
         self._start, self._end = framing.seal.layout.start, framing.rx
         self._escape = framing.stuffing.escape
         self._searched = -1
-        """Bytes of the frame that hold no mark; -1: none has begun."""
+        """Number of frame bytes without a marker; -1 before a frame has begun."""
 
     def restart(self) -> None:
         super().restart()
@@ -121,7 +121,7 @@ class _DoubledDecoder(StreamDecoder):
                 return found
 
     def _to_start(self) -> FrameFault | None:
-        """Go to the next start that is neither a doubled escape nor an end."""
+        """Advance to the next start that is neither a doubled escape nor an end."""
         stream, start = self._stream, self._start
         if not start:
             self._searched = 0 if len(stream) else -1
@@ -147,7 +147,7 @@ class _DoubledDecoder(StreamDecoder):
         return self._skip(place - stream.at) if place > stream.at else None
 
     def _to_end(self) -> bytes | FrameFault | None:
-        """Return the frame that begins here, once its end is there; -1 in `_searched` goes on."""
+        """Return the complete frame, or None; -1 in `_searched` continues the search."""
         stream, data, end = self._stream, self._stream.data, self._end
         while True:
             place = data.find(self._escape, stream.at + self._searched)
@@ -160,7 +160,7 @@ class _DoubledDecoder(StreamDecoder):
             elif there.startswith(end):
                 return self._frame(place)
             else:
-                # An escape that stands for nothing: what was begun here has lost its end.
+                # An invalid escape: the frame that began here has lost its end.
                 gone = place - stream.at if self._start else place + 2 - stream.at
                 self._searched = -1
                 return self._skip(gone)
@@ -185,7 +185,7 @@ class _DoubledDecoder(StreamDecoder):
 
 
 class _LengthDecoder(StreamDecoder):
-    """Frames that say how many bytes they have before they are stuffed."""
+    """Decodes frames whose length field counts the bytes before stuffing."""
 
     def __init__(self, stream: Stream | None, framing: EscapedFraming, length: LengthField) -> None:
         super().__init__(stream, framing.max_bytes)
@@ -199,9 +199,9 @@ class _LengthDecoder(StreamDecoder):
     def _begin(self) -> None:
         self._plain = Unstuffer(self._stuffing)
         self._total = 0
-        """Bytes of the frame, once it has said so."""
+        """Size of the frame in bytes, once its length field is decoded."""
         self._taken = len(self._start)
-        """Bytes of the line that are looked at, from the begin of the frame on."""
+        """Number of processed wire bytes since the beginning of the frame."""
 
     def restart(self) -> None:
         super().restart()
@@ -227,7 +227,7 @@ class _LengthDecoder(StreamDecoder):
         return None
 
     def _take(self) -> tuple[str, ...] | None:
-        """Take bytes until the frame is whole: (); None for more; or why it is no frame."""
+        """Process bytes until the frame is complete; return (), None if incomplete, or an error."""
         stream, plain, start = self._stream, self._plain, self._start
         inner = len(start)
         while True:
@@ -235,7 +235,7 @@ class _LengthDecoder(StreamDecoder):
             if not self._total and size >= self._length.end:
                 self._total = self._length.total(start + plain.plain[: self._length.end - inner], 0)
                 if not self._least <= self._total <= self._max_bytes:
-                    return "bad-length", "a frame says a length that it cannot have; skipped"
+                    return "bad-length", "a frame has an invalid length field; skipped"
             if self._total and size >= self._total - len(self._end) and not plain.is_between:
                 return self._ending()
             if self._taken >= len(stream):
@@ -244,10 +244,10 @@ class _LengthDecoder(StreamDecoder):
             self._taken += 1
             is_mark = start[:1] == bytes((byte,)) and byte in self._stuffing.spec.table
             if is_mark or not plain.take(byte):
-                return "bad-stuffing", "a frame is not stuffed as its framing says; skipped"
+                return "bad-stuffing", "a frame has invalid byte stuffing; skipped"
 
     def _ending(self) -> tuple[str, ...] | None:
-        """Look at the end bytes, as `_take` does at all others."""
+        """Check the end bytes, with the same results as `_take`."""
         at = self._stream.at + self._taken
         there = bytes(self._stream.data[at : at + len(self._end)])
         if there == self._end:
@@ -255,13 +255,13 @@ class _LengthDecoder(StreamDecoder):
         return None if self._end.startswith(there) else ("no-frame", "a frame without its end")
 
     def _to_start(self) -> FrameFault | None:
-        """Go to the next start bytes, or to what may become them."""
+        """Advance to the next start bytes, or to their possible beginning."""
         gone = self._before(self._start)
         self._credit.earn(gone)
         return self._skip(gone) if gone else None
 
     def _frame(self) -> bytes | FrameFault | None:
-        """Open the frame that is whole."""
+        """Decode the complete frame."""
         size = self._taken + len(self._end)
         try:
             payload = self._seal.open(self._start + bytes(self._plain.plain) + self._end)
@@ -280,6 +280,6 @@ class _LengthDecoder(StreamDecoder):
         self._begin()
 
     def _leave(self, code: str, text: str, *, closes: bool = False) -> FrameFault | None:
-        """Go on behind the first byte of what was no frame, if that may be looked at again."""
+        """Continue after the first byte of an invalid frame, if the budget allows a second scan."""
         self._move(1 if self._credit.spend(self._taken) else max(1, self._taken))
         return self._lost(code, text, closes=closes)

@@ -1,9 +1,9 @@
-"""Frames that are JSON objects or arrays, one after the other: ``json``.
+"""The framing ``json``: consecutive JSON objects or arrays.
 
-Theory of operation. Only brackets and quotes matter to find the end of a value, so a pattern jumps
-from one to the next and every byte is looked at once. Blanks, line ends and the record separator of
-RFC 7464 may stand between two values. A bracket that closes another kind, or a control character
-inside a string, cannot be JSON: everything up to it is dropped.
+Theory of operation. Only brackets and quotes determine the end of a value. A pattern jumps from one
+to the next, so every byte is scanned once. Blanks, line ends and the record separator of RFC 7464
+may separate two values. A mismatched bracket, or a control character inside a string, cannot be
+JSON: everything up to it is dropped.
 """
 
 import re
@@ -33,7 +33,7 @@ _QUOTE, _BACKSLASH = ord('"'), ord("\\")
 
 
 class JsonFraming(NamedTuple):
-    """One JSON object or array is one frame; `tx` is added to each that is sent."""
+    """One JSON object or array is one frame; `tx` follows each sent frame."""
 
     tx: bytes
     seal: Seal | None
@@ -53,12 +53,12 @@ class JsonFraming(NamedTuple):
         return frame if self.is_reversed else frame + self.tx
 
     def decoder(self, stream: Stream | None = None) -> Decoder:
-        """Return a fresh decoder."""
+        """Return a new decoder."""
         between = self.tx if self.is_reversed else b""
         return _JsonDecoder(stream, between, self.seal, self.max_bytes)
 
     def reversed(self) -> "JsonFraming":
-        """Return the same framing seen from the other end of the line."""
+        """Return the same framing for the other end of the connection."""
         return self._replace(is_reversed=not self.is_reversed)
 
 
@@ -74,10 +74,10 @@ class _JsonDecoder(StreamDecoder):
     def restart(self) -> None:
         super().restart()
         self._open: list[int] = []
-        """What closes each bracket that is open."""
+        """Expected closing brackets of all open brackets."""
         self._is_in_string = False
         self._looked = 0
-        """How many bytes of the stream have been looked at."""
+        """Number of scanned bytes of the stream."""
 
     def next(self, now: float = 0.0) -> bytes | FrameFault | None:
         stream = self._stream
@@ -96,7 +96,7 @@ class _JsonDecoder(StreamDecoder):
                 return fault
 
     def _to_value(self) -> FrameFault | None:
-        """Go to the next bracket that opens."""
+        """Advance to the next opening bracket."""
         stream, data = self._stream, self._stream.data
         blank = self._blank.match(data, stream.at)
         if blank is not None:
@@ -110,7 +110,7 @@ class _JsonDecoder(StreamDecoder):
         return fault
 
     def _to_end(self) -> int:
-        """Return the size of the value; 0 when it has not ended, -1 when it is none."""
+        """Return the size of the value; 0 if incomplete, -1 if invalid."""
         stream, data, stack = self._stream, self._stream.data, self._open
         while True:
             pattern = _IN_STRING if self._is_in_string else _MARK

@@ -1,10 +1,10 @@
-"""Frames whose size is known from their first bytes: ``fixed`` and ``length``.
+"""The framings ``fixed`` and ``length``: the first bytes of a frame determine its size.
 
-Theory of operation of the search. Where the frame has start bytes, the decoder goes to the next
-ones; where it has none, it takes every byte for the first one of a frame. What turns out to be no
-frame (no good length, wrong end bytes, wrong checksum) costs its first byte only: the true frame
-may begin right behind it. Checksums are the only part that would then look at the same bytes again
-and again, so `Credit` pays for them; when it is used up, the whole candidate is dropped.
+Theory of operation of the search. If the frame has start bytes, the decoder advances to the next
+ones; otherwise every byte may begin a frame. An invalid frame (bad length, wrong end bytes, wrong
+checksum) costs only its first byte: the true frame may begin right after it. Only checksums would
+then scan the same bytes again and again, so `Credit` limits them; after that, the whole candidate
+is dropped.
 """
 
 from typing import NamedTuple
@@ -27,7 +27,7 @@ __all__ = ["MeasuredFraming"]
 
 
 class MeasuredFraming(NamedTuple):
-    """Frames of one size, or with a field that says their size; the same in both directions."""
+    """Frames of a fixed size, or with a length field; the same in both directions."""
 
     seal: Seal
     max_bytes: int
@@ -42,11 +42,11 @@ class MeasuredFraming(NamedTuple):
         return sealed(self.seal, payload, self.max_bytes)
 
     def decoder(self, stream: Stream | None = None) -> Decoder:
-        """Return a fresh decoder."""
+        """Return a new decoder."""
         return _MeasuredDecoder(stream, self.seal, self.max_bytes)
 
     def reversed(self) -> "MeasuredFraming":
-        """Return the same framing seen from the other end of the line."""
+        """Return the same framing for the other end of the connection."""
         return self
 
 
@@ -65,7 +65,7 @@ class _MeasuredDecoder(StreamDecoder):
         self._plain = (
             0 if self._start or self._end or not self._least <= size <= max_bytes else size
         )
-        """Size of every frame, if there is nothing to look at before it is opened; else 0."""
+        """Size of every frame, if no check precedes its decoding; else 0."""
 
     def next(self, now: float = 0.0) -> bytes | FrameFault | None:
         stream, data = self._stream, self._stream.data
@@ -76,7 +76,7 @@ class _MeasuredDecoder(StreamDecoder):
             try:
                 payload = self._seal.open(bytes(data[stream.at : end]))
             except BadFrame:
-                pass  # it is told below
+                pass  # reported below
             else:
                 stream.at, self._is_lost = end, False
                 self._credit.earn(self._plain)
@@ -105,7 +105,7 @@ class _MeasuredDecoder(StreamDecoder):
                 return fault
 
     def _to_start(self) -> FrameFault | None:
-        """Go to the next start bytes, or to what may become them."""
+        """Advance to the next start bytes, or to their possible beginning."""
         stream, start = self._stream, self._start
         if not start or stream.data.startswith(start, stream.at):
             return None
@@ -113,7 +113,7 @@ class _MeasuredDecoder(StreamDecoder):
         return self._leave(gone) if gone else None
 
     def _frame(self, frame: bytes) -> bytes | FrameFault | None:
-        """Return the payload, a fault, or None when the frame was none of the first in its run."""
+        """Return the payload, a violation, or None for a violation that was already reported."""
         try:
             payload = self._seal.open(frame)
         except BadFrame as error:
@@ -136,12 +136,12 @@ class _MeasuredDecoder(StreamDecoder):
         self._stream.at += count
 
     def _endless(self, there: int) -> FrameFault | None:
-        """Wait for the rest of a number that says its own size."""
+        """Wait for the rest of a length field of variable size."""
         return self._bad_length(there) if there >= self._max_bytes else None
 
     def _bad_length(self, size: int) -> FrameFault | None:
         self._move(1)
         if size > self._max_bytes:
-            text = f"a frame says that it has {size} bytes; the longest may have {self._max_bytes}"
+            text = f"a frame claims {size} bytes, more than the limit of {self._max_bytes}"
             return self._lost("frame-too-long", text)
-        return self._lost("bad-length", "a frame says a length that it cannot have; skipped")
+        return self._lost("bad-length", "a frame has an invalid length field; skipped")

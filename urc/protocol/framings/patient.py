@@ -1,10 +1,9 @@
-"""What any framing may have besides: an end to its patience, and an eye for terminals.
+"""Timeout and removal of escape sequences, for any framing.
 
-Theory of operation. A frame that has begun and does not go on holds up all that follows: a length
-read wrongly may ask for bytes that never come. With a timeout, the silence behind the newest byte
-ends the wait: what began the frame is given up byte by byte, and the frames in what is left are
-told. Escape sequences of terminals are taken out before anything is cut, so that neither marks nor
-texts are torn by them.
+Theory of operation. An incomplete frame blocks all later ones: a corrupted length field may demand
+bytes that never arrive. With a timeout, silence after the newest byte ends the wait. The beginning
+of the frame is then dropped byte by byte, and the frames in the remaining bytes are reported.
+Terminal escape sequences are removed before framing, so that they split neither markers nor texts.
 """
 
 import re
@@ -20,15 +19,15 @@ _SEQUENCE: Final = re.compile(
     rb"\x1b(?:\[[0-?]{0,64}[ -/]{0,8}[@-~]|\][^\x07\x1b]{0,256}(?:\x07|\x1b\\)"
     rb"|[ -/]{0,8}[0-Z\\^-~])"
 )
-"""ECMA-48: a control sequence, a command to the terminal such as its title, a single escape."""
+"""ECMA-48: a control sequence, a command to the terminal such as its title, or a single escape."""
 _MOST_TRIES: Final = 4096
-"""How often another begin of a frame is looked for; each may look at all that is left."""
+"""Limit of attempts to find the beginning of another frame; each may scan all remaining bytes."""
 _LONGEST: Final = 300
-"""Bytes of a sequence that is waited for."""
+"""Longest incomplete escape sequence, in bytes."""
 
 
 class PatientFraming(NamedTuple):
-    """A framing, with a timeout inside of its frames, or without the colours of a terminal."""
+    """A framing with a timeout within frames, or with removal of escape sequences."""
 
     framing: Framing
     timeout_s: float | None
@@ -39,27 +38,27 @@ class PatientFraming(NamedTuple):
         return self.framing.encode(payload)
 
     def decoder(self, stream: Stream | None = None) -> Decoder:
-        """Return a fresh decoder."""
+        """Return a new decoder."""
         return _PatientDecoder(Stream() if stream is None else stream, self)
 
     def reversed(self) -> "PatientFraming":
-        """Return the same framing seen from the other end of the line."""
+        """Return the same framing for the other end of the connection."""
         return self._replace(framing=self.framing.reversed())
 
 
 class _PatientDecoder:
-    """Passes bytes on, and looks at the clock."""
+    """Delegates to another decoder and adds the timeout."""
 
     def __init__(self, stream: Stream, framing: PatientFraming) -> None:
         self._stream = stream
         self._framing = framing
         self._decoder = framing.framing.decoder(stream)
         self._newest: float | None = None
-        """When the newest byte came; None when there was none."""
+        """Time of the newest byte; None before the first one."""
         self._told: list[bytes | FrameFault] = []
-        """Frames and faults that the silence has brought to light."""
+        """Frames and violations that the timeout has released."""
         self._held = b""
-        """The begin of an escape sequence."""
+        """Beginning of an incomplete escape sequence."""
 
     @property
     def pending(self) -> int:
@@ -68,7 +67,7 @@ class _PatientDecoder:
 
     @property
     def deadline(self) -> float | None:
-        """When patience ends, or what the framing itself waits for."""
+        """End of the timeout, or the deadline of the framing itself."""
         if self._told:
             return float("-inf")
         own, timeout = self._decoder.deadline, self._framing.timeout_s
@@ -78,7 +77,7 @@ class _PatientDecoder:
         return ends if own is None else min(own, ends)
 
     def feed(self, data: bytes, now: float = 0.0) -> list[bytes | FrameFault]:
-        """Take bytes and return the frames that are now complete, in order."""
+        """Append bytes and return the completed frames, in order."""
         self.push(data, now)
         frames: list[bytes | FrameFault] = []
         while (frame := self.next(now)) is not None:
@@ -86,7 +85,7 @@ class _PatientDecoder:
         return frames
 
     def push(self, data: bytes, now: float = 0.0) -> None:
-        """Take bytes, to be cut by `next`."""
+        """Append bytes for `next`."""
         self._give_up(now)
         if self._framing.strips_ansi:
             data = self._stripped(data)
@@ -94,22 +93,22 @@ class _PatientDecoder:
         self._newest = now
 
     def next(self, now: float = 0.0) -> bytes | FrameFault | None:
-        """Return one frame or fault, or None when there is none yet."""
+        """Return one frame or violation, or None if incomplete."""
         if self._newest is None and len(self._stream):
-            self._newest = now  # what another decoder has left
+            self._newest = now  # bytes left by another decoder
         if self._told:
             return self._told.pop(0)
         return self._decoder.next(now)
 
     def tick(self, now: float) -> list[bytes | FrameFault]:
-        """Return the frames that the silence until `now` has completed, or brought to light."""
+        """Return the frames that the silence until `now` has completed or released."""
         frames = self._decoder.tick(now)
         self._give_up(now)
         told, self._told = self._told, []
         return told + frames
 
     def _give_up(self, now: float) -> None:
-        """Drop what began a frame and did not go on; note the frames behind it."""
+        """Drop the beginning of a stalled frame; record the frames after it."""
         timeout, stream = self._framing.timeout_s, self._stream
         if timeout is None or self._newest is None or now < self._newest + timeout:
             return
@@ -125,11 +124,11 @@ class _PatientDecoder:
             if found is None:
                 left -= 1
                 if not left or isinstance(self._framing.framing, DelimiterFraming):
-                    before = len(stream.data)  # there is no begin that could be looked for
-                # Nothing more is to come, so what is held back here is no frame.
+                    before = len(stream.data)  # no further beginning of a frame exists
+                # No further bytes will arrive, so the buffered bytes are no frame.
                 stream.at = min(max(before + 1, stream.at), len(stream.data))
                 if not is_lost:
-                    text = f"a frame began and did not go on for {timeout:g} s; dropped"
+                    text = f"a frame was incomplete for {timeout:g} s; dropped"
                     self._told.append(FrameFault("frame-timeout", text))
                 is_lost = True
                 self._decoder = self._framing.framing.decoder(stream)

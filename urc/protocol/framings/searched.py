@@ -1,4 +1,4 @@
-"""Frames that are found by looking for them: ``regex`` and ``brackets``."""
+"""The framings ``regex`` and ``brackets``, which search for frames."""
 
 import re
 from collections.abc import Callable
@@ -23,19 +23,19 @@ from urc.protocol.stream import Stream
 __all__ = ["BracketsDecoder", "BracketsFraming", "RegexFraming"]
 
 Search = Callable[[bytes | bytearray, int], Any]
-"""Data and where to begin → a match of `re` or RE2, or None."""
+"""Search function: data and start offset → a match of `re` or RE2, or None."""
 
 _SMALL: Final = 256
-"""Bytes that are searched anew at every receive."""
+"""Buffer size up to which every receive searches again, in bytes."""
 _GROWTH: Final = 8
-"""More bytes are searched anew when they have grown by this part, or after `_QUIET_S`."""
+"""A larger buffer is searched again after growing by one part in `_GROWTH`, or after `_QUIET_S`."""
 _QUIET_S: Final = 0.005
 
 
 class RegexFraming(NamedTuple):
-    """A frame is what a pattern matches.
+    """Frames that match a pattern.
 
-    With `tx`, what is sent need not match: it ends with `tx` instead, as the other end reads it.
+    With `tx`, a sent frame need not match: it ends with `tx`, as the other end expects.
     """
 
     search: Search
@@ -60,33 +60,33 @@ class RegexFraming(NamedTuple):
             return frame + self.tx
         found = self.search(frame, 0)
         if found is None or found.span() != (0, len(frame)):
-            raise FramingError(f"{payload!r} makes no frame that the pattern of the framing takes")
+            raise FramingError(f"{payload!r} does not match the pattern of the framing")
         return frame
 
     def decoder(self, stream: Stream | None = None) -> Decoder:
-        """Return a fresh decoder."""
+        """Return a new decoder."""
         if self.tx and self.is_reversed:
             opened = None if self.seal is None else self.seal.open
             return DelimiterDecoder(stream, self.tx, self.max_bytes, opened)
         return _RegexDecoder(stream, self.search, self.seal, self.max_bytes)
 
     def reversed(self) -> "RegexFraming":
-        """Return the same framing seen from the other end of the line."""
+        """Return the same framing for the other end of the connection."""
         return self._replace(is_reversed=not self.is_reversed)
 
 
 def _searcher(pattern: str) -> Search:
-    """Return the search over bytes; each character of the pattern is the byte of its number."""
+    """Return the search over bytes; each character of the pattern is the byte of that number."""
     source = pattern.removeprefix("^").encode("latin-1")
     try:
         import re2
     except ImportError:
-        # The loader lets pass only what is linear at each place where a match may begin.
+        # The loader accepts only patterns with linear time at each start position.
         compiled: Search = re.compile(source).search
         return compiled
     options = re2.Options()
     options.log_errors = False
-    options.max_mem = 1 << 20  # as for all patterns
+    options.max_mem = 1 << 20  # the limit of all patterns
     options.encoding = re2.Options.Encoding.LATIN1
     searched: Search = re2.compile(source, options).search
     return searched
@@ -100,7 +100,7 @@ class _RegexDecoder(StreamDecoder):
         self._search = search
         self._seal = seal
         self._tried = 0
-        """How many bytes of the stream were searched without finding a frame."""
+        """Number of searched bytes without a match."""
         self._newest = 0.0
 
     @property
@@ -157,7 +157,7 @@ class _RegexDecoder(StreamDecoder):
         return None
 
     def _wait(self) -> FrameFault | None:
-        """Keep the newest bytes, in which a frame may have begun."""
+        """Keep the newest bytes, which may contain the beginning of a frame."""
         fault = None
         surplus = len(self._stream) - self._max_bytes
         if surplus > 0:
@@ -167,9 +167,9 @@ class _RegexDecoder(StreamDecoder):
 
 
 class BracketsFraming(NamedTuple):
-    """Frames between two marks, which are no part of the payload; what is between frames is not.
+    """Frames between two markers; markers and bytes between frames are not part of the payload.
 
-    Nothing may be nested: where a second opening mark comes, the frame begins there.
+    Frames are not nested: at a second opening marker, the frame begins again.
     """
 
     seal: Seal
@@ -187,23 +187,23 @@ class BracketsFraming(NamedTuple):
         inner = frame[len(layout.start) : len(frame) - len(layout.end)]
         for mark in (layout.start, layout.end):
             if mark in inner:
-                raise FramingError(f"{payload!r} contains {mark!r}, which marks a frame")
+                raise FramingError(f"{payload!r} contains {mark!r}, a marker of the framing")
         if layout.start == layout.end and not inner:
-            raise FramingError("nothing between two marks that are the same is no frame")
+            raise FramingError("an empty frame cannot be sent between two equal markers")
         return frame
 
     def decoder(self, stream: Stream | None = None) -> Decoder:
-        """Return a fresh decoder."""
+        """Return a new decoder."""
         layout = self.seal.layout
         return BracketsDecoder(stream, layout.start, layout.end, self.seal.open, self.max_bytes)
 
     def reversed(self) -> "BracketsFraming":
-        """Return the same framing seen from the other end of the line."""
+        """Return the same framing for the other end of the connection."""
         return self
 
 
 class BracketsDecoder(StreamDecoder):
-    """Remembers how far it has searched for the closing mark."""
+    """A decoder that remembers its search position for the closing marker."""
 
     def __init__(
         self, stream: Stream | None, start: bytes, end: bytes, opened: Open, max_bytes: int
@@ -212,15 +212,15 @@ class BracketsDecoder(StreamDecoder):
         self._opened = opened
         self._open, self._close = start, end
         self._searched = 0
-        """How many bytes of the stream are known to have no closing mark; 0: none is opened."""
+        """Number of scanned bytes without a closing marker; 0 before an opening marker."""
 
     def restart(self) -> None:
-        """Let a frame of a `switch` begin here."""
+        """Reset the state: a `switch` begins a frame here."""
         super().restart()
         self._searched = 0
 
     def next(self, now: float = 0.0) -> bytes | FrameFault | None:
-        """Return one frame or fault, or None when there is none yet."""
+        """Return one frame or violation, or None if incomplete."""
         stream, data = self._stream, self._stream.data
         while True:
             if not self._searched:
@@ -234,7 +234,7 @@ class BracketsDecoder(StreamDecoder):
                     return None
                 fault = self._overflow()
             else:
-                # A mark that opens again: what was before it has lost its end.
+                # Another opening marker: the frame before it has lost its end.
                 last = data.rfind(self._open, stream.at + len(self._open), close)
                 if last < 0:
                     frame = self._frame(close)
@@ -253,7 +253,7 @@ class BracketsDecoder(StreamDecoder):
         return self._skip(gone) if gone else None
 
     def _overflow(self) -> FrameFault | None:
-        """Go on at the newest opening mark, the only one that may still be closed in time."""
+        """Continue at the newest opening marker, the only one that can still be closed in time."""
         stream = self._stream
         fault = self._too_long()
         last = stream.data.rfind(self._open, stream.at + len(self._open))
@@ -267,11 +267,11 @@ class BracketsDecoder(StreamDecoder):
         return self._lost("frame-too-long", text)
 
     def _frame(self, close: int) -> bytes | FrameFault | None:
-        """Take the frame that ends with the mark at `close`; None when it is no frame at all."""
+        """Remove the frame that ends with the marker at `close`; return None for an empty one."""
         stream = self._stream
         stop = close + len(self._close)
         if self._open == self._close and close == stream.at + len(self._open):
-            # Two equal marks side by side: the second one opens.
+            # Two adjacent equal markers: the second one opens a frame.
             stream.at = close
             self._searched = len(self._open)
             return None

@@ -1,4 +1,4 @@
-"""Frames that no byte ends: ``idle``, where silence does, and ``datagram``, which come whole."""
+"""The framings ``idle``, where silence ends a frame, and ``datagram``, with whole frames."""
 
 from typing import NamedTuple, cast
 
@@ -11,7 +11,7 @@ __all__ = ["DatagramFraming", "IdleFraming"]
 
 
 class IdleFraming(NamedTuple):
-    """A frame ends when nothing has come for `gap_s` seconds."""
+    """A frame ends after `gap_s` seconds of silence."""
 
     gap_s: float
     seal: Seal | None
@@ -27,16 +27,16 @@ class IdleFraming(NamedTuple):
         return sealed(self.seal, payload, self.max_bytes)
 
     def decoder(self, stream: Stream | None = None) -> Decoder:
-        """Return a fresh decoder."""
+        """Return a new decoder."""
         return _IdleDecoder(stream, self)
 
     def reversed(self) -> "IdleFraming":
-        """Return the same framing seen from the other end of the line."""
+        """Return the same framing for the other end of the connection."""
         return self
 
 
 class DatagramFraming(NamedTuple):
-    """What one receive gives is one frame."""
+    """Each receive gives one frame."""
 
     seal: Seal | None
     max_bytes: int
@@ -51,16 +51,16 @@ class DatagramFraming(NamedTuple):
         return sealed(self.seal, payload, self.max_bytes)
 
     def decoder(self, stream: Stream | None = None) -> Decoder:
-        """Return a fresh decoder."""
+        """Return a new decoder."""
         return _WholeDecoder(stream, self.seal, self.max_bytes)
 
     def reversed(self) -> "DatagramFraming":
-        """Return the same framing seen from the other end of the line."""
+        """Return the same framing for the other end of the connection."""
         return self
 
 
 class _WholeDecoder(StreamDecoder):
-    """Everything that is there is one frame."""
+    """Takes all received bytes as one frame."""
 
     def __init__(self, stream: Stream | None, seal: Seal | None, max_bytes: int) -> None:
         super().__init__(stream, max_bytes)
@@ -82,16 +82,16 @@ class _WholeDecoder(StreamDecoder):
 
 
 class _IdleDecoder(_WholeDecoder):
-    """Keeps the frames that silence has ended until they are asked for.
+    """Keeps the frames that ended by silence until they are requested.
 
-    `now` is the time at which the bytes came; without a clock, frames end by `tick` alone.
+    `now` is the time of receipt; without a clock, only `tick` ends frames.
     """
 
     def __init__(self, stream: Stream | None, framing: IdleFraming) -> None:
         super().__init__(stream, framing.seal, framing.max_bytes)
         self._gap_s = framing.gap_s
         self._newest: float | None = None
-        """When the newest byte came; None while there are none."""
+        """Time of the newest byte; None for an empty buffer."""
         self._done: list[bytes | FrameFault] = []
         self._is_too_long = False
 
@@ -109,7 +109,7 @@ class _IdleDecoder(_WholeDecoder):
         stream.push(data)
         self._newest = now
         if len(stream) > self._max_bytes:
-            # Nothing of a frame that is too long is of use; its end is still waited for.
+            # Discard the bytes of a frame that is too long, but still wait for its end.
             stream.at = len(stream.data)
             if not self._is_too_long:
                 self._is_too_long = True
@@ -126,10 +126,10 @@ class _IdleDecoder(_WholeDecoder):
         return frames
 
     def _end(self, now: float) -> None:
-        """Complete the frame when the silence until `now` was long enough."""
+        """Complete the frame when the silence until `now` is long enough."""
         if self._newest is None:
             if len(self._stream):
-                self._newest = now  # what another decoder has left
+                self._newest = now  # bytes left by another decoder
             return
         if now < self._newest + self._gap_s:
             return

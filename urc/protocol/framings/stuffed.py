@@ -1,6 +1,6 @@
 """Byte stuffing: ``slip`` (RFC 1055) and ``cobs`` (Cheshire and Baker, 1999).
 
-Both free one byte value from the payload, so that it can end the frame.
+Both remove one byte value from the payload, which then ends the frame.
 """
 
 import re
@@ -19,7 +19,7 @@ _END, _ESCAPE = b"\xc0", b"\xdb"
 _ESCAPED_END, _ESCAPED_ESCAPE = b"\xdb\xdc", b"\xdb\xdd"
 _BAD_ESCAPE: Final = re.compile(rb"\xdb(?![\xdc\xdd])")
 _BLOCK: Final = 254
-"""Most bytes other than zero behind one code byte of COBS."""
+"""Most non-zero bytes after one code byte of COBS."""
 
 
 class SlipFraming(NamedTuple):
@@ -37,22 +37,22 @@ class SlipFraming(NamedTuple):
         """Return the bytes of one frame, or raise `FramingError`."""
         frame = sealed(self.seal, payload, self.max_bytes)
         if not frame:
-            raise FramingError("nothing at all is no frame of SLIP")
+            raise FramingError("SLIP cannot send an empty frame")
         return frame.replace(_ESCAPE, _ESCAPED_ESCAPE).replace(_END, _ESCAPED_END) + _END
 
     def decoder(self, stream: Stream | None = None) -> Decoder:
-        """Return a fresh decoder."""
+        """Return a new decoder."""
         most = 2 * self.max_bytes
         opened = _opener(_from_slip, self.seal, self.max_bytes)
         return DelimiterDecoder(stream, _END, most, opened, skips_empty=True)
 
     def reversed(self) -> "SlipFraming":
-        """Return the same framing seen from the other end of the line."""
+        """Return the same framing for the other end of the connection."""
         return self
 
 
 class CobsFraming(NamedTuple):
-    """Frames that end with a zero, of which none is inside."""
+    """Frames that end with a zero byte and contain no other zero."""
 
     seal: Seal | None
     max_bytes: int
@@ -67,13 +67,13 @@ class CobsFraming(NamedTuple):
         return _to_cobs(sealed(self.seal, payload, self.max_bytes)) + b"\0"
 
     def decoder(self, stream: Stream | None = None) -> Decoder:
-        """Return a fresh decoder."""
+        """Return a new decoder."""
         most = self.max_bytes + self.max_bytes // _BLOCK + 1
         opened = _opener(_from_cobs, self.seal, self.max_bytes)
         return DelimiterDecoder(stream, b"\0", most, opened, skips_empty=True)
 
     def reversed(self) -> "CobsFraming":
-        """Return the same framing seen from the other end of the line."""
+        """Return the same framing for the other end of the connection."""
         return self
 
 
@@ -93,7 +93,7 @@ def _from_slip(stuffed: bytes) -> bytes:
     bad = _BAD_ESCAPE.search(stuffed)
     if bad is not None:
         shown = stuffed[bad.start() : bad.start() + 2].hex(" ")
-        raise BadFrame("bad-stuffing", f"{shown} is no escape of SLIP; the frame is dropped")
+        raise BadFrame("bad-stuffing", f"{shown} is not a SLIP escape; the frame is dropped")
     return stuffed.replace(_ESCAPED_END, _END).replace(_ESCAPED_ESCAPE, _ESCAPE)
 
 
@@ -101,7 +101,7 @@ def _to_cobs(data: bytes) -> bytes:
     pieces: list[bytes] = []
     blocks = data.split(b"\0")
     for place, block in enumerate(blocks):
-        # A full block ends without a zero of its own, so the rest follows in one more.
+        # A full block has no zero of its own, so the rest follows in another block.
         at = 0
         while len(block) - at >= _BLOCK:
             pieces.append(b"\xff" + block[at : at + _BLOCK])
@@ -120,7 +120,7 @@ def _from_cobs(stuffed: bytes) -> bytes:
         block = stuffed[at + 1 : at + code]
         if len(block) != code - 1:
             raise BadFrame(
-                "bad-stuffing", f"the code {code:02x} of COBS points behind its frame; dropped"
+                "bad-stuffing", f"the code {code:02x} of COBS points beyond its frame; dropped"
             )
         pieces.append(block)
         at += code

@@ -1,8 +1,8 @@
-"""Several framings on one stream, told apart by the first bytes of each frame: ``switch``.
+"""The framing ``switch``: several framings on one stream, chosen by the first bytes of each frame.
 
-Theory of operation. All cases work on one `Stream`. At the begin of a frame the first bytes choose
-the case; as soon as it has given a frame or lost its way, the choice is made anew. Bytes that begin
-no case are skipped up to the next that do.
+Theory of operation. All cases share one `Stream`. The first bytes of a frame select the case. After
+each frame or violation of that case, the selection starts again. Bytes that begin no case are
+skipped.
 """
 
 import re
@@ -24,14 +24,14 @@ __all__ = ["SwitchFraming"]
 
 
 class SwitchFraming(NamedTuple):
-    """Cases in the order in which they are tried."""
+    """Cases in the order of selection."""
 
     cases: tuple[tuple[bytes, Framing], ...]
     max_bytes: int
     otherwise: Framing | None = None
-    """Of frames that begin as no case does; None: there are none such."""
+    """Framing of all other frames; None: other frames are invalid."""
     is_robot: bool = False
-    """Whether this is the emulated robot's end of the line."""
+    """Whether this is the end of the emulated robot."""
 
     @classmethod
     def from_spec(cls, spec: FramingSpec) -> "SwitchFraming":
@@ -42,7 +42,7 @@ class SwitchFraming(NamedTuple):
         return cls(built, spec.max_bytes, None if other is None else build_framing(other))
 
     def encode(self, payload: bytes) -> bytes:
-        """Return the frame of the first case that begins as it must with this payload."""
+        """Return the frame of the first case whose first bytes match for this payload."""
         refused = ""
         other = self.otherwise if self.is_robot and _is_text(payload) else None
         if other is not None and not any(payload.startswith(first) for first, _ in self.cases):
@@ -59,11 +59,11 @@ class SwitchFraming(NamedTuple):
             frame = self.otherwise.encode(payload)
             if not any(frame.startswith(first) for first, _ in self.cases):
                 return frame
-            refused = "a frame that begins as a case of the framing does would be taken for one"
-        raise FramingError(refused or f"no case of the framing begins as {payload[:40]!r} does")
+            refused = "the frame would be taken for another case of the framing"
+        raise FramingError(refused or f"no case of the framing begins like {payload[:40]!r}")
 
     def decoder(self, stream: Stream | None = None) -> Decoder:
-        """Return a fresh decoder."""
+        """Return a new decoder."""
         shared = Stream() if stream is None else stream
         cases = [(first, framing.decoder(shared)) for first, framing in self.cases]
         other = None if self.otherwise is None else self.otherwise.decoder(shared)
@@ -74,14 +74,14 @@ class SwitchFraming(NamedTuple):
         )
 
     def reversed(self) -> "SwitchFraming":
-        """Return the same framing seen from the other end of the line."""
+        """Return the same framing for the other end of the connection."""
         cases = tuple((first, framing.reversed()) for first, framing in self.cases)
         other = None if self.otherwise is None else self.otherwise.reversed()
         return self._replace(cases=cases, otherwise=other, is_robot=not self.is_robot)
 
 
 def _is_text(payload: bytes) -> bool:
-    """Guess which frames of an emulated robot are lines of text among binary ones."""
+    """Guess which frames of an emulated robot are text lines among binary frames."""
     return payload.isascii() and payload.decode("ascii").isprintable()
 
 
@@ -136,7 +136,7 @@ class _SwitchDecoder(StreamDecoder):
         return frames
 
     def _told(self, found: bytes | FrameFault) -> bytes | FrameFault | None:
-        """End the case that has given `found`; return None for what need not be told again."""
+        """Leave the case after `found`; return None for a violation that was already reported."""
         self._active = None
         if isinstance(found, bytes):
             self._is_lost = False
@@ -147,14 +147,14 @@ class _SwitchDecoder(StreamDecoder):
         return self._lost(*found[:2], closes=found.closes)
 
     def _choose(self) -> FrameFault | None:
-        """Choose the case of the frame at the front, and go there."""
+        """Select the case of the frame at the front, and advance to that frame."""
         stream = self._stream
         if self._other is not None:
             self._choose_here(self._other)
             return None
         found = self._any.search(stream.data, stream.at)
         if found is None:
-            # What may be the beginning of a case is kept.
+            # Keep the possible beginning of a case.
             place = max(stream.at, len(stream.data) - self._longest + 1)
             while not self._may_begin(bytes(stream.data[place:])):
                 place += 1
@@ -168,7 +168,7 @@ class _SwitchDecoder(StreamDecoder):
         return fault
 
     def _choose_here(self, other: StreamDecoder) -> None:
-        """Choose the case of the frame that begins with the next byte: `other` when it is none."""
+        """Select the case of the frame at the next byte, or `other` if no case matches."""
         stream = self._stream
         front = bytes(stream.data[stream.at : stream.at + self._longest])
         chosen = next((one for first, one in self._cases if front.startswith(first)), None)

@@ -1,9 +1,9 @@
-"""Frames that are XML elements, one after the other: ``xml``.
+"""The framing ``xml``: consecutive XML elements.
 
-Theory of operation. A stream of elements has no root, so each element at the top is a frame. Only
-tags, comments and the like matter to find its end; quotes hide what stands in attributes. The scan
-jumps from mark to mark and looks at every byte once. Blanks, comments and declarations may stand
-between two frames. A tag that closes another element ends nothing: everything up to it is dropped.
+Theory of operation. A stream of elements has no root, so each top-level element is a frame. Only
+tags, comments and the like determine its end; quoted attribute values may contain markup
+characters. The scan jumps from marker to marker and scans every byte once. Blanks, comments and
+declarations may separate frames. At a mismatched closing tag, everything up to it is dropped.
 """
 
 import re
@@ -18,14 +18,14 @@ __all__ = ["XmlFraming"]
 _NESTING_MOST: Final = 100
 _BETWEEN: Final = b" \t\r\n"
 _SPECIAL: Final = {b"<!--": b"-->", b"<![CDATA[": b"]]>", b"<?": b"?>"}
-"""What begins a piece without tags in it, and what ends it."""
+"""Beginning of a section without tags → its end."""
 _IN_TAG: Final = re.compile(rb"[\"'<>]")
 _NAME: Final = re.compile(rb"</?([^\s/<>\"'=]+)")
 _WAIT, _BAD = 0, -1
 
 
 class XmlFraming(NamedTuple):
-    """One XML element is one frame; `tx` is added to each that is sent."""
+    """One XML element is one frame; `tx` follows each sent frame."""
 
     tx: bytes
     max_bytes: int
@@ -47,11 +47,11 @@ class XmlFraming(NamedTuple):
         return payload if self.is_reversed else payload + self.tx
 
     def decoder(self, stream: Stream | None = None) -> Decoder:
-        """Return a fresh decoder."""
+        """Return a new decoder."""
         return _XmlDecoder(stream, self.tx if self.is_reversed else b"", self.max_bytes)
 
     def reversed(self) -> "XmlFraming":
-        """Return the same framing seen from the other end of the line."""
+        """Return the same framing for the other end of the connection."""
         return self._replace(is_reversed=not self.is_reversed)
 
 
@@ -62,23 +62,23 @@ class _XmlDecoder(StreamDecoder):
         self._begin()
 
     def restart(self) -> None:
-        """Let a frame of a `switch` begin here."""
+        """Reset the state: a `switch` begins a frame here."""
         super().restart()
         self._begin()
 
     def _begin(self) -> None:
         self._open: list[bytes] = []
-        """Names of the elements that are open."""
+        """Names of the open elements."""
         self._looked = 0
-        """How many bytes of the stream have been looked at."""
+        """Number of scanned bytes of the stream."""
         self._tag = -1
-        """Where the tag begins in which the scan is; -1: in none."""
+        """Offset of the incomplete tag; -1 outside of tags."""
         self._quote = b""
         self._until = b""
-        """What ends the comment, declaration or plain text in which the scan is."""
+        """Terminator of the present comment, declaration or plain text."""
 
     def next(self, now: float = 0.0) -> bytes | FrameFault | None:
-        """Return one frame or fault, or None when there is none yet."""
+        """Return one frame or violation, or None if incomplete."""
         stream = self._stream
         while True:
             if not self._looked:
@@ -98,7 +98,7 @@ class _XmlDecoder(StreamDecoder):
                 return fault
 
     def _to_mark(self) -> FrameFault | None:
-        """Go to the next ``<``."""
+        """Advance to the next ``<``."""
         stream, data = self._stream, self._stream.data
         blank = self._blank.match(data, stream.at)
         if blank is not None:
@@ -108,7 +108,7 @@ class _XmlDecoder(StreamDecoder):
         return self._skip(start - stream.at) if start > stream.at else None
 
     def _to_end(self) -> int:
-        """Return where the element or the piece before it ends; `_WAIT` or `_BAD` when nowhere."""
+        """Return the end of the element or of the section before it; else `_WAIT` or `_BAD`."""
         while True:
             if self._until:
                 step = self._through_special()
@@ -123,7 +123,7 @@ class _XmlDecoder(StreamDecoder):
                 return self._looked
 
     def _to_piece(self) -> int:
-        """Find the next tag, comment or the like; return whether one was found, or `_BAD`."""
+        """Find the next tag or section; return 1, `_WAIT` or `_BAD`."""
         stream, data = self._stream, self._stream.data
         place = data.find(b"<", stream.at + self._looked)
         if place < 0:
@@ -176,7 +176,7 @@ class _XmlDecoder(StreamDecoder):
                 return self._closed(bytes(data[stream.at + self._tag : place]))
 
     def _closed(self, tag: bytes) -> int:
-        """Take note of a whole tag; return `_BAD` when it cannot stand here."""
+        """Process a complete tag; return `_BAD` for an invalid one."""
         self._tag = -1
         found = _NAME.match(tag)
         if found is None:
@@ -188,7 +188,7 @@ class _XmlDecoder(StreamDecoder):
         return 1 if len(self._open) <= _NESTING_MOST else _BAD
 
     def _taken(self, size: int) -> bytes | FrameFault | None:
-        """Take an element off the stream; None for what stands between two."""
+        """Remove an element from the stream and return it; None for a section between elements."""
         stream = self._stream
         piece = bytes(stream.data[stream.at : stream.at + size])
         stream.at += size
