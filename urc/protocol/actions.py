@@ -187,7 +187,7 @@ def _expecting(
         else _prompted(step, builder)
     )
     otherwise = _otherwise(label, step.otherwise, builder)
-    text = step.text or f"{label}: no matching frame within {answer.timeout_s:g} s"
+    text = step.text or f"{label}: the expected frame did not come within {answer.timeout_s:g} s"
 
     def expect(runner: Runner, now: float) -> list[LineEvent]:
         line = runner.host.lines[step.transport]

@@ -26,19 +26,23 @@ _UP: Final = (".", "..")
 class _Piece(NamedTuple):
     template: Template
     is_value: bool
-    """Whether it is what somebody has given, and not part of the document or its settings."""
+    """Whether it is an argument, and not part of the document or its settings."""
 
 
 class Place:
-    """Writes one place."""
+    """Writes an address: the path of a request, or a topic.
+
+    A value is one segment of its address and cannot redirect it. A value that is the whole address
+    may have several segments. Settings are as trusted as the document.
+    """
 
     def __init__(self, pieces: tuple[_Piece, ...], written: Callable[[str, bool], str]) -> None:
-        """Join `pieces`; `written` makes a word of a value, which may be the whole place."""
+        """Initialise with `pieces`; `written` converts a value, which may be the whole address."""
         self._pieces = pieces
         self._written = written
 
     def write(self, namespace: Mapping[str, object]) -> str:
-        """Return the place; raise `NotWritable` or `ExpressionError`."""
+        """Return the address; raise `NotWritable` or `ExpressionError`."""
         is_whole = len(self._pieces) == 1
         words = [
             self._written(text, is_whole) if is_value else text
@@ -50,11 +54,11 @@ class Place:
 
 
 def place_writer(name: str, tree: object) -> Place | None:
-    """Return what writes the attribute `name`; None where it is as good as plain text.
+    """Return the writer of the attribute `name`; None if it needs no check.
 
     Args:
         name: ``path``, ``topic`` …
-        tree: the attribute as it was compiled.
+        tree: the compiled attribute.
     """
     written = _WRITTEN.get(name)
     if written is None or not isinstance(tree, Template) or tree.names <= _SETTINGS:

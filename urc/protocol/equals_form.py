@@ -1,4 +1,4 @@
-"""The plain forms: ``equals`` for one text, ``raw`` for the whole frame, ``any`` for any frame."""
+"""The plain forms ``equals``, ``raw``, ``any`` and ``silence``."""
 
 from collections.abc import Mapping
 from typing import cast
@@ -13,13 +13,13 @@ __all__ = ["AnyReader", "EqualsReader", "RawReader", "SilenceReader"]
 
 
 class SilenceReader:
-    """Takes no frame at all; the line takes the time that passes."""
+    """Matches no frame: the robot stays silent on success, and the timeout is the reply."""
 
     def __init__(self, spec: ReadSpec, context: CodecContext) -> None:
-        """Nothing of them matters."""
+        """Ignore both arguments: the form has no options."""
 
     def read(self, frame: Frame) -> Mapping[str, object] | None:
-        """Return None: whatever comes is something else."""
+        """Return None: any frame is another frame."""
 
 
 class EqualsReader:

@@ -16,7 +16,7 @@ __all__ = ["FRAMINGS", "build_framing"]
 
 
 class TwoFramings(NamedTuple):
-    """What is sent is framed otherwise than what comes."""
+    """Different framings for sent and received data."""
 
     sent: Framing
     received: Framing
@@ -26,11 +26,11 @@ class TwoFramings(NamedTuple):
         return self.sent.encode(payload)
 
     def decoder(self, stream: Stream | None = None) -> Decoder:
-        """Return a fresh decoder."""
+        """Return a new decoder."""
         return self.received.decoder(stream)
 
     def reversed(self) -> "TwoFramings":
-        """Return the same framings seen from the other end of the line."""
+        """Return the same framings for the other end of the connection."""
         return TwoFramings(self.received.reversed(), self.sent.reversed())
 
 

@@ -28,11 +28,11 @@ __all__ = ["Inbox"]
 _HIDDEN: Final = "•••"
 _MOST_SECRETS: Final = 8
 _SHORTEST: Final = 3
-"""Shorter secrets would blot out half of every message; then the whole of it is hidden."""
+"""Shorter secrets would redact parts of many words, so the whole message is hidden."""
 
 
 class Secrets:
-    """What was sent on a connection and must not be shown, not even when the robot echoes it."""
+    """Secrets sent on a connection, hidden even when the robot echoes them."""
 
     __slots__ = ("_texts",)
 
@@ -40,13 +40,13 @@ class Secrets:
         self._texts: deque[str] = deque(maxlen=_MOST_SECRETS)
 
     def add(self, data: bytes, encoding: str) -> None:
-        """Take note of bytes that hold a secret."""
+        """Register bytes that contain a secret."""
         text = data.decode(encoding, "replace").strip()
         if text:
             self._texts.append(text)
 
     def hide(self, text: str) -> str:
-        """Return a message without the secrets."""
+        """Return a message with its secrets redacted."""
         for secret in self._texts:
             if secret in text:
                 text = text.replace(secret, _HIDDEN) if len(secret) >= _SHORTEST else _HIDDEN

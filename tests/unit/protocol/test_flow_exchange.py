@@ -362,7 +362,8 @@ sequences: { dock: [{ expect: '^DOCKED$' }] }
     talk.says("DOCKING")
     talk.at(4.5)
     assert talk.messages[-1] == (
-        "dock.0: no matching frame within 0.5 s; 'DOCKING' came, which is not what it expects"
+        "dock.0: the expected frame did not come within 0.5 s; 'DOCKING' came, which is not what"
+        " it expects"
     )
 
 
