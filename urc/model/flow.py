@@ -1,6 +1,6 @@
-"""How talk flows: queues, stages of a reply, and conditions.
+"""Flow of requests: queues, stages of a reply, and conditions.
 
-Everything here is data, made by `urc.config` and acted upon by `urc.protocol`.
+Data only: `urc.config` makes these values, and `urc.protocol` acts on them.
 """
 
 from collections.abc import Mapping

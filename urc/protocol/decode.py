@@ -1,7 +1,7 @@
 """Decoding of raw fields into typed values.
 
 Pure. Each engine builds the converters once per signal. A value of the wrong type or range is a
-counted violation and never a sample: a wrong number on the screen is worse than an old one.
+counted violation and never a sample. A wrong number on the screen is worse than an old one.
 """
 
 import math

@@ -115,7 +115,7 @@ class Ask(NamedTuple):
 
 
 class Owner(Protocol):
-    """Who asked."""
+    """The owner of a request."""
 
     def ended(self, exchange: "Exchange", outcome: Outcome, now: float) -> "list[LineEvent]":
         """Record the outcome; return the resulting events."""

@@ -1,7 +1,7 @@
 """Struct items written by closures: values → bytes.
 
 Pure. This is the reverse of `urc.protocol.struct_read`. Theory of operation: every item becomes a
-step ``(pen, scope)`` that appends its bytes. Values that are known only later leave a gap that is
+step ``(pen, scope)`` that appends its bytes. Two kinds of values leave a gap that is
 filled in: the size of a following text (its `Gap` waits in the scope), and expressions over the
 size of the whole frame (`Pen.late`).
 """
