@@ -1,1 +1,1 @@
-"""The dashboard: pages, one WebSocket a client, static modules."""
+"""The dashboard: pages, static modules and one WebSocket for each page."""

@@ -1,7 +1,7 @@
-"""What can be asked under ``/api/v1``, as an OpenAPI 3.1 document, made from what is decoded.
+"""The OpenAPI 3.1 document of ``/api/v1``, made from the types that the server decodes.
 
-Floor 5. The shapes are those of `urc.web.manage.wire`, so the document cannot say another
-thing than the server does; a test compares its paths with the routes.
+Layer 5. The schemas come from `urc.web.manage.wire`, so document and server agree. A test compares
+the paths with the routes.
 """
 
 from functools import cache
@@ -44,7 +44,7 @@ class _Call(NamedTuple):
     summary: str
     answer: type
     body: type | None = None
-    """What is sent; None: it is a GET, or a POST without one."""
+    """Type of the request body; None for a GET, or a POST without a body."""
     is_post: bool = True
     status: int = 200
     query: tuple[str, ...] = ()
@@ -147,7 +147,7 @@ _CALLS: Final = (
 
 
 async def document(_: Request) -> Response:
-    """Answer with the document."""
+    """Return the document as a response."""
     headers = {"cache-control": "no-store"}
     return Response(api_document(), media_type="application/json", headers=headers)
 

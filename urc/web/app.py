@@ -1,6 +1,6 @@
 """The dashboard as one ASGI application: routes to pages, files and sockets. Only wires.
 
-Floor 5. `build_app` is handed the robots and everything that tells them apart; `serve` runs it.
+Layer 5. `build_app` gets the robots and all options; `serve` runs the application.
 """
 
 import asyncio
@@ -81,17 +81,17 @@ def build_app(
     """Return the application that serves `robots`.
 
     Args:
-        robots: by the name in their URL.
-        access: the keys; None makes some that nobody has.
-        allowed_hosts: names it answers to, besides addresses, ``localhost`` and its own.
-        linger_s: how long a robot stays connected after its last client has gone, in seconds.
-        data: folder in which a stop is kept over a restart, and the audit; None: neither is.
-        tiles: folder of map pictures, ``z/x/y.png``; None: there are none.
-        remake: makes each robot anew when its document is saved, and turns the dev pages on; None:
-            there are none.
-        workshop: makes robots while the server runs, and turns the managers and the settings pages
-            on; None: there are none.
-        trusted: widgets that do not ship with URC, and live in the page all the same.
+        robots: the robots, by the name in their URL.
+        access: the keys; None makes keys that stay unknown.
+        allowed_hosts: accepted names of this server, besides addresses, ``localhost`` and its own.
+        linger_s: time for which a robot stays connected after its last client, in seconds.
+        data: folder of the latches and the audit log, or None.
+        tiles: folder of map tiles, ``z/x/y.png``, or None.
+        remake: makes a robot from its saved document; turns the developer pages on. None turns
+            them off.
+        workshop: makes robots at run time; turns the managers and the settings pages on. None
+            turns them off.
+        trusted: third-party widgets that run in the page all the same.
 
     Raises:
         UrcError: two robots bring different widgets of one name.
@@ -139,7 +139,7 @@ def _trail(audit: AuditLog | None, name: str, robot: Robot) -> Trail | None:
 
 
 class _Dashboard(Starlette):
-    """Starlette with the page policy outermost, so that its own error answers pass through it."""
+    """Starlette with the page policy outermost, so that its error responses pass through it."""
 
     def __init__(
         self,
@@ -188,7 +188,7 @@ class _Dashboard(Starlette):
         )
 
     def build_middleware_stack(self) -> ASGIApp:
-        """Put the policy around everything, the handler of unexpected errors included."""
+        """Put the policy around everything, also around the handler of unexpected errors."""
         door = Door(super().build_middleware_stack(), self._access, self._stoppable)
         return Policy(words.Reader(door), self._access, allowed_hosts=self._allowed_hosts)
 
@@ -207,23 +207,23 @@ class _Routes:
 
     @property
     def robots(self) -> Mapping[str, Robot]:
-        """All that are served now, by the name in their URL."""
+        """All served robots, by the name in their URL."""
         return self.fleet.robots
 
     @property
     def stations(self) -> Mapping[str, Station]:
-        """Their stations."""
+        """The stations of the robots, by the same name."""
         return self.fleet.stations
 
     def manage_routes(self) -> list[Route]:
-        """Return the routes of the managers, where there are any."""
+        """Return the routes of the managers, or none."""
         if self.manager is None:
             return []
         manage = ManageRoutes(self.manager, self.ways, is_here, may_manage)
         return [*manage.routes(), *SettingsRoutes(self.manager, manage, self.ways).routes()]
 
     def stoppable(self) -> list[Stoppable]:
-        """Return the robots that move."""
+        """Return the robots with a STOP."""
         return [
             Stoppable(name, each.profile.title or name)
             for name, each in self.robots.items()
@@ -231,15 +231,15 @@ class _Routes:
         ]
 
     def profiles(self) -> list[Profile]:
-        """Return what the robots are."""
+        """Return the profiles of the served robots."""
         return [each.profile for each in self.robots.values()]
 
     def widget_files(self) -> tuple[Assets, ...]:
-        """Return what pages load of widgets: those of the robots, then those that are looked at."""
+        """Return the files of widgets: those of the robots, then those of the gallery."""
         return self.fleet.widgets, self.gallery.assets
 
     def renew(self, name: str, robot: Robot, latch: LatchFile | None) -> None:
-        """Go on with another version of a robot; raise `UrcError` when its widgets clash."""
+        """Switch to another version of a robot; raise `UrcError` when its widgets clash."""
         robot = self.fleet.renew(name, robot)
         secrets = secret_texts(robot.profile, robot.settings)
         self.stations[name].controls.trail.hide(secrets)
@@ -247,7 +247,7 @@ class _Routes:
 
     @asynccontextmanager
     async def lifespan(self, _: Starlette) -> AsyncIterator[None]:
-        """Keep one supervisor a robot for as long as the server runs."""
+        """Run one supervisor for each robot while the server runs."""
         try:
             async with self.fleet.running() as group:
                 if self.manager is not None:
@@ -259,7 +259,7 @@ class _Routes:
                 if watching is not None:
                     watching.cancel()
         finally:
-            if self.audit:  # the last: how the robots were stopped is in it
+            if self.audit:  # closed last: it records the stops at the end
                 await asyncio.to_thread(self.audit.close)
 
     async def menu(self, request: Request) -> Response:
@@ -288,7 +288,7 @@ class _Routes:
         if interface is None:
             raise HTTPException(404, words.t("This robot has no interface of that name."))
         is_dev = self.dev is not None and is_here(request)
-        # Foreign widgets are rendered by another process, which is waited for.
+        # Another process renders third-party widgets; the call blocks until it is done.
         html = await asyncio.to_thread(
             robot_page,
             request.state.nonce,
@@ -321,25 +321,25 @@ class _Routes:
         return JSONResponse({"latched": by, "confirmed": is_confirmed}, headers=_PAGE)
 
     async def controls(self, request: Request) -> Response:
-        """Tell who drives a robot, and who stopped it."""
+        """Return the lease of a robot and the state of its STOP."""
         station = self.stations.get(request.path_params["name"])
         if station is None:
             return JSONResponse({"error": "no robot of that name is served here"}, 404, _PAGE)
         return JSONResponse(station.who(), headers=_PAGE)
 
     async def timeline(self, request: Request) -> Response:
-        """Tell who made a robot move."""
+        """Return the audit log of a robot's motion."""
         name = request.path_params["name"]
         if name not in self.stations:
             return JSONResponse({"error": "no robot of that name is served here"}, 404, _PAGE)
         return await timeline(request, self.audit, name, is_here=is_here(request))
 
     async def recording(self, request: Request) -> Response:
-        """Tell where a recording stands."""
+        """Return the state of a playback."""
         return tape_state(self._tape(request))
 
     async def move(self, request: Request) -> Response:
-        """Move it."""
+        """Change a playback."""
         return await move_tape(request, self._tape(request))
 
     def _tape(self, request: Request) -> Tape | None:
@@ -356,7 +356,7 @@ class _Routes:
             await Client(websocket, station, flow, guest).serve()
 
     async def spare(self, websocket: WebSocket) -> None:
-        """Be a second line of a page that drives."""
+        """Serve a redundant socket of a page that drives."""
         station = await self._accepted(websocket)
         if station is not None:
             flow = websocket.scope["state"]["flow"]

@@ -1,7 +1,7 @@
-"""Work that may stall, in a thread that holds up neither the loop nor the end of the process.
+"""Work that may block, in a thread that delays neither the loop nor the exit of the process.
 
-Floor 5. `asyncio.to_thread` is waited for when the loop ends; a repository that stalls for two
-minutes must not hold up Ctrl-C for two minutes.
+Layer 5. The loop waits for `asyncio.to_thread` when it closes. A repository that hangs for two
+minutes must not delay Ctrl-C by two minutes.
 """
 
 import asyncio
@@ -16,9 +16,9 @@ _T = TypeVar("_T")
 
 
 def in_daemon(work: Callable[[], _T], name: str) -> "asyncio.Future[_T]":
-    """Start `work` in a thread of its own; return the future of what it returns or raises.
+    """Start `work` in a thread of its own; return a future of its result or exception.
 
-    Who cancels the future is not waited for: the thread goes on to its own end, unheard.
+    After a cancel the thread runs to its end, and its result is dropped.
     """
     loop = asyncio.get_running_loop()
     future: asyncio.Future[_T] = loop.create_future()
@@ -38,7 +38,7 @@ def in_daemon(work: Callable[[], _T], name: str) -> "asyncio.Future[_T]":
             result = work()
         except BaseException as error:
             fault = error
-        with suppress(RuntimeError):  # the loop has ended meanwhile
+        with suppress(RuntimeError):  # the loop has closed
             loop.call_soon_threadsafe(settle, result, fault)
 
     threading.Thread(target=run, name=name, daemon=True).start()

@@ -1,7 +1,7 @@
-"""The door: lets in browsers that open the printed address, and shows others how to come in.
+"""Access control of pages: lets in browsers with the printed address, and shows others how.
 
-Floor 5. An ASGI layer inside the page policy. STOP goes through for everyone, and so do the files
-that the page at the door is made of.
+Layer 5. ASGI middleware inside the page policy. STOP passes without a key, and so do the files of
+the access page.
 """
 
 import re
@@ -21,13 +21,13 @@ from urc.web.wire.messages import CLOSE_NOT_LET_IN, encode_error
 __all__ = ["Door", "DoorPage", "Stoppable"]
 
 SAID = "open the address that URC printed when it started: it has the key"
-"""To programs and sockets; `words.js` knows it, too."""
+"""Refusal for programs and sockets; `words.js` translates it."""
 _OPEN = re.compile(
     r"/healthz|/favicon\.ico|/app\.webmanifest|/sw\.js|/(?:static|vendor|words)/.+\.\w+"
 )
-"""What says nothing of a robot."""
+"""Paths of files that contain nothing about a robot."""
 _CODE = re.compile(r"/(?:static|vendor|words|widgets)/.+\.\w+")
-"""What frames load, below a path that only our own pages are told."""
+"""Paths of files for frames, below a secret prefix."""
 _HEADERS = {"cache-control": "no-store"}
 _REFUSED = {**_HEADERS, "www-authenticate": 'Bearer realm="URC"'}
 
@@ -36,48 +36,48 @@ class Stoppable(NamedTuple):
     """A robot with a STOP."""
 
     name: str
-    """In its URL."""
+    """Its name in URLs."""
     title: str
 
     @property
     def stop_url(self) -> str:
-        """Where STOP goes."""
+        """The URL of its STOP."""
         return f"/api/v1/robots/{quote(self.name, safe='')}/stop"
 
 
 @dataclass(frozen=True, slots=True)
 class DoorPage:
-    """``door.html.j2``: how to come in, or where to go on; and STOP."""
+    """``door.html.j2``: instructions or a link to the page, and STOP."""
 
     head: Head
     url: str
-    """Where to go on, a path; "" where there is no way on but the printed address."""
+    """Path of the page behind; "" if only the printed address helps."""
     is_old: bool
-    """Whether a key came that opens nothing, which is told before going on."""
+    """Whether the request had an invalid key, which the page reports first."""
     path: str
-    """Of this page, to ask again from here: a link of another site sends no key along."""
+    """Path of this page, for a new request: a link of another site sends no cookie."""
     robots: tuple[Stoppable, ...]
 
 
 class Door:
-    """The layer."""
+    """The middleware."""
 
     def __init__(
         self, app: ASGIApp, access: Access, robots: Callable[[], Iterable[Stoppable]]
     ) -> None:
-        """Let nobody in yet.
+        """Prepare.
 
         Args:
-            app: what is behind it.
-            access: who is known.
-            robots: returns those that can be stopped.
+            app: the application behind it.
+            access: the keys and sessions.
+            robots: returns the robots with a STOP.
         """
         self._app = app
         self._access = access
         self._robots = robots
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Hand on what may go on, and answer the rest."""
+        """Hand on allowed requests, and answer the others."""
         if scope["type"] == "lifespan":
             await self._app(scope, receive, send)
             return
@@ -109,7 +109,7 @@ class Door:
         return scope["method"] in ("GET", "HEAD") and _OPEN.fullmatch(path) is not None
 
     def _answer_to(self, word: str, query: list[tuple[str, str]], scope: Scope) -> HTMLResponse:
-        """Return the answer to a browser that hands in a key."""
+        """Return the response to a browser that hands in a key."""
         rest = urlencode([pair for pair in query if pair[0] != PARAMETER])
         # Never "//…", which would be another host.
         path = "/" + quote(scope["path"].lstrip("/"))
@@ -117,7 +117,7 @@ class Door:
         session = self._access.admit(word)
         if session is None and scope["state"]["visitor"].standing == "stranger":
             return self._page(scope, url=url if self._access.is_open else "", is_old=True)
-        # A page, not a redirect: who comes from another site sends no strict cookie after one.
+        # A page, not a redirect: after one from another site the browser sends no strict cookie.
         page = self._page(scope, url=url)
         if session is not None:
             is_secure = scope["scheme"] == "https"
@@ -147,7 +147,7 @@ class Door:
 
 
 async def _turn_away(receive: Receive, send: Send) -> None:
-    """Accept a socket and close it with the reason: a refused handshake tells a page nothing."""
+    """Accept a socket and close it with the reason: a refused handshake gives a page no reason."""
     await receive()
     await send({"type": "websocket.accept"})
     await send({"type": "websocket.send", "text": encode_error("refused", SAID)})

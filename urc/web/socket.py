@@ -1,8 +1,8 @@
-"""One browser client: what it sends is checked, what it gets is never queued behind another's.
+"""The WebSocket of one page: its messages are checked, and no page waits for another.
 
-Floor 5. Reads and writes are two tasks of one group. The writer takes the newest state when the
-line is free, so a client that cannot keep up skips frames; one that takes nothing for `STALL_S` is
-cut off.
+Layer 5. Reads and writes are two tasks of one group. The writer takes the newest state when the
+socket is free, so a slow page skips frames. A page that takes nothing for `STALL_S` is
+disconnected.
 """
 
 import asyncio
@@ -32,9 +32,9 @@ __all__ = ["Allowance", "Client", "Flow", "Guest", "Line"]
 
 MESSAGES_PER_S = 100
 TICKS_PER_S = 2000
-"""Ticks of held controls are thinned, not refused: only a flood of them closes the line."""
+"""Rate at which ticks of held controls close the socket. Slower ones are thinned, not refused."""
 TICK = b'{"t":"tick",'
-"""So a page's ticks begin; written otherwise they only take the longer way."""
+"""First bytes of a page's tick; a tick in another spelling takes the slower path."""
 BAD_MESSAGES = 10
 COMMANDS_AT_ONCE = 16
 COMMAND_TIMEOUT_S = 30.0
@@ -45,7 +45,7 @@ log = logging.getLogger(__name__)
 
 
 class Client:
-    """Talks to one page until either side is done."""
+    """The server's side of one page, until either side closes."""
 
     def __init__(
         self,
@@ -64,7 +64,7 @@ class Client:
         self._pong = ""
         self._place = Place()
         self._live: Live | None = None
-        """Set after the page was told what the indices of values mean."""
+        """Set once the page has the indices of its values."""
         self._is_listening = False
         self._closing: tuple[int, str] | None = None
         self._commands: set[asyncio.Task[None]] = set()
@@ -73,7 +73,7 @@ class Client:
         self.bad_messages = 0
 
     async def serve(self) -> None:
-        """Be this client from the accepted socket to its end."""
+        """Serve this page from the accepted socket to its end."""
         missing = missing_settings(self._station.robot)
         if missing:
             names = ", ".join(setting.name for setting in missing)
@@ -89,7 +89,7 @@ class Client:
     async def _visit(self) -> None:
         opening = asyncio.ensure_future(self._station.live())
         leaving = asyncio.ensure_future(self._line.receive())
-        # A page that leaves while the session is still being opened must not count as a client.
+        # A page that leaves while the session is still opening must not count as a client.
         try:
             await asyncio.wait((opening, leaving), return_when=asyncio.FIRST_COMPLETED)
             if leaving.done() and leaving.result()["type"] == "websocket.disconnect":
@@ -145,7 +145,7 @@ class Client:
         self._live = live
         while True:
             async with asyncio.timeout(STALL_S):
-                # Values taken before the line is free would be old when they leave.
+                # Values taken before the socket is free would be old when they leave.
                 await self._flow.drained()
                 self._news.clear()
                 self._send_shared(live)
@@ -160,7 +160,7 @@ class Client:
             await self._news.wait()
 
     def _flushed(self) -> None:
-        """Send a flush of the fan-out at once on a free line; leave all else to the writer.
+        """Send a flush of the fan-out at once if the socket is free; leave all else to the writer.
 
         Waking the writer for every flush would cost three times as much as the send.
         """
@@ -172,7 +172,7 @@ class Client:
         self._news.set()
 
     def _send_shared(self, live: Live) -> None:
-        """Send what all clients share, and images for as long as the kernel takes them."""
+        """Send the data that all pages share, and images until the kernel's buffer is full."""
         if frames := live.fanout.take(self._place):
             self._flow.write(frames)
         while self._place.looks.names and self._flow.is_free():
@@ -184,7 +184,7 @@ class Client:
     def _take_answers(self) -> list[str]:
         answers = list(self._answers)
         self._answers.clear()
-        # Last, so that the round trip the page measures has the waiting in it.
+        # Last, so that the page's round-trip time includes the wait in the buffer.
         if self._pong:
             answers.append(self._pong)
             self._pong = ""
@@ -209,12 +209,12 @@ class Client:
             self._is_listening = False
 
     def _offered(self, data: bytes) -> bool:
-        """Take a tick that has just come, with nothing before it; all else is for `_take`."""
+        """Take a tick that just arrived with nothing before it; `_take` handles all else."""
         seat = self._seat
         if seat is None or not (self._is_listening and data.startswith(TICK)) or self._closing:
             return False
         how = self._station.controls.offer(seat, data)
-        # Those that come in time are not counted: they are far fewer than may be.
+        # Ticks within the rate are not counted: they are far fewer than the limit.
         return how == "in time" or (
             how == "one more" and self._ticks.take(self._station.clock.now())
         )
@@ -231,7 +231,7 @@ class Client:
         except wire.BadMessage as error:
             fault = str(error)
         if isinstance(asked, (Tick, Release, Stop)):
-            self._hear(asked)  # a stop is not counted: it is taken, however much else was said
+            self._hear(asked)  # STOP is never counted, so no limit can refuse it
         elif not self._allowance.take(now_s):
             self._close(wire.CLOSE_TOO_FAST, f"more than {MESSAGES_PER_S} messages a second")
         elif asked is None:
@@ -252,7 +252,7 @@ class Client:
 
     def _hear(self, said: Driving) -> None:
         if isinstance(said, Stop) and self._station.robot.tape is not None:
-            return  # nothing moves in a recording, and no stop could ever be confirmed
+            return  # nothing moves in a recording, and no robot could acknowledge a stop
         if self._seat is not None:
             self._station.controls.hear(self._seat, said)
 
@@ -287,7 +287,7 @@ class Client:
 
     def _start(self, asked: wire.Run, live: Live, group: asyncio.TaskGroup) -> None:
         if len(self._commands) + len(self._answers) >= COMMANDS_AT_ONCE:
-            # Refused by closing nothing and queueing nothing: the page sees it as its one answer.
+            # The refusal closes and queues nothing: it is the page's only reply.
             text = f"{COMMANDS_AT_ONCE} commands are still under way"
             if len(self._answers) < 2 * COMMANDS_AT_ONCE:
                 self._reply(asked, code="busy", message=text)
@@ -299,7 +299,7 @@ class Client:
         task.add_done_callback(self._commands.discard)
 
     async def _run(self, asked: wire.Run, live: Live) -> None:
-        sent: deque[Payload] = deque(maxlen=1)  # what went out last
+        sent: deque[Payload] = deque(maxlen=1)  # the last frame that was sent
         try:
             people = await self._confirmed(asked)
             async with asyncio.timeout(self._limit_s(asked.command)):
@@ -323,12 +323,12 @@ class Client:
             self._reply(asked, values=replied.values, people=people, sent=_last(sent))
 
     def _limit_s(self, command: str) -> float | None:
-        """Return how long a command may take; a sequence ends by itself, however long it is."""
+        """Return the time limit of a command; a sequence has its own end."""
         known = self._station.robot.profile.driver.commands.get(command)
         return None if known is not None and known.steps else COMMAND_TIMEOUT_S
 
     async def _confirmed(self, asked: wire.Run) -> tuple[str, ...]:
-        """Return who has said yes to a command; raise `CommandFailed` where it may not be given."""
+        """Return who confirmed a command; raise `CommandFailed` if it is not allowed."""
         if self._seat is None:
             return ()
         known = self._station.robot.profile.driver.commands.get(asked.command)
@@ -339,7 +339,7 @@ class Client:
         people = await self._station.consent.people(
             self._seat, asked.id, known, asked.arguments, asked.token
         )
-        admit(who, asked.command, asked.arguments, asked.stops)  # a question takes its time
+        admit(who, asked.command, asked.arguments, asked.stops)  # again: a confirmation takes time
         return people
 
     def _reply(
@@ -353,7 +353,7 @@ class Client:
         sent: Payload = b"",
         is_ours: bool = False,
     ) -> None:
-        """Answer a command, and leave in the audit what it came to."""
+        """Reply to a command, and write its outcome to the audit log."""
         self._answer(wire.encode_reply(asked, values=values, code=code, message=message))
         if self._seat is None:
             return

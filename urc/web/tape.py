@@ -1,7 +1,7 @@
-"""Where a recording stands that is shown in place of a robot, and the way to move it.
+"""Requests that read or change the playback of a recording.
 
-Floor 5. Its pages are those of a robot that is only watched. Whoever sees them may move it: there
-is nothing behind it that could be harmed.
+Layer 5. Its pages are those of a robot that is only watched. Any visitor may change the playback,
+because no real robot is connected.
 """
 
 import math
@@ -17,7 +17,7 @@ __all__ = ["move_tape", "tape_state"]
 
 
 def tape_state(tape: Tape | None) -> Response:
-    """Answer where a recording stands; None: there is none."""
+    """Return the state of the playback as a response; 404 for None."""
     if tape is None:
         return told(404, "this is no recording")
     return answer(
@@ -32,7 +32,7 @@ def tape_state(tape: Tape | None) -> Response:
 
 
 async def move_tape(request: Request, tape: Tape | None) -> Response:
-    """Let a recording run, stand, or go on from somewhere else, and answer where it stands."""
+    """Run, pause or move the playback, and return its state as a response."""
     if tape is None:
         return told(404, "this is no recording")
     try:

@@ -1,7 +1,7 @@
-"""Why did it move? The audit of one robot, as JSON for the dev page.
+"""The audit log of one robot, as JSON for the developer page: why did it move?
 
-Floor 5. It shows what went over a robot's lines, so it needs the start key, as the dev
-page is. ``?last=`` says how many entries, newest first, ``?since=`` from when on (UTC, seconds).
+Layer 5. It contains traffic of the robot, so it needs the start key, like the developer page.
+``?last=`` is the number of entries, newest first; ``?since=`` is the earliest time (UTC, seconds).
 """
 
 import asyncio
@@ -22,13 +22,13 @@ _SETTLE_S = 0.5
 async def timeline(
     request: Request, log: AuditLog | None, robot: str, *, is_here: bool
 ) -> JSONResponse:
-    """Return what happened to a robot, newest first.
+    """Return the entries about a robot, newest first.
 
     Args:
-        request: its query says how much of it.
-        log: where it is kept; None: nowhere.
-        robot: whose.
-        is_here: whether who asks has the start key.
+        request: its query limits the entries.
+        log: the audit log, or None.
+        robot: name of the robot.
+        is_here: whether the request has the start key.
     """
     if not is_here:
         text = "the timeline needs the key in the address that URC printed"
@@ -53,5 +53,5 @@ async def timeline(
 
 
 def _settled(log: AuditLog, robot: str, since: float, last: int) -> list[Entry]:
-    log.settle(_SETTLE_S)  # what has just happened is asked for the most
+    log.settle(_SETTLE_S)  # the newest entries matter most
     return read(log.file, robot=robot, since=since, last=last)

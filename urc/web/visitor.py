@@ -1,6 +1,6 @@
-"""What who asks may do: the holder of the start key more; a page may choose to watch only.
+"""Rights of a visitor: the start key gives more rights, and a page may choose to watch only.
 
-Floor 5. Pure.
+Layer 5. Pure.
 """
 
 from ipaddress import ip_address
@@ -14,13 +14,13 @@ __all__ = ["guest_of", "is_here", "may_manage", "visitor_of"]
 
 
 def visitor_of(connection: HTTPConnection) -> Visitor:
-    """Return who asks, as the policy found it out."""
+    """Return the visitor of a request, as the page policy identified it."""
     found: Visitor = getattr(connection.state, "visitor", STRANGER)
     return found
 
 
 def guest_of(connection: HTTPConnection) -> Guest:
-    """Return who asks, for the robot's other screens."""
+    """Return the visitor's identity for the robot's other pages."""
     host = connection.client.host if connection.client else ""
     has_key = is_here(connection)
     place = "" if has_key and _is_loopback(host) else host
@@ -33,12 +33,12 @@ def guest_of(connection: HTTPConnection) -> Guest:
 
 
 def is_here(connection: HTTPConnection) -> bool:
-    """Return whether who asks has the start key: an address says nothing of that."""
+    """Return whether the visitor has the start key; the address does not matter."""
     return visitor_of(connection).standing == "here"
 
 
 def may_manage(connection: HTTPConnection) -> bool:
-    """Return whether who asks may install packages and change settings."""
+    """Return whether the visitor may install packages and change settings."""
     return visitor_of(connection).standing in ("here", "manager")
 
 

@@ -1,10 +1,10 @@
-"""The words that pages show, in the reader's language; English is the key and the fall-back.
+"""Texts of pages in the user's language; English is the key and the fallback.
 
-Floor 5. The catalogues are gettext's (``translations/*.po``, written and checked by
-``scripts.translations``); what is read here is their compiled form, one flat table a language. The
-same table goes to the page's modules as ``urc/words``, so both sides say the same.
+Layer 5. The catalogues are those of gettext (``translations/*.po``, written and checked by
+``scripts.translations``). This module reads their compiled form, one flat table for each language.
+The page's modules import the same table as ``urc/words``, so server and page use the same texts.
 
-Words of a robot's own documents (titles of signals, names of commands) are its author's, and stay.
+Texts of a robot's own documents, such as titles of signals, are not translated.
 """
 
 import json
@@ -50,14 +50,14 @@ LANGUAGES: Mapping[str, str] = {
     "fr": "Français",
     "it": "Italiano",
 }
-"""BCP 47 tag → what its speakers call it."""
+"""BCP 47 tag → the language's own name."""
 MOST_WISHES = 20
-"""How many entries of an Accept-Language header are looked at."""
+"""Most entries of an Accept-Language header that are read."""
 
 _HOLE = re.compile(r"\{([a-z_]+)\}")
 
 language: ContextVar[str] = ContextVar("urc_language", default="en")
-"""Of the page that is being made."""
+"""Language of the current request."""
 
 
 def t(text: str, /, **names: object) -> str:
@@ -68,7 +68,7 @@ def t(text: str, /, **names: object) -> str:
 
 @lru_cache(maxsize=len(LANGUAGES))
 def table(tag: str) -> Mapping[str, str]:
-    """Return English → the language; empty for English and for what nobody translated."""
+    """Return English → the language; empty for English and for a missing catalogue."""
     place = FOLDER / f"{tag}.json"
     if tag not in LANGUAGES or not place.is_file():
         return {}
@@ -77,7 +77,7 @@ def table(tag: str) -> Mapping[str, str]:
 
 
 def address(tag: str) -> str:
-    """Return where pages find the table of a language."""
+    """Return the URL of a language's table."""
     return "/static/core/english.js" if tag == "en" else f"/words/{tag}.js"
 
 
@@ -87,11 +87,10 @@ def module(tag: str) -> str:
 
 
 def choose(chosen: str, accepted: str) -> str:
-    """Return the language for a reader.
+    """Return the language for a user.
 
-    Args:
-        chosen: what was picked on this device; "" where nothing was.
-        accepted: the Accept-Language header (RFC 9110, 12.5.4).
+    `chosen` is the language picked on this device, or "". `accepted` is the Accept-Language header
+    (RFC 9110, 12.5.4).
     """
     if chosen in LANGUAGES:
         return chosen
@@ -112,13 +111,13 @@ def _wish(text: str) -> tuple[str, float]:
 
 
 class Reader:
-    """An ASGI layer that finds out which language the reader wants."""
+    """ASGI middleware that sets the language of each request."""
 
     def __init__(self, app: ASGIApp) -> None:
         self._app = app
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Hand on, with `language` set for this one request."""
+        """Call the application with `language` set for this request."""
         if scope["type"] == "http":
             asked = HTTPConnection(scope)
             accepted = asked.headers.get("accept-language", "")

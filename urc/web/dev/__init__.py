@@ -1,1 +1,1 @@
-"""The dev page of a robot: its traffic, a parser to try, what a command would send."""
+"""The developer page of a robot: traffic log, parser try-out, command preview."""

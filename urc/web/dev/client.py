@@ -1,8 +1,8 @@
-"""One dev page: it is told the traffic, and its questions are answered one after the other.
+"""The WebSocket of one developer page: traffic of the robot, and replies to requests of the page.
 
-Floor 5. The traffic of a page waits in a backlog of its own, of which the oldest goes first and is
-counted; a page that takes nothing for `STALL_S` is cut off. What it asks is answered beside the
-loop, a few questions at most at a time.
+Layer 5. Traffic waits in a backlog for each page; the oldest rows are dropped and counted. A page
+that takes nothing for `STALL_S` is disconnected. Requests are handled one after the other in a
+thread, with a limit on their number.
 """
 
 import asyncio
@@ -42,21 +42,21 @@ MESSAGES_PER_S = 20
 BAD_MESSAGES = 10
 QUESTIONS = 8
 MOST_ANSWERS = 32
-"""Answers that may wait to be sent."""
+"""Most replies that wait to be sent."""
 ROWS_KEPT = 1000
 BYTES_KEPT = 1 << 20
 ROWS_AT_ONCE = 200
 BEHIND_S = 0.05
-"""Between two messages with rows: a robot that talks a thousand times a second is one of twenty."""
+"""Interval of messages with rows, in seconds. A robot may produce a thousand rows a second."""
 HELD_S = 0.5
-"""After so long without more, what may have begun a secret is shown."""
+"""Wait after which held-back text that may begin a secret is shown, in seconds."""
 RETRY_S = 1.0
 
 log = logging.getLogger(__name__)
 
 
 class Backlog:
-    """Rows that a page has not been sent yet."""
+    """A queue of rows for one page."""
 
     def __init__(self) -> None:
         self.first = 0
@@ -68,7 +68,7 @@ class Backlog:
         return len(self._rows)
 
     def put(self, row: Row) -> None:
-        """Take a row; the oldest go while there are too many."""
+        """Add a row; drop the oldest ones beyond the limit."""
         row.n = self.first + len(self._rows)
         self._rows.append(row)
         self._bytes += row.weight
@@ -76,7 +76,7 @@ class Backlog:
             self._pop()
 
     def take(self) -> list[Row]:
-        """Return the oldest few, and keep them no longer."""
+        """Remove and return the oldest rows, up to the limit of one message."""
         return [self._pop() for _ in range(min(ROWS_AT_ONCE, len(self._rows)))]
 
     def _pop(self) -> Row:
@@ -87,15 +87,15 @@ class Backlog:
 
 
 class _Known(NamedTuple):
-    """What questions are answered from: the version of the robot that runs."""
+    """The running version of the robot, for the handling of requests."""
 
     profile: Profile
     settings: dict[str, Value]
-    """Of secrets only stand-ins, for missing ones samples."""
+    """Values of settings: stand-ins for secrets, samples for missing ones."""
 
 
 class DevClient:
-    """Talks to one dev page until either side is done."""
+    """The server's side of one developer page, until either side closes."""
 
     def __init__(self, line: Line, watch: ProfileWatch, flow: Flow) -> None:
         self._line = line
@@ -113,7 +113,7 @@ class DevClient:
         self._edition = -1
 
     async def serve(self) -> None:
-        """Be this client from the accepted socket to its end."""
+        """Serve this page from the accepted socket to its end."""
         self._watch.listeners.add(self._news.set)
         try:
             async with asyncio.TaskGroup() as group:
@@ -133,7 +133,7 @@ class DevClient:
     # -- traffic
 
     async def _follow(self) -> None:
-        """Put what happens on the robot's lines into the backlog, session after session."""
+        """Put the traffic of the robot into the backlog, session after session."""
         while True:
             if missing_settings(self._station.robot) or self._station.is_full:
                 await self._clock.sleep(RETRY_S)
@@ -265,7 +265,7 @@ class DevClient:
         self._news.set()
 
     async def _answer(self) -> None:
-        """Answer what is asked, one question after the other, off the loop."""
+        """Handle the requests one after the other, in a thread."""
         while True:
             asked = await self._questions.get()
             robot = self._watch.robot

@@ -1,7 +1,7 @@
-"""What a command would send: the exact bytes or messages, or the refusal in words. Sends nothing.
+"""Preview of a command: its exact bytes or messages, or the reason of its refusal. Sends nothing.
 
-Floor 5, pure. A command that waits for an answer before it goes on is shown with all the frames
-that its steps can write with what is known beforehand.
+Layer 5, pure. A command may wait for a reply between two steps. The preview shows each frame that
+can be built in advance.
 """
 
 from collections.abc import Iterator, Mapping
@@ -22,29 +22,29 @@ __all__ = ["Preview", "Written", "preview"]
 
 MOST_FRAMES = 200
 MOST_WITHIN = 8
-"""Sequences that run one another."""
+"""Deepest nesting of sequences that run each other."""
 
 
 class Written(NamedTuple):
-    """One line of a preview: a frame, or what happens between two of them."""
+    """One line of a preview: a frame, or a step between two frames."""
 
     transport: str
-    """"" for what is no frame."""
+    """Name of the transport; "" for a line without frame."""
     payload: Payload
     text: str
-    """What happens instead of a frame, or why it cannot be shown."""
+    """Description of a step without frame, or the reason why the frame is not shown."""
 
 
 class Preview(NamedTuple):
-    """What a command would do."""
+    """The effect of a command."""
 
     refusal: str
-    """Why it would be refused; "" when it would not."""
+    """Reason of a refusal, or ""."""
     frames: tuple[Written, ...] = ()
     questions: tuple[str, ...] = ()
-    """What people are asked before."""
+    """Questions to the operator before the command runs."""
     requires: tuple[str, ...] = ()
-    """What must hold on the robot, which only the robot knows."""
+    """Conditions on signals of the robot, which a preview cannot check."""
 
 
 def preview(
@@ -53,13 +53,13 @@ def preview(
     command: str,
     arguments: Mapping[str, object],
 ) -> Preview:
-    """Return what `command` would send with `arguments`.
+    """Return the frames that `command` would send with `arguments`.
 
     Args:
-        driver: as loaded.
-        settings: value of every setting; what stands here for a secret is shown.
+        driver: the loaded driver.
+        settings: value of every setting; the given stand-in of a secret is shown.
         command: its name.
-        arguments: those that are given; the others take their defaults.
+        arguments: some of its arguments; the others take their defaults.
     """
     found = driver.commands.get(command)
     if found is None:

@@ -1,7 +1,7 @@
-"""The dev page of each robot: the wire log, the parser try-out, what a command would send.
+"""Routes of the developer pages: traffic log, parser try-out and command preview of each robot.
 
-Floor 5. Only there when the server was started for it, and only for who has the start key: it
-shows everything that goes over a robot's lines. `urc.web.app` knows one `Dev`, or none.
+Layer 5. Only with ``--dev``, and only for holders of the start key, because the pages show all
+traffic of a robot. `urc.web.app` has at most one `Dev`.
 """
 
 import asyncio
@@ -27,32 +27,32 @@ __all__ = ["HOW_TO_TURN_ON", "Dev", "DevPage", "dev_url", "no_dev_routes"]
 HOW_TO_TURN_ON = "The dev page is off. Start URC with --dev to turn it on."
 _ONLY_HERE = "The dev page needs the key in the address that URC printed."
 CLIENTS = 16
-"""Dev pages that may be open at a time."""
+"""Most developer pages that may be open at a time."""
 
 
 @dataclass(frozen=True, slots=True)
 class DevPage:
-    """``dev.html.j2``: everything else is told by the two sockets."""
+    """``dev.html.j2``; the two sockets bring all other data."""
 
     head: Head
     title: str
     url: str
-    """Of the robot's own page."""
+    """Path of the robot's own page."""
     values: str
-    """Path and query of the WebSocket with values and links, on which commands are given, too."""
+    """Path and query of the dashboard's WebSocket: values, links and commands."""
     socket: str
-    """Path of the dev page's own."""
+    """Path of the developer page's WebSocket."""
     timeline: str
-    """Path of what made the robot move."""
+    """Path of the audit log of motion."""
 
 
 def dev_url(name: str) -> str:
-    """Return the path of a robot's dev page."""
+    """Return the path of a robot's developer page."""
     return f"/robots/{quote(name, safe='')}/dev"
 
 
 def no_dev_routes() -> list[BaseRoute]:
-    """Return the routes of a server without dev pages: they say how to get them."""
+    """Return the routes of a server without ``--dev``: they say how to turn the pages on."""
 
     async def tell(_: Request) -> Response:
         raise HTTPException(404, HOW_TO_TURN_ON)
@@ -61,7 +61,7 @@ def no_dev_routes() -> list[BaseRoute]:
 
 
 class Dev:
-    """The dev pages of all robots."""
+    """The developer pages of all robots."""
 
     def __init__(
         self,
@@ -70,13 +70,13 @@ class Dev:
         take: Callable[[str, Robot], None],
         is_here: Callable[[HTTPConnection], bool],
     ) -> None:
-        """Watch nothing yet.
+        """Prepare.
 
         Args:
-            stations: by the name in their URL.
+            stations: the robots, by the name in their URL.
             remake: makes the robot of a new version of its profile; by the same name.
-            take: goes on with that one; may raise `UrcError`.
-            is_here: tells whether who asks has the start key.
+            take: switches to the new robot; may raise `UrcError`.
+            is_here: returns whether a request has the start key.
         """
         self._is_here = is_here
         self._open = 0
@@ -86,13 +86,13 @@ class Dev:
         }
 
     async def run(self) -> None:
-        """Watch the documents for ever; ends by being cancelled."""
+        """Watch the documents until cancelled."""
         async with asyncio.TaskGroup() as group:
             for watch in self._watches.values():
                 group.create_task(watch.run())
 
     def routes(self) -> list[BaseRoute]:
-        """Return where the pages and their sockets are."""
+        """Return the routes of the pages and their sockets."""
         return [
             Route("/robots/{name}/dev", self._page),
             WebSocketRoute("/robots/{name}/dev/ws", self._socket),

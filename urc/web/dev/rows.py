@@ -1,6 +1,6 @@
-"""Rows of the wire log: what is shown of each piece of traffic, and of each note.
+"""Rows of the traffic log: the shown part of each frame and each note.
 
-Floor 5, pure.
+Layer 5, pure.
 """
 
 import json
@@ -22,24 +22,24 @@ __all__ = [
 ]
 
 SHOWN_BYTES = 4096
-"""Of one piece of traffic; the rest is only counted."""
+"""Most bytes that are shown of one frame; the others are only counted."""
 THUMBNAIL_BYTES = 48 * 1024
-"""Largest picture that is shown as one."""
+"""Largest image that is shown as one, in bytes."""
 _SHOWN = ("image/png", "image/jpeg", "image/gif")
 _NAMES = ("topic", "action", "service", "method", "path", "url")
-"""Attributes that say where a message goes or comes from, in this order."""
+"""Attributes with the source or target of a message, by priority."""
 
 
 class Row(msgspec.Struct, omit_defaults=True):
-    """One line of the wire log."""
+    """One line of the traffic log."""
 
     n: int
     time_s: float
-    """Monotonic; the page gets the age."""
+    """Monotonic time; the page gets the age."""
     kind: str
     """``sent``, ``received`` or ``note``."""
     line: str
-    """Transport."""
+    """Name of the transport."""
     size: int = 0
     data: bytes = b""
     verb: str = ""
@@ -49,16 +49,16 @@ class Row(msgspec.Struct, omit_defaults=True):
     text: str = ""
     level: str = ""
     picture: str = ""
-    """Media type, where `data` is a whole picture."""
+    """Media type if `data` is a whole image, else ""."""
 
     @property
     def weight(self) -> int:
-        """Bytes it takes, about."""
+        """Memory that the row takes, in bytes, roughly."""
         return 100 + len(self.data) + len(self.text) + len(self.more)
 
 
 def traffic_row(traffic: Traffic) -> Row:
-    """Return the row of a piece of traffic."""
+    """Return the row of sent or received data."""
     row = Row(0, traffic.time_s, traffic.direction, traffic.transport)
     if traffic.envelope is not None:
         fill(row, traffic.envelope)
@@ -73,7 +73,7 @@ def note_row(note: Note) -> Row:
 
 
 def fill(row: Row, envelope: Envelope) -> None:
-    """Write a message into a row: verb, address, the other attributes, and the body."""
+    """Write a message into a row: verb, address, other attributes and body."""
     named = [name for name in _NAMES if envelope.attributes.get(name) is not None]
     told = [str(envelope.attributes[name]) for name in named]
     row.verb, row.address = envelope.verb, cut(" ".join(told))
@@ -93,7 +93,7 @@ def fill(row: Row, envelope: Envelope) -> None:
 
 
 def _fill_bytes(row: Row, data: bytes) -> None:
-    row.size = len(data)  # of what is shown: how long a secret is, is part of it
+    row.size = len(data)  # size of the shown text: the length of a secret must not leak
     kind = media_type(data)
     if kind in _SHOWN:
         row.text = f"<{grouped(len(data))} bytes, {kind}>"
@@ -104,5 +104,5 @@ def _fill_bytes(row: Row, data: bytes) -> None:
 
 
 def grouped(number: int) -> str:
-    """Return a number with a narrow blank between thousands: ``12 345``."""
+    """Return a number with a narrow space between thousands: ``12 345``."""
     return f"{number:,}".replace(",", "\u202f")

@@ -1,8 +1,7 @@
-"""The dev interface: one robot with what was fixed at the start, read anew each time it is begun.
+"""The developer start page: one robot with fixed values, whose documents are read at each start.
 
-Floor 5. Only there with ``--dev``, and only for who has the start key. What a driver's author
-saves is used at once by the dev page's watch; to begin here reads everything again, saved or not
-noticed.
+Layer 5. Only with ``--dev``, and only for holders of the start key. The developer page loads a
+saved document at once; this page reads all documents again, whether or not a change was noticed.
 """
 
 import asyncio
@@ -46,7 +45,7 @@ class Fixed:
 
 @dataclass(frozen=True, slots=True)
 class DevStartPage:
-    """``dev_start.html.j2``: what is fixed, and the button that begins."""
+    """``dev_start.html.j2``: the fixed values, and the start button."""
 
     head: Head
     nav: Nav
@@ -54,7 +53,7 @@ class DevStartPage:
 
 
 class DevStart:
-    """The page and what its button does."""
+    """The page and the action of its button."""
 
     def __init__(
         self,
@@ -64,14 +63,14 @@ class DevStart:
         ways: Ways,
         is_here: Callable[[HTTPConnection], bool],
     ) -> None:
-        """Begin nothing yet.
+        """Prepare.
 
         Args:
             fleet: the robots.
-            remake: makes the robot of a profile that was read anew, by name.
-            take: goes on with that one; may raise `UrcError`.
-            ways: which pages there are.
-            is_here: tells whether who asks has the start key.
+            remake: makes a robot from a new version of its profile, by name.
+            take: switches to the new robot; may raise `UrcError`.
+            ways: the pages of this server, for links.
+            is_here: returns whether a request has the start key.
         """
         self._fleet = fleet
         self._remake = remake
@@ -80,14 +79,14 @@ class DevStart:
         self._is_here = is_here
 
     def routes(self) -> list[Route]:
-        """Return the page, and what begins."""
+        """Return the routes of the page and of its action."""
         return [
             Route("/dev", self.page),
             Route("/api/v1/robots/{name}/dev/start", self.start, methods=["POST"]),
         ]
 
     async def page(self, request: Request) -> Response:
-        """Show what is fixed."""
+        """Show the fixed values."""
         if not self._is_here(request):
             raise HTTPException(
                 403, t("The dev interface needs the key in the address that URC printed.")
@@ -102,7 +101,7 @@ class DevStart:
         return HTMLResponse(render("dev_start.html.j2", page), headers=_NO_STORE)
 
     async def start(self, request: Request) -> Response:
-        """Read everything anew, and tell where the robot is."""
+        """Read all documents again, and return the URL of the robot."""
         name = request.path_params["name"]
         if not self._is_here(request):
             return told(403, "the dev interface needs the key in the address that URC printed")
@@ -123,7 +122,7 @@ class DevStart:
 
 
 def no_dev_start() -> list[Route]:
-    """Return the route of a server without a dev interface: it says how to get it."""
+    """Return the route of a server without ``--dev``: it says how to turn the page on."""
 
     async def tell(_: Request) -> Response:
         raise HTTPException(404, t("The dev interface is off. Start URC with --dev to turn it on."))

@@ -1,8 +1,8 @@
-"""What a driver makes of bytes that somebody pastes: which frames, who takes them, or why nobody.
+"""Try-out of the parser: the frames in pasted bytes, their consumers, or the reasons for none.
 
-Floor 5, pure: it builds readers of its own and touches no live robot. The order is that of the
-engine: a frame that answers nothing goes to the first message that takes it. Which reply it would
-be is told beside that, for here nobody has asked anything.
+Layer 5, pure: it builds readers of its own and touches no live robot. The order is that of the
+engine: an unsolicited frame goes to the first message that matches. Matching replies are listed
+too, because the try-out has no pending request.
 """
 
 import json
@@ -28,31 +28,31 @@ __all__ = ["MOST_BYTES", "Finding", "Piece", "Taker", "pasted_bytes", "try_out"]
 
 MOST_BYTES = 64 * 1024
 MOST_PIECES = 200
-"""Frames of one try-out that are told of."""
+"""Most frames in the result of one try-out."""
 MOST_REASONS = 30
 _ESCAPES = {"n": b"\n", "r": b"\r", "t": b"\t", "0": b"\0", "e": b"\x1b", "\\": b"\\"}
 _ESCAPE = re.compile(r"\\(x[0-9A-Fa-f]{2}|.|$)", re.DOTALL)
 
 
 class Taker(NamedTuple):
-    """Somebody who takes a frame."""
+    """The consumer of a frame."""
 
     kind: str
-    """``message``, ``reply``, or ``refusal``: an answer that means failure."""
+    """``message``, ``reply`` or ``refusal`` (an error reply)."""
     names: tuple[str, ...]
-    """Who it is; several replies may look alike."""
+    """Names of messages or replies; several replies may match."""
     fields: Mapping[str, object]
     samples: tuple[tuple[str, object, str], ...]
     """Signal, value, alarm."""
     refused: tuple[str, ...]
-    """Values that are none, and why; of a refusal, what people are told."""
+    """Invalid values with the reason; of an error reply, its text for people."""
 
 
 class Piece(NamedTuple):
-    """One frame, or bytes that were none."""
+    """One frame, or bytes outside any frame."""
 
     start: int
-    """Where it begins in what was pasted, in bytes."""
+    """Offset of its first byte in the input."""
     end: int
     data: bytes
     """Its payload: without delimiter, length or checksum."""
@@ -60,22 +60,22 @@ class Piece(NamedTuple):
     """Why the bytes are no frame; "" for a frame."""
     takers: tuple[Taker, ...] = ()
     reasons: tuple[str, ...] = ()
-    """Where nobody takes it: what each who was asked says."""
+    """Reason of each candidate that does not match, if none does."""
 
 
 class Finding(NamedTuple):
-    """All of it."""
+    """The result of a try-out."""
 
     size: int
     pieces: tuple[Piece, ...]
     left: int
-    """Bytes at the end that begin a frame and do not end it."""
+    """Bytes of an incomplete frame at the end."""
     more: int
-    """Frames beyond `MOST_PIECES`, which were not looked at."""
+    """Frames beyond `MOST_PIECES`, which are not parsed."""
 
 
 class _Candidate(NamedTuple):
-    """Somebody who is asked about each frame."""
+    """A message or reply that a frame is matched against."""
 
     kind: str
     name: str
@@ -85,16 +85,16 @@ class _Candidate(NamedTuple):
 
 
 def pasted_bytes(text: str, *, is_hex: bool, encoding: str) -> bytes:
-    r"""Return the bytes that somebody means by a text.
+    r"""Return the bytes that a pasted text stands for.
 
     Args:
-        text: as pasted.
-        is_hex: pairs of hex digits; blanks, commas, colons and ``0x`` between them say nothing.
-            Else text, in which ``\n \r \t \0 \e \\`` and ``\xHH`` are bytes.
-        encoding: of the text.
+        text: the input.
+        is_hex: whether it is pairs of hex digits; blanks, commas, colons and ``0x`` between them
+            are ignored. Else it is text with the escapes ``\n \r \t \0 \e \\`` and ``\xHH``.
+        encoding: encoding of the text.
 
     Raises:
-        UrcError: it is neither, or too long; the message says where.
+        UrcError: the text is invalid or too long; the message has the position.
     """
     data = _from_hex(text) if is_hex else _from_text(text, encoding)
     if len(data) > MOST_BYTES:
@@ -109,17 +109,17 @@ def try_out(
     data: bytes,
     topic: str = "",
 ) -> Finding:
-    """Return what the driver makes of `data`.
+    """Return the frames in `data` and their consumers.
 
     Args:
-        driver: as loaded.
+        driver: the loaded driver.
         settings: value of every setting.
-        transport: where it comes in.
-        data: bytes as the robot sends them; on a transport that carries messages, the body of one.
-        topic: where that message comes from; "": it is the answer to a request.
+        transport: name of the transport that receives the data.
+        data: bytes as the robot sends them; on a message transport, the body of one message.
+        topic: topic of that message; "" for a reply to a request.
 
     Raises:
-        UrcError: no such transport, or a body that is no JSON where nothing else can come.
+        UrcError: the transport is unknown, or the body must be JSON and is not.
     """
     spec = driver.transports.get(transport)
     if spec is None:
@@ -143,7 +143,7 @@ def try_out(
 def _cut(
     spec: TransportSpec, data: bytes
 ) -> tuple[list[tuple[int, int, bytes | FrameFault]], int, int]:
-    """Return frames and faults with their places, the bytes left over, and frames not told of."""
+    """Return frames and faults with their places, leftover bytes, and the number of more frames."""
     decoder = build_framing(spec.framing).decoder()
     decoder.push(data, 0.0)
     cut: list[tuple[int, int, bytes | FrameFault]] = []
@@ -155,7 +155,7 @@ def _cut(
         else:
             more += 1
         at = end
-    if decoder.deadline is not None:  # silence ends it, and nothing follows what was pasted
+    if decoder.deadline is not None:  # a timeout ends the frame, and no more bytes follow
         for late in decoder.tick(decoder.deadline):
             end = max(at, len(data) - decoder.pending)
             cut.append((at, end, late))
@@ -165,7 +165,7 @@ def _cut(
 
 def _envelope(spec: TransportSpec, data: bytes, topic: str) -> Envelope:
     body: object = data
-    if spec.type == "rosbridge":  # its messages are data; the others bring bytes
+    if spec.type == "rosbridge":  # its messages are structured data; others bring bytes
         try:
             body = json.loads(data)
         except (ValueError, RecursionError) as error:
@@ -181,7 +181,7 @@ def _take(
     takers: list[Taker] = []
     for one in asked:
         if one.kind == "message" and any(taker.kind == "message" for taker in takers):
-            continue  # the first one has it
+            continue  # the first match consumes the frame
         taker = _taken(_anew(frame), one)
         if taker is not None:
             _add(takers, taker)
@@ -193,7 +193,7 @@ def _take(
 
 
 def _add(takers: list[Taker], taker: Taker) -> None:
-    """Add a taker, to one that says the same if there is any."""
+    """Add a consumer; merge it into an equal one."""
     for place, other in enumerate(takers):
         if other._replace(names=()) == taker._replace(names=()) and taker.kind != "message":
             takers[place] = other._replace(names=(*other.names, *taker.names))
@@ -221,7 +221,7 @@ def _taken(frame: Frame, one: _Candidate) -> Taker | None:
 def _why_not(
     frame: Frame, one: _Candidate, spec: TransportSpec, settings: Mapping[str, object]
 ) -> str:
-    """Return in words why a frame is another one."""
+    """Return why a frame does not match, in words."""
     read = one.read
     if read.topic is not None and (topic := topic_of(read, settings)) != frame.topic:
         came = "an answer" if frame.topic is None else repr(frame.topic)
@@ -264,7 +264,7 @@ def _candidates(
 
 
 def _replies(driver: Driver, spec: TransportSpec) -> Iterator[tuple[str, Reply]]:
-    """Yield all that is waited for on a line, each stage and step as a reply of its own."""
+    """Yield all expected replies on a transport; each stage and step counts as one reply."""
     asked = [(f"reply to {one.name}", one.transport, one.reply) for one in driver.commands.values()]
     asked += [
         (f"reply to poll {one.name}", one.transport, one.reply)
@@ -287,7 +287,7 @@ def _replies(driver: Driver, spec: TransportSpec) -> Iterator[tuple[str, Reply]]
 
 
 def _anew(frame: Frame) -> Frame:
-    """Return the same frame, of which nobody has said anything."""
+    """Return a copy of the frame without cached results."""
     other = Frame(frame.payload, frame.encoding)
     other.topic = frame.topic
     return other

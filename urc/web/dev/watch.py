@@ -1,7 +1,7 @@
-"""Watches the documents of one robot and goes on with the new version whenever one is saved.
+"""Watches the documents of one robot, and switches to the new version when a document is saved.
 
-Floor 5. A version that is broken changes nothing: the old one goes on, and the findings are told.
-One that is good waits until nobody has the controls, for the robot is disconnected in between.
+Layer 5. A broken version changes nothing: the old one keeps running, and its problems are reported.
+A good one waits until the robot is not driven, because the switch disconnects it for a moment.
 """
 
 import asyncio
@@ -29,17 +29,17 @@ log = logging.getLogger(__name__)
 
 
 class Examined(NamedTuple):
-    """What `urc validate` says of a file."""
+    """The result of `urc validate` for a file."""
 
     profile: Profile | None
-    """None: it cannot be used."""
+    """None if the file has errors."""
     problems: tuple[Problem, ...]
     files: tuple[str, ...]
-    """Every document that counts."""
+    """Paths of all documents of the profile."""
 
 
 def examine(file: str) -> Examined:
-    """Check a document and run its own tests."""
+    """Check a document and run its tests."""
     checked = check(file, built_in_catalog(), shelf_of(file))
     problems = checked.problems
     if checked.profile is not None:
@@ -49,34 +49,34 @@ def examine(file: str) -> Examined:
 
 @dataclass(slots=True)
 class ProfileWatch:
-    """The documents of one robot."""
+    """The watch over the documents of one robot."""
 
     station: Station
     remake: Remake
     take: Callable[[Robot], None]
-    """Goes on with another version everywhere; may raise `UrcError`."""
+    """Switches all users to another version; may raise `UrcError`."""
     state: State = "running"
     told: str = ""
-    """What happened last, for people."""
+    """Last event, for people."""
     problems: tuple[Problem, ...] = ()
     edition: int = 0
-    """Grows with every change of what is told here."""
+    """Counter of changes to the published state."""
     listeners: set[Callable[[], None]] = field(default_factory=set)
     _next: Profile | None = None
     _robot: Robot | None = None
 
     @property
     def robot(self) -> Robot:
-        """The newest version that was taken; the session of the one before it may be closing."""
+        """The newest accepted version; the session of the version before may still be closing."""
         return self._robot or self.station.robot
 
     @property
     def file(self) -> str:
-        """The robot's document."""
+        """The path of the robot's document."""
         return self.robot.profile.file
 
     async def run(self) -> None:
-        """Watch for ever; ends by being cancelled."""
+        """Watch until cancelled."""
         sleep = self.station.clock.sleep
         watched = Watched([self.file])
         found = await asyncio.to_thread(examine, self.file)
@@ -88,7 +88,8 @@ class ProfileWatch:
                 self._go_on()
                 await sleep(PERIOD_S)
             await self._settled(watched)
-            watched = Watched((self.file, *found.files))  # before it is read
+            # Taken before the file is read, so that no change is missed.
+            watched = Watched((self.file, *found.files))
             try:
                 found = await asyncio.to_thread(examine, self.file)
                 self._judge(found)
@@ -97,7 +98,7 @@ class ProfileWatch:
                 self._tell("broken", f"looking at it failed ({type(bug).__name__}: {bug})")
 
     async def _settled(self, watched: Watched) -> None:
-        """Wait until nobody writes: a program may write a file in several steps."""
+        """Wait until the files are stable: a program may write a file in several steps."""
         before: list[object] = []
         while (now := watched.states()) != before:
             before = now
@@ -123,7 +124,7 @@ class ProfileWatch:
                 self._tell("waiting", text)
 
     def _go_on(self) -> bool:
-        """Go on with the new version, if there is one and the robot is at rest."""
+        """Switch to the new version if there is one and the robot is at rest."""
         if self._next is None or not self.station.is_at_rest:
             return False
         profile, self._next = self._next, None

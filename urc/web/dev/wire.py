@@ -1,13 +1,13 @@
-"""What goes over the dev page's own WebSocket: message shapes, and nothing else.
+"""Message types of the developer page's WebSocket, without behaviour.
 
-Floor 5. JSON text both ways; bytes travel as base64. Server → page, by ``t``::
+Layer 5. JSON text both ways; bytes travel as base64. Server → page, by ``t``::
 
     hello    once, first
-    profile  what the profile says now, whether it is the one that runs, and every finding
-    rows     the traffic and the notes, oldest first; numbers run on, a gap shows what was dropped
-    tried    the answer to `Try`
-    shown    the answer to `Show`
-    pong, error   as on the dashboard's own
+    profile  the profile, its state and its problems
+    rows     traffic and notes, oldest first; a gap in the numbers shows dropped rows
+    tried    the reply to `Try`
+    shown    the reply to `Show`
+    pong, error   as on the dashboard's WebSocket
 
 Page → server: ``ping``, ``try`` and ``show``.
 """
@@ -42,7 +42,7 @@ MOST_PROBLEMS = 100
 
 
 class Try(msgspec.Struct, tag_field="t", tag="try", forbid_unknown_fields=True, frozen=True):
-    """Asks what the driver makes of something pasted."""
+    """Requests a try-out of the parser with pasted text."""
 
     id: int
     transport: str
@@ -55,7 +55,7 @@ _Scalar = bool | int | float | str
 
 
 class Show(msgspec.Struct, tag_field="t", tag="show", forbid_unknown_fields=True, frozen=True):
-    """Asks what a command would send."""
+    """Requests a preview of a command."""
 
     id: int
     command: str
@@ -67,7 +67,7 @@ _decoder: msgspec.json.Decoder[Inbound] = msgspec.json.Decoder(Inbound)
 
 
 def decode(text: str | bytes) -> Inbound:
-    """Return the message, or raise `BadMessage` saying what is wrong with it."""
+    """Return the message; raise `BadMessage` with the reason if it is invalid."""
     if len(text) > INBOUND_BYTES:
         raise BadMessage(f"longer than {INBOUND_BYTES} bytes")
     try:
@@ -88,7 +88,7 @@ class _Rows(Outbound, tag="rows", omit_defaults=False, frozen=True):
     first: int
     now: int
     rows: list[Row]
-    """Their times in milliseconds, as ages: see `encode_rows`."""
+    """Rows with their ages in milliseconds; see `encode_rows`."""
 
 
 class _Found(msgspec.Struct, frozen=True):
@@ -189,7 +189,7 @@ def encode_hello(robot: str, now_s: float) -> str:
 
 
 def encode_rows(rows: Iterable[Row], first: int, now_s: float) -> str:
-    """Return rows of the wire log, the first of which has the number `first`."""
+    """Return rows of the traffic log; `first` is the number of the first row."""
     aged = [
         msgspec.structs.replace(row, time_s=max(0, milliseconds(now_s - row.time_s)))
         for row in rows
@@ -207,16 +207,16 @@ def encode_profile(
     told: str,
     problems: Iterable[Problem],
 ) -> str:
-    """Return what the profile says, and what is wrong with the file.
+    """Return the profile and the problems of its file.
 
     Args:
-        driver: the one that runs.
+        driver: the running driver.
         messaging: types of transports that carry messages.
-        edition: grows with every change.
-        state: ``running``; ``waiting``: a new one is good and waits; ``broken``: it is not.
-        file: where it is read from.
-        told: what happened last, for people.
-        problems: all findings.
+        edition: counter of changes.
+        state: ``running``; ``waiting``: a good new version waits; ``broken``: it has errors.
+        file: path of the document.
+        told: last event, for people.
+        problems: all problems of the file.
     """
     kinds = frozenset(messaging)
     lines = [
@@ -229,7 +229,7 @@ def encode_profile(
 
 
 def encode_tried(number: int, finding: Finding | None, error: str = "") -> str:
-    """Return what became of something pasted."""
+    """Return the result of a try-out."""
     if finding is None:
         return encoded(_Tried(number, cut(error)))
     pieces = tuple(_piece(one) for one in finding.pieces)
@@ -237,7 +237,7 @@ def encode_tried(number: int, finding: Finding | None, error: str = "") -> str:
 
 
 def encode_shown(number: int, shown: Preview) -> str:
-    """Return what a command would send."""
+    """Return the preview of a command."""
     frames = [_frame(one) for one in shown.frames]
     return encoded(_Shown(number, cut(shown.refusal), frames, shown.questions, shown.requires))
 

@@ -1,1 +1,1 @@
-"""Who holds the controls of a robot, and how their hands reach it."""
+"""Control of a robot from pages: leases, held commands, commands, STOP and confirmations."""

@@ -1,11 +1,11 @@
-"""Questions that one person alone may not answer: a second screen says yes, or nobody does.
+"""The two-person rule: a second page must approve the command, or it fails.
 
-Floor 5. Until people sign in, a person is a screen that may drive: whoever asks can never be the
-second. Everything is bounded: how many questions wait, and for how long.
+Layer 5. Until users sign in, a person is a page that may drive, so the asking page can never be the
+second person. The number of questions and their waiting time are bounded.
 
-What a screen has said yes to is named by a token of ours. It counts once, for a few seconds, on
-that screen, and for just this command with just these arguments, which its bytes are made of: what
-was recorded, changed, or held up on its way is no yes.
+A token of the server stands for a confirmation. It counts once, for a few seconds, on that page,
+and only for the same command with the same arguments. A recorded, changed or delayed confirmation
+is therefore void.
 """
 
 import asyncio
@@ -29,11 +29,11 @@ from urc.web.wire import ask as wire
 __all__ = ["TOKEN_S", "WAIT_S", "Consent"]
 
 WAIT_S: Final = 30.0
-"""How long a second person has to say yes."""
+"""Longest wait for the second person, in seconds."""
 TOKEN_S: Final = 5.0
-"""How long a token counts."""
+"""Lifetime of a token, in seconds."""
 _MOST: Final = 8
-"""Questions that wait at a time, and tokens of one screen."""
+"""Most pending questions, and most tokens of one page."""
 
 
 @dataclass(slots=True)
@@ -48,7 +48,7 @@ class _Question:
 
 
 class _Yes(NamedTuple):
-    """What somebody has said yes to."""
+    """A confirmed command with its arguments."""
 
     asker: Seat
     meant: bytes
@@ -59,7 +59,7 @@ class Consent:
     """The questions of one robot."""
 
     def __init__(self, seats: Callable[[], tuple[Seat, ...]], clock: Clock) -> None:
-        """Begin with none; `seats` are the screens that look at the robot now."""
+        """Begin without questions; `seats` returns the pages that watch the robot."""
         self._seats = seats
         self._clock = clock
         self._numbers = count(1)
@@ -67,7 +67,7 @@ class Consent:
         self._tokens: dict[str, _Yes] = {}
 
     def prepare(self, asker: Seat, said: wire.Prepare) -> str:
-        """Return a token for what somebody at this screen has said yes to."""
+        """Return a token for a confirmation on this page."""
         now = self._clock.now()
         self._tokens = {key: yes for key, yes in self._tokens.items() if yes.until_s > now}
         mine = [key for key, yes in self._tokens.items() if yes.asker is asker]
@@ -81,17 +81,17 @@ class Consent:
     async def people(
         self, asker: Seat, run: int, known: Command, arguments: Mapping[str, Reading], token: str
     ) -> tuple[str, ...]:
-        """Return who has said yes to a command; nobody has to where nothing is asked.
+        """Return the names of the people who confirmed a command; () if it needs no confirmation.
 
         Args:
-            asker: who gives it.
-            run: its number on that screen.
+            asker: the page that runs it.
+            run: number of the command on that page.
             known: the command.
-            arguments: what it is given with.
-            token: of `prepare`; used up by this.
+            arguments: its arguments.
+            token: from `prepare`; valid once.
 
         Raises:
-            CommandFailed: somebody must, and has not.
+            CommandFailed: a confirmation is missing.
         """
         yes = self._tokens.pop(token, None)
         asks = questions(known, arguments)
@@ -110,17 +110,12 @@ class Consent:
         return (asker.client.name, await self.second(asker, run, known.title or known.name, two))
 
     async def second(self, asker: Seat, run: int, command: str, confirm: Confirm) -> str:
-        """Ask everybody else that may drive; return the name of who said yes.
+        """Ask all other pages that may drive; return the name of the second person.
 
-        Args:
-            asker: who gave the command, and has said yes.
-            run: number of the command on that screen.
-            command: what it is called.
-            confirm: the question.
+        `run` is the number of the command on the asking page.
 
         Raises:
-            CommandFailed: nobody did, in time; somebody said no; the asker took it back; or STOP
-                was pressed.
+            CommandFailed: approval was refused, withdrawn or too late, or STOP was pressed.
         """
         if len(self._questions) >= _MOST:
             raise CommandFailed("busy", f"{_MOST} questions wait for a second person already")
@@ -145,19 +140,19 @@ class Consent:
         return second.client.name
 
     def stop(self) -> None:
-        """End every question, and forget every yes: STOP was pressed."""
+        """End every question and revoke every token: STOP was pressed."""
         self._tokens.clear()
         for one in self._questions.values():
             if not one.answer.done():
                 one.answer.set_exception(CommandFailed("not-confirmed", STOPPED))
 
     def welcome(self, seat: Seat) -> None:
-        """Tell a screen that has just come what is asked."""
+        """Send the pending questions to a new page."""
         for one in self._questions.values():
             self._tell(seat, one)
 
     def hear(self, seat: Seat, said: wire.Agree) -> None:
-        """Take what a screen says to a question; a question that is over is left alone."""
+        """Take the answer of a page; ignore it when the question is over."""
         one = self._questions.get(said.n)
         if one is None or one.answer.done() or seat.client.role == "viewer":
             return

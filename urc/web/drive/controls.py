@@ -1,8 +1,8 @@
-"""The controls of one robot, as its screens see them: one desk, a seat for each screen.
+"""The controls of one robot: one motion desk, and one operator session for each page.
 
-Floor 5. Nothing waits for anybody: what a seat is told is the newest lease, the newest beat, and
-one line for each control, taken when its own line is free. Ticks that come faster than any robot
-takes them are thinned: the newest wins, and the last one always arrives.
+Layer 5. Nothing blocks: a page gets the newest lease, the newest heartbeat and one notice for each
+control when its socket is free. Ticks faster than any robot's rate are thinned: the newest wins,
+and the last one always arrives.
 """
 
 import asyncio
@@ -29,19 +29,19 @@ from urc.web.wire import drive as wire
 __all__ = ["BEAT_S", "Controls", "Drivable", "Seat"]
 
 BEAT_S = 0.05
-"""How often the screen that has the controls is told a number, which its ticks echo."""
+"""Interval of the heartbeat numbers to the page that drives, in seconds; its ticks echo them."""
 THINNED_S = 0.01
-"""Mean time between two ticks of one control that are looked at, at least."""
+"""Shortest mean time between two applied ticks of one control, in seconds."""
 PATIENCE_S = 0.25
-"""A tick that came late is no news while the control moves all the same."""
+"""A late tick is not reported while the control has moved within this time, in seconds."""
 
 
 Offered = Literal["in time", "one more", "no tick"]
-"""A tick at a pace that any robot may have, or faster than that, or something else."""
+"""A tick within the rate of any robot, a faster one, or another message."""
 
 
 class Controls:
-    """The desk of one robot, and who sits at it."""
+    """The motion desk of one robot and its pages."""
 
     def __init__(
         self,
@@ -50,13 +50,10 @@ class Controls:
         file: LatchFile | None = None,
         trail: Trail | None = None,
     ) -> None:
-        """Take up the latch where it was.
+        """Restore the latch from its file.
 
-        Args:
-            driver: its commands with ``hold`` are the controls.
-            clock: the time.
-            file: keeps the latch over a restart; None: nothing does.
-            trail: takes note of what happens; None: nobody does.
+        The held commands of `driver` are the controls. `file` keeps the latch over a restart, and
+        `trail` receives the events of the audit log; both may be None.
         """
         self.trail = trail or Trail("", _unread, utc=lambda: 0.0)
         self.desk = self._desk(driver, file.load() if file is not None else Latch(LeaseState()))
@@ -67,17 +64,17 @@ class Controls:
         self._seats: dict[str, Seat] = {}
         self._guests = 0
         self._number = 0
-        """Of the newest lease."""
+        """Number of the newest lease."""
         self._beating: Alarm | None = None
         self._expiring: Alarm | None = None
         self.once = Once(driver, lambda: self.desk, clock, self.trail)
         self.watch = LoopWatch(clock, self._held_up)
-        """Runs while the robot is connected."""
+        """Detects a blocked event loop; runs while the robot is connected."""
         self._heed(file)
 
     @property
     def seats(self) -> tuple[Seat, ...]:
-        """The screens that look at the robot."""
+        """The pages that watch the robot."""
         return tuple(self._seats.values())
 
     @property
@@ -86,10 +83,10 @@ class Controls:
         return tuple(name for name, one in self._driver.commands.items() if one.hold is not None)
 
     def renew(self, driver: Driver, file: LatchFile | None) -> None:
-        """Go on with another version of the driver, between two sessions.
+        """Switch to another version of the driver, between two sessions.
 
-        A latched stop holds, and one that the robot has not heard of is still owed; nobody has the
-        controls, and nothing that was armed still is.
+        A latched STOP stays latched, and an unacknowledged one is still sent. All leases end, and
+        nothing stays armed.
         """
         kept = Latch(self.desk.lease.state, not self.desk.is_confirmed)
         for seat in self._seats.values():
@@ -114,7 +111,7 @@ class Controls:
     # -- sessions
 
     async def serve(self, session: Drivable) -> None:
-        """Let a session be driven for as long as this runs; ends by being cancelled."""
+        """Let a session be driven until this task is cancelled."""
         if not self.desk.can_move:
             return
         self._hub = session.hub
@@ -132,7 +129,7 @@ class Controls:
             self._hub = None
             self.desk.detach()
             now = self._clock.now()
-            for command in self.commands:  # its movers stop what moves, and report no more
+            for command in self.commands:  # movers stop silently
                 self.trail.stopped(command, "the robot was disconnected", now)
 
     async def _follow(self, movers: Movers) -> None:
@@ -140,15 +137,15 @@ class Controls:
             for command, reason in await movers.stops():
                 self._stopped(command, reason)
 
-    # -- screens
+    # -- pages
 
     def sit(self, place: str, role: Role, wake: Callable[[], None]) -> Seat:
-        """Give a screen its seat; raise `UrcError` when there are too many.
+        """Add a page; raise `UrcError` when there are too many.
 
         Args:
-            place: where it is, for the others: an address, or "" for this machine.
-            role: what it may do.
-            wake: called when there is something to take.
+            place: its address, shown to others; "" for this machine.
+            role: its rights.
+            wake: callback for new messages to the page.
         """
         self._guests += 1
         name = f"screen {self._guests}{f' at {place}' if place else ''}"
@@ -158,7 +155,7 @@ class Controls:
         return seat
 
     def rise(self, seat: Seat) -> None:
-        """Take note that a screen is gone: what it held stops."""
+        """Remove a page; its held controls stop."""
         for command in list(seat.alarms):
             seat.forget(command)
         self._seats.pop(seat.client.id, None)
@@ -167,16 +164,16 @@ class Controls:
         self.desk.part(seat.client.id)
 
     def seat_of(self, key: str) -> Seat | None:
-        """Return the seat with this key."""
+        """Return the page with this key, or None."""
         said = key.encode()
         return next(
             (one for one in self._seats.values() if compare_digest(one.key.encode(), said)), None
         )
 
     def take(self, seat: Seat) -> list[str]:
-        """Return the messages that bring a screen up to date."""
+        """Return the messages that bring a page up to date."""
         texts: list[str] = []
-        is_told = self.desk.can_move or seat.client.role == "viewer"  # who may give nothing
+        is_told = self.desk.can_move or seat.client.role == "viewer"  # a watcher gives no commands
         if is_told and seat.seen != self._number:
             seat.seen = self._number
             desk, now = self.desk, self._clock.now()
@@ -189,13 +186,13 @@ class Controls:
             seat.beat = None
         return texts
 
-    # -- what screens say
+    # -- messages from pages
 
     def offer(self, seat: Seat, data: bytes) -> Offered:
-        """Take a tick as it came, unread; return what it was.
+        """Take a tick as raw bytes; return its kind.
 
-        Nothing is made of one that comes while another waits: it only takes its place. When many
-        do, the rest waits with it where it is, and costs nobody anything.
+        A tick that arrives while another is pending replaces it without being decoded. Many of
+        them pause the socket, so a flood costs nothing.
         """
         if seat.alarms and seat.doubled is None:
             command = wire.command_of(data)
@@ -219,7 +216,7 @@ class Controls:
         return "one more"
 
     def hear(self, seat: Seat, said: wire.Driving) -> None:
-        """Do what a screen says."""
+        """Perform a message from a page."""
         match said:
             case wire.Tick():
                 self._thin(seat, said)
@@ -299,7 +296,7 @@ class Controls:
             return None
 
     def _tick(self, seat: Seat, tick: wire.Tick, now: float) -> None:
-        given = tuple.__new__(Input, (tick.epoch, tick.number, tick.echo))  # one of many a second
+        given = tuple.__new__(Input, (tick.epoch, tick.number, tick.echo))  # fast: many a second
         command = tick.command
         reason = self.desk.tick(seat.client.id, command, tick.arguments, given, now)
         if not reason:
@@ -311,19 +308,19 @@ class Controls:
     def _is_closed(self, given: Input) -> bool:
         return given.epoch != self.desk.lease.state.epoch
 
-    # -- what follows
+    # -- effects
 
     def _stopped(self, command: str, reason: Reason) -> None:
         self.desk.stopped(command, reason)
         self.trail.stopped(command, reason, self._clock.now())
         if reason in ("released", "stopped"):
-            return  # the hand knows, or the lease says it
+            return  # the operator let go, or the lease reports it
         for seat in self._seats.values():
             seat.moved_s.pop(command, None)
             seat.notice(command, wire.encode_stopped(command, reason))
 
     def _refused(self, command: str, why: str) -> None:
-        """Let every screen know in which words the robot refused to move."""
+        """Tell every page why the robot refused to move."""
         self.trail.stopped(command, why, self._clock.now())
         for seat in self._seats.values():
             seat.forget(command)
@@ -335,7 +332,7 @@ class Controls:
             file.on_fault = self._latch_fault
 
     def _latch_fault(self, fault: str) -> None:
-        """Let everybody know that a stop would not outlast a restart, or does again."""
+        """Report that STOP would not survive a restart, or that it would again."""
         if fault:
             text = f"STOP works, but would not outlast a restart of the server: {fault}"
             self._tell("error", text)
@@ -372,7 +369,7 @@ class Controls:
             self._beat()
 
     def _beat(self) -> None:
-        """Tell the holder a number, and again in a while; nobody else is told any."""
+        """Send a heartbeat to the page that drives, and schedule the next one."""
         self._beating = None
         holder = self.desk.lease.state.holder
         seat = self._seats.get(holder.id) if holder is not None else None
@@ -398,4 +395,4 @@ class Controls:
 
 
 def _unread(entry: Entry) -> None:
-    """Nobody reads it."""
+    """Ignore an entry of the audit log."""

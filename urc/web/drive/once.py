@@ -1,9 +1,9 @@
-"""Commands that are given once, beside those that are held: who may give them, and what STOP does.
+"""Commands without a held control: the check of permission, and the effect of STOP.
 
-Floor 5. The lease of section 6 is for what a hand holds. What is given once needs none; but a page
-that only watches gives nothing, and what moves something by itself (``moves``) is neither begun
-against a stop, nor against whoever drives. The engine refuses it while a stop is latched, too: what
-waits on a line, or in a question, must not go out after it.
+Layer 5. Only held commands need the lease. A command without it needs the role of an operator; a
+watcher gives none. A command that starts autonomous motion (``moves``) also fails while a STOP is
+latched or another operator drives. The engine checks the latch a second time, because a command may
+have waited in a queue or for a confirmation.
 """
 
 import asyncio
@@ -24,56 +24,56 @@ from urc.web.drive.seat import Drivable
 __all__ = ["HELD", "NotAdmitted", "Once", "can_move", "needs_holding"]
 
 AGAIN_S = 1.0
-"""After so long a stop that has not reached the robot is given again."""
+"""Delay before the next try while a STOP has not reached the robot, in seconds."""
 _STOP = Client("", "STOP")
 HELD = "this command moves the robot for as long as it is held, and nothing here can hold it"
 
 
 class NotAdmitted(CommandFailed):
-    """A command of which nothing is asked of the robot."""
+    """The refusal of a command before anything was sent to the robot."""
 
 
 def can_move(driver: Driver) -> bool:
-    """Return whether anything of the robot moves, and so STOP is shown and latches."""
+    """Return whether the robot can move, and so needs STOP and its latch."""
     return any(one.hold is not None or one.moves or one.stops for one in driver.commands.values())
 
 
 def needs_holding(driver: Driver, command: str) -> bool:
-    """Return whether the command is motion: given once, it would never be stopped."""
+    """Return whether a command is continuous motion, which must not run without a held control."""
     known = driver.commands.get(command)
     return known is not None and known.hold is not None
 
 
 def _moves(command: Command, arguments: Mapping[str, object]) -> bool:
-    """Return whether it moves something with what a page gives, as the robot is given it."""
+    """Return whether a command with these arguments starts motion."""
     if command.moves_if is None:
         return command.moves
     try:
         return command.moves_with(check_arguments(command, arguments))
     except BadArgument:
-        return False  # nothing is sent of it; the engine says what is wrong
+        return False  # the engine reports the mistake; nothing is sent
 
 
 class Once:
-    """Those of one robot."""
+    """Commands without a held control, for one robot."""
 
     def __init__(
         self, driver: Driver, desk: Callable[[], MotionDesk], clock: Clock, trail: Trail
     ) -> None:
-        """Prepare; `desk` returns the one that counts now."""
+        """Prepare; `desk` returns the current motion desk."""
         self.driver = driver
         self._desk = desk
         self._clock = clock
         self._trail = trail
         self._session: Drivable | None = None
         self.on_stopped: Callable[[], None] = _nobody
-        """Called at each press of STOP."""
+        """Callback for each press of STOP."""
         self._pressed = asyncio.Event()
 
     def admit(
         self, client: Client, command: str, arguments: Mapping[str, object], stops: int | None
     ) -> None:
-        """Raise `NotAdmitted` while this screen may not give a command or sequence."""
+        """Raise `NotAdmitted` if this page may not run the command or sequence."""
         is_held = needs_holding(self.driver, command)
         reason = HELD if is_held else self.refusal(client, command, arguments, stops)
         if reason:
@@ -86,13 +86,9 @@ class Once:
         arguments: Mapping[str, object] = NOTHING,
         stops: int | None = None,
     ) -> str:
-        """Return why this screen may not give a command or sequence now, or "".
+        """Return why this page may not run a command or sequence now, or "".
 
-        Args:
-            client: the screen.
-            command: what it gives.
-            arguments: with these.
-            stops: how many it knew of when it was wished; None: it is wished now.
+        `stops` is the page's count of STOPs at the operator's click; None means now.
         """
         known = self.driver.commands.get(command)
         if known is not None and _moves(known, arguments):
@@ -100,15 +96,15 @@ class Once:
         return WATCHES if client.role == "viewer" else ""
 
     def pull_refusal(self, client: Client, sequence: str, what: Pull) -> str:
-        """Return why this screen may not do that with a sequence; whoever drives may end any."""
+        """Return why this page may not skip or end a sequence; the driver may end any."""
         if what in ("pause", "abort"):
             return WATCHES if client.role == "viewer" else ""
         return self.refusal(client, sequence)
 
-    # -- the session
+    # -- session
 
     async def serve(self, session: Drivable) -> None:
-        """Let STOP reach a session; one that is latched, or still owed, does at once."""
+        """Let STOP reach a session, at once if it is latched or not yet acknowledged."""
         self._session = session
         self._pressed.clear()
         if self._desk().lease.latched or self._desk().owed:
@@ -120,25 +116,25 @@ class Once:
                     await self._pressed.wait()
                     self._pressed.clear()
                     if giving is not None:
-                        giving.cancel()  # each press is a stop of its own
+                        giving.cancel()  # each press starts a new stop
                     giving = group.create_task(self._give_stops(session))
         finally:
             self._session = None
 
     def stopped(self) -> None:
-        """Take note that STOP was pressed."""
+        """Start a stop: STOP was pressed."""
         self.on_stopped()
         if self._session is not None:
             self._session.latch(self._desk().lease.latched)
             self._pressed.set()
 
     def reset(self) -> None:
-        """Take note that nothing is stopped any more."""
+        """End the stop after a reset."""
         if self._session is not None:
             self._session.latch("")
 
     async def _give_stops(self, session: Drivable) -> None:
-        """Give the commands that stop the robot until it has heard of each."""
+        """Repeat the stop commands until the robot has acknowledged each."""
         while owed := self._desk().owed:
             async with asyncio.TaskGroup() as group:
                 for command in owed:
@@ -153,7 +149,7 @@ class Once:
             await session.command(command, {}, on_sent=sent.append)
         except CommandFailed as failed:
             outcome = f"{failed.code}: {failed.message}"
-            # What the robot refuses it has heard. After a reset nobody wants another one.
+            # A refusal proves that the robot received the command. A reset ends the retries.
             is_heard = failed.code == "refused" or (bool(sent) and not self._desk().lease.latched)
         if sent:
             self._trail.ran(_STOP, command, {}, outcome, sent[-1])
@@ -162,4 +158,4 @@ class Once:
 
 
 def _nobody() -> None:
-    """Nobody wants to know."""
+    """Ignore a press of STOP."""

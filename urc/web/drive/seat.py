@@ -1,6 +1,6 @@
-"""One screen at the controls of a robot: what it is to be told, and what of it waits.
+"""The state of one page that may drive a robot: pending ticks, pending notices and its lease.
 
-Floor 5.
+Layer 5.
 """
 
 import secrets
@@ -21,17 +21,17 @@ from urc.web.wire import drive as wire
 __all__ = ["FLOOD", "Drivable", "Seat", "SpareLine"]
 
 FLOOD = 4
-"""Ticks that come while one waits already; then the rest may wait with it, before it is read."""
+"""Ticks that may arrive while one is pending; further ones stay in the socket's buffer."""
 
 
 class SpareLine(Protocol):
-    """A second line of a screen, see `urc.web.drive.spare`."""
+    """A redundant socket of a page, see `urc.web.drive.spare`."""
 
     def beat(self, number: int) -> None:
-        """Tell it a number."""
+        """Send a heartbeat number."""
 
     def end(self) -> None:
-        """Take nothing more from it."""
+        """Stop reading from the socket."""
 
 
 class Drivable(Protocol):
@@ -39,15 +39,15 @@ class Drivable(Protocol):
 
     @property
     def frames(self) -> Frames:
-        """The engine."""
+        """The encoder of the engine."""
 
     @property
     def movers(self) -> Movers | None:
-        """Who writes motion; None where the robot has no held command."""
+        """The sender of motion; None for a robot without a held command."""
 
     @property
     def hub(self) -> Hub:
-        """Takes what everybody should know."""
+        """The hub, for values that all pages see."""
 
     async def command(
         self,
@@ -56,61 +56,61 @@ class Drivable(Protocol):
         *,
         on_sent: Callable[[Payload], None] | None = None,
     ) -> Replied:
-        """Run one command and return its reply; raise `CommandFailed` when there is none."""
+        """Run one command and return its reply; raise `CommandFailed` without one."""
 
     def latch(self, reason: str) -> None:
-        """End sequences, and begin nothing that moves by itself; "" lets it be begun again."""
+        """Latch, end sequences and block autonomous motion; "" as reason resets the latch."""
 
 
 class Seat:
-    """One screen at the controls."""
+    """The state of one page that may drive a robot."""
 
     def __init__(self, client: Client, wake: Callable[[], None]) -> None:
         self.client = client
         self.wake = wake
         self.beat: int | None = None
         self.notices: dict[str, str] = {}
-        """Control or verb → the newest line about it."""
+        """Control or verb → newest notice about it."""
         self.seen = -1
-        """Number of the lease that it was told."""
+        """Number of the newest lease that was sent to the page."""
         self.pending: dict[str, wire.Tick | bytes] = {}
-        """Control → the newest tick that waits to be looked at; read by then, or not."""
+        """Control → newest pending tick, decoded or still as bytes."""
         self.paces: dict[str, Pace] = {}
         self.alarms: dict[str, Alarm] = {}
         self.moved_s: dict[str, float] = {}
-        """Control → when a tick of it was last taken, ..."""
+        """Control → time of its last applied tick."""
         self.moved_at_s = float("-inf")
-        """... and of any."""
+        """Time of the last applied tick of any control."""
         self.key = secrets.token_urlsafe(16)
-        """By which a second line says that it is this screen's."""
+        """Secret by which a redundant socket joins this page."""
         self.spare: SpareLine | None = None
         self.doubled: FirstOfTwo | None = None
-        """Which of two comes first, since it had a second line."""
+        """Duplicate filter, once the page has a redundant socket."""
         self.hold_back: Callable[[bool], None] = _nothing
-        """Lets nothing more be read from its line for now, or lets it go on."""
+        """Pauses (True) or resumes (False) reading from the page's socket."""
         self.crowd = 0
-        """Ticks that came since one had to wait; more than a few are a flood."""
+        """Ticks since one became pending; more than a few pause the socket."""
         self.dropped = 0
-        """Ticks that a newer one took the place of: nothing was made of them."""
+        """Pending ticks that a newer one replaced."""
 
     def notice(self, key: str, text: str) -> None:
-        """Tell it; a newer line about the same replaces one that was not taken yet."""
+        """Queue a notice; it replaces an unsent one with the same key."""
         self.notices[key] = text
         self.wake()
 
     def lease(self, state: LeaseState, now: float, *, is_confirmed: bool) -> str:
-        """Return who has the controls, as this screen is told."""
+        """Return the lease message for this page."""
         left_s = max(0.0, state.asked_until - now) if state.asked_by is not None else 0.0
         return wire.encode_lease(
             state, self.client, left_s=left_s, is_confirmed=is_confirmed, spare=self.key
         )
 
     def is_first(self, about: str, number: int) -> bool:
-        """Return whether this was not said on the other line already, or something newer."""
+        """Return whether a message is the first with its number; the other is a duplicate."""
         return self.doubled is None or not number or self.doubled.take(about, number)
 
     def forget(self, command: str) -> None:
-        """Drop what waits of a control."""
+        """Drop the pending tick of a control."""
         self.pending.pop(command, None)
         alarm = self.alarms.pop(command, None)
         if alarm is not None:
@@ -118,11 +118,11 @@ class Seat:
             self.relax()
 
     def relax(self) -> None:
-        """Let its line be read again."""
+        """Resume reading from the page's socket."""
         if self.crowd >= FLOOD:
             self.hold_back(False)
         self.crowd = 0
 
 
 def _nothing(is_held: bool) -> None:
-    """Nobody can hold its line back."""
+    """Do nothing: this socket cannot be paused."""

@@ -1,12 +1,12 @@
-"""A second line between a page and its seat, for a link that loses packets.
+"""The redundant socket of a page, for links that lose packets.
 
-Floor 5. What a TCP connection has lost holds up everything behind it for a round trip and more, and
-twice that when the repeat is lost, too: longer than a lease. Two connections hardly lose at the
-same time. So a page that drives over such a link says everything about held controls on both, is
-told the beats on both, and whatever comes first counts: all of it carries the page's own number.
+Layer 5. A lost packet delays all later data of its TCP connection by a round trip or more. The
+delay doubles when the repeat is lost too, and is then longer than a lease. Two connections rarely
+lose packets at the same time. On such a link a page sends everything about held controls on both,
+and gets heartbeats on both. The first copy counts: each message carries the page's number.
 
-A spare line is nobody by itself. It names the seat that it belongs to by a key that only the page
-in that seat was told, and ends with it.
+A redundant socket has no rights of its own. It joins the page by a key that only that page has, and
+closes with it.
 """
 
 import msgspec
@@ -24,7 +24,7 @@ __all__ = ["CLOSE_NO_SEAT", "CLOSE_NOT_TAKEN", "KEY_WITHIN_S", "Spare"]
 CLOSE_NO_SEAT = 4404
 CLOSE_NOT_TAKEN = 4400
 KEY_WITHIN_S = 5.0
-"""In which a line must say whose it is."""
+"""Longest wait for the join message of a socket, in seconds."""
 MESSAGES_PER_S = 2000
 
 _hello = msgspec.json.Decoder(wire.Spare)
@@ -33,10 +33,10 @@ _BAD = (msgspec.MsgspecError, UnicodeError, RecursionError)
 
 
 class Spare:
-    """One such line."""
+    """One redundant socket."""
 
     def __init__(self, line: Line, controls: Controls, clock: Clock, flow: Flow) -> None:
-        """Prepare; `line` is accepted, and `flow` is the socket below it."""
+        """Prepare; `line` is accepted, and `flow` is its flow control."""
         self._line = line
         self._controls = controls
         self._clock = clock
@@ -45,7 +45,7 @@ class Spare:
         self._allowance = Allowance(MESSAGES_PER_S, clock.now())
 
     async def serve(self) -> None:
-        """Be this line until either side is done."""
+        """Serve this socket until either side closes."""
         try:
             seat = await self._seat()
             if seat is None:
@@ -63,12 +63,12 @@ class Spare:
             pass
 
     def beat(self, number: int) -> None:
-        """Tell the page a number, unless an older one is still on its way."""
+        """Send a heartbeat number, unless an older one is still in the buffer."""
         if self._flow.is_free():
             self._flow.write(as_frame(wire.encode_beat(number).encode(), is_text=True))
 
     def end(self) -> None:
-        """Take nothing more, because its page has gone or has made another."""
+        """Stop: the page has closed, or has a newer redundant socket."""
         self._is_over = True
         self._flow.abort()
 
@@ -94,6 +94,6 @@ class Spare:
             said = _said.decode(data)
         except _BAD:
             return False
-        if said.number > 0:  # without a number nobody knows which of two it is
+        if said.number > 0:  # without a number, duplicates cannot be found
             self._controls.hear(seat, said)
         return said.number > 0

@@ -1,1 +1,1 @@
-"""One robot's readings and images, to all who watch it, and the lines they go by."""
+"""Values and images of one robot, on their way to all its pages."""

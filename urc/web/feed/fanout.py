@@ -23,11 +23,11 @@ __all__ = ["FRAMES_PER_SECOND", "Fanout", "Known", "Pacer", "Place"]
 FRAMES_PER_SECOND = 60.0
 LOG_LINES_FOR_NEWCOMERS = 50
 SHARED_FOR_S = 0.005
-"""How long clients may share an encoded frame: its ages count from its encoding."""
+"""Reuse of an encoded frame, in seconds; its ages count from its encoding."""
 
 
 class Known(NamedTuple):
-    """How much of the robot's state a client has."""
+    """A client's position in the robot's state."""
 
     revision: int = 0
     """Hub revision of its newest values."""
@@ -36,14 +36,14 @@ class Known(NamedTuple):
     progress: int = 0
     """Number of its state of the sequences."""
     notes: int = 0
-    """Log lines that it got, or was told it lost."""
+    """Log lines that it has received or missed."""
     joined: int = 0
     """Hub revision at which it joined; 0 after its first values."""
 
 
 @dataclass(slots=True)
 class Place:
-    """One client's progress through values and images."""
+    """One client's position in values and images."""
 
     known: Known = field(default_factory=Known)
     looks: Looks = field(default_factory=Looks)
@@ -59,19 +59,19 @@ class _Update(NamedTuple):
 
 
 class Pacer:
-    """Lets the first of a burst through at once, and then a steady rate.
+    """A rate limiter that passes the first event of a burst at once, then a steady rate.
 
-    One period of tolerance: a source at just this rate, with jitter, is never held back, and no
-    second sees more than one frame above the rate.
+    It tolerates one period of jitter: a source at exactly this rate is never delayed, and no second
+    has more than one event above the rate.
     """
 
     def __init__(self, rate_hz: float) -> None:
         self._period_s = 1.0 / rate_hz
         self.free_s = -self._period_s
-        """When the next one may go."""
+        """Time at which the next event may pass."""
 
     def went(self, now_s: float) -> None:
-        """Count one that went."""
+        """Count one event."""
         due_s = self.free_s + self._period_s
         self.free_s = now_s if now_s > due_s else due_s
 
@@ -87,7 +87,7 @@ class Fanout:
         clock: Clock | None = None,
         each: Iterable[str] = (),
     ) -> None:
-        """Start without clients; `each` names the signals of which every reading is sent."""
+        """Start without clients; `each` names the signals whose every reading is sent."""
         hub.streams.keep(each)
         self.hub = hub
         self._wakes: set[Callable[[], None]] = set()
@@ -102,14 +102,14 @@ class Fanout:
         self._due: Alarm | None = None
         """The next flush."""
         self._loop: asyncio.AbstractEventLoop | None = None
-        """While this runs."""
+        """The event loop while this runs."""
         self._broken: asyncio.Future[None] | None = None
         self._pictures = {name for name, signal in hub.signals.items() if is_picture(signal)}
         self.shelf = PictureShelf(hub, self._clock)
 
     async def run(self) -> None:
-        """Flush for ever; ends by being cancelled, or with what a flush raised."""
-        self._loop = asyncio.get_running_loop()  # which costs a system call
+        """Flush until cancelled, or raise the exception of a flush."""
+        self._loop = asyncio.get_running_loop()  # cached: it costs a system call
         self._broken = self._loop.create_future()
         try:
             with self.hub.heed(self._changed):
@@ -121,7 +121,7 @@ class Fanout:
                 self._due.cancel()
 
     def _changed(self) -> None:
-        """Have a flush, as soon as may be, and after whatever the loop is at."""
+        """Schedule a flush, as soon as the rate allows, in a later turn of the loop."""
         if self._due is not None or self._loop is None:
             return
         free_s = self._pacer.free_s
@@ -135,7 +135,7 @@ class Fanout:
         self._pacer.went(self._clock.now())
         try:
             self.flush()
-        except Exception as fault:  # the session's, which awaits `run`
+        except Exception as fault:  # raised in `run`, which the session awaits
             if self._broken is not None and not self._broken.done():
                 self._broken.set_exception(fault)
 
@@ -147,7 +147,7 @@ class Fanout:
             wake()
 
     def join(self, wake: Callable[[], None]) -> Place:
-        """Call `wake` at each flush, which must return at once; return the client's place."""
+        """Call `wake`, which must not block, at each flush; return the client's position."""
         self._wakes.add(wake)
         notes = max(0, self.hub.notes_count - LOG_LINES_FOR_NEWCOMERS)
         return Place(Known(notes=notes, joined=self.hub.revision))
@@ -157,7 +157,7 @@ class Fanout:
         self._wakes.discard(wake)
 
     def take(self, place: Place) -> bytes:
-        """Return the frames that bring `place` up to date, and move it there; may be empty."""
+        """Return the frames that bring `place` up to date, and advance it; may be empty."""
         if self._encoded_at != self.hub.revision:
             self._encoded_at = self.hub.revision
             self._updates.clear()
@@ -187,7 +187,7 @@ class Fanout:
         return _Update(after, frames, now_s)
 
     def _without_pictures(self, samples: Sequence[Sample]) -> Sequence[Sample]:
-        """Remove images, which go to the clients that show them; the end of one is a value."""
+        """Remove images, which only go to pages that show them; the end of an image stays."""
         pictures = self._pictures
         if not pictures:
             return samples

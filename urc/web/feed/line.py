@@ -1,6 +1,6 @@
-"""The socket below a browser client, and the limit on its messages.
+"""The socket of a browser client, and the rate limit of its messages.
 
-Floor 5.
+Layer 5.
 """
 
 import asyncio
@@ -31,7 +31,7 @@ class Line(Protocol):
 
 
 class Flow(Protocol):
-    """The state of the socket below a client."""
+    """Flow control of a client's socket."""
 
     def is_free(self) -> bool:
         """Whether the kernel has taken everything written so far."""
@@ -43,24 +43,24 @@ class Flow(Protocol):
         """Write whole WebSocket frames."""
 
     def listen(self, sink: Callable[[bytes], bool]) -> None:
-        """Let `sink` have each text that came whole, before `Line.receive`.
+        """Hand each whole text to `sink` before `Line.receive` gets it.
 
-        It saves the turns of a task. What it does not take, returning False, is for `receive`.
+        It saves two task switches. A text for which `sink` returns False goes to `receive`.
         """
 
     def hold_back(self, is_held: bool) -> None:
-        """Let nothing more be read for now, or let it go on: what comes waits where it is."""
+        """Pause or resume reading; unread data stays in the kernel's buffer."""
 
     def abort(self) -> None:
-        """Cut the connection without waiting for anything."""
+        """Close the connection at once, without a handshake."""
 
 
 class SocketFlow:
-    """Lets a client write whole frames, wait until the kernel has taken everything, or cut it."""
+    """Lets a client write whole frames, wait until the buffer is empty, or abort."""
 
     def __init__(self) -> None:
         self.sink: Callable[[bytes], bool] | None = None
-        """Called with each whole text message."""
+        """Callback for each whole text message."""
         self._transport: asyncio.Transport | None = None
         self._is_free = True
         self._writable = asyncio.Event()
@@ -69,21 +69,21 @@ class SocketFlow:
     # Called by the protocol
 
     def made(self, transport: asyncio.Transport) -> None:
-        """Take the transport, and have it report the first byte that the kernel does not take."""
+        """Take the transport, and make it report the first byte that the kernel does not take."""
         self._transport = transport
         transport.set_write_buffer_limits(high=0)
 
     def lost(self) -> None:
-        """Let a waiting writer go on, to learn that the line is gone."""
+        """Wake a waiting writer, so that it notices the end of the connection."""
         self.resume()
 
     def pause(self) -> None:
-        """Take note that the kernel is full."""
+        """Record that the kernel's buffer is full."""
         self._is_free = False
         self._writable.clear()
 
     def resume(self) -> None:
-        """Take note that the kernel has taken everything."""
+        """Record that the kernel's buffer is empty."""
         self._is_free = True
         self._writable.set()
 
@@ -94,7 +94,7 @@ class SocketFlow:
         return self._is_free
 
     def is_closing(self) -> bool:
-        """Return whether the transport takes nothing more."""
+        """Return whether the transport is closing."""
         return self._transport is None or self._transport.is_closing()
 
     async def drained(self) -> None:
@@ -107,22 +107,22 @@ class SocketFlow:
             transport.write(frame)
 
     def listen(self, sink: Callable[[bytes], bool]) -> None:
-        """Let `sink` have each text that came whole."""
+        """Hand each whole text to `sink`."""
         self.sink = sink
 
     def hold_back(self, is_held: bool) -> None:
-        """Let nothing more be read for now, or let it go on."""
+        """Pause or resume reading."""
         if self._transport and not self.is_closing():
             (self._transport.pause_reading if is_held else self._transport.resume_reading)()
 
     def abort(self) -> None:
-        """Cut the connection without waiting for anything."""
+        """Close the connection at once, without a handshake."""
         if self._transport:
             self._transport.abort()
 
 
 class Allowance:
-    """How many messages may come: a bucket that holds one second's worth."""
+    """A token bucket for messages, with a capacity of one second."""
 
     def __init__(self, rate_hz: float, now_s: float) -> None:
         self._rate_hz = rate_hz
@@ -130,7 +130,7 @@ class Allowance:
         self._time_s = now_s
 
     def take(self, now_s: float) -> bool:
-        """Count one message; False when it is one too many."""
+        """Count one message; return False above the limit."""
         earned = (now_s - self._time_s) * self._rate_hz
         self._left = min(self._rate_hz, self._left + earned)
         self._time_s = now_s
@@ -144,9 +144,9 @@ class Guest(NamedTuple):
     """The person or program at the other end."""
 
     place: str = ""
-    """Address, for the others; "" for this machine."""
+    """Address, shown to other pages; "" for this machine."""
     role: Role = "driver"
     who: str = ""
-    """Whose seats are counted together: one browser, program or address; "": nobody's."""
+    """Identity for the count of sockets: a browser, program or address; "" is not counted."""
     is_known: bool = False
     """Whether it has a key; else `who` is an address."""

@@ -1,7 +1,7 @@
-"""The newest image of each signal, encoded once for all who look at it.
+"""The newest image of each signal, encoded once for all pages that show it.
 
-Floor 5. Nothing is queued: a client takes an image when its line is free, and then the newest one.
-What came meanwhile, that client has never heard of.
+Layer 5. Nothing is queued: a client takes the newest image when its socket is free, and skips the
+older ones.
 """
 
 from collections.abc import Iterable
@@ -16,8 +16,8 @@ from urc.web.wire.picture import as_frame, encode_picture
 __all__ = ["Encoded", "Looks", "PictureShelf", "is_picture"]
 
 SHARED_FOR_S = 0.05
-"""How long an encoded image is handed out: the age in it is that of its encoding, and an image of
-some ten kilobytes is not worth making anew for a few milliseconds."""
+"""Reuse of an encoded image, in seconds. Its age counts from the encoding, and a few milliseconds
+are not worth another copy of some ten kilobytes."""
 
 
 class Encoded(NamedTuple):
@@ -27,22 +27,22 @@ class Encoded(NamedTuple):
     """The whole WebSocket frame."""
     sample: Sample
     number: int
-    """Grows with each new image of any signal."""
+    """Counter of images; grows with each new image of any signal."""
     made_s: float
 
 
 @dataclass(slots=True)
 class Looks:
-    """What one client shows, and what it has of it."""
+    """The images that one client shows, and the newest ones that it has."""
 
     names: tuple[str, ...] = ()
     seen: dict[str, int] = field(default_factory=dict)
-    """Signal → number of the image that it has."""
+    """Signal → number of its last image at the client."""
     turn: int = 0
-    """Whose turn it is, so that one fast camera leaves room for another."""
+    """Round-robin position, so that one fast camera leaves room for another."""
 
     def show(self, names: Iterable[str]) -> None:
-        """Take what the page shows from now on; what it stops showing, it has to be sent anew."""
+        """Set the shown images; a hidden one is sent again when it is shown again."""
         self.names = tuple(dict.fromkeys(names))
         self.seen = {name: number for name, number in self.seen.items() if name in self.names}
 
@@ -53,7 +53,7 @@ def is_picture(signal: Signal | None) -> bool:
 
 
 class PictureShelf:
-    """What the clients of one session share."""
+    """The encoded images of one session, for all its clients."""
 
     def __init__(self, hub: Hub, clock: Clock) -> None:
         self._hub = hub
@@ -62,7 +62,7 @@ class PictureShelf:
         self._count = 0
 
     def take(self, looks: Looks) -> Encoded | None:
-        """Return an image that the client shows and has not got, or None; it counts as sent."""
+        """Return a shown image that the client lacks, or None; it then counts as sent."""
         count = len(looks.names)
         for step in range(count):
             name = looks.names[(looks.turn + step) % count]

@@ -1,1 +1,1 @@
-"""The robots that are served."""
+"""The served robots."""

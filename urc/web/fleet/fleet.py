@@ -1,6 +1,6 @@
-"""The robots that are served: by the name in their URL, each with its station. They come and go.
+"""The served robots by the name in their URL, each with its station. The set changes at run time.
 
-Floor 5. A robot that goes is let go of in good order: what moves is stopped first.
+Layer 5. Removing a robot first stops its motion.
 """
 
 import asyncio
@@ -17,15 +17,15 @@ from urc.web.words import t
 __all__ = ["Broken", "Fleet"]
 
 _END_S = 15.0
-"""How long a robot's session may take to end."""
+"""Longest wait for the end of a robot's session, in seconds."""
 
 
 class Broken(NamedTuple):
-    """A robot that should be on the menu and cannot."""
+    """A robot whose documents or widgets cannot be used."""
 
     title: str
     fault: str
-    """One line."""
+    """Reason, in one line."""
 
 
 class Fleet:
@@ -34,10 +34,10 @@ class Fleet:
     def __init__(
         self, robots: Mapping[str, Robot], station: Callable[[str, Robot], Station]
     ) -> None:
-        """Take up the robots that are there from the start.
+        """Prepare the robots from the start.
 
         Args:
-            robots: by the name in their URL.
+            robots: the robots, by the name in their URL.
             station: makes the station of a robot.
 
         Raises:
@@ -50,13 +50,13 @@ class Fleet:
             name: station(name, robot) for name, robot in robots.items()
         }
         self.broken: dict[str, Broken] = {}
-        """Those that cannot be used, by name."""
+        """Robots that cannot be used, by name."""
         self._tasks: dict[str, asyncio.Task[None]] = {}
         self._group: asyncio.TaskGroup | None = None
 
     @asynccontextmanager
     async def running(self) -> AsyncIterator[asyncio.TaskGroup]:
-        """Keep one supervisor a robot for as long as the context lasts."""
+        """Run one supervisor for each robot while the context lasts."""
         async with asyncio.TaskGroup() as group:
             self._group = group
             for name in self.stations:
@@ -78,9 +78,9 @@ class Fleet:
         self._start(name)
 
     def renew(self, name: str, robot: Robot) -> Robot:
-        """Take another version of a robot into the lists, and return it as it is served.
+        """Register another version of a robot, and return it in its served form.
 
-        Its station goes on with it when it is told: see `Station.replace`.
+        The caller then passes it to the station: see `Station.replace`.
 
         Raises:
             UrcError: its widgets cannot be served.
@@ -92,7 +92,7 @@ class Fleet:
         return robot
 
     async def remove(self, name: str) -> None:
-        """Serve a robot no more: its session ends, what moves is stopped first."""
+        """Remove a robot: stop its motion, then end its session."""
         self.robots.pop(name, None)
         self.broken.pop(name, None)
         self.stations.pop(name, None)
@@ -103,10 +103,10 @@ class Fleet:
             await asyncio.wait((task,), timeout=_END_S)
 
     def driven_by(self, name: str) -> str:
-        """Return who drives a robot now, or "" when nobody does.
+        """Return the name of the operator who drives a robot, or "".
 
-        A stop that is still on its way counts while there is a session that delivers it; without
-        one, as where the address is wrong, it is no reason to keep that address.
+        A pending stop counts while a session can deliver it. Without a session, for example because
+        of a wrong address, it must not block a change of that address.
         """
         station = self.stations.get(name)
         if station is None or station.is_at_rest:
@@ -126,7 +126,7 @@ class Fleet:
 
 
 def _assets(robots: Mapping[str, Robot]) -> Assets:
-    """Return the files of all widgets; copies of one widget, each in its ecosystem, are one."""
+    """Return the files of all widgets; equal widgets of different robots are one."""
     return widget_assets(
         unified(one for robot in robots.values() for one in robot.profile.widgets.values())
     )

@@ -1,7 +1,7 @@
-"""Makes the robots that a dashboard shows: from documents, settings, and what is installed.
+"""Makes the robots of a dashboard: from documents, settings and installed packages.
 
-Floor 5. It reads files and keeps what the operator fills in; it holds no session. Reading takes a
-while: from the event loop it is called in a thread.
+Layer 5. It reads files and stores settings; it has no session. Reading takes a while, so the event
+loop calls it in a thread.
 """
 
 import logging
@@ -36,32 +36,32 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True, slots=True)
 class Workshop:
-    """What makes robots, chosen by who starts the dashboard."""
+    """Options of the robot factory, chosen at the start of the dashboard."""
 
     data: Path
-    """Folder in which settings and packages are kept."""
+    """Folder of settings and packages."""
     make: Callable[[Profile, Mapping[str, Value]], Robot]
     """Return the robot of a profile with settings."""
     tried: Callable[[Profile, Mapping[str, Value]], AbstractAsyncContextManager[Session]]
-    """Give a session that only tries the lines: nothing is steered by it."""
+    """Open a session that only tests the transports, without any control."""
     given: Callable[[Profile], Mapping[str, Value]]
-    """Return the settings that were given at the start; nothing that is filled in changes them.
-    Raises `UrcError` for those that no longer fit."""
+    """Return the settings from the start of the server; stored settings never change them.
+    Raise `UrcError` for settings that no longer fit."""
     shows_installed: bool = False
-    """Whether the menu has the robots and drivers that are installed."""
+    """Whether the menu shows the installed robots and drivers."""
 
 
 class Filled(NamedTuple):
-    """What the settings of a robot come to."""
+    """The resolved settings of a robot."""
 
     values: dict[str, Value]
-    """Of every setting that has one that may be used."""
+    """Values of all settings that may be used."""
     given: dict[str, Value]
-    """Those of them that were given at the start."""
+    """Values from the start of the server."""
     destination: str
-    """Where the robot's lines lead."""
+    """Hosts and ports of the robot's transports."""
     withheld: frozenset[str]
-    """Secrets that are there, but were entered for another destination."""
+    """Secrets that were entered for another destination."""
 
 
 class Added(NamedTuple):
@@ -72,28 +72,27 @@ class Added(NamedTuple):
 
 
 class Garage:
-    """The documents behind the robots."""
+    """The documents of the robots."""
 
     def __init__(self, workshop: Workshop) -> None:
-        """Look which packages are installed; no document is read yet."""
+        """List the installed packages; no document is read yet."""
         self.workshop = workshop
         self.store = Store(workshop.data / "packages")
         self._there = self._roots()
         """Packages that were installed at the start."""
         self._begun: dict[str, str] = {}
-        """Robot → where its lines led when it was seen first: what was given at the start is for
-        there."""
+        """Robot → its first destination, for which the settings from the start are valid."""
         self._manifests: dict[tuple[str, int, int], Manifest] = {}
-        """By digest and state of the archive: pages ask for all of them again and again."""
+        """Cache by digest and state of the archive, because pages need all manifests often."""
 
     def _roots(self) -> frozenset[str]:
         try:
             return frozenset(lock.root for lock in self.store.installed())
-        except PackageError:  # the managers' pages tell it
+        except PackageError:  # the managers' pages report it
             return frozenset()
 
     def stamp(self) -> object:
-        """Return what is another thing whenever something was installed or removed."""
+        """Return a value that changes with every install and removal."""
         try:
             found = (self.store.folder / "state.json").stat()
         except OSError:
@@ -101,16 +100,16 @@ class Garage:
         return found.st_mtime_ns, found.st_size, found.st_ino
 
     def kept(self, name: str) -> KeptFile:
-        """Return where it is kept what was filled in for the robot of that name."""
+        """Return the file with the settings of a robot."""
         return KeptFile(self.workshop.data / "robots", name)
 
     def robot(self, name: str, profile: Profile, kept: Kept | None = None) -> Robot:
         """Return a robot with its settings and all interfaces that fit; raise `UrcError`.
 
         Args:
-            name: in its URL.
-            profile: as its document says.
-            kept: what was filled in; None: what is in its file.
+            name: its name in URLs.
+            profile: the profile from its document.
+            kept: its stored settings; None reads them from the file.
         """
         chosen = self.kept(name).load() if kept is None else kept
         filled = self.filled(profile, chosen)
@@ -124,11 +123,11 @@ class Garage:
         return self.workshop.make(self.furnished(profile, chosen.interface), filled.values)
 
     def filled(self, profile: Profile, kept: Kept) -> Filled:
-        """Return what the settings of a robot come to; raise `UrcError`.
+        """Return the resolved settings of a robot; raise `UrcError`.
 
-        What was given at the start wins over what was filled in, and that over the default.
-        What was filled in and does not fit any more, as after an update, counts as not set.
-        A secret is used for no other destination than the one for which it was entered.
+        A value from the start wins over a stored one, and a stored one over the default. A stored
+        value that no longer fits, for example after an update, counts as missing. A secret is only
+        used for the destination for which it was entered.
         """
         defaults: dict[str, Value] = {
             name: setting.default
@@ -165,14 +164,14 @@ class Garage:
         return Filled(everything, given, place, frozenset(withheld))
 
     def _begun_at(self, profile: Profile, package: str, values: Mapping[str, Value]) -> str:
-        """Return where the lines of a robot led at the start; "" where it was not there."""
+        """Return the robot's destination at the start; "" if it was installed later."""
         if package and package not in self._there:
             return ""
         place = destination_of(profile, package, values)
         return self._begun.setdefault(package or profile.name, place)
 
     def package_of(self, profile: Profile) -> str:
-        """Return the installed package of a robot, as ``drivers/puppet``; "" where it is a file."""
+        """Return the installed package of a robot, as ``drivers/puppet``; "" for a file."""
         home = (self.store.folder / "ecosystems").resolve()
         try:
             parts = Path(profile.file).resolve().relative_to(home).parts
@@ -181,7 +180,7 @@ class Garage:
         return "/".join(parts[1:3])
 
     def furnished(self, profile: Profile, first: str = "") -> Profile:
-        """Return a profile with the installed interfaces that fit it; `first` is shown first."""
+        """Return a profile with the fitting installed interfaces; `first` comes first."""
         interfaces, widgets = dict(profile.interfaces), dict(profile.widgets)
         for added in self.interfaces():
             found = self.fitted(added, profile)
@@ -193,13 +192,13 @@ class Garage:
         return profile._replace(interfaces=interfaces, widgets=widgets)
 
     def fitted(self, added: Added, profile: Profile) -> Fitted:
-        """Return what an installed interface is on a robot."""
+        """Return an installed interface with its bindings on a robot."""
         if added.lock.key.name in profile.interfaces:
             return Fitted(None, fault="this robot has an interface of that name")
         return fit_interface(added.document, profile, shelf_of(added.document))
 
     def interfaces(self) -> list[Added]:
-        """Return the interfaces that were installed by themselves, the newest version of each."""
+        """Return the newest version of each interface that a user installed directly."""
         newest = {lock.root: lock for lock in _ascending(self.store.installed())}
         found = []
         for lock in newest.values():
@@ -207,13 +206,13 @@ class Garage:
                 try:
                     found.append(Added(lock, str(self.store.document(lock))))
                 except PackageError:
-                    continue  # damaged: the list of what is installed says so
+                    continue  # damaged: the list of installed packages shows it
         return found
 
     def parked(self) -> dict[str, list[Lock]]:
-        """Return the installed packages that can be driven: name → its versions, oldest first.
+        """Return the installed packages with a robot: name → its versions, oldest first.
 
-        Of a robot and a driver of one name there is the one that is in use.
+        If a robot and a driver share a name, only the one in use is listed.
         """
         locks = self.store.installed()
         found: dict[str, list[Lock]] = {}
@@ -223,7 +222,7 @@ class Garage:
         return dict(sorted(found.items()))
 
     def chosen(self, locks: list[Lock], version: str) -> Lock:
-        """Return the version that was chosen for a robot; the newest where it is not there."""
+        """Return the chosen version for a robot; the newest one if it is missing."""
         return next((lock for lock in locks if lock.version == version), locks[-1])
 
     def profile(self, lock: Lock) -> Profile:
@@ -233,11 +232,11 @@ class Garage:
         return profile
 
     def reread(self, profile: Profile) -> Profile:
-        """Return what the document of a robot that was there from the start says; raise."""
+        """Return the current profile in the document of a robot from the start; raise."""
         return open_document(profile.file)
 
     def manifest(self, lock: Lock) -> Manifest:
-        """Return what an installed package says of itself; raise `UrcError`."""
+        """Return the manifest of an installed package; raise `UrcError`."""
         digest = lock.packages[lock.root].sha256
         try:
             found = self.store.blob_file(digest).stat()

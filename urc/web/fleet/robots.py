@@ -1,7 +1,7 @@
-"""A robot as the dashboard sees it, and the life of its session.
+"""A robot as the dashboard sees it, and the lifetime of its session.
 
-Floor 5. The session is opened for the first client and closed a short while after the last one has
-gone, so that a reload of the page does not cut the robot off and Back does.
+Layer 5. The session opens for the first client. It closes a short while after the last one has
+gone, so that a reload keeps the robot connected, and Back disconnects it.
 """
 
 import asyncio
@@ -46,18 +46,18 @@ OPEN_TIMEOUT_S = 10.0
 RETRY_S = 1.0
 CLIENTS = 256
 SEATS, KNOWN_SEATS = 8, 64
-"""Clients of one robot that may come from one stranger's address, and from one that has a key."""
+"""Most clients of one robot from one unknown address, and from one visitor with a key."""
 CLOSE_TIMEOUT_S = 8.0
-"""How long a session that is to end is waited for."""
+"""Longest wait for the end of a session, in seconds."""
 STOP_WITHIN_S = 1.0
-"""How long somebody who stops a robot without a socket waits to hear that it was reached."""
+"""Longest wait of a STOP over HTTP for its delivery, in seconds."""
 _LOOK_S = 0.01
 
 log = logging.getLogger(__name__)
 
 
 class SessionLike(Protocol):
-    """What the dashboard needs of an opened profile."""
+    """The part of an opened profile that the dashboard needs."""
 
     @property
     def hub(self) -> Hub:
@@ -65,11 +65,11 @@ class SessionLike(Protocol):
 
     @property
     def frames(self) -> Frames:
-        """What makes the frames of held commands."""
+        """The encoder of held commands."""
 
     @property
     def movers(self) -> Movers | None:
-        """Who writes them; None where the robot has no held command."""
+        """The sender of motion; None for a robot without a held command."""
 
     async def command(
         self,
@@ -79,17 +79,17 @@ class SessionLike(Protocol):
         confirmed_by: tuple[str, ...] = (),
         on_sent: Callable[[Payload], None] | None = None,
     ) -> Replied:
-        """Run one command and return its reply; raise `CommandFailed` when there is none."""
+        """Run one command and return its reply; raise `CommandFailed` without one."""
 
     def pull(self, sequence: str, what: Pull) -> None:
-        """Let a sequence pause, do one more step, go on, or end."""
+        """Pause, step, resume or end a sequence."""
 
     def latch(self, reason: str) -> None:
-        """End sequences, and begin nothing that moves by itself; "" lets it be begun again."""
+        """Latch, end sequences and block autonomous motion; "" as reason resets the latch."""
 
 
 Glimpse = bytes | Mapping[str, Reading] | None
-"""A picture, or values by signal; None: nothing is known of the robot."""
+"""An image, or values by signal; None if nothing is known about the robot."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,15 +98,15 @@ class Robot:
 
     profile: Profile
     settings: Mapping[str, Value]
-    """What is set now, defaults included."""
+    """Current values, with defaults."""
     open_session: Callable[[], AbstractAsyncContextManager[SessionLike]]
-    """Connects while the context lasts. Must not wait for the robot to answer."""
+    """Connects while the context lasts. Must not wait for a reply of the robot."""
     glimpse: Callable[[], Glimpse] | None = None
-    """What is seen of an emulated robot without being connected to it; None for a real one."""
+    """View of an emulated robot without a connection; None for a real one."""
     is_emulated: bool = False
-    """It has the name of a real one: what is kept of the one is not the other's."""
+    """Whether it is emulated: real and emulated robots of one name share no stored state."""
     tape: Tape | None = None
-    """The recording that is shown in its place; None: it is a robot."""
+    """The recording in place of the robot, or None."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,17 +116,17 @@ class Live:
     session: SessionLike
     fanout: Fanout
     number: str
-    """Tells this session from the robot's other ones, also across restarts of the server."""
+    """Unique number of this session, also across restarts of the server."""
     ended: asyncio.Event
     """Set when the session is over, whatever the reason."""
 
 
 class SessionFailed(UrcError):
-    """The robot's session could not be opened, or ended."""
+    """The error of a session that did not open, or has ended."""
 
 
 def missing_settings(robot: Robot) -> tuple[Setting, ...]:
-    """Return the settings that must be filled in before the robot can be connected."""
+    """Return the required settings that have no value; without them the robot cannot connect."""
     return tuple(
         setting
         for name, setting in robot.profile.settings.items()
@@ -135,7 +135,7 @@ def missing_settings(robot: Robot) -> tuple[Setting, ...]:
 
 
 def each_counts(profile: Profile) -> frozenset[str]:
-    """Return the signals of which a widget of the robot must hear each reading."""
+    """Return the signals whose every reading is shown by a widget of the robot."""
     uses = [*profile.slots.values()]
     for interface in profile.interfaces.values():
         uses += interface.widgets.values()
@@ -163,11 +163,11 @@ class Station:
         """Wait for the first client.
 
         Args:
-            robot: whose session it is.
-            linger_s: how long it stays open after the last client has gone, in seconds.
-            clock: the time.
-            latch: keeps a stop over a restart.
-            trail: takes note of who moves the robot.
+            robot: the robot.
+            linger_s: time for which the session stays open after its last client, in seconds.
+            clock: the clock.
+            latch: keeps a STOP over a restart.
+            trail: receives the events of the audit log.
         """
         self.robot = robot
         self.clock: Clock = clock or LoopClock()
@@ -181,22 +181,22 @@ class Station:
         self._next: asyncio.Future[Live] | None = None
         self._is_open = False
         self._held_off = 0
-        """How many want the robot left alone."""
+        """Number of users that need the robot disconnected."""
         self._successor: tuple[Robot, LatchFile | None] | None = None
 
     @property
     def is_full(self) -> bool:
-        """Whether one more client would be one too many."""
+        """Whether the limit of clients is reached."""
         return self._visitors >= CLIENTS
 
     def has_seat_for(self, guest: Guest) -> bool:
-        """Return whether one more client of `guest` leaves room for those of others."""
+        """Return whether another client of `guest` still leaves places for other visitors."""
         most = KNOWN_SEATS if guest.is_known else SEATS
         return not guest.who or self._seats[guest.who] < most
 
     @contextmanager
     def visit(self, who: str = "") -> Iterator[None]:
-        """Count as a client for as long as the context lasts; `who` is that of its `Guest`."""
+        """Count as a client while the context lasts; `who` is that of its `Guest`."""
         self._visitors += 1
         self._seats[who] += 1
         self._stirred.set()
@@ -205,11 +205,11 @@ class Station:
         finally:
             self._visitors -= 1
             self._seats[who] -= 1
-            self._seats += Counter()  # without those that are gone
+            self._seats += Counter()  # drops zero counts
             self._stirred.set()
 
     async def live(self) -> Live:
-        """Return the open session; raise `SessionFailed` when there will be none."""
+        """Return the open session; raise `SessionFailed` if it does not open."""
         try:
             async with asyncio.timeout(OPEN_TIMEOUT_S):
                 return await asyncio.shield(self._coming())
@@ -217,7 +217,7 @@ class Station:
             raise SessionFailed("the robot's session did not open in time") from None
 
     def glimpse(self) -> Glimpse:
-        """Return what can be seen of the robot just now; nobody is connected for it."""
+        """Return the current view of the robot, without a connection."""
         if self.robot.glimpse is not None:
             return self.robot.glimpse()
         coming = self._next
@@ -230,7 +230,7 @@ class Station:
         return next(pictures, None) or values or None
 
     async def deliver_stop(self) -> bool:
-        """Wait a moment for the stop to reach the robot, connecting it when nobody looks at it."""
+        """Connect the robot if needed, and wait briefly until it has the stop; return success."""
         desk = self.controls.desk
         end_s = self.clock.now() + STOP_WITHIN_S
         with self.visit():
@@ -239,7 +239,7 @@ class Station:
         return desk.is_confirmed and desk.has_own_stop
 
     def who(self) -> dict[str, str | bool]:
-        """Return who drives the robot, and who stopped it: `urc.web.manage.wire.ControlState`."""
+        """Return lease and STOP as `urc.web.manage.wire.ControlState`."""
         state = self.controls.desk.lease.state
         holder = "" if state.holder is None else state.holder.name or "another screen"
         is_emulated = self.robot.is_emulated or self.robot.tape is not None
@@ -247,20 +247,20 @@ class Station:
 
     @property
     def is_at_rest(self) -> bool:
-        """Whether nobody has the controls and every stop has reached the robot."""
+        """Whether the robot is not driven and every stop has reached it."""
         desk = self.controls.desk
         return desk.lease.state.holder is None and desk.is_confirmed
 
     @property
     def is_open(self) -> bool:
-        """Whether there is a session, or one is being opened or closed."""
+        """Whether a session is open, opening or closing."""
         return self._is_open
 
     @asynccontextmanager
     async def held_off(self) -> AsyncIterator[None]:
-        """Leave the robot alone for as long as the context lasts: many robots serve one at a time.
+        """Keep the robot disconnected while the context lasts: many robots accept one connection.
 
-        For a robot that nobody drives. An open session ends first; clients wait for the next one.
+        For a robot that is not driven. An open session ends first; clients wait for the next one.
         """
         self._held_off += 1
         self._stirred.set()
@@ -274,9 +274,9 @@ class Station:
             self._stirred.set()
 
     def replace(self, robot: Robot, latch: LatchFile | None = None) -> None:
-        """Go on with another version of the robot; an open session ends, and the next is its own.
+        """Switch to another version of the robot; an open session ends, the next one uses it.
 
-        For a robot that `is_at_rest`: it is disconnected meanwhile.
+        For a robot that `is_at_rest`: the switch disconnects it for a moment.
         """
         self._successor = (robot, latch)
         if not self._is_open:
@@ -290,7 +290,7 @@ class Station:
             self.controls.renew(self.robot.profile.driver, latch)
 
     async def run(self) -> None:
-        """Supervise for ever; ends by being cancelled."""
+        """Supervise the session until cancelled."""
         while True:
             self._succeed()
             await self._wait_for(present=True)
@@ -319,20 +319,20 @@ class Station:
                     for work in (live.fanout.run(), self.controls.serve(session))
                 ]
                 await self._until_deserted()
-                self._next = None  # who comes from here on waits for the next session
+                self._next = None  # later clients wait for the next session
                 for task in tasks:
                     task.cancel()
         finally:
             self._next = None
             self.controls.trail.attend(None, self.clock.now)
             live.ended.set()
-            live.fanout.flush()  # wakes every client, and each of them sees the end
+            live.fanout.flush()  # wakes every client, so that each sees the end
 
     async def _until_deserted(self) -> None:
         while True:
             await self._wait_for(present=False)
-            # Whether the time is over the alarm says, not the clock: a loop's timer may be a
-            # fraction of a millisecond early, and would then not ring again.
+            # The alarm decides about the end of the wait, not the clock: a timer of the loop may
+            # fire a fraction of a millisecond early, and would then not fire again.
             rung = asyncio.Event()
 
             def ring(rung: asyncio.Event = rung) -> None:
@@ -349,11 +349,11 @@ class Station:
 
     @property
     def _is_unwanted(self) -> bool:
-        """Whether an open session is to end, whoever looks on."""
+        """Return whether an open session must end despite its clients."""
         return self._successor is not None or self._held_off > 0
 
     async def _wait_for(self, *, present: bool) -> None:
-        """Wait until the robot is wanted, or until it is not, for any reason."""
+        """Wait until the robot needs a session, or until it no longer does."""
         while not (self._is_wanted if present else self._visitors == 0 or self._is_unwanted):
             self._stirred.clear()
             await self._stirred.wait()
@@ -371,4 +371,4 @@ class Station:
         coming, self._next = self._next, None
         if coming is not None and not coming.done():
             coming.set_exception(SessionFailed(reason))
-            coming.exception()  # nobody may be waiting: that is no error
+            coming.exception()  # marks the exception as retrieved

@@ -1,4 +1,4 @@
-"""A recording that is shown in place of a robot. Floor 5."""
+"""The playback of a recording in place of a robot. Layer 5."""
 
 from typing import Protocol
 
@@ -6,33 +6,33 @@ __all__ = ["Tape"]
 
 
 class Tape(Protocol):
-    """A recording that is played."""
+    """A recording with its playback position."""
 
     @property
     def began_s(self) -> float:
-        """When it was recorded, in seconds since 1970."""
+        """Start time of the recording, in seconds since 1970."""
 
     @property
     def length_s(self) -> float:
-        """How long it lasts."""
+        """Length of the recording, in seconds."""
 
     @property
     def position_s(self) -> float:
-        """Where it stands."""
+        """Playback position, in seconds from the beginning."""
 
     @property
     def is_playing(self) -> bool:
-        """Whether it runs."""
+        """Whether the playback is running."""
 
     @property
     def speed(self) -> float:
-        """How many seconds of it pass in one."""
+        """Playback speed; 1 is real time."""
 
     def play(self) -> None:
-        """Run; from the beginning, where it stands at its end."""
+        """Play; start again at the beginning if the position is the end."""
 
     def pause(self) -> None:
-        """Stand where it is."""
+        """Pause at the current position."""
 
     def seek(self, position_s: float) -> None:
-        """Go on from somewhere else."""
+        """Move to a position."""

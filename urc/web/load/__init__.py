@@ -1,1 +1,1 @@
-"""What pages may load: looked up, never found."""
+"""Files that pages may load, as tables from URL to file."""

@@ -1,6 +1,6 @@
-"""Two versions of one widget on one dashboard: each robot keeps the one that it was installed with.
+"""Two versions of one widget on one dashboard: each robot keeps the installed version.
 
-Floor 5. Pages load widgets by name, so where a name means two things the second gets another one.
+Layer 5. Pages load widgets by name. Where two widgets share a name, the second one is renamed.
 """
 
 import filecmp
@@ -16,7 +16,7 @@ __all__ = ["apart", "is_same", "unified"]
 
 
 def apart(profile: Profile, others: Iterable[Profile]) -> Profile:
-    """Return a profile none of whose widgets has the name of another one of the others."""
+    """Return the profile with each widget renamed whose name another profile uses differently."""
     taken: dict[str, Path] = {}
     for other in others:
         for widget in other.widgets.values():
@@ -30,7 +30,7 @@ def apart(profile: Profile, others: Iterable[Profile]) -> Profile:
 
 
 def unified(widgets: Iterable[Widget]) -> list[Widget]:
-    """Return widgets of which those that are the same, each in a folder of its own, are one."""
+    """Return the widgets, with copies of one widget in different folders merged into one."""
     found: dict[str, Widget] = {}
     every = []
     for widget in widgets:
@@ -73,7 +73,7 @@ def _uses(uses: Mapping[str, WidgetUse], names: Mapping[str, str]) -> dict[str, 
 
 
 def _digest(folder: Path) -> str:
-    """Return what tells the files of a folder from others, in a few letters."""
+    """Return a short hash of the files of a folder."""
     digest = hashlib.blake2b(digest_size=5)
     for name, file in sorted(_files(folder).items()):
         data = file.read_bytes()

@@ -1,7 +1,7 @@
-"""Files a page may load: known before the first request, never a path made from a URL.
+"""Files that a page may load: known before the first request, and never a path from a URL.
 
-Floor 5. Every table below is filled from folders that ship with URC, or from widget manifests; a
-request is a look-up in it. Files are read again when they change, so that an edit shows at once.
+Layer 5. Every table is filled from folders that ship with URC, or from widget manifests; a request
+is a look-up. A changed file is read again, so an edit shows at once.
 """
 
 import hashlib
@@ -21,10 +21,10 @@ __all__ = ["Assets", "folder_assets", "import_map", "script", "widget_assets"]
 
 STATIC = Path(__file__).resolve().parents[1] / "static"
 KIT = ("curve", "giving", "kit", "meter", "motion", "padmap", "palette", "scale", "sheet", "stroke")
-"""Modules of ours that widgets import as ``urc/…``."""
+"""Modules of URC that widgets import as ``urc/…``."""
 WIDGET_FILES = ("widget.js", "widget.css")
 MOST_FILES = 200
-"""That pages may load of one widget."""
+"""Most files that pages may load of one widget."""
 MEDIA_TYPES = {
     ".css": "text/css; charset=utf-8",
     ".js": "text/javascript; charset=utf-8",
@@ -52,7 +52,7 @@ class _File:
     tag: str = ""
 
     def refresh(self) -> None:
-        """Read the file when it is not the one in memory; raises OSError when it is gone."""
+        """Read the file if it has changed; raise OSError if it no longer exists."""
         found = self.path.stat()
         stamp = (found.st_mtime_ns, found.st_size)
         if stamp != self.stamp:
@@ -63,12 +63,12 @@ class _File:
 
 @dataclass(slots=True)
 class Assets:
-    """Name in the URL → file."""
+    """A table of files by their name in the URL."""
 
     files: dict[str, _File] = field(default_factory=dict)
 
     def respond(self, name: str, request: Request) -> Response:
-        """Return the file, or 304 when the browser has it already; raise 404."""
+        """Return the file, or 304 if the browser's copy is current; raise 404."""
         file = self.files.get(name)
         if file is None:
             raise HTTPException(404)
@@ -80,7 +80,7 @@ class Assets:
 
 
 def script(source: str, request: Request) -> Response:
-    """Return a module that was made, not read; 304 when the browser has it already."""
+    """Return a generated module, or 304 if the browser's copy is current."""
     body = source.encode()
     return _kept(body, _tag(body), MEDIA_TYPES[".js"], request)
 
@@ -97,7 +97,7 @@ def _tag(body: bytes) -> str:
 
 
 def folder_assets(folder: Path) -> Assets:
-    """Return every file of `folder` whose type a page can use, by its name relative to it."""
+    """Return every file of `folder` with a web media type, by its relative name."""
     root = folder.resolve()
     found = Assets()
     for path in sorted(root.rglob("*")):
@@ -108,10 +108,10 @@ def folder_assets(folder: Path) -> Assets:
 
 
 def widget_assets(widgets: Iterable[Widget]) -> Assets:
-    """Return what pages load of each widget: modules, style sheet and small assets.
+    """Return the files of each widget that pages load: modules, style sheet and small assets.
 
-    The names are ``<widget>/<path in its folder>``. A link that leads out of the folder is left
-    out, and so is what is hidden.
+    The names are ``<widget>/<path in its folder>``. Hidden files, and links that lead out of the
+    folder, are left out.
 
     Raises:
         UrcError: two widgets of one name come from different folders, or one has too many files.
@@ -125,7 +125,7 @@ def widget_assets(widgets: Iterable[Widget]) -> Assets:
                 f"two robots bring different widgets named {widget.name!r}: "
                 f"{folder} and {widget.folder}"
             )
-        # Also when they are not there yet: a widget is written while the page is open.
+        # Also missing ones: an author may write the widget while the page is open.
         for name in WIDGET_FILES:
             found.files[f"{widget.name}/{name}"] = _File(widget.folder / name)
         for name, file in _more_files(widget):
@@ -146,12 +146,12 @@ def _is_hidden(part: str) -> bool:
 
 
 def import_map(vendor: Path | None) -> Mapping[str, object]:
-    """Return the page's import map: our kit, and the third-party modules that the build brought."""
+    """Return the page's import map: URC's modules and the third-party modules of the build."""
     imports = {f"urc/{name}": f"/static/widgets/{name}.js" for name in KIT}
     imports["urc/words"] = "/words/en.js"
     place = vendor / "importmap.json" if vendor else None
     if place is not None and place.is_file():
         written: dict[str, str] = json.loads(place.read_text(encoding="utf-8"))["imports"]
-        # The build writes them relative to its folder, which pages see as /vendor/.
+        # The build writes paths relative to its folder, which is /vendor/ for pages.
         imports |= {name: f"/vendor/{url.removeprefix('./')}" for name, url in written.items()}
     return {"imports": imports}

@@ -1,6 +1,6 @@
-"""What pages load, as routes: our modules and styles, those of others, of widgets, words, tiles.
+"""Routes of the files that pages load: modules, styles, widgets, catalogues and map tiles.
 
-Floor 5. Each is a look-up in a table; see `urc.web.load.assets`.
+Layer 5. Each is a look-up in a table; see `urc.web.load.assets`.
 """
 
 from collections.abc import Callable
@@ -22,9 +22,9 @@ class FileRoutes:
     """The routes.
 
     Args:
-        vendor: folder of the third-party modules that the build brought; None: there are none.
-        tiles: folder of map pictures, ``z/x/y.png``; None: there are none.
-        widgets: returns the tables of the widgets' files, the first that has a name counts.
+        vendor: folder of the third-party modules of the build, or None.
+        tiles: folder of map tiles, ``z/x/y.png``, or None.
+        widgets: returns the tables of the widgets' files; the first table with a name counts.
     """
 
     def __init__(
@@ -36,7 +36,7 @@ class FileRoutes:
         self._widgets = widgets
 
     def routes(self) -> list[Route]:
-        """Return what has to come behind the pages of the widgets."""
+        """Return the routes; they go after the pages of the widgets."""
         return [
             Route("/favicon.ico", self._favicon),
             Route("/app.webmanifest", self._manifest),
@@ -59,11 +59,11 @@ class FileRoutes:
         return self._static.respond("app.webmanifest", request)
 
     async def _worker(self, request: Request) -> Response:
-        """Serve the service worker from the root: it may only look after what lies below it."""
+        """Serve the service worker from the root, because its scope is the folder of its URL."""
         return self._static.respond("sw.js", request)
 
     async def _words(self, request: Request) -> Response:
-        """Serve what pages say, in one language, as a module."""
+        """Serve the catalogue of one language as a module."""
         tag = request.path_params["tag"]
         if tag not in words.LANGUAGES:
             raise HTTPException(404)
@@ -84,7 +84,7 @@ class FileRoutes:
         return answer
 
     async def _tile(self, request: Request) -> Response:
-        """Serve a square of a map, where a folder with tiles was given."""
+        """Serve a map tile, if a folder of tiles is configured."""
         if self._tiles is None:
             raise HTTPException(404)
         return tile(self._tiles, **request.path_params, request=request)

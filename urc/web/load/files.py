@@ -1,9 +1,8 @@
-"""Files that a robot's documents name for their widgets, and tiles of maps: looked up, never found.
+"""Files that a robot's documents name for their widgets, and map tiles.
 
-So are pages of somebody else; the document that shows one is made in ``framed.py``.
-
-Floor 5. A URL is a key into a table made from the loaded profile, or three numbers; no path is ever
-made from what a browser sends.
+Layer 5. A URL is a key into a table made from the loaded profile, or three numbers. No path is ever
+made from text of a browser. Pages of third parties work alike; ``framed.py`` makes the document
+around them.
 """
 
 import hashlib
@@ -36,7 +35,7 @@ MEDIA_TYPES = {
     ".ogg": "audio/ogg",
     **dict.fromkeys((".md", ".txt", ".csv"), "text/plain; charset=utf-8"),
 }
-"""Whatever else there is goes as bytes."""
+"""Media types by suffix; any other file is sent as bytes."""
 
 TILE_TYPES = {"png": "image/png", "jpg": "image/jpeg", "jpeg": "image/jpeg", "webp": "image/webp"}
 DEEPEST_ZOOM = 25
@@ -45,13 +44,13 @@ EMPTY_TILE = bytes.fromhex(
     "89504e470d0a1a0a0000000d4948445200000001000000010804000000b51c0c020000"
     "000b49444154789c636060000000030001b8ad3a630000000049454e44ae426082"
 )
-"""A clear pixel: where a map has no picture, what lies below it is seen."""
+"""A transparent pixel: layers below a missing tile stay visible."""
 
 
 def linked_options(use: WidgetUse, robot: str) -> dict[str, object]:
-    """Return a widget's options as the page gets them: instead of a file, its address.
+    """Return a widget's options for its page, with URLs in place of files.
 
-    Instead of the URL of a page it gets the address of the document that shows the page.
+    The URL of a third-party page becomes the URL of the document that frames it.
     """
     files = {name: _url(robot, name, place) for name, place in use.files.items()}
     options = {name: _linked(value, files) for name, value in use.options.items()}
@@ -75,19 +74,19 @@ def _framed(robot: str, url: str) -> str:
 
 
 def page_key(url: str) -> str:
-    """Return the word under which a page that an option names is looked up."""
+    """Return the key of a third-party page that an option names."""
     return hashlib.blake2b(url.encode(), digest_size=8).hexdigest()
 
 
 def uses_of(profile: Profile) -> Iterator[WidgetUse]:
-    """Yield every slot that a widget fills: of the profile, and of its interfaces."""
+    """Yield every filled slot of the profile and of its interfaces."""
     yield from profile.slots.values()
     for interface in profile.interfaces.values():
         yield from interface.widgets.values()
 
 
 def _key(name: str, place: str) -> str:
-    # Two documents may call different files the same; what follows is for models, which name their
+    # The digest keeps files of the same name apart. The path follows it, because a model names its
     # parts by path.
     return f"{hashlib.blake2b(place.encode(), digest_size=6).hexdigest()}/{name}"
 
@@ -105,10 +104,10 @@ def robot_file(profile: Profile, key: str, request: Request) -> Response:
 
 
 def tile(folder: Path, z: int, x: int, y: int, kind: str, request: Request) -> Response:
-    """Return one square of a map from ``folder/z/x/y.kind``; a clear one where there is none.
+    """Return one map tile from ``folder/z/x/y.kind``; a transparent one if the file is missing.
 
     Raises:
-        HTTPException: 404, when the numbers name no square, or the type is none of a tile.
+        HTTPException: 404 when the numbers or the media type name no tile.
     """
     if kind not in TILE_TYPES or not 0 <= z <= DEEPEST_ZOOM or not (0 <= x < 2**z > y >= 0):
         raise HTTPException(404)

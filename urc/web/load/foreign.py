@@ -1,7 +1,7 @@
-"""Which widgets live in the page, and which in a frame of their own.
+"""Decides which widgets run in the page and which in a frame of their own.
 
-Floor 5. What ships with URC is part of the page. Every other widget is somebody else's program: it
-is mounted in a sandboxed frame, unless whoever runs the server says that it is trusted.
+Layer 5. Widgets that ship with URC are part of the page. Every other widget is third-party code: it
+runs in a sandboxed frame, unless the server was started with it as trusted.
 """
 
 from collections.abc import Iterable
@@ -21,23 +21,23 @@ OURS = frozenset({
     "slider", "speed", "state", "stop", "switch", "table", "terminal", "text", "tilt", "value",
     "vector-pad",
 })  # fmt: skip
-"""Widgets that ship with URC. Named here, so that a folder beside theirs is not taken for one."""
+"""Widgets that ship with URC, listed so that another folder next to theirs is not trusted."""
 
 
 @dataclass(frozen=True, slots=True)
 class Border:
-    """Tells foreign widgets from those that may share the page."""
+    """Tells third-party widgets from trusted ones."""
 
     trusted: frozenset[str] = frozenset()
-    """Names of foreign widgets that share it all the same."""
+    """Names of third-party widgets that run in the page."""
 
     @classmethod
     def of(cls, trusted: Iterable[str]) -> "Border":
-        """Return the border that lets these widgets through."""
+        """Return the rule that trusts these widgets."""
         return cls(frozenset(trusted))
 
     def is_foreign(self, widget: Widget) -> bool:
-        """Return whether the widget has to live in a frame."""
+        """Return whether the widget has to run in a frame."""
         if widget.name in self.trusted:
             return False
         home = shipped("widgets")
@@ -46,12 +46,12 @@ class Border:
     def styles(self, widgets: Iterable[Widget]) -> tuple[str, ...]:
         """Return the URLs of the widgets' style sheets, for a page.
 
-        That of a foreign widget is not among them: it could change the whole page.
+        Style sheets of third-party widgets are left out: they could change the whole page.
         """
         mine = dict.fromkeys(one.name for one in widgets if not self.is_foreign(one))
         return tuple(f"/widgets/{quote(name)}/widget.css" for name in mine)
 
 
 def frame_url(widget: Widget) -> str:
-    """Return where the frame of a foreign widget is."""
+    """Return the URL of the frame of a third-party widget."""
     return f"/frames/{quote(widget.name)}"

@@ -1,1 +1,1 @@
-"""The managers: packages got from repositories, and the settings of robots."""
+"""The managers: packages from repositories, and the settings of robots."""

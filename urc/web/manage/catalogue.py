@@ -1,7 +1,7 @@
-"""What the repositories have, as they said it last: asked in the background, read at once.
+"""The package lists of the repositories: refreshed in the background, read from memory.
 
-Floor 5. A page that is opened starts the asking and shows what was known; nobody waits for a
-server that is switched off.
+Layer 5. A page starts a refresh and shows the last known lists at once, so no page waits for a
+server that is off.
 """
 
 import asyncio
@@ -22,18 +22,18 @@ from urc.web.manage.wire import Place
 __all__ = ["FRESH_S", "Catalogue"]
 
 FRESH_S: Final = 20.0
-"""What was said so long ago is not asked again."""
+"""Age below which a list is not refreshed again, in seconds."""
 
 
 class Catalogue:
     """The packages of all repositories that this user added."""
 
     def __init__(self, folder: Path, now: Callable[[], float]) -> None:
-        """Ask nobody yet.
+        """Prepare; no repository is contacted yet.
 
         Args:
-            folder: of the packages; the list of repositories is in it.
-            now: the time, in seconds.
+            folder: folder of the packages, with the list of repositories.
+            now: returns the time, in seconds.
         """
         self._folder = folder
         self._now = now
@@ -41,13 +41,13 @@ class Catalogue:
         self._asking: asyncio.Task[None] | None = None
         self.places: tuple[Place, ...] = ()
         self.found: dict[Key, list[tuple[Entry, str]]] = {}
-        """Every version of every package, and the address of its repository."""
+        """Every version of every package, with the URL of its repository."""
         self.fault = ""
-        """Why the list of repositories itself cannot be read."""
+        """Why the list of repositories cannot be read, or ""."""
 
     @property
     def is_asking(self) -> bool:
-        """Whether answers are on their way."""
+        """Whether a refresh is running."""
         return self._asking is not None and not self._asking.done()
 
     def repositories(self, complain: Callable[[str], None]) -> Repositories:
@@ -55,14 +55,14 @@ class Catalogue:
         return Repositories(self._folder, complain)
 
     def ask(self, *, force: bool = False) -> None:
-        """Begin to ask all repositories, unless that was done a moment ago."""
+        """Start a refresh from all repositories, unless the last one is recent."""
         is_fresh = self._asked_s is not None and self._now() - self._asked_s < FRESH_S
         if self.is_asking or (is_fresh and not force):
             return
         self._asking = asyncio.get_running_loop().create_task(self._ask())
 
     async def close(self) -> None:
-        """Wait for nobody any more."""
+        """Abandon pending requests."""
         if self._asking is not None:
             self._asking.cancel()
             await asyncio.wait((self._asking,), timeout=1)
@@ -77,17 +77,17 @@ class Catalogue:
         return search(entries, words.split())
 
     def versions(self, key: Key) -> list[Entry]:
-        """Return all versions of a package that are offered, the newest first."""
+        """Return all offered versions of a package, newest first."""
         some = [entry for entry, _ in self.found.get(key, ()) if not entry.why_withdrawn]
         return sorted(some, key=lambda entry: entry.number, reverse=True)
 
     def withdrawn(self, lock: Lock) -> list[str]:
-        """Return for people what was withdrawn of an installed package, one line each."""
+        """Return the withdrawn parts of an installed package, for people, one a line."""
         keys = map(parse_key, lock.packages)
         return withdrawn_lines(lock, [one for key in keys for one, _ in self.found.get(key, ())])
 
     def origin(self, entry: Entry) -> str:
-        """Return the address of the repository that has it."""
+        """Return the URL of its repository."""
         return next((url for one, url in self.found.get(entry.key, ()) if one is entry), "")
 
     async def _ask(self) -> None:
@@ -101,7 +101,7 @@ class Catalogue:
             *(in_daemon(lambda one=one: self._answer(one), f"ask {one.name}") for one in known)  # type: ignore[misc]
         )
         found: dict[Key, list[tuple[Entry, str]]] = {}
-        for place, entries in reversed(answers):  # the first that has a package gives it
+        for place, entries in reversed(answers):  # the first one wins
             fresh: dict[Key, list[tuple[Entry, str]]] = {}
             for entry in entries:
                 fresh.setdefault(entry.key, []).append((entry, place.url))
@@ -110,7 +110,7 @@ class Catalogue:
         self._asked_s = self._now()
 
     def _answer(self, repository: Repository) -> tuple[Place, tuple[Entry, ...]]:
-        """Ask one repository, in a thread."""
+        """Contact one repository, in a thread."""
         said: list[str] = []
         url, is_plain = repository.name, repository.name.startswith("http:")
         try:
@@ -127,4 +127,4 @@ class Catalogue:
 
 
 def _unheard(_: str) -> None:
-    """Let a complaint pass: it is told where the answer is."""
+    """Ignore a warning: the result has it."""

@@ -1,7 +1,6 @@
-"""What somebody hands over instead of naming it: a bundle, an archive, or a bare interface.
+"""Sources of uploaded packages: a bundle, an archive, or a bare interface document.
 
-Floor 5. A bare document becomes a package of its own, so that it is kept, listed and removed as
-all others are.
+Layer 5. A bare document becomes a package, so it is stored, listed and removed like all others.
 """
 
 from collections.abc import Sequence
@@ -24,19 +23,19 @@ __all__ = ["given_source", "source_at"]
 
 _DOCUMENTS: Final = (".yaml", ".yml")
 _BYTES: Final = 262_144
-"""Of a bare document."""
+"""Largest bare document, in bytes."""
 
 
 def given_source(name: str, data: bytes, installed: Sequence[Lock]) -> FileSource:
-    """Return what was handed over.
+    """Return the source of an uploaded file.
 
     Args:
-        name: of the file, as the browser tells it; only its ending counts.
-        data: all of it.
-        installed: what is there: a bare document gets a version that is new.
+        name: name of the file from the browser; only its suffix counts.
+        data: its content.
+        installed: installed packages; a bare document gets an unused version.
 
     Raises:
-        PackageError: it is no package, and no interface either.
+        PackageError: it is neither a package nor an interface.
     """
     name = PurePath(name).name or "what was handed over"
     suffix = PurePath(name).suffix.lower()
@@ -54,9 +53,9 @@ def given_source(name: str, data: bytes, installed: Sequence[Lock]) -> FileSourc
 
 
 def source_at(path: Path, installed: Sequence[Lock]) -> FileSource:
-    """Return what stands at a path of this machine; raise `PackageError`.
+    """Return the source at a path of this machine; raise `PackageError`.
 
-    That is a package's folder, a bundle, an archive, an interface's document, or a folder with one.
+    The path is a package's folder, a bundle, an archive, an interface document, or its folder.
     """
     bare = path / "interface.yaml" if path.is_dir() else path
     if bare.suffix.lower() not in _DOCUMENTS or (path / MANIFEST).is_file():

@@ -1,7 +1,7 @@
-"""The one install that may be under way: planned, read, agreed to, done; or given up at any moment.
+"""The install job: planned, reviewed, approved and done, or cancelled at any moment.
 
-Floor 5. Nothing here holds up the loop: fetching is done in a thread that is not waited for when
-somebody gives up, and the store changes in one step at the end.
+Layer 5. Nothing here blocks the loop. Downloads run in a thread that a cancel abandons, and the
+store changes in one step at the end.
 """
 
 import asyncio
@@ -32,18 +32,18 @@ from urc.web.words import spoken
 __all__ = ["Busy", "Job", "Jobs", "Wanted"]
 
 _WIRE_MOST: Final = 100
-"""Lines of what changes on the wire that are told."""
+"""Most reported lines about changes in the frames to the robot."""
 _INSTALLING: Final = phrase("installing")
 _LEFT_MOST: Final = 4
-"""Threads that may still hang at a server after somebody gave up."""
+"""Most abandoned threads that still wait for a server."""
 
 
 Wanted = Wish | Path | FileSource | Lock
-"""A package by name, a place on this machine, what was handed over, or an update of a lock."""
+"""A package by name, a path of this machine, an upload, or an update of a lock."""
 
 
 class Busy(UrcError):
-    """Another job is under way."""
+    """The refusal of a job while another one runs."""
 
 
 class _Planned(NamedTuple):
@@ -51,17 +51,17 @@ class _Planned(NamedTuple):
     origins: tuple[str, ...]
     may: tuple[str, ...]
     risks: tuple[str, ...] = ()
-    """What of this machine it uses by itself."""
+    """Resources of this machine that the package uses without a user's action."""
     old: Lock | None = None
-    """What an update takes the place of."""
+    """The version that an update replaces."""
     stays: Lock | None = None
-    """What is in use, and stays so: another version is installed beside it."""
+    """The version in use, which stays in use: the new one is installed in addition."""
     changes: Difference | None = None
 
 
 @dataclass
 class Job:
-    """One install, from the wish to its end. Its thread only writes words and numbers."""
+    """One install, from the request to its end. Its thread only writes texts and numbers."""
 
     number: int
     title: str
@@ -74,7 +74,7 @@ class Job:
     is_given_up: bool = False
 
     def news(self) -> JobNews:
-        """Return what pages are told."""
+        """Return the state of the job for pages."""
         planned = self.planned
         changes = planned.changes if planned is not None else None
         packages = planned.origins if planned is not None else ()
@@ -98,7 +98,7 @@ class Job:
 
 
 class _Watched:
-    """A source that tells a job what it fetches, and stops when the job is given up."""
+    """A source that reports progress to a job, and stops after a cancel."""
 
     def __init__(self, source: Source, job: Job) -> None:
         self._source = source
@@ -130,7 +130,7 @@ class _Watched:
 
 
 class Jobs:
-    """The jobs of one store: one at a time, and the newest stays to be looked at."""
+    """The jobs of one store: one at a time; the newest stays visible."""
 
     def __init__(
         self,
@@ -138,12 +138,12 @@ class Jobs:
         sources: Callable[[Callable[[str], None]], Sequence[Source]],
         used: Callable[[Key], Lock | None] = lambda _: None,
     ) -> None:
-        """Do nothing yet.
+        """Prepare.
 
         Args:
-            store: what is changed.
-            sources: returns the repositories, whose complaints go to what is given.
-            used: returns what is in use of a package, or under its name.
+            store: the store of packages.
+            sources: returns the repositories; their warnings go to its argument.
+            used: returns the version of a package in use, also under its name alone.
         """
         self._store = store
         self._used = used
@@ -154,7 +154,7 @@ class Jobs:
         self.newest: Job | None = None
 
     def begin(self, what: Wanted) -> Job:
-        """Plan what somebody asks for; raise `Busy` while another one is at work."""
+        """Plan an install; raise `Busy` while another job runs."""
         if self.newest is not None and self.newest.state == "working":
             raise Busy(f"{self.newest.title} is under way: wait for it, or give it up")
         if self._left >= _LEFT_MOST:
@@ -166,21 +166,22 @@ class Jobs:
         return job
 
     def touched(self, number: int) -> tuple[Key | None, Lock | None]:
-        """Return which package a job installs, and what is in use and must stay so."""
+        """Return the package that a job installs, and the version in use that must stay."""
         planned = self._asked(number).planned
         if planned is None:
             return None, None
         return planned.plan.lock.key, None if planned.old else self._used(planned.plan.lock.key)
 
     async def agree(self, number: int, *, takes_risks: bool = False) -> Job:
-        """Install what a job has planned; raise `Busy` when it does not ask.
+        """Install the planned package.
 
         Args:
-            number: of the job.
-            takes_risks: whether what the package uses by itself was agreed to as well.
+            number: number of the job.
+            takes_risks: whether the user also approved the package's own access to this machine.
 
         Raises:
-            PackageError: it was not.
+            Busy: the job does not wait for approval.
+            PackageError: the package needs `takes_risks`.
         """
         job = self._asked(number)
         planned = job.planned
@@ -202,13 +203,13 @@ class Jobs:
         return job
 
     async def planned(self) -> Job | None:
-        """Wait until the newest job asks, or has ended; return it."""
+        """Wait until the newest job needs approval or has ended; return it."""
         if self._task is not None:
             await asyncio.wait((self._task,))
         return self.newest
 
     def give_up(self, number: int) -> Job:
-        """End a job that has changed nothing yet; raise `Busy` when it is another one."""
+        """Cancel a job that has changed nothing yet; raise `Busy` if it is not the newest."""
         job = self._asked(number)
         if job.state in ("working", "asks") and job.line != _INSTALLING:
             job.is_given_up = True
@@ -219,7 +220,7 @@ class Jobs:
         return job
 
     async def close(self) -> None:
-        """Wait for nobody any more."""
+        """Abandon all threads."""
         if self._task is not None:
             self._task.cancel()
             await asyncio.wait((self._task,), timeout=1)
@@ -245,10 +246,10 @@ class Jobs:
     def _ended(self, thread: "asyncio.Future[_Planned]") -> None:
         self._left -= 1
         if not thread.cancelled():
-            thread.exception()  # nobody may be waiting any more: that is no error
+            thread.exception()  # marks the exception as retrieved
 
     def _plan(self, job: Job, what: Wanted) -> _Planned:
-        """Fetch everything and read what it may do; in a thread."""
+        """Download everything and read its permissions; in a thread."""
         known = [_Watched(one, job) for one in self._sources(job.notes.append)]
         plan = self._fetched(job, what, known)
         if job.is_given_up:
@@ -278,7 +279,7 @@ class Jobs:
     def _changes(
         self, job: Job, before: Lock | None, plan: Plan, folder: Path, look: Looks
     ) -> Difference | None:
-        """Return what is another thing than in the version before, where that can be told."""
+        """Return the differences from the version before, as far as they are known."""
         if before is None:
             return None
         if before.key != plan.lock.key:
@@ -331,6 +332,6 @@ def _clean(lines: Iterable[str]) -> tuple[str, ...]:
 
 
 def _line(error: Exception) -> str:
-    """Return a failure in one line: of several findings the first."""
+    """Return a failure in one line: the first of several problems."""
     text = str(error).strip().splitlines()
     return text[0] if text else type(error).__name__

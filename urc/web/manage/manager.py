@@ -1,6 +1,6 @@
-"""Packages and the robots on the menu in step: what is installed is served, what goes is not.
+"""Keeps the robots of the menu in step with the installed packages.
 
-Floor 5. It has no route and no page: `urc.web.manage.routes` asks it.
+Layer 5. It has no route and no page: `urc.web.manage.routes` uses it.
 """
 
 import asyncio
@@ -32,7 +32,7 @@ log = logging.getLogger(__name__)
 
 
 class Manager:
-    """All that the managers' pages do."""
+    """The operations of the managers' pages."""
 
     def __init__(
         self,
@@ -41,13 +41,13 @@ class Manager:
         now: Callable[[], float],
         renew: Callable[[str, Robot], None],
     ) -> None:
-        """Look at nothing yet.
+        """Prepare.
 
         Args:
             garage: makes the robots.
-            fleet: where they are served.
-            now: the time, in seconds.
-            renew: goes on with another version of a robot; raises `UrcError`.
+            fleet: the served robots.
+            now: returns the time, in seconds.
+            renew: switches to another version of a robot; raises `UrcError`.
         """
         self.garage = garage
         self.fleet = fleet
@@ -55,13 +55,13 @@ class Manager:
         self.catalogue = Catalogue(garage.workshop.data / "packages", now)
         self.jobs = Jobs(garage.store, self._sources, self._used)
         self._parked: dict[str, Lock] = {}
-        """Robots that stand on the menu because they are installed: name → what is served."""
+        """Robots that are on the menu because they are installed: name → served version."""
         self._offered: dict[str, str] = {}
         """Interfaces that robots offer because they are installed: name → digest."""
         self._seen: object = None
-        """What told the state of the store apart from others when it was looked at last."""
+        """Fingerprint of the store's state at the last look."""
         self._is_behind = False
-        """Whether something waits until a robot is no longer driven."""
+        """Whether a change is deferred until a robot is no longer driven."""
         self._changing = asyncio.Lock()
 
     def _sources(self, complain: Callable[[str], None]) -> list[Source]:
@@ -69,14 +69,14 @@ class Manager:
         return list(known)
 
     async def close(self) -> None:
-        """Wait for nobody any more."""
+        """Abandon pending work."""
         await self.jobs.close()
         await self.catalogue.close()
 
     # The menu
 
     async def park(self) -> None:
-        """Serve what is installed, where the menu has it, and no more than that."""
+        """Serve the installed robots if the menu shows them, and no others."""
         if not self.garage.workshop.shows_installed:
             return
         parked = await asyncio.to_thread(self.garage.parked)
@@ -87,7 +87,7 @@ class Manager:
             del self._parked[name]
         for name, locks in parked.items():
             if name in self.fleet.robots and name not in self._parked:
-                continue  # one of that name was there from the start
+                continue  # a robot of that name was there from the start
             await self._park(name, locks)
 
     async def _park(self, name: str, locks: list[Lock]) -> None:
@@ -95,7 +95,7 @@ class Manager:
             kept = await asyncio.to_thread(self.garage.kept(name).load)
             lock, served = self.garage.chosen(locks, kept.version), self._parked.get(name)
             if served in locks and not kept.version:
-                lock = served  # another program installed a newer one: it is chosen by hand
+                lock = served  # another program installed a newer one; the user chooses
             if name in self.fleet.robots and (served == lock or self._waits(name)):
                 return
             profile = await asyncio.to_thread(self.garage.profile, lock)
@@ -111,13 +111,13 @@ class Manager:
             self._parked.setdefault(name, locks[-1])
 
     def _waits(self, name: str) -> bool:
-        """Return whether a robot is driven: what became of its package is looked at later."""
+        """Return whether a robot is driven; a change of its package is then deferred."""
         is_driven = name in self.fleet.robots and bool(self.fleet.driven_by(name))
         self._is_behind = self._is_behind or is_driven
         return is_driven
 
     async def refurnish(self) -> None:
-        """Offer the interfaces that are installed now, on every robot that nobody drives."""
+        """Offer the installed interfaces on every robot that is not driven."""
         added = await asyncio.to_thread(self.garage.interfaces)
         now = {one.lock.key.name: one.lock.digest for one in added}
         changed = {name for name, _ in now.items() ^ self._offered.items()}
@@ -136,7 +136,7 @@ class Manager:
                 log.warning("%s: %s", name, error)
 
     async def take(self, name: str, robot: Robot, version: str) -> None:
-        """Go on with a robot whose settings were filled in; raise `UrcError` when widgets clash."""
+        """Switch to a robot with new settings; raise `UrcError` when widgets clash."""
         if name in self.fleet.robots:
             self._renew(name, robot)
         else:
@@ -147,7 +147,7 @@ class Manager:
                 self._parked[name] = self.garage.chosen(locks, version)
 
     def document_of(self, name: str, robot: Robot) -> Profile:
-        """Return a robot's profile as its document says, without what was added to it."""
+        """Return a robot's profile as its document says, without added interfaces."""
         lock = self._parked.get(name)
         if lock is not None:
             return self.garage.profile(lock)
@@ -158,18 +158,18 @@ class Manager:
         return {name: str(lock) for name, lock in self._parked.items()}
 
     def lock_of(self, name: str) -> Lock | None:
-        """Return which installed package a robot is; None: it was there from the start."""
+        """Return the installed package of a robot; None for a robot from the start."""
         return self._parked.get(name)
 
     # Changes
 
     async def look(self) -> None:
-        """Bring the menu up to date when another program has installed or removed something."""
+        """Update the menu if another program has installed or removed a package."""
         if await asyncio.to_thread(self.garage.stamp) != self._seen:
             await self.changed()
 
     async def changed(self) -> None:
-        """Bring the menu up to date with what is installed."""
+        """Update the menu from the installed packages."""
         async with self._changing:
             self._seen = await asyncio.to_thread(self.garage.stamp)
             self._is_behind = False
@@ -178,30 +178,30 @@ class Manager:
                 await self.refurnish()
                 if self._is_behind:
                     self._seen = None
-            except (UrcError, OSError) as error:  # the managers' pages tell it, too
+            except (UrcError, OSError) as error:  # the managers' pages show it, too
                 log.warning("what is installed cannot be read: %s", error)
 
     async def connect(self, url: str) -> None:
-        """Remember a repository that answers; raise `PackageError`."""
+        """Add a repository that responds; raise `PackageError`."""
         known = self.catalogue.repositories(log.info)
         await in_daemon(lambda: known.add(url), "connect")
         self.catalogue.ask(force=True)
 
     async def disconnect(self, url: str) -> None:
-        """Forget a repository; raise `PackageError` when it was never added."""
+        """Remove a repository; raise `PackageError` if it was never added."""
         known = self.catalogue.repositories(log.info)
         await asyncio.to_thread(known.remove, url)
         self.catalogue.ask(force=True)
 
     def gone(self, wish: Wish) -> list[str]:
-        """Return all that would go with a package, as ``drivers/puppet 1.0.0``; raise."""
+        """Return all packages that a removal would remove, as ``drivers/puppet 1.0.0``; raise."""
         before = self.garage.store.installed()
         meant = self._meant(wish)
         after = [lock for lock in before if lock not in meant]
         return sorted(_all(before) - _all(after))
 
     def _meant(self, wish: Wish) -> list[Lock]:
-        """Return the installed packages that a wish means; raise `PackageError` for none."""
+        """Return the installed packages that a wish names; raise `PackageError` for none."""
         meant = [
             lock
             for lock in self.garage.store.installed()
@@ -213,17 +213,15 @@ class Manager:
         return meant
 
     def forgettable(self, wish: Wish) -> list[str]:
-        """Return the robots for which something was filled in that goes with a package; raise."""
+        """Return the robots whose settings a removal could delete; raise."""
         meant = self._meant(wish)
         left = [lock for lock in self.garage.store.installed() if lock not in meant]
         return names_kept(self._kept_folder, meant, left)
 
     async def remove(self, text: str, *, forgets: bool = True) -> list[str]:
-        """Remove a package and what only it needed; return what is gone.
+        """Remove a package and its unneeded dependencies; return their names.
 
-        Args:
-            text: which.
-            forgets: whether what was filled in for its robot goes, too.
+        `forgets` deletes the settings of its robot, too.
 
         Raises:
             PackageError: it is not installed, or its robot is being driven.
@@ -244,9 +242,9 @@ class Manager:
         return gone
 
     async def agree(self, number: int, *, takes_risks: bool = False) -> Job:
-        """Install what the job has planned; raise `Busy` while its robot is being driven.
+        """Install the planned package; raise `Busy` while its robot is being driven.
 
-        What is in use of the package stays so, but for an update.
+        The version in use stays in use, except after an update.
         """
         key, used = await asyncio.to_thread(self.jobs.touched, number)
         if key is not None:
@@ -265,7 +263,7 @@ class Manager:
         return lock
 
     async def back(self, text: str) -> Lock:
-        """Go back to the version before an update; return it. Raise `PackageError`."""
+        """Restore and return the version before an update. Raise `PackageError`."""
         lock = await asyncio.to_thread(self.installed, text)
         self._check_idle_of(lock.key)
 
@@ -283,7 +281,7 @@ class Manager:
                 self.check_idle(name)
 
     def _used(self, key: Key) -> Lock | None:
-        """Return what is in use of a package, or, of what is driven, under its name."""
+        """Return the version of a package in use; for a driven robot, any package of its name."""
         installed = self.garage.store.installed()
         if key.kind in DRIVEN:
             return in_use(self._kept_folder, key.name, installed)
@@ -295,23 +293,23 @@ class Manager:
         return self.garage.workshop.data / "robots"
 
     def check_idle(self, name: str) -> None:
-        """Raise `Busy` while somebody drives a robot."""
+        """Raise `Busy` while a robot is driven."""
         driver = self.fleet.driven_by(name)
         if driver:
             raise Busy(f"{name} is being driven ({driver}): wait until the controls are given back")
 
-    # What pages show
+    # Data for pages
 
     def shelf(self, words: str, kinds: tuple[str, ...], *, may_manage: bool) -> Shelf:
-        """Return what a page shows; in a thread, since it reads files.
+        """Return the lists of a page; in a thread, since it reads files.
 
         Args:
-            words: that packages of repositories must have.
-            kinds: of packages.
-            may_manage: whether who asks may change anything.
+            words: search words for the packages of repositories.
+            kinds: kinds of packages.
+            may_manage: whether the visitor may change anything.
         """
         catalogue = self.catalogue
-        # First of all: answers that come meanwhile are then asked for once more, not missed.
+        # Read first: replies that arrive during the search then cause one more request.
         is_asking = catalogue.is_asking
         locks = self.garage.store.installed()
         hits = catalogue.hits(words, kinds)

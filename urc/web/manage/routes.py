@@ -1,7 +1,7 @@
-"""The managers over HTTP: their pages, and what these ask for under ``/api/v1``.
+"""Routes of the managers: their pages, and their requests under ``/api/v1``.
 
-Floor 5. Everything that changes something is a POST with a JSON body, from this server's own pages
-(`urc.web.serve.policy` sees to it), by holders of the start key or of the token of --manage.
+Layer 5. Each change is a POST with a JSON body from this server's own pages; `urc.web.serve.policy`
+checks that. It needs the start key or the token of --manage.
 """
 
 import asyncio
@@ -102,7 +102,7 @@ ONLY_HERE: Final = "this needs the key in the address that URC printed, or the t
 
 
 class Refusal(Exception):
-    """An answer that is no success: status, and one line."""
+    """An error response: status and one line."""
 
     def __init__(self, status: int, line: str) -> None:
         super().__init__(line)
@@ -111,7 +111,7 @@ class Refusal(Exception):
 
 
 def answer(value: object, status: int = 200) -> Response:
-    """Return JSON that nobody keeps."""
+    """Return a JSON response that is not cached."""
     return Response(msgspec.json.encode(value), status, _NO_STORE, media_type="application/json")
 
 
@@ -126,12 +126,12 @@ async def body_of(request: Request, kind: type[_T]) -> _T:
 
 
 def told(status: int, line: str) -> Response:
-    """Return a failure in one line."""
+    """Return an error response with one line."""
     return answer(Failure(line), status)
 
 
 def _api(handler: _Handler) -> _Handler:
-    """Turn our own errors into one line each."""
+    """Turn each `UrcError` of a handler into a response with one line."""
 
     @wraps(handler)
     async def handle(self: "ManageRoutes", request: Request) -> Response:
@@ -159,13 +159,13 @@ class ManageRoutes:
         is_here: Callable[[HTTPConnection], bool],
         may_manage: Callable[[HTTPConnection], bool],
     ) -> None:
-        """Answer nothing yet.
+        """Prepare.
 
         Args:
-            manager: does the work.
-            ways: which pages there are.
-            is_here: tells whether who asks has the start key.
-            may_manage: tells whether who asks may change anything.
+            manager: the operations.
+            ways: the pages of this server, for links.
+            is_here: returns whether a request has the start key.
+            may_manage: returns whether a request may change anything.
         """
         self._manager = manager
         self._ways = ways
@@ -173,7 +173,7 @@ class ManageRoutes:
         self.may_manage = may_manage
 
     def routes(self) -> list[Route]:
-        """Return the pages, and what they ask for."""
+        """Return the routes of the pages and of their requests."""
         posts = {
             "repositories": self.connect,
             "repositories/ask": self.ask,
@@ -196,7 +196,7 @@ class ManageRoutes:
         ]
 
     def check(self, connection: HTTPConnection) -> None:
-        """Raise `Refusal` when who asks may not change anything."""
+        """Raise `Refusal` if the visitor may not change anything."""
         if not self.may_manage(connection):
             raise Refusal(403, ONLY_HERE)
 
@@ -215,7 +215,7 @@ class ManageRoutes:
 
     @_api
     async def shelf(self, request: Request) -> Response:
-        """Tell what there is; ``kinds`` and ``words`` choose. No repository is asked."""
+        """Return the packages; ``kinds`` and ``words`` filter. No repository is contacted."""
         query = request.query_params
         kinds = tuple(one for one in query.get("kinds", "").split(",") if one in _KINDS) or _KINDS
         shelf = await asyncio.to_thread(
@@ -228,9 +228,9 @@ class ManageRoutes:
 
     @_api
     async def ask(self, request: Request) -> Response:
-        """Begin to ask the repositories; ``force`` asks however new their answers are.
+        """Start a refresh from the repositories; ``force`` ignores the age of the last one.
 
-        Anybody who looks at a page may ask, but only now and then.
+        Any visitor may start a refresh, but only now and then.
         """
         said = await body_of(request, Ask)
         self._manager.catalogue.ask(force=said.force and self.may_manage(request))
@@ -238,7 +238,7 @@ class ManageRoutes:
 
     @_api
     async def connect(self, request: Request) -> Response:
-        """Connect to a repository: it must answer."""
+        """Add a repository if it responds."""
         self.check(request)
         said = await body_of(request, Url)
         text = said.url.strip()
@@ -249,7 +249,7 @@ class ManageRoutes:
 
     @_api
     async def disconnect(self, request: Request) -> Response:
-        """Forget a repository; what was installed from it stays."""
+        """Remove a repository; its installed packages stay."""
         self.check(request)
         said = await body_of(request, Url)
         await self._manager.disconnect(said.url)
@@ -257,21 +257,21 @@ class ManageRoutes:
 
     @_api
     async def install(self, request: Request) -> Response:
-        """Begin to install a package: fetch it, and say what it may do."""
+        """Start the install of a package: download it, and list its permissions."""
         self.check(request)
         said = await body_of(request, Package)
         return self._begun(parse_wish(said.package))
 
     @_api
     async def add(self, request: Request) -> Response:
-        """Begin to add a package by its path in a repository, or on this machine."""
+        """Start the install of a package by its path in a repository, or on this machine."""
         self.check(request)
         said = await body_of(request, Add)
         return self._begun(self._meant(said.path.strip(), request))
 
     @_api
     async def upload(self, request: Request) -> Response:
-        """Begin to add the package, bundle or interface whose bytes are the body."""
+        """Start the install of an uploaded package, bundle or interface: the request body."""
         self.check(request)
         if request.headers.get("content-type") != "application/octet-stream":
             raise Refusal(415, "a body of application/octet-stream is expected")
@@ -284,14 +284,14 @@ class ManageRoutes:
 
     @_api
     async def update(self, request: Request) -> Response:
-        """Begin to update a package: fetch the newest, and say what it changes."""
+        """Start the update of a package: download the newest version, and list its changes."""
         self.check(request)
         said = await body_of(request, Package)
         return self._begun(await asyncio.to_thread(self._manager.installed, said.package))
 
     @_api
     async def back(self, request: Request) -> Response:
-        """Put back the version that an update took the place of."""
+        """Restore the version before an update."""
         self.check(request)
         said = await body_of(request, Package)
         old = await self._manager.back(said.package)
@@ -299,7 +299,7 @@ class ManageRoutes:
 
     @_api
     async def remove(self, request: Request) -> Response:
-        """Remove a package; without ``yes`` only tell what would go."""
+        """Remove a package; without ``yes`` only list the packages that would go."""
         self.check(request)
         said = await body_of(request, Package)
         if not said.yes:
@@ -315,7 +315,7 @@ class ManageRoutes:
 
     @_api
     async def agree(self, request: Request) -> Response:
-        """Install what the job has planned."""
+        """Install the planned package."""
         self.check(request)
         said = await body_of(request, Agree)
         job = await self._manager.agree(said.number, takes_risks=said.takes_risks)
@@ -323,7 +323,7 @@ class ManageRoutes:
 
     @_api
     async def cancel(self, request: Request) -> Response:
-        """Give the job up; nothing has changed."""
+        """Cancel the job; nothing has changed."""
         self.check(request)
         said = await body_of(request, Agree)
         return answer(self._manager.jobs.give_up(said.number).news())
@@ -333,13 +333,13 @@ class ManageRoutes:
         return answer(news, 202)
 
     def _meant(self, path: str, request: Request) -> Wish | Path:
-        """Return what a path means: ``/interfaces/wide/`` in a repository, or a place here."""
+        """Resolve a path: ``/interfaces/wide/`` in a repository, or a path of this machine."""
         inside = path.strip("/")
         if inside.partition("/")[0] in FOLDERS:
             try:
                 return parse_wish(inside)
             except PackageError:
-                pass  # a folder of this machine may be called so
+                pass  # a folder of this machine may have that name
         if not self._is_here(request):
             raise Refusal(403, "a path of this machine is only named with the key that URC printed")
         place = Path(path).expanduser()

@@ -1,7 +1,6 @@
-"""The settings of one robot as its page shows them: a field for each, by the type of its value.
+"""Data of a robot's settings page: one form field for each setting, by the type of its value.
 
-Floor 5. Pure: what is in a field is decided here, what becomes of it in
-`urc.web.manage.settings_routes`.
+Layer 5. Pure: this module fills the fields, `urc.web.manage.settings_routes` reads them.
 """
 
 from collections.abc import Collection, Mapping, Sequence
@@ -27,8 +26,8 @@ _INPUTS: Final = {
     "number": ("text", "decimal"),
     "path": ("text", ""),
 }
-"""Type of a setting → type of its field, and which keys a phone shows. Numbers are text, too: a
-field of type number hides what it does not understand."""
+"""Type of a setting → type of its field and its on-screen keyboard. Numbers are text fields:
+a field of type number drops input that it cannot parse."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,27 +41,27 @@ class Option:
 
 @dataclass(frozen=True, slots=True)
 class Field:
-    """One setting."""
+    """The form field of one setting."""
 
     name: str
     title: str
     about: str
-    """What it is, with its range and default."""
+    """Description with range and default."""
     kind: str
     """``text``, ``password``, ``choice`` or ``switch``."""
     keys: str
-    """``inputmode``; "" for the usual."""
+    """``inputmode``; "" for the default."""
     value: str
-    """As filled in; of a secret never."""
+    """Entered value; never that of a secret."""
     placeholder: str
-    """What counts where nothing is filled in."""
+    """Effective value while the field is empty."""
     options: tuple[Option, ...]
     is_given: bool
-    """It was given at the start, and cannot be changed here."""
+    """Whether the value was given at the start, and so is fixed here."""
     is_set: bool
-    """A secret: whether there is one."""
+    """Whether a secret has a value."""
     is_withheld: bool
-    """A secret that is there and not used: it was entered for another destination."""
+    """Whether a stored secret is unused because it was entered for another destination."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,19 +73,19 @@ class SettingsPage:
     name: str
     title: str
     url: str
-    """Of the robot's own page."""
+    """URL of the robot's page."""
     post_url: str
     driver: str
     versions: tuple[Option, ...]
-    """Installed versions of the driver; empty when it is a file."""
+    """Installed versions of the driver; empty for a driver from a file."""
     interfaces: tuple[Option, ...]
     fields: tuple[Field, ...]
     transports: tuple[str, ...]
-    """Names of the lines that a test tries."""
+    """Names of the transports of the test."""
     may_manage: bool
     is_simulated: bool
     fault: str
-    """Why the robot cannot be used; "" when it can."""
+    """Why the robot cannot be used, or ""."""
 
 
 def settings_page(
@@ -106,17 +105,17 @@ def settings_page(
     """Return the page.
 
     Args:
-        nonce: of this response.
-        name: of the robot in its URL.
-        profile: what it is, with all its interfaces.
-        kept: what was filled in before.
-        given: settings that were given at the start.
-        withheld: secrets that are not used, since they were entered for another destination.
-        ways: which pages there are.
-        driver: what it is driven with.
-        versions: installed versions of it, the newest first.
-        may_manage: whether who asks may change anything.
-        fault: why the robot cannot be used.
+        nonce: nonce of this response.
+        name: name of the robot in its URL.
+        profile: the profile with all its interfaces.
+        kept: the stored settings.
+        given: settings from the start of the server.
+        withheld: secrets that are unused because they were entered for another destination.
+        ways: the pages of this server, for links.
+        driver: the driver in use.
+        versions: its installed versions, newest first.
+        may_manage: whether the visitor may change anything.
+        fault: why the robot cannot be used, or "".
     """
     title = profile.title or name
     place = quote(name, safe="")
@@ -218,5 +217,5 @@ def _about(setting: Setting) -> str:
 
 
 def _text(value: Value) -> str:
-    """Return a value as it is typed."""
+    """Return a value as a user would type it."""
     return str(value).lower() if isinstance(value, bool) else str(value)

@@ -1,6 +1,6 @@
-"""The settings of one robot over HTTP: filled in, tried for real, kept, and used at once.
+"""Routes of a robot's settings: they are entered, tested, stored and used at once.
 
-Floor 5. What cannot be reached is not kept, unless it is told to be: a robot may be switched off.
+Layer 5. Settings whose test fails are not stored, unless the user insists: a robot may be off.
 """
 
 import asyncio
@@ -42,12 +42,12 @@ class SettingsRoutes:
     """The settings pages of all robots."""
 
     def __init__(self, manager: Manager, manage: ManageRoutes, ways: Ways) -> None:
-        """Answer nothing yet.
+        """Prepare.
 
         Args:
-            manager: knows the robots.
-            manage: knows who may change anything.
-            ways: which pages there are.
+            manager: the packages and robots.
+            manage: the check of permission.
+            ways: the pages of this server, for links.
         """
         self._manager = manager
         self._manage = manage
@@ -55,7 +55,7 @@ class SettingsRoutes:
         self._trying: set[str] = set()
 
     def routes(self) -> list[Route]:
-        """Return the page, and where it says what was filled in."""
+        """Return the routes of the page and of its form."""
         return [
             Route("/robots/{name}/settings", self.page),
             Route("/api/v1/robots/{name}/settings", self.save, methods=["POST"]),
@@ -102,7 +102,7 @@ class SettingsRoutes:
         return robot.profile if robot is not None else None
 
     async def save(self, request: Request) -> Response:
-        """Try what was filled in, and keep it."""
+        """Test the entered settings, and store them."""
         name = request.path_params["name"]
         try:
             self._manage.check(request)
@@ -140,7 +140,7 @@ class SettingsRoutes:
             if any(one.verdict == "fails" for one in lines) and not said.anyway:
                 text = t("not saved: the robot could not be reached")
                 return SettingsAnswer(is_saved=False, text=text, lines=lines)
-        manager.check_idle(name)  # trying takes a while
+        manager.check_idle(name)  # again: the test takes a while
         await asyncio.to_thread(garage.kept(name).save, kept)
         await manager.take(name, robot, said.version)
         text = t("saved, and used from now on")
@@ -152,10 +152,10 @@ class SettingsRoutes:
         try:
             return self._manager.garage.kept(name).load()
         except UrcError:
-            return Kept()  # damaged: what is filled in now takes its place
+            return Kept()  # damaged: the new values replace it
 
     def _document(self, name: str, version: str) -> Profile:
-        """Return the profile of the version that is chosen, as its document says."""
+        """Return the profile of the chosen version, as written in its document."""
         manager, garage = self._manager, self._manager.garage
         lock = manager.lock_of(name)
         if lock is not None:
@@ -168,7 +168,7 @@ class SettingsRoutes:
     def _filled_in(
         self, profile: Profile, before: Kept, said: SettingsAsked
     ) -> tuple[Kept, dict[str, str]]:
-        """Return what is to be kept, and what is wrong with it, field by field."""
+        """Return the settings to store, and the mistakes by field."""
         texts, faults = _typed(profile, said)
         garage = self._manager.garage
         package = garage.package_of(profile)
@@ -193,7 +193,7 @@ class SettingsRoutes:
     async def _tried(
         self, name: str, profile: Profile, values: Mapping[str, Value]
     ) -> tuple[TriedLine, ...]:
-        """Try every line, alone with the robot; a STOP ends that at once."""
+        """Test every transport while the robot is disconnected; a STOP ends the test at once."""
         workshop = self._manager.garage.workshop
         station = self._manager.fleet.stations.get(name)
         held_off = station.held_off() if station is not None else nullcontext()
@@ -213,7 +213,7 @@ class SettingsRoutes:
 
 
 def _epoch(station: Station | None) -> int:
-    """Return a number that is another one after every STOP, and whenever somebody drives."""
+    """Return a number that changes with every STOP and every new driver."""
     return station.controls.desk.lease.state.epoch if station is not None else 0
 
 
@@ -229,7 +229,7 @@ def _line(tried: Tried) -> TriedLine:
 
 
 def _typed(profile: Profile, said: SettingsAsked) -> tuple[dict[str, str], dict[str, str]]:
-    """Return what was typed and fits, and what is wrong with the rest, field by field."""
+    """Return the valid inputs, and the mistakes in the others by field."""
     texts: dict[str, str] = {}
     faults: dict[str, str] = {}
     for name, setting in profile.settings.items():

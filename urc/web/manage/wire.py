@@ -1,6 +1,6 @@
-"""What the managers' pages and the server say to each other: JSON, in camel case.
+"""Messages between the managers' pages and the server: JSON, in camel case.
 
-Floor 5. Pure. Requests are decoded into these, so what does not fit is refused in one line.
+Layer 5. Pure. Requests are decoded into these types; a mismatch is refused with one line.
 """
 
 from typing import Annotated, Any, Final, Literal
@@ -36,7 +36,7 @@ __all__ = [
 ]
 
 MOST_HITS: Final = 100
-"""Packages that one search shows."""
+"""Most packages in the result of a search."""
 
 _Short = Annotated[str, msgspec.Meta(max_length=300)]
 _Long = Annotated[str, msgspec.Meta(max_length=4096)]
@@ -44,76 +44,76 @@ _Settings = Annotated[dict[_Short, _Long | None], msgspec.Meta(max_length=200)]
 
 
 class Message(msgspec.Struct, frozen=True, rename="camel", forbid_unknown_fields=True):
-    """Anything that is said here."""
+    """Base of all messages of this module."""
 
 
 class Url(Message, frozen=True):
-    """A repository is connected to, or forgotten."""
+    """Request to add or remove a repository."""
 
     url: _Short
 
 
 class Ask(Message, frozen=True):
-    """The repositories are asked what they have."""
+    """Request to refresh the package lists from the repositories."""
 
     force: bool = False
-    """However new their answers are."""
+    """Whether to ignore the age of the last refresh."""
 
 
 class Package(Message, frozen=True):
-    """A package is asked for: ``drivers/puppet`` or ``drivers/puppet@1.0.0``."""
+    """Request about a package: ``drivers/puppet`` or ``drivers/puppet@1.0.0``."""
 
     package: _Short
     yes: bool = False
-    """Of a removal: do it; else only say what would go."""
+    """Whether to perform a removal; else it is only listed."""
     forget: bool = True
-    """Of a removal: also of what was filled in for the robot, secrets among it."""
+    """Whether a removal also deletes the settings of the robot, with its secrets."""
 
 
 class Add(Message, frozen=True):
-    """A package is added by its path: in a repository, or on this machine."""
+    """Request to add a package by its path: in a repository, or on this machine."""
 
     path: _Long
 
 
 class Agree(Message, frozen=True):
-    """What a job may do was read and agreed to; or the job is given up."""
+    """Approval or cancellation of a job, after its permissions were shown."""
 
     number: int
     takes_risks: bool = False
-    """Whether what the package uses of this machine by itself was agreed to as well."""
+    """Whether the user also approved the package's own access to this machine."""
 
 
 JobState = Literal["working", "asks", "done", "failed", "cancelled"]
 
 
 class JobNews(Message, frozen=True):
-    """Where the one job stands that there is at a time."""
+    """State of the current job."""
 
     number: int
     title: str
     state: JobState
     line: str
-    """What it does, or what became of it, in one line."""
+    """Current activity or result, in one line."""
     done: int
     of: int
-    """Steps; 0 while nobody knows."""
+    """Number of steps; 0 while unknown."""
     is_update: bool = False
     packages: tuple[str, ...] = ()
-    """Where each package comes from, and who signed it; of an update what becomes of each."""
+    """Origin and signer of each package; for an update, the change of each."""
     may: tuple[str, ...] = ()
-    """What the package may do, one line each."""
+    """Permissions of the package, one a line."""
     risks: tuple[str, ...] = ()
-    """What of this machine it uses by itself; of an update only what is new."""
+    """Its own access to this machine; for an update, only new access."""
     gained: tuple[str, ...] = ()
-    """Of an update: what it may do that the version before may not."""
+    """Permissions that an update adds."""
     lost: tuple[str, ...] = ()
     wire: tuple[str, ...] = ()
-    """Of an update: what changes in what goes to the robot."""
+    """Changes in the frames to the robot, for an update."""
     stays: str = ""
-    """The version that is in use, and stays so until another one is chosen; "": none does."""
+    """Version that stays in use until the user chooses another one, or ""."""
     notes: tuple[str, ...] = ()
-    """What should be known beside, as a repository that did not answer."""
+    """Further notes, for example about a repository that did not respond."""
 
 
 class Place(Message, frozen=True):
@@ -122,19 +122,19 @@ class Place(Message, frozen=True):
     url: str
     name: str
     count: int
-    """Versions of packages that it has."""
+    """Number of package versions in it."""
     fault: str
-    """Why it could not be asked; "" when it was."""
+    """Why the last request failed, or ""."""
     is_kept: bool
-    """What it said before is used."""
+    """Whether its cached list is in use."""
     is_plain: bool
-    """It is reached without encryption."""
+    """Whether it is reached without encryption."""
     keeper: str = ""
-    """Who signs its index, with the fingerprint of the key; "" for nobody."""
+    """Signer of its index, with the fingerprint of the key; "" if it is unsigned."""
 
 
 class Installed(Message, frozen=True):
-    """An installed package that was asked for by itself."""
+    """A package that a user installed, and no mere dependency."""
 
     package: str
     name: str
@@ -144,20 +144,20 @@ class Installed(Message, frozen=True):
     licence: str
     authors: tuple[str, ...]
     brings: tuple[str, ...]
-    """All that came along with it, as ``widgets/dial 1.0.0``."""
+    """Its dependencies, as ``widgets/dial 1.0.0``."""
     newer: str
-    """A version that a repository has; "" when there is none."""
+    """Newer version in a repository, or ""."""
     before: str
-    """The version that an update took the place of; "" when there is none to go back to."""
+    """Version before the update, or "" if none can be restored."""
     url: str
-    """Of its page; "" where it has none."""
+    """URL of its page, or ""."""
     settings_url: str
     fits: tuple[str, ...]
-    """Of an interface: titles of the robots that offer it."""
+    """Titles of the robots that offer this interface."""
     fault: str
-    """Why it cannot be used; "" when it can."""
+    """Why it cannot be used, or ""."""
     withdrawn: tuple[str, ...] = ()
-    """What its repository offers no more, of it and of what came along, and why; one line each."""
+    """Withdrawn packages among it and its dependencies, with the reason; one a line."""
 
 
 class Available(Message, frozen=True):
@@ -168,130 +168,130 @@ class Available(Message, frozen=True):
     kind: str
     version: str
     versions: tuple[str, ...]
-    """All, the newest first."""
+    """All versions, newest first."""
     summary: str
     licence: str
     authors: tuple[str, ...]
     origin: str
     size: int
     has: str
-    """The version that is installed; "" for none."""
+    """Installed version, or ""."""
 
 
 class Shelf(Message, frozen=True):
-    """All that a manager's page shows."""
+    """All lists of a manager's page."""
 
     repositories: tuple[Place, ...]
     installed: tuple[Installed, ...]
     available: tuple[Available, ...]
     total: int
-    """Packages that were found; at most `MOST_HITS` are told."""
+    """Packages that were found; the lists have at most `MOST_HITS`."""
     is_asking: bool
-    """The repositories are being asked."""
+    """Whether a refresh is running."""
     may_manage: bool
     job: JobNews | None
 
 
 class Line(Message, frozen=True):
-    """What was done, in one line."""
+    """Result of an action, in one line."""
 
     line: str
 
 
 class Gone(Message, frozen=True):
-    """What went, or would go."""
+    """Packages that a removal removes."""
 
     gone: tuple[str, ...]
-    """As ``drivers/puppet 1.0.0``."""
+    """Names as ``drivers/puppet 1.0.0``."""
     line: str
     has_settings: bool = False
-    """Whether something was filled in for it, which may be forgotten."""
+    """Whether it has settings, which the removal may delete."""
 
 
 class Failure(Message, frozen=True):
-    """Why something was not done."""
+    """Error response: why a request failed."""
 
     error: str
-    """One line."""
+    """The reason, in one line."""
 
 
 class Healthy(Message, frozen=True):
-    """The server runs."""
+    """Response of the health check."""
 
     status: str
     version: str
 
 
 class Stopped(Message, frozen=True):
-    """A robot was told to stop."""
+    """Result of a STOP."""
 
     latched: str
-    """Who stopped it."""
+    """Name of the operator who pressed STOP."""
     confirmed: bool
-    """Whether the stop was handed to the robot's line."""
+    """Whether the robot's transports have taken the stop."""
 
 
 class ControlState(Message, frozen=True):
-    """Who drives a robot, and who stopped it."""
+    """The holder of the lease, and the state of STOP."""
 
     holder: str
-    """The screen that has the controls; "" where none has."""
+    """Name of the page that drives, or ""."""
     latched: str
-    """Who pressed STOP; "" while nothing is latched."""
+    """Name of the operator who pressed STOP; "" while nothing is latched."""
     emulated: bool
-    """It only has the name of a real robot: it is emulated, or a recording."""
+    """Whether the robot is emulated or a playback."""
 
 
 class TapeAsked(Message, frozen=True):
-    """A recording is to be moved; what is left out stays as it is."""
+    """Request to change the playback; fields that are left out stay as they are."""
 
     position_s: float | None = None
     is_playing: bool | None = None
 
 
 class TapeState(Message, frozen=True):
-    """Where a recording stands."""
+    """State of a playback."""
 
     began_s: float
-    """When it was recorded, in seconds since 1970."""
+    """Start time of the recording, in seconds since 1970."""
     length_s: float
     position_s: float
     is_playing: bool
     speed: float
-    """How many seconds of it pass in one."""
+    """Playback speed; 1 is real time."""
 
 
 class Timeline(Message, frozen=True):
-    """What made a robot move."""
+    """Audit log of a robot's motion."""
 
     entries: list[dict[str, Any]]
     fault: str
-    """Why no more is kept; "" when it is."""
+    """Why the log is no longer written, or ""."""
 
 
 class Started(Message, frozen=True):
-    """A robot's documents were read anew."""
+    """Result of a reload of a robot's documents."""
 
     line: str
     url: str
-    """Of its page."""
+    """URL of its page."""
 
 
 class SettingsAsked(Message, frozen=True):
-    """What was filled in for a robot."""
+    """The submitted settings of a robot."""
 
     settings: _Settings = {}
-    """Setting → as typed; None leaves a secret as it is."""
+    """Setting → typed text; None leaves a secret as it is."""
     version: _Short = ""
     interface: _Short = ""
     test: bool = True
-    """Whether the robot is tried."""
+    """Whether to test the connection."""
     anyway: bool = False
-    """Whether it is saved even when the robot could not be reached."""
+    """Whether to save even if the test fails."""
 
 
 class TriedLine(Message, frozen=True):
-    """What became of one transport in a test."""
+    """Test result of one transport."""
 
     transport: str
     type: str
@@ -302,12 +302,12 @@ class TriedLine(Message, frozen=True):
 
 
 class SettingsAnswer(Message, frozen=True):
-    """What became of it."""
+    """Result of a submission of settings."""
 
     is_saved: bool
     text: str
     faults: dict[str, str] = {}
-    """Setting → what is wrong with it, in one line."""
+    """Setting → its mistake, in one line."""
     missing: tuple[str, ...] = ()
     """Titles of settings that have no value."""
     lines: tuple[TriedLine, ...] = ()

@@ -1,1 +1,1 @@
-"""The HTTP server underneath, and who may talk to it."""
+"""The HTTP server and its access control."""

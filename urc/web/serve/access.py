@@ -1,8 +1,8 @@
-"""Who asks: known by a secret of this start, never by an address.
+"""Identity of visitors: a secret of this start, never an address.
 
-Floor 5. Pure. The address that URC prints carries the start key. A browser hands it in once and
-gets a session, kept in a cookie that scripts cannot read; a program sends the key with each
-request. Keys and sessions end with the server.
+Layer 5. Pure. The address that URC prints carries the start key. A browser hands it in once and
+gets a session in a cookie that scripts cannot read; a program sends the key with each request. Keys
+and sessions end with the server.
 """
 
 import secrets
@@ -14,27 +14,27 @@ from urllib.parse import quote
 __all__ = ["PARAMETER", "STRANGER", "Access", "Standing", "Visitor"]
 
 PARAMETER = "key"
-"""Of the query of an address that lets a browser in."""
+"""Name of the start key in the query of a URL."""
 PREFIX = "urc-start-"
 SESSIONS = 1000
-"""Browsers that are known at once; the one that came first is forgotten."""
+"""Most known browsers; the oldest one is forgotten."""
 CODES = 16
 OLD_COOKIES = 8
-"""Cookies of earlier starts that a browser may keep; one more, and all are taken away."""
+"""Most cookies of earlier starts in one browser; one more, and all are deleted."""
 
 Standing = Literal["here", "manager", "stranger"]
-"""``here``: has the start key. ``manager``: has the token of ``--manage``. Else a stranger."""
+"""``here`` has the start key, ``manager`` the token of ``--manage``, ``stranger`` neither."""
 _Headers = Iterable[tuple[bytes, bytes]]
 
 
 class Visitor(NamedTuple):
-    """Who asks, as far as it is known."""
+    """Identity of a visitor."""
 
     standing: Standing = "stranger"
     name: str = ""
-    """Tells one browser, or the programs, from others; "" for strangers. No secret."""
+    """Identifier of the browser or program; "" for unknown visitors. No secret."""
     is_program: bool = False
-    """Whether the request itself carries the key: no foreign page can have made it."""
+    """Whether the request itself carries the key, which a third-party page cannot send."""
 
 
 STRANGER = Visitor()
@@ -46,33 +46,33 @@ class Access:
     def __init__(
         self, *, is_open: bool = False, key: str = "", instance: str = "", token: str = ""
     ) -> None:
-        """Make the key, and know no browser.
+        """Make the key.
 
         Args:
-            is_open: strangers may watch and drive; else they may only press STOP.
+            is_open: unknown visitors may watch and drive; otherwise they may only press STOP.
             key: the start key; "" makes one.
-            instance: tells the cookie of this start from others; "" makes one.
-            token: lets its holders manage; "" when there is none.
+            instance: identifier in the cookie's name of this start; "" makes one.
+            token: the secret of managers; "" for none.
         """
         self.is_open = is_open
         self.key = key or secrets.token_urlsafe(24)
         self.instance = instance or secrets.token_hex(4)
         self.cookie = PREFIX + self.instance
         self.frame_code = f"/frame-code/{secrets.token_urlsafe(16)}"
-        """Path below which frames load code: they have no origin, and so no cookies."""
+        """Path below which frames load code: a frame has no origin, and so sends no cookies."""
         self._token = token
         self._sessions: dict[str, Visitor] = {}
         self._codes: dict[str, None] = {}
         self._count = 0
 
     def address(self, url: str) -> str:
-        """Return `url`, which has no query, as the address that lets a browser in."""
+        """Return `url`, which has no query, with the start key."""
         return f"{url}?{PARAMETER}={quote(self.key, safe='')}"
 
     def address_once(self, url: str) -> str:
-        """Return an address that lets in the first browser only, and leaves the key unsaid.
+        """Return an address for the first browser only, without the start key.
 
-        For what others see, as the command line of a browser.
+        It may appear in public, for example in the command line of a browser.
         """
         code = secrets.token_urlsafe(24)
         self._codes[code] = None
@@ -81,11 +81,11 @@ class Access:
         return f"{url}?{PARAMETER}={code}"
 
     def address_of_managers(self, url: str) -> str:
-        """Return the address for those who manage from elsewhere; "" when there is no token."""
+        """Return the address for remote managers; "" without a token."""
         return f"{url}?{PARAMETER}={quote(self._token, safe='')}" if self._token else ""
 
     def admit(self, word: str) -> str | None:
-        """Return the new session of a browser that hands in `word`; None when it opens nothing."""
+        """Return the new session of a browser that hands in `word`; None if the key is invalid."""
         standing = self._standing(word)
         if standing is None and word in self._codes:
             del self._codes[word]
@@ -103,9 +103,9 @@ class Access:
         """Return the ``Set-Cookie`` headers that keep a session.
 
         Args:
-            session: what `admit` returned.
-            headers: of the request.
-            is_secure: whether it came over TLS.
+            session: the result of `admit`.
+            headers: headers of the request.
+            is_secure: whether the request came over TLS.
         """
         secure = "; Secure" if is_secure else ""
         kept = [f"{self.cookie}={session}; Path=/; HttpOnly; SameSite=Strict{secure}"]
@@ -115,7 +115,7 @@ class Access:
         return kept
 
     def visitor(self, headers: _Headers) -> Visitor:
-        """Return who makes a request with these headers (names in lower case)."""
+        """Return the visitor of a request with these headers (names in lower case)."""
         pairs = list(headers)
         for name, value in pairs:
             scheme, _, word = value.decode("latin-1").partition(" ")
@@ -138,7 +138,7 @@ def _is_same(said: str, wanted: str) -> bool:
 
 
 def _cookies(headers: _Headers) -> Iterator[tuple[str, str]]:
-    """Yield name and value of each cookie; one name may come more than once."""
+    """Yield name and value of each cookie; a name may repeat."""
     for name, value in headers:
         if name == b"cookie":
             for part in value.decode("latin-1").split(";"):

@@ -1,8 +1,8 @@
-"""One HTTP connection: a request must be whole in time, and every refusal carries our headers.
+"""One HTTP connection: requests have a time limit, and every refusal carries the policy headers.
 
-Floor 5. A thin layer over uvicorn's protocol; only `server` uses it. What uvicorn answers by
-itself, before any application is asked, would otherwise go out without the page policy: a request
-that is no HTTP, and one connection too many.
+Layer 5. A thin layer over uvicorn's protocol; only `server` uses it. uvicorn answers two cases
+before any application is called: bytes that are no HTTP, and too many connections. Without this
+layer those responses would lack the page policy.
 """
 
 import asyncio
@@ -20,17 +20,17 @@ from urc.web.serve.policy import REFUSAL_HEADERS
 __all__ = ["CONNECTIONS", "REQUEST_S", "RESERVE", "Connection", "refusal"]
 
 CONNECTIONS = 1024
-"""How many may be open at once, WebSockets included. One more closes one that only waits: of the
-address that has most of these, the oldest."""
+"""Most open connections, WebSockets included. A further one closes an idle one: the oldest of the
+address with the most idle connections."""
 RESERVE = 64
-"""How many more may be made while none of them only waits, to say STOP and nothing else."""
+"""Further connections while none is idle, for STOP only."""
 REQUEST_S = 5.0
-"""In which a connection must bring a whole request, its body too: the first one from the moment it
-is made, each later one from its first byte."""
+"""Time limit for a whole request with its body, in seconds. It runs from the opening of the
+connection for the first request, and from the first byte for later ones."""
 
 
 def refusal(status: HTTPStatus, text: str) -> bytes:
-    """Return a whole answer of one line of plain text, after which the connection closes."""
+    """Return a complete response with one line of plain text; the connection closes after it."""
     body = text.encode() + b"\n"
     headers = [
         (b"content-type", b"text/plain; charset=utf-8"),
@@ -44,16 +44,16 @@ def refusal(status: HTTPStatus, text: str) -> bytes:
 
 
 def _stops(data: bytes) -> bool:
-    """Return whether a request that begins so is a STOP."""
+    """Return whether a request with this beginning is a STOP."""
     method, _, rest = data.partition(b"\r\n")[0].partition(b" ")
     return is_stop(method.decode("latin-1"), rest.partition(b" ")[0].decode("latin-1"))
 
 
 class Connection(H11Protocol):
-    """uvicorn's HTTP/1.1, with a limit on the time that a request takes to arrive.
+    """uvicorn's HTTP/1.1 protocol with a time limit on the arrival of a request.
 
-    WARNING: of the base class this uses asyncio's own protocol methods, the constructor's
-    arguments, `send_400_response`, and the attributes `conn`, `connections`, `loop` and
+    WARNING: it depends on parts of the base class: asyncio's protocol methods, the arguments of the
+    constructor, `send_400_response`, and the attributes `conn`, `connections`, `loop` and
     `transport`. tests/e2e/test_dashboard_server.py fails when one of them changes its meaning.
     """
 
@@ -74,7 +74,7 @@ class Connection(H11Protocol):
         self._is_one_too_many = False
         self._has_spoken = False
         self.made_s = 0.0
-        """When it was made, by the clock of the loop."""
+        """Time of its opening, by the clock of the loop."""
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
         """Take the transport, and expect a request."""
@@ -88,26 +88,26 @@ class Connection(H11Protocol):
         self._watch()
 
     def data_received(self, data: bytes) -> None:
-        """Take what came, and see whether the request is whole now."""
+        """Take received bytes, and check whether the request is complete."""
         self._has_spoken = True
         if self._is_one_too_many and not _stops(data):
-            # Not earlier: an answer to nothing is lost when the request then meets a closed door.
+            # Not earlier: the client would lose a response sent before it has written its request.
             self._refuse(HTTPStatus.SERVICE_UNAVAILABLE, "Too many connections are open.")
             return
         super().data_received(data)
         self._watch()
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """Stop the clock."""
+        """Cancel the time limit."""
         self._unwatch()
         super().connection_lost(exc)
 
     def send_400_response(self, msg: str) -> None:
-        """Say that this is no HTTP; called by the base class."""
+        """Refuse bytes that are no HTTP; called by the base class."""
         self._refuse(HTTPStatus.BAD_REQUEST, msg)
 
     def _make_room(self) -> bool:
-        """Close one that only waits, if there is one; return whether there was."""
+        """Close an idle connection; return whether one was found."""
         waiting: dict[str, list[Connection]] = {}
         for one in self.connections:
             if isinstance(one, Connection) and one is not self and one.only_waits:
@@ -121,13 +121,13 @@ class Connection(H11Protocol):
 
     @property
     def only_waits(self) -> bool:
-        """Whether no whole request is under way on it."""
+        """Return whether the connection is idle: no complete request is under way."""
         is_ours = self.transport.get_protocol() is self and not self.transport.is_closing()
         return is_ours and self.conn.their_state in (h11.IDLE, h11.SEND_BODY)
 
     def _watch(self) -> None:
-        """Let the clock run while a request is not whole, and only then."""
-        is_ours = self.transport.get_protocol() is self  # else it has become a WebSocket
+        """Run the time limit while a request is incomplete."""
+        is_ours = self.transport.get_protocol() is self  # else it is a WebSocket
         is_open = self.conn.their_state in (h11.IDLE, h11.SEND_BODY)
         if not (is_ours and is_open) or self.transport.is_closing():
             self._unwatch()
@@ -144,7 +144,7 @@ class Connection(H11Protocol):
         if self._has_spoken:
             text = f"The request was not here within {self._request_s:g} s."
             self._refuse(HTTPStatus.REQUEST_TIMEOUT, text)
-        else:  # a browser that connects in advance takes an answer to nothing for a fault
+        else:  # a browser that connects in advance takes an early response for a fault
             self.transport.close()
 
     def _refuse(self, status: HTTPStatus, text: str) -> None:
@@ -154,5 +154,5 @@ class Connection(H11Protocol):
         if self.conn.our_state is h11.IDLE:
             self.transport.write(refusal(status, text))
             self.transport.close()
-        else:  # the application is answering, or has: ours would land in the middle, or behind
+        else:  # the application is answering: our response would land inside or after it
             self.transport.abort()

@@ -1,7 +1,7 @@
-"""How much one visitor may have under way: a crowd from one place leaves room for the others.
+"""Limits on the concurrent requests of one visitor, so that others still get through.
 
-Floor 5. Pure. Holders of a key are counted one by one, strangers by their address. STOP is not
-counted: it always has a place.
+Layer 5. Pure. Visitors with a key are counted one by one, unknown visitors by their address. STOP
+is not counted: it is always accepted.
 """
 
 import re
@@ -14,10 +14,10 @@ from urc.web.serve.access import Visitor
 __all__ = ["KNOWN_PLACES", "PLACES", "Places", "is_stop"]
 
 PLACES = 32
-"""Requests and sockets of one stranger's address at a time. A page has one or two sockets and up
-to six requests: enough for several pages, and for a few people behind one address."""
+"""Most requests and sockets of one unknown address at a time. A page has up to two sockets and six
+requests: enough for several pages, and for a few people behind one address."""
 KNOWN_PLACES = 256
-"""Of one browser or program that is known: it may watch many robots."""
+"""The same limit for a known browser or program: it may watch many robots."""
 
 _STOP = re.compile(r"/api/v1/robots/[^/ ]+/stop")
 
@@ -28,19 +28,17 @@ def is_stop(method: str, path: str) -> bool:
 
 
 class Places:
-    """Who has how much under way."""
+    """Counters of concurrent requests by visitor."""
 
     def __init__(self) -> None:
-        """Begin with nothing."""
+        """Begin with zero."""
         self._taken: Counter[str] = Counter()
 
     @contextmanager
     def taken(self, visitor: Visitor, address: str) -> Iterator[bool]:
-        """Take a place for as long as the context lasts; give whether there was one.
+        """Take a place while the context lasts; yield whether one was free.
 
-        Args:
-            visitor: who asks.
-            address: from where, for strangers.
+        `address` counts for unknown visitors.
         """
         is_known = visitor.standing != "stranger"
         who = f"{visitor.standing} {visitor.name}" if is_known else f"at {address}"

@@ -1,8 +1,8 @@
-"""Finds WebSocket frames that are one whole text in one piece: what nearly every tick is.
+"""Finds WebSocket frames that hold one whole text message: nearly every tick is one.
 
-Floor 5, pure. It only looks. Whatever is anything else (parts of frames, of messages, control
-frames, what breaks the protocol) is for the library below, which reads the same bytes; here they
-are counted, so that the next frame is known to begin where it begins.
+Layer 5, pure. It only reads. The WebSocket library handles everything else from the same bytes:
+fragments, control frames and protocol errors. Here those are only counted, to find the start of the
+next frame.
 """
 
 from typing import Final
@@ -10,7 +10,7 @@ from typing import Final
 __all__ = ["Frames", "text_of"]
 
 _TEXT: Final = 0x81
-"""First byte of a text that is not continued."""
+"""First byte of an unfragmented text frame."""
 _MASKED: Final = 0x80
 _SHORT, _LONG = 126, 127
 _HEAD: Final = 2
@@ -21,23 +21,23 @@ _CONTROL: Final = 0x08
 
 
 class Frames:
-    """What came from one client, from the first byte after the handshake on."""
+    """The received bytes of one client, from the first byte after the handshake on."""
 
     def __init__(self) -> None:
         self._is_between = True
-        """The next byte begins a frame that begins a message."""
+        """Whether the next byte begins a frame that begins a message."""
         self._left = 0
-        """Bytes of the present frame that have not come."""
+        """Missing bytes of the current frame."""
         self._head = b""
-        """Of a frame of whose head a part has not come."""
+        """Bytes of an incomplete frame header."""
         self._is_inside = False
-        """A message has begun and is to be continued."""
+        """Whether a fragmented message is incomplete."""
         self.spans: list[tuple[int, int]] = []
-        """Of what came last and was no single text: where the texts at its beginning, each in one
-        whole frame, begin and end. Each is for `text_of`."""
+        """Start and end of each whole text frame at the beginning of the last received bytes, for
+        `text_of`; empty if they were a single text."""
 
     def whole(self, data: bytes) -> bytes | None:
-        """Return the text in `data` if that is one whole frame and nothing else, else None."""
+        """Return the text if `data` is exactly one whole text frame, else None."""
         size = len(data)
         if self._is_between and size >= _HEAD + _MASK and data[0] == _TEXT and data[1] & _MASKED:
             at, said = _HEAD + _MASK, data[1] & 0x7F
@@ -75,19 +75,19 @@ class Frames:
 
 
 def text_of(frame: bytes) -> bytes:
-    """Return the text in a whole frame of `Frames.spans`."""
+    """Return the text of a whole frame of `Frames.spans`."""
     at = _HEAD + _MASK + (2 if frame[1] & 0x7F == _SHORT else 0)
     return _unmasked(frame[at - _MASK : at], frame[at:])
 
 
 def _is_text(data: bytes, at: int) -> bool:
-    """Return whether a text in one frame of a usual length begins there."""
+    """Return whether a whole text frame of usual length begins at `at`."""
     size = data[at + 1]
     return data[at] == _TEXT and bool(size & _MASKED) and size & 0x7F != _LONG
 
 
 def _size(data: bytes, at: int) -> int | None:
-    """Return the bytes of the frame that begins at `at`, its head included; None: not known yet."""
+    """Return the size of the frame at `at` with its header, in bytes; None if still unknown."""
     if len(data) < at + _HEAD:
         return None
     size, head = data[at + 1] & 0x7F, _HEAD

@@ -1,9 +1,9 @@
-"""Who may talk to the dashboard, and what a page may do: checked before any route is looked at.
+"""Access checks and page policy for every request, before any route is looked up.
 
-Floor 5. A pure ASGI layer around the whole application, so that error answers pass through it too.
-Three attacks end here: a foreign name that resolves to this machine (Host), a foreign page that
-opens our WebSocket or posts to us (Origin), and markup that tries to run (page policy, framing).
-It knows no route, no robot and no template.
+Layer 5. Pure ASGI middleware around the whole application, so that error responses pass through it
+too. It blocks three attacks: a foreign name that resolves to this machine (Host), a foreign page
+that opens our WebSocket or posts to us (Origin), and injected markup (page policy, framing). It
+knows no route, no robot and no template.
 """
 
 import ipaddress
@@ -33,7 +33,7 @@ __all__ = [
 ]
 
 BODY_BYTES = 1 << 20
-"""Largest request body that is read, in bytes."""
+"""Largest accepted request body, in bytes."""
 
 _AUTHORITY = r"(?P<host>\[[0-9a-f:.]{2,45}\]|[a-z0-9_.-]{1,253})(?::(?P<port>[0-9]{1,5}))?"
 _HOST = re.compile(_AUTHORITY, re.ASCII | re.IGNORECASE)
@@ -57,7 +57,7 @@ _FIXED_HEADERS = (
     (b"cross-origin-resource-policy", b"same-origin"),
     (
         b"permissions-policy",
-        # What driving needs stays ours; the rest is off, for widgets as well.
+        # Features that driving needs are for our origin; all others are off, for widgets as well.
         b"accelerometer=(self), gyroscope=(self), magnetometer=(self), gamepad=(self), "
         b"fullscreen=(self), screen-wake-lock=(self), camera=(), microphone=(), geolocation=(), "
         b"display-capture=(), payment=(), usb=(), serial=(), hid=(), midi=()",
@@ -85,8 +85,8 @@ _FRAME_HEADERS = (
 _CODE_FOLDERS = ("static", "vendor", "words")
 _CODE_HEADERS = (
     *(pair for pair in _FIXED_HEADERS if pair[0] != b"cross-origin-resource-policy"),
-    # A frame without an origin is nobody's own, so what it may load is open to all who know the
-    # path: our pages, and the frames in them.
+    # A frame without an origin shares an origin with no page. So its files are open to all that
+    # know the path: our pages and the frames in them.
     (b"cross-origin-resource-policy", b"cross-origin"),
     (b"access-control-allow-origin", b"*"),
 )
@@ -95,20 +95,20 @@ REFUSAL_HEADERS = (
     (b"content-security-policy", b"default-src 'none'; frame-ancestors 'none'"),
     *_FIXED_HEADERS,
 )
-"""For a refusal in plain text that no application has made: nothing may run or load there."""
+"""Headers of a plain-text refusal outside the application: nothing may run or load there."""
 
 
 class Authority(NamedTuple):
-    """A host with its port, as in ``Host:`` or behind the scheme of an origin."""
+    """A host with its port, as in ``Host:`` or in an origin."""
 
     host: str
     """Lower case; IPv6 in its brackets."""
     port: int | None
-    """None when it was left out."""
+    """None if the text has no port."""
 
 
 def parse_host(text: str) -> Authority | None:
-    """Return the parts of a ``Host`` header, or None when it isn't exactly one host and port."""
+    """Return the parts of a ``Host`` header, or None unless it is exactly one host and port."""
     match = _HOST.fullmatch(text)
     return _authority(match) if match else None
 
@@ -116,16 +116,15 @@ def parse_host(text: str) -> Authority | None:
 def is_host_allowed(
     authority: Authority, names: frozenset[str], *, is_loopback: bool = False
 ) -> bool:
-    """Return whether we answer to that host.
+    """Return whether the server accepts that host.
 
-    An address written out cannot be re-bound by a foreign name server, and ``localhost`` isn't
-    served by one. Every other name must be one of `names`: whatever answers multicast questions on
-    a network may claim any name under ``.local``.
+    A foreign name server can rebind neither a literal address nor ``localhost``. Every other name
+    must be one of `names`: any device on the network may claim a name under ``.local``.
 
     Args:
         authority: the host.
-        names: those that were given, and this machine's own; lower case.
-        is_loopback: whether the request comes over loopback: no other address leads there.
+        names: allowed names, in lower case, with this machine's own.
+        is_loopback: whether the request came over loopback; then no other address is valid.
     """
     host = authority.host
     name = host.removesuffix(".")
@@ -141,18 +140,18 @@ def is_host_allowed(
 
 
 def own_names() -> frozenset[str]:
-    """Return the names under ``.local`` by which this machine makes itself known."""
+    """Return this machine's own names under ``.local``."""
     name = socket.gethostname().lower().removesuffix(".").removesuffix(".local")
     label = name.partition(".")[0]
     return frozenset({f"{label}.local"} if _LABEL.fullmatch(label) else ())
 
 
 def is_origin_ours(origin: str, scheme: str, authority: Authority) -> bool:
-    """Return whether `origin` is exactly scheme, host and port of this request.
+    """Return whether `origin` has exactly the scheme, host and port of this request.
 
     Args:
-        origin: the header as it came; ``null`` is never ours.
-        scheme: ``http``, ``https``, ``ws`` or ``wss``, as the request arrived.
+        origin: the header; ``null`` is never ours.
+        scheme: ``http``, ``https``, ``ws`` or ``wss`` of the request.
         authority: the request's own host.
     """
     match = _ORIGIN.fullmatch(origin)
@@ -168,19 +167,19 @@ def is_origin_ours(origin: str, scheme: str, authority: Authority) -> bool:
 
 
 def frame_policy(scope: Scope, widget: str, digest: str, place: str) -> str:
-    """Return the policy of a frame: code of ours and of one widget, and nothing else at all.
+    """Return the policy of a frame: code of URC and of one widget, and nothing else.
 
-    No nonce: with one, a script or style of any other address could be loaded, and an address is a
-    message. The digest opens the import map alone.
+    It has no nonce: a nonce would allow scripts and styles of any address, and a request to an
+    address can carry data out. The digest allows the import map alone.
 
     Args:
-        scope: of the request for the frame, whose host was let in.
-        widget: its name, as in a URL.
+        scope: of the request for the frame; its host is allowed already.
+        widget: its name in URLs.
         digest: ``sha256-…`` of the import map.
         place: path below which frames load code.
     """
     authority = parse_host(_values(scope, b"host")[0])
-    # The grammar of sources has no IPv6 addresses.
+    # The grammar of CSP sources has no IPv6 addresses.
     if authority is None or authority.host.startswith("["):
         return _FRAME_POLICY.format(digest=digest, code="'self'")
     port = "" if authority.port is None else f":{authority.port}"
@@ -191,7 +190,7 @@ def frame_policy(scope: Scope, widget: str, digest: str, place: str) -> str:
 
 
 class Policy:
-    """The ASGI layer. Puts ``nonce``, the page's, and ``visitor``, who asks, into the state."""
+    """The middleware. It puts ``nonce`` and ``visitor`` into the state of the request."""
 
     def __init__(self, app: ASGIApp, access: Access, *, allowed_hosts: Iterable[str] = ()) -> None:
         self._app = app
@@ -201,7 +200,7 @@ class Policy:
         self._places = Places()
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Refuse, or hand on with headers added to every answer."""
+        """Refuse, or call the application and add the headers to its response."""
         if scope["type"] == "lifespan":
             await self._app(scope, receive, send)
             return
@@ -235,7 +234,7 @@ class Policy:
         if is_upgrade or scope["method"] not in _SAFE_METHODS:
             origins = _values(scope, b"origin")
             if not origins and scope["state"]["visitor"].is_program:
-                pass  # no page of another site can send the key
+                pass  # a page of another site cannot send the key
             elif len(origins) != 1 or not is_origin_ours(origins[0], scope["scheme"], authority):
                 return 403, "Only this server's own pages may do that."
         lengths = _values(scope, b"content-length")
@@ -245,11 +244,11 @@ class Policy:
 
 
 class _Answer:
-    """Adds the headers of the page policy to whatever answer goes out first.
+    """Adds the headers of the page policy to the response.
 
-    A route may leave words in the request's state: ``frame_policy``, the policy of a frame instead
-    of a page's; ``is_code``, for what frames may load too; and ``is_file``, for what others have
-    written: opened by itself, such a file is no page of ours.
+    A route may set three keys in the request's state. ``frame_policy`` is the policy of a frame
+    instead of a page's. ``is_code`` marks files that frames may load too. ``is_file`` marks
+    third-party content: opened by itself, it must not act as a page of URC.
     """
 
     def __init__(self, scope: Scope, send: Send, nonce: str) -> None:
@@ -281,13 +280,13 @@ class _Answer:
         elif kind == "websocket.accept":
             self._has_begun = True
         elif kind == "websocket.close" and not self._has_begun:
-            # A route that isn't there: the server's own refusal would carry no headers.
+            # The server's own refusal of an unknown route would carry no headers.
             await self.refuse(404, "There is no such page.")
             return
         await self._send(message)
 
     async def refuse(self, status: int, text: str) -> None:
-        """Answer with one line of plain text."""
+        """Respond with one line of plain text."""
         if self._is_upgrade and not self._can_explain:
             self._has_begun = True
             await self._send({"type": "websocket.close", "code": 1008, "reason": text})
@@ -304,7 +303,7 @@ class _Answer:
 
 
 def _limited(scope: Scope, receive: Receive) -> Receive:
-    """Return `receive`, refusing a body that turns out longer than it may be."""
+    """Return `receive` with a limit on the total length of the body."""
     if scope["type"] == "websocket":
         return receive
     total = 0
@@ -328,7 +327,7 @@ def _authority(match: re.Match[str]) -> Authority | None:
 
 
 def _is_loopback(scope: Scope) -> bool:
-    """Return whether a request comes over loopback, from a program of this machine."""
+    """Return whether a request comes over loopback, from a program on this machine."""
     client = scope.get("client")
     try:
         return client is not None and unmapped(ipaddress.ip_address(client[0])).is_loopback

@@ -1,7 +1,7 @@
-"""The HTTP server underneath: uvicorn, run from a coroutine, with low limits on what may wait.
+"""The HTTP server: uvicorn, run from a coroutine, with small send buffers.
 
-Floor 5. Besides `connection` the only module that knows uvicorn. The kernel and the process keep as
-little unsent data per client as possible: whatever waits there grows old and can't be taken back.
+Layer 5. Only this module and `connection` know uvicorn. Kernel and process buffer as little unsent
+data per client as possible: buffered data grows old and cannot be taken back.
 """
 
 import asyncio
@@ -50,16 +50,16 @@ async def serve(
     """Serve `app` until SIGINT, SIGTERM or cancellation; then close within 3 seconds.
 
     Args:
-        app: what `build_app` made.
+        app: the result of `build_app`.
         host: an address or name of this machine.
         port: 0 lets the system choose one.
-        on_ready: called once with an address to open, as ``http://127.0.0.1:8080/``: the first of
+        on_ready: called once with an address, as ``http://127.0.0.1:8080/``: the first of
             `reachable_urls`.
-        request_s: in which a connection must bring a whole request, in seconds.
-        connections: how many may be open at once; the next is answered with 503.
+        request_s: time limit for a complete request, in seconds.
+        connections: most open connections; a further one gets status 503.
 
     Raises:
-        UrcError: the address cannot be listened on.
+        UrcError: the server cannot listen on the address.
     """
     listener = _listen(host, port)
     connection = partial(Connection, request_s=request_s, most=connections)
@@ -94,19 +94,19 @@ async def serve(
 
 
 class _Server(uvicorn.Server):
-    """uvicorn's server, told of its end instead of looking for it ten times a second."""
+    """uvicorn's server with an event for its end, in place of polling ten times a second."""
 
     def __init__(self, config: uvicorn.Config) -> None:
         super().__init__(config)
         self._ending = asyncio.Event()
 
     def end(self) -> None:
-        """Close in good order."""
+        """Close gracefully."""
         self.should_exit = True
         self._ending.set()
 
     async def main_loop(self) -> None:
-        """Renew the date of the answers, until the end."""
+        """Update the Date header every second, until the end."""
         while not await self.on_tick(0):
             with contextlib.suppress(TimeoutError):
                 async with asyncio.timeout(DATE_S):
@@ -114,15 +114,15 @@ class _Server(uvicorn.Server):
 
     @contextlib.contextmanager
     def capture_signals(self) -> Iterator[None]:
-        """Leave the signals to `_ending`: uvicorn's own handling raises them again at the end."""
+        """Leave signals to `_ending`: uvicorn's own handler raises them again at the end."""
         yield
 
 
 class _DashboardSocket(WebSocketsSansIOProtocol):
-    """uvicorn's WebSocket, with nothing waiting in the process, and a word when the line is free.
+    """uvicorn's WebSocket without a send queue, and with a callback when the socket is writable.
 
-    WARNING: only asyncio's own protocol methods and the constructor's arguments are used here, the
-    rest of the base class is uvicorn's business. The application finds the `SocketFlow` in
+    WARNING: only asyncio's protocol methods and the arguments of the constructor are used here; the
+    rest of the base class is private to uvicorn. The application finds the `SocketFlow` in
     ``scope["state"]["flow"]``.
     """
 
@@ -135,21 +135,21 @@ class _DashboardSocket(WebSocketsSansIOProtocol):
     ) -> None:
         self._urc_flow = SocketFlow()
         self._urc_frames: Frames | None = None
-        """None before the handshake, which is what comes first."""
+        """None during the handshake."""
         super().__init__(config, server_state, {**app_state, "flow": self._urc_flow}, _loop)
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """Take the transport, and let it pause us as soon as the kernel is full."""
+        """Take the transport, and ask to be paused as soon as the kernel's buffer is full."""
         super().connection_made(transport)
         self._urc_flow.made(cast("asyncio.Transport", transport))
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """Let a waiting writer go on, to learn that the line is gone."""
+        """Wake a waiting writer, so that it notices the end of the connection."""
         super().connection_lost(exc)
         self._urc_flow.lost()
 
     def data_received(self, data: bytes) -> None:
-        """Pass a whole text on at once, if the client takes it; all else goes its usual way."""
+        """Hand a whole text to the client at once; all else takes uvicorn's usual path."""
         if self._urc_frames is None:
             self._urc_frames = Frames()
             super().data_received(data)
@@ -166,7 +166,7 @@ class _DashboardSocket(WebSocketsSansIOProtocol):
     def _urc_several(
         self, data: bytes, spans: Iterable[tuple[int, int]], sink: Callable[[bytes], bool]
     ) -> None:
-        """Pass on what came together, up to the first that the client does not take."""
+        """Hand over texts that arrived together, up to the first that the client does not take."""
         at = 0
         for begin, end in spans:
             if not sink(text_of(data[begin:end])):
@@ -176,12 +176,12 @@ class _DashboardSocket(WebSocketsSansIOProtocol):
             super().data_received(data[at:])
 
     def pause_writing(self) -> None:
-        """Tell the client that the kernel is full."""
+        """Tell the client that the kernel's buffer is full."""
         super().pause_writing()
         self._urc_flow.pause()
 
     def resume_writing(self) -> None:
-        """Tell the client that the kernel has taken everything."""
+        """Tell the client that the kernel's buffer is empty."""
         super().resume_writing()
         self._urc_flow.resume()
 
@@ -196,13 +196,13 @@ def _listen(host: str, port: int) -> socket.socket:
         raise UrcError(f"cannot listen on {host}: {error.strerror or error}") from error
     try:
         listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        # Accepted sockets inherit these two.
+        # Accepted sockets inherit these two options.
         listener.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BUFFER_BYTES)
         if hasattr(socket, "TCP_NOTSENT_LOWAT"):
             listener.setsockopt(socket.IPPROTO_TCP, socket.TCP_NOTSENT_LOWAT, UNSENT_BYTES)
         if family == socket.AF_INET6:
-            # "::" means every address, of both kinds, whatever the system's own default is.
-            with contextlib.suppress(OSError):  # a system that knows no such thing
+            # "::" means every address, IPv4 and IPv6, whatever the system's default is.
+            with contextlib.suppress(OSError):  # a system without this option
                 listener.setsockopt(socket.IPPROTO_IPV6, socket.IPV6_V6ONLY, 0)
         listener.bind(address)
         listener.listen(BACKLOG)
@@ -216,14 +216,14 @@ def _listen(host: str, port: int) -> socket.socket:
 
 
 def reachable_urls(host: str, port: int) -> tuple[str, ...]:
-    """Return the addresses under which a dashboard that listens on `host` can be opened.
+    """Return the URLs of a dashboard that listens on `host`.
 
-    For ``0.0.0.0`` and ``::`` these are the addresses of this machine's interfaces, those of the
-    network first, or its loopback when it has none; else it is `host`. No packet is sent.
+    For ``0.0.0.0`` and ``::`` these are the addresses of this machine's interfaces, or loopback if
+    it has none; else it is `host`. Network addresses come first. No packet is sent.
 
     Args:
-        host: what is listened on: an address, or a name.
-        port: the real one.
+        host: the address or name that the server listens on.
+        port: the real one, not 0.
     """
     try:
         address = ipaddress.ip_address(host.partition("%")[0])
@@ -246,7 +246,7 @@ async def _until_ready(server: uvicorn.Server, running: "asyncio.Future[None]") 
 
 
 async def _follow(server: _Server, running: "asyncio.Future[None]") -> None:
-    """Wait for the server's end; being cancelled ends it in good order first."""
+    """Wait for the server's end; close it gracefully on cancellation."""
     try:
         await asyncio.shield(running)
     except asyncio.CancelledError:
@@ -258,12 +258,12 @@ async def _follow(server: _Server, running: "asyncio.Future[None]") -> None:
 
 @contextlib.contextmanager
 def _ending(server: _Server) -> Iterator[None]:
-    """Let SIGINT and SIGTERM end the server while the context lasts, where they can be caught."""
+    """Let SIGINT and SIGTERM end the server while the context lasts, where possible."""
     loop = asyncio.get_running_loop()
     caught: list[signal.Signals] = []
 
     for number in (signal.SIGINT, signal.SIGTERM):
-        # Not in a thread, and not on Windows: there the caller's own handling stays.
+        # In a thread and on Windows, loops have no signal handlers: the caller's own stay.
         with contextlib.suppress(NotImplementedError, RuntimeError, ValueError):
             loop.add_signal_handler(number, server.end)
             caught.append(number)

@@ -1,1 +1,1 @@
-"""The pages, and what they are made of."""
+"""The pages and their parts."""

@@ -1,7 +1,7 @@
-"""The picture on a robot's card: what its camera sees, where it is, or its main values.
+"""The image on a robot's card: its camera, its pose in the world, or its main values.
 
-Floor 5. A card looks, and connects nothing: an emulated robot is looked at from outside, a real one
-only while somebody is connected to it.
+Layer 5. A card never connects a robot. An emulated robot has a view from outside; a real one shows
+data only while a page is connected.
 """
 
 from collections.abc import Callable, Mapping
@@ -21,27 +21,27 @@ from urc.web.words import t
 __all__ = ["VALUES", "Cards", "small_values"]
 
 VALUES = 4
-"""How many values a card shows, where there is no picture."""
+"""Most values on a card without image."""
 _FRESH = {"cache-control": "no-store"}
 _UNSHOWN = ("image", "blob", "array")
 
 
 class Cards:
-    """Answers what a card shows now.
+    """Responds with the current content of cards.
 
     Args:
-        stations: of all robots that are served, by the name in their URL.
+        stations: the served robots, by the name in their URL.
     """
 
     def __init__(self, stations: Callable[[], Mapping[str, Station]]) -> None:
         self._stations = stations
 
     def routes(self) -> list[Route]:
-        """Return the one route there is."""
+        """Return the only route."""
         return [Route("/robots/{name}/card", self.card)]
 
     async def card(self, request: Request) -> Response:
-        """Send a picture, or values as JSON ``[[title, text], …]``; 204 when nothing is known."""
+        """Send an image, or values as JSON ``[[title, text], …]``; 204 without any data."""
         station = self._stations().get(request.path_params["name"])
         if station is None:
             raise HTTPException(404, t("No robot of that name is served here."))

@@ -1,7 +1,7 @@
-"""One cell of a page: a widget's own markup, and what the page must know to bring it to life.
+"""One cell of a page: the widget's markup, and the configuration for its module.
 
-Floor 5. Widget templates come from packages, so they run in a sandbox, and one that fails costs its
-own cell.
+Layer 5. Widget templates come from packages. They run in a sandbox, and a failure only affects
+their own cell.
 """
 
 import json
@@ -40,16 +40,16 @@ class Cell:
     """One slot of the grid with its widget's markup."""
 
     index: int
-    """Place in the page's cells; the grid's rules name it."""
+    """Number of the cell in the page; the grid's rules use it."""
     config: str
     """JSON for the host: slot, widget, inputs, outputs (see ``output.js``), options, title."""
     html: Markup
     """The widget's own rendered template; "" when it failed."""
     error: str
-    """Why the widget's template failed, when it did."""
+    """Why the widget's template failed, or ""."""
     is_background: bool
     frame: str = ""
-    """URL of the frame that it lives in; "" for one that lives in the page."""
+    """URL of the widget's frame; "" for a widget in the page."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,34 +60,33 @@ class WidgetContext:
     """
 
     title: str
-    """What the author calls this place, else the first needed signal's, else the first command's,
-    else the first signal's, else the widget's title."""
+    """Title of the slot. Without one: the title of the first required signal, the first command,
+    the first signal or the widget, in this order."""
     options: Mapping[str, object]
-    """Checked against the manifest; every declared option has a key, None where nothing is set."""
+    """Checked options. Every declared option has a key; None means no value."""
     inputs: Mapping[str, Signal | tuple[Signal, ...]]
-    """Input → the signal bound to it, of one that takes many all of them; inputs that are not bound
-    are missing."""
+    """Input → its signal, or its signals for an input of many. Unbound inputs are missing."""
     widget: str
     """The widget's name."""
     uid: str
     """Unique in the page, for ``id`` and ``aria-labelledby``."""
     outputs: Mapping[str, str] = field(default_factory=dict)
-    """Output → what the command bound to it is called, for people; outputs that are not bound are
-    missing, so that a widget can leave out what would do nothing."""
+    """Output → readable name of its command. Unbound outputs are missing, so that a widget can
+    leave their controls out."""
 
 
 def render_widget(widget: Widget, context: WidgetContext) -> Markup:
-    """Return the widget's markup. Whatever its template raises comes through."""
+    """Return the widget's markup; pass on any exception of its template."""
     source, variables = _source(widget), _variables(context)
     return Markup(widget_template(source).render(variables))  # noqa: S704  # autoescaped
 
 
 def render_foreign(uses: Iterable[tuple[WidgetUse, Profile]], border: Border) -> None:
-    """Render the markup of all foreign widgets of a page at once, which one by one takes longer.
+    """Render the markup of all third-party widgets of a page at once, which saves time.
 
     Args:
-        uses: the cells in their order, each with what its robot is.
-        border: which widgets are foreign.
+        uses: the cells in their order, each with the profile of its robot.
+        border: tells third-party widgets from trusted ones.
     """
     wanted = []
     for index, (use, profile) in enumerate(uses):
@@ -97,7 +96,7 @@ def render_foreign(uses: Iterable[tuple[WidgetUse, Profile]], border: Border) ->
                 context = widget_context(use, widget, profile, uid=f"cell-{index}")
                 wanted.append((_source(widget), _variables(context)))
             except OSError:
-                continue  # its cell says so
+                continue  # its cell shows the error
     markup_of(wanted)
 
 
@@ -110,7 +109,7 @@ def _variables(context: WidgetContext) -> dict[str, object]:
 
 
 def widget_context(use: WidgetUse, widget: Widget, profile: Profile, uid: str) -> WidgetContext:
-    """Return what the widget's template may know."""
+    """Return the variables of the widget's template."""
     signals = profile.driver.signals
     single = {name: signals[signal] for name, signal in use.inputs.items()}
     several = {name: tuple(signals[one] for one in many) for name, many in use.lists.items()}
@@ -123,9 +122,9 @@ def widget_context(use: WidgetUse, widget: Widget, profile: Profile, uid: str) -
 
 
 def _heading(widget: Widget, inputs: Mapping[str, Signal], outputs: Mapping[str, str]) -> str:
-    """Return what the widget is about: the first signal it needs, else its command.
+    """Return the subject of the widget: its first required signal, else its command.
 
-    What it can steer besides is not what it is about: a camera that can be turned is a camera.
+    An additional output is not its subject: a camera with pan and tilt is a camera.
     """
     needed = [name for name in inputs if widget.inputs[name].is_required]
     about = [inputs[name].title or spoken(inputs[name].name) for name in (*needed, *inputs)]
@@ -150,10 +149,10 @@ def widget_cell(
     *,
     is_background: bool = False,
 ) -> Cell:
-    """Return one slot with its widget; whatever the widget's template raises costs this one.
+    """Return one slot with its widget; an exception of the template only affects this cell.
 
-    The template of a foreign widget is rendered by another process, which is waited for unless
-    `render_foreign` did it.
+    Another process renders the template of a third-party widget. The call waits for it, unless
+    `render_foreign` has done so before.
     """
     widget = profile.widgets[use.widget]
     context = widget_context(use, widget, profile, uid=f"cell-{index}")
@@ -165,7 +164,7 @@ def widget_cell(
             error = fault and f"{TEMPLATE}:{line}: {fault}"
         else:
             html = render_widget(widget, context)
-    except Exception as problem:  # a supervisor: a widget costs its own cell
+    except Exception as problem:  # a supervisor: a widget may only break its own cell
         place = f"{TEMPLATE}:{fault_line(problem)}"
         error = f"{place}: {type(problem).__name__}: {problem}"
     if error:
@@ -184,6 +183,6 @@ def widget_cell(
 
 
 def spoken(name: str) -> str:
-    """Return an identifier as a person would write it: ``left_motor`` → ``Left motor``."""
+    """Return an identifier in readable form: ``left_motor`` → ``Left motor``."""
     words = name.replace("_", " ").replace("-", " ").strip()
     return words[:1].upper() + words[1:]

@@ -1,6 +1,6 @@
-"""What a widget's ``demo.yaml`` may say: a schema, made of what the widget's manifest declares.
+"""The JSON Schema of a widget's ``demo.yaml``, made from the widget's manifest.
 
-Floor 5. The gallery and `urc validate` both ask here, so that they never differ.
+Layer 5. The gallery and `urc validate` share it, so their results agree.
 """
 
 from collections.abc import Iterable, Mapping
@@ -47,7 +47,7 @@ _VALUE: Final = {
     "of": {"enum": _ELEMENTS},
     "size": _COUNT,
 }
-"""What signals and arguments have in common."""
+"""Common keys of signals and arguments."""
 _SIGNAL: Final = _mapping(
     "signal of a demo",
     {
@@ -96,9 +96,9 @@ _FOLLOW: Final = dict.fromkeys(
 
 
 def check_demo(widget: Widget, document: Document) -> list[Problem]:
-    """Return every difference between a demo and what its widget can be shown with.
+    """Return every problem of a demo.
 
-    The states speak of what the demo binds: they are looked at when that is sound.
+    The states refer to the bindings of the demo: they are checked once those are valid.
     """
     data = document.data
     problems = check_inline(document, (), data, _demo(widget, data))
@@ -145,7 +145,7 @@ def _part(data: Any, key: str) -> dict[str, Any]:
 def _state(
     bound: Mapping[str, Any], signals: Mapping[str, Any], outputs: Mapping[str, Any]
 ) -> dict[str, Any]:
-    """Return the schema of a state: it speaks of the signals that the demo, or it alone, binds."""
+    """Return the schema of a state, for the signals of the demo and its own."""
     values = {name: _values(given) for name, given in signals.items()}
     past = {"type": "array", "items": {"type": "array", "minItems": 2, "maxItems": 2}}
     answered = {*outputs, *_commands(outputs.values())}
@@ -168,21 +168,21 @@ def _state(
 
 
 def _values(given: Any) -> dict[str, Any]:
-    """Return the schema of a value; of many signals there is one for each."""
+    """Return the schema of a value; an input of many signals has one for each."""
     if not isinstance(given, list):
         return {}
     return {"type": "array", "minItems": len(given), "maxItems": len(given)}
 
 
 def _ages(names: Iterable[str]) -> dict[str, Any]:
-    """Return the schema of an age, which holds for all signals or is said of each."""
+    """Return the schema of ages: one for all signals, or one for each."""
     age = {"if": {"type": "array"}, "then": {"items": _NUMBER}, "else": _NUMBER}
     named = _mapping("the signals of this demo", dict.fromkeys(names, age))
     return {"type": ["number", "object"], "if": {"type": "object"}, "then": named}
 
 
 def _single(signals: Mapping[str, Any]) -> list[str]:
-    """Return the names of the signals, each of a list by its own."""
+    """Return the names of single signals; a list of signals has one name for each."""
     names = []
     for name, given in signals.items():
         many = isinstance(given, list)

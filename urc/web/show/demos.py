@@ -1,6 +1,6 @@
-"""A widget's ``demo.yaml``: its states, each as a small robot of its own that says what it shows.
+"""A widget's ``demo.yaml``: its states, each as a small robot with fixed values.
 
-Floor 5. The gallery shows them, and the tests and the pictures of the manual come from it.
+Layer 5. The gallery, the tests and the images of the manual use it.
 """
 
 import base64
@@ -28,7 +28,7 @@ from urc.web.wire.messages import encode_hello
 __all__ = ["DemoState", "demo_states", "colour_bars"]
 
 PICTURE_BYTES = 4 << 20
-"""Most bytes of an image in a demo."""
+"""Largest image in a demo, in bytes."""
 _BARS = ((0xC0,) * 3, (0xC0, 0xC0, 0), (0, 0xC0, 0xC0), (0, 0xC0, 0), (0xC0, 0, 0xC0), (0xC0, 0, 0))
 
 
@@ -38,18 +38,18 @@ class DemoState(NamedTuple):
     name: str
     use: WidgetUse
     profile: Profile
-    """A robot with just this widget; nothing is connected to it."""
+    """A robot with only this widget and no connection."""
     news: str
-    """JSON for ``gallery.js``: what the robot says."""
+    """JSON for ``gallery.js``: the values of the robot."""
     shows: tuple[str, ...]
-    """Texts that must then be readable."""
+    """Texts that the widget must show."""
 
 
 def demo_states(widget: Widget) -> list[DemoState]:
-    """Return the states that the widget's ``demo.yaml`` describes, in its order.
+    """Return the states in the widget's ``demo.yaml``, in its order.
 
     Raises:
-        ProblemsError: the file is missing, or does not say what can be shown.
+        ProblemsError: the file is missing or invalid.
     """
     document = read_document(str(widget.folder / "demo.yaml"))
     problems = check_demo(widget, document)
@@ -93,7 +93,7 @@ def _state(widget: Widget, document: Document, demo: Mapping[str, Any], name: st
 def _signals(
     declared: Mapping[str, Any],
 ) -> tuple[dict[str, Signal], dict[str, str], dict[str, tuple[str, ...]]]:
-    """Return the signals, and which input is bound to which; an input of many has a list."""
+    """Return the signals, and the bindings of single inputs and of inputs of many signals."""
     signals: dict[str, Signal] = {}
     inputs: dict[str, str] = {}
     lists: dict[str, tuple[str, ...]] = {}
@@ -163,7 +163,7 @@ def _readings(
     inputs: Mapping[str, str],
     lists: Mapping[str, tuple[str, ...]],
 ) -> Iterator[dict[str, Any]]:
-    """Yield one reading a signal: its value or picture, its age in seconds, its alarm."""
+    """Yield one reading a signal: its value or image, its age in seconds, its alarm."""
     ages, alarms = shown.get("age_s", 0.0), shown.get("alarms") or {}
     for name, value in (shown.get("values") or {}).items():
         many = name in lists
@@ -200,7 +200,7 @@ def _images(
 
 
 def _image(widget: Widget, value: Any) -> bytes | None:
-    """Return an image that is made, read, or written out; None: the value is none."""
+    """Return a generated, stored or inline image; None if the value is no image."""
     match value:
         case {"picture": [int(width), int(height)], **more} if not more:
             return colour_bars(width, height)
@@ -221,7 +221,7 @@ def _decoded(text: str) -> bytes:
 
 
 def _file(folder: Path, name: str) -> bytes:
-    """Return a file of the widget's folder, and of no other."""
+    """Return a file of the widget's folder; refuse all other paths."""
     path = (folder / name).resolve()
     if not path.is_relative_to(folder.resolve()) or not path.is_file():
         raise UrcError(f"there is no file {name!r} in the widget's folder")
@@ -231,7 +231,7 @@ def _file(folder: Path, name: str) -> bytes:
 
 
 def colour_bars(width: int, height: int) -> bytes:
-    """Return a PNG with colour bars over a ramp from black to white; the same at every call."""
+    """Return a PNG with colour bars over a grey ramp; equal sizes give equal bytes."""
     if not (1 <= width <= 2048 and 1 <= height <= 2048):
         raise UrcError(f"a test picture has 1 to 2048 pixels a side, not {width} x {height}")
     bars = b"".join(bytes(_BARS[x * len(_BARS) // width]) for x in range(width))

@@ -1,7 +1,7 @@
-"""The document in which a foreign widget lives: an empty cell, and what it may load.
+"""The document of a frame with a third-party widget: an empty cell and an import map.
 
-Floor 5. It holds nothing of a robot: the page hands the markup and the values over (``warden.js``).
-Its policy names the few places that it may load code from; there is no other way out of it.
+Layer 5. It holds no data of a robot: the page passes markup and values in (``warden.js``). Its
+policy allows code from a few paths; it has no other access to the network.
 """
 
 import base64
@@ -24,15 +24,15 @@ __all__ = ["FramePage", "Frames"]
 
 @dataclass(frozen=True, slots=True)
 class FramePage:
-    """``frame.html.j2``: the document around one foreign widget."""
+    """``frame.html.j2``: the document around one third-party widget."""
 
     title: str
     import_map: Markup
-    """JSON; the policy names its digest, so it is written exactly so."""
+    """JSON, character by character: the policy contains its digest."""
     style: str
     """URL of the widget's style sheet."""
     place: str
-    """Path below which it loads all of this."""
+    """Path prefix of its files."""
 
 
 class Frames:
@@ -40,7 +40,7 @@ class Frames:
 
     Args:
         modules: the import map.
-        has: whether pages may load that widget's files.
+        has: returns whether a widget of that name exists.
         place: path below which frames load code.
     """
 
@@ -52,7 +52,7 @@ class Frames:
         self._place = place
 
     async def frame(self, request: Request) -> Response:
-        """Return the document for one widget; raise 404 when there is none of that name."""
+        """Return the document for one widget; raise 404 for an unknown name."""
         name, place = request.path_params["widget"], self._place
         if not self._has(name):
             raise HTTPException(404)
@@ -63,6 +63,6 @@ class Frames:
         return HTMLResponse(render("frame.html.j2", page), headers={"cache-control": "no-store"})
 
     def _below(self, modules: Mapping[str, object]) -> Mapping[str, object]:
-        """Return the import map with all of it below the frames' path."""
+        """Return the import map with all its URLs below the frames' path."""
         imports = cast("Mapping[str, str]", modules["imports"])
         return {"imports": {name: f"{self._place}{url}" for name, url in imports.items()}}

@@ -1,8 +1,8 @@
-"""What a robot's documents name for their widgets, as routes: files, and pages of somebody else.
+"""Routes of files and third-party pages that a robot's documents name for their widgets.
 
-Floor 5. A page is shown by a document that can do nothing else: no script, one frame. The
-dashboard's own policy lets it frame only what is ours. So this document frames the other page, and
-its policy names the one origin that the option of a widget names.
+Layer 5. A document without scripts and with one frame shows a third-party page. The policy of the
+dashboard allows only frames of its own origin. So this document frames the other page, and its
+policy allows the one origin in the widget's option.
 """
 
 import base64
@@ -27,7 +27,7 @@ from urc.web.show.pages import render
 
 __all__ = ["FramedPage", "Linked", "framed_page"]
 
-# White, as pages expect that bring no colour of their own; a dark one paints its own ground.
+# White, as pages without a background expect; a dark page paints its own.
 _STYLE: Final = Markup(
     "html,body,iframe{display:block;width:100%;height:100%;margin:0;border:0;background:white}"
 )
@@ -40,30 +40,30 @@ _POLICY: Final = (
 
 @dataclass(frozen=True, slots=True)
 class FramedPage:
-    """``framed.html.j2``: the document around one page of somebody else."""
+    """``framed.html.j2``: the document around one third-party page."""
 
     title: str
-    """Its host."""
+    """Host of the page."""
     url: str
-    """"" when it is not shown."""
+    """URL of the page; "" if it is refused."""
     fault: str
-    """One line: why it is not shown."""
+    """Why it is refused, in one line."""
     style: Markup = _STYLE
-    """The policy names its digest, so it is written exactly so."""
+    """Style, character by character: the policy contains its digest."""
 
 
 class Linked:
     """The routes.
 
     Args:
-        robots: all that are served now, by the name in their URL.
+        robots: the served robots, by the name in their URL.
     """
 
     def __init__(self, robots: Callable[[], Mapping[str, Robot]]) -> None:
         self._robots = robots
 
     def routes(self) -> list[Route]:
-        """Return them, to be put into the application."""
+        """Return the routes for the application."""
         return [
             Route("/robots/{name}/files/{file:path}", self._file),
             Route("/robots/{name}/framed/{page}", self._page),
@@ -85,7 +85,7 @@ class Linked:
 def framed_page(profile: Profile, key: str, request: Request) -> Response:
     """Return the document around a page that an option names; raise 404 for any other.
 
-    A page of the very server that is asked is not shown: in a frame it could reach the dashboard.
+    A page of this server itself is refused: in a frame it could reach the dashboard.
     """
     pages = (many for use in uses_of(profile) for many in use.pages.values())
     urls = {page_key(url): url for many in pages for url in many}
@@ -104,7 +104,7 @@ def framed_page(profile: Profile, key: str, request: Request) -> Response:
 
 def _is_ours(origin: str, netloc: str, request: Request) -> bool:
     ours = parse_host(request.headers.get("host", ""))
-    # Behind a proxy the scheme that we see may not be the browser's: the same words are enough.
+    # Behind a proxy the scheme here may differ from the browser's; host and port are enough.
     return (
         ours is None
         or parse_host(netloc) == ours

@@ -1,6 +1,6 @@
-"""The gallery: every widget there is, and each in the states of its demo, without any robot.
+"""The gallery: every widget in the states of its demo, without a robot.
 
-Floor 5. The page itself plays the robot (``gallery.js``); no socket is opened, nothing is sent.
+Layer 5. The page itself plays the robot (``gallery.js``): it opens no socket and sends nothing.
 """
 
 import asyncio
@@ -95,15 +95,15 @@ def _on(shelf: Shelf, name: str) -> Found:
 
 
 def mark(text: str) -> str:
-    """Return the text; pages say it by `t`, and the catalogues must have it."""
+    """Return the text, marked for the catalogues; pages translate it with `t`."""
     return text
 
 
 EXAMPLES = (mark("normal"), mark("stale"), mark("gone"), mark("none"), mark("hostile"))
-"""Names of states that most widgets have; others are called as their authors call them."""
+"""Names of states that most widgets have; an author may add others."""
 SEPARATOR = "+"
 MOST_AT_ONCE = 16
-"""Widgets on one page."""
+"""Most widgets on one page."""
 NO_WIDGET = mark("There is no widget of that name.")
 
 log = logging.getLogger(__name__)
@@ -118,7 +118,7 @@ class Entry:
     summary: str
     url: str
     fault: str
-    """Why it cannot be shown; "" when it can."""
+    """Why it cannot be shown, or ""."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,7 +137,7 @@ class Exhibit:
     widget: str
     state: str
     label: str
-    """What the state is called, in the reader's language where most widgets have it."""
+    """Name of the state; common names are translated."""
     title: str
     cell: Cell
     news: str
@@ -150,15 +150,15 @@ class Shown(NamedTuple):
     widget: Widget | None
     states: list[DemoState]
     problems: tuple[Problem, ...] = ()
-    """Why there are no states."""
+    """Why the widget has no states."""
 
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """One finding about a widget that cannot be shown."""
+    """One problem of a widget that cannot be shown."""
 
     line: str
-    """Where, and what was found."""
+    """Location and description."""
     hint: str
 
 
@@ -171,22 +171,22 @@ class DemoPage:
     summary: str
     exhibits: tuple[Exhibit, ...]
     faults: tuple[Fault, ...]
-    """Why those of them that are missing cannot be shown."""
+    """Problems of the widgets that cannot be shown."""
     stamp_url: str
-    """What changes when a file of theirs is saved; "" where nobody looks for that."""
+    """URL of the stamp, for reloads after an edit, or ""."""
     stamp: str
-    """What stood there before they were read."""
+    """The stamp before the files were read."""
 
 
 class Gallery:
-    """Pages and files of all widgets there are.
+    """Pages and files of all widgets.
 
     Args:
         modules: the import map.
         profiles: returns the profiles of the served robots.
-        is_dev: pages load themselves anew when a file of their widgets is saved.
-        ways: which pages there are beside.
-        border: which widgets live in frames.
+        is_dev: whether pages reload when a file of their widgets is saved.
+        ways: navigation links of this server.
+        border: tells third-party widgets from trusted ones.
     """
 
     def __init__(
@@ -204,10 +204,10 @@ class Gallery:
         self._ways = ways
         self._border = border
         self.assets = Assets()
-        """Of the widgets that were looked at; they need not belong to any robot."""
+        """Files of the shown widgets, which need not belong to any robot."""
 
     def routes(self) -> list[Route]:
-        """Return what has to come before the route of the widgets' files."""
+        """Return the routes; they go before the route of the widgets' files."""
         return [
             Route("/widgets", self.index),
             Route("/widgets/", self.index),
@@ -227,7 +227,7 @@ class Gallery:
     async def demo(self, request: Request) -> Response:
         """Show one widget, or several with a plus between their names."""
         names = self._names(request)
-        # Looked at before they are read: nothing may be saved in between and not be seen.
+        # Taken before the files are read, so that no change is missed.
         stamp = await asyncio.to_thread(self._stamp, names) if self._is_dev else ""
         shown = [await asyncio.to_thread(self._shown, name) for name in names]
         self.assets.files |= widget_assets(one.widget for one in shown if one.widget).files
@@ -261,7 +261,7 @@ class Gallery:
         )
 
     async def stamp(self, request: Request) -> Response:
-        """Return a text that is another one when a file of the widgets has been saved."""
+        """Return a text that changes whenever a file of the widgets is saved."""
         if not self._is_dev:
             raise HTTPException(404)
         stamp = await asyncio.to_thread(self._stamp, self._names(request))
@@ -294,14 +294,14 @@ class Gallery:
         return entries
 
     def _names(self, request: Request) -> list[str]:
-        """Return the names in the address; raise 404 for too many."""
+        """Return the names in the URL; raise 404 for too many."""
         wanted = list(dict.fromkeys(request.path_params["names"].split(SEPARATOR)))
         if len(wanted) > MOST_AT_ONCE:
             raise HTTPException(404, f"A page shows {MOST_AT_ONCE} widgets at most.")
         return wanted
 
     def _shown(self, name: str) -> Shown:
-        """Return a widget with its states, or why it has none; raise 404 where there is none."""
+        """Return a widget with its states or its problems; raise 404 for an unknown one."""
         found = self._lookup.find(name)
         if found is None:
             raise HTTPException(404, t(NO_WIDGET))
@@ -323,7 +323,7 @@ def _exhibits(shown: Iterable[Shown], border: Border) -> Iterable[Exhibit]:
 
 
 async def with_slash(request: Request) -> Response:
-    """Lead to the page of the same path with a slash at its end."""
+    """Redirect to the same path with a slash at its end."""
     return RedirectResponse(request.url.replace(path=f"{request.url.path}/").path, 308)
 
 

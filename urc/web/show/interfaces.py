@@ -1,6 +1,6 @@
-"""Which interface of a robot a page shows, its pages, and the others that it offers.
+"""Choice of a robot's interface and its pages.
 
-Floor 5. Pure. Beside its own interfaces every robot has the one that is made for finding faults.
+Layer 5. Pure. Each robot has a generated debug interface in addition to its own interfaces.
 """
 
 import json
@@ -32,11 +32,11 @@ __all__ = [
 ]
 
 DEBUGGING: Final = Interface(DEBUG, "Debug")
-"""Stands for the interface that is made: it has no grid."""
+"""Stand-in for the debug interface: it has no grid."""
 DEBUG_STYLES: Final = ("/static/dev/dev.css", "/static/dev/debug.css")
 KEPT: Final = "urc-interface"
-"""Cookie in which a device keeps which interface of a robot it showed last; its path is the robot's
-page, and ``interfaces.js`` writes it."""
+"""Cookie with the robot's last shown interface on this device. Its path is the robot's page, and
+``interfaces.js`` writes it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,22 +67,19 @@ class DebugPart:
     commands: str
     """JSON list for ``debug_commands.js``."""
     count: int
-    """How many commands there are."""
+    """Number of commands."""
     wire: str
-    """Path of the dev page's socket; "" where there is none."""
+    """Path of the developer page's socket, or ""."""
     dev_url: str
 
 
 def chosen(profile: Profile, wanted: str | None, kept: str = "") -> Interface | None:
-    """Return the interface to show.
+    """Return the interface to show, or None if the robot has none of the wanted name.
 
     Args:
-        profile: of the robot.
-        wanted: its name in the page's address; None: the address says nothing.
-        kept: which one the device showed last; one that is not there any more is passed over.
-
-    Returns:
-        None when there is no interface of the name that is wanted.
+        profile: profile of the robot.
+        wanted: name in the page's URL, or None.
+        kept: name of the last shown interface on the device; ignored if it no longer exists.
     """
     known = {**profile.interfaces, DEBUG: DEBUGGING}
     if wanted is not None:
@@ -91,13 +88,13 @@ def chosen(profile: Profile, wanted: str | None, kept: str = "") -> Interface | 
 
 
 def choices(profile: Profile, interface: Interface, url: str, more: str) -> tuple[Choice, ...]:
-    """Return all interfaces of a robot, the one for finding faults last.
+    """Return all interfaces of a robot, the debug interface last.
 
     Args:
-        profile: of the robot.
-        interface: the one that is shown.
+        profile: profile of the robot.
+        interface: the current one.
         url: path of the robot's page.
-        more: what stands behind the name in each address.
+        more: text to append to each URL.
     """
     every = (*profile.interfaces.values(), DEBUGGING)
     return tuple(
@@ -112,7 +109,7 @@ def choices(profile: Profile, interface: Interface, url: str, more: str) -> tupl
 
 
 def page_tabs(interface: Interface, wanted: str = "") -> tuple[PageTab, ...]:
-    """Return the pages of an interface with tabs, of which exactly one is current."""
+    """Return the pages of an interface with tabs; exactly one is current."""
     names = list(interface.tabs)
     current = wanted if wanted in interface.tabs else next(iter(names), "")
     return tuple(
@@ -122,12 +119,12 @@ def page_tabs(interface: Interface, wanted: str = "") -> tuple[PageTab, ...]:
 
 
 def is_turned(interface: Interface, slots: tuple[str, ...]) -> bool:
-    """Return whether the drawn picture is only seen on a phone that lies on its side."""
+    """Return whether a phone shows the designed layout only in landscape."""
     return any(needs_turning(page, slots) for page in interface.pages)
 
 
 def debug_part(profile: Profile, dev_url: str = "") -> DebugPart:
-    """Return what the interface for finding faults shows."""
+    """Return the data of the debug interface."""
     driver = profile.driver
     commands = [_command(one, driver) for one in driver.commands.values()]
     signals = tuple(driver.signals.values())

@@ -1,18 +1,17 @@
-"""The picture of an interface as CSS: where each cell lies, for each kind of screen.
+"""The layout of an interface as CSS: the place of each cell, for each kind of screen.
 
-Floor 5. Pure. The rules hold numbers only, so nothing out of a document can end the style element.
+Layer 5. Pure. The rules contain only numbers, so no text of a document can end the style element.
 
-A row or column in which no slot stands is a margin: it keeps its place in the picture, and gets an
-eighth of the room of one that is used. A phone has no room for margins: they are left out there.
-Held upright it shows the ``phone`` grid, else the ``tall`` one, else the wide one; of the latter
-two it stacks more than two columns in reading order. On its side it shows the ``low`` grid, else
-the wide one.
+A row or column without a slot is a margin: it keeps its place, with an eighth of the room of
+others. Phones have no margins. A phone in portrait shows the ``phone`` grid, else the ``tall`` one,
+else the ``wide`` one; the latter two are stacked in reading order if they have more than two
+columns. A phone in landscape shows the ``low`` grid, else the ``wide`` one.
 
-Over a background, what is empty is a window: it keeps its full size on every screen; only on a low
-one, empty rows give way to those with widgets.
+Over a background, an empty cell is a window with its full size on every screen. Only on a screen of
+low height, empty rows shrink in favour of rows with widgets.
 
-The pages of an interface share its cells: which page is open says ``data-page`` on the grid, and a
-cell that is in two pages stays what it is.
+The pages of an interface share its cells. The attribute ``data-page`` of the grid selects the page,
+and a cell in two pages keeps its state.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -27,16 +26,16 @@ SHORT = "(max-height: 479.98px)"
 TALL = "(orientation: portrait)"
 PHONE_COLUMNS = 2
 LEFT_HAND = ':root[data-hand="left"]'
-"""Who works with the left hand; ``hand.js`` sets it."""
+"""Selector for left-handed operators; ``hand.js`` sets the attribute."""
 _USED_COLUMN, _USED_ROW, _MARGIN = "minmax(0,1fr)", "minmax(8rem,1fr)", "minmax(0,.12fr)"
 _LOW_ROW = "minmax(6.5rem,1fr)"
-"""On a phone that lies on its side: two of them fit."""
+"""Height of a row on a phone in landscape: two rows fit."""
 _WINDOW = ("minmax(5rem,1fr)", "minmax(0,1fr)")
-"""A row and a column through which the background is seen."""
+"""Sizes of a row and a column that show the background."""
 
 
 def grid_css(interface: Interface, slots: Sequence[str]) -> str:
-    """Return the rules for the cells, which are numbered in the order of `slots`."""
+    """Return the rules for the cells, numbered in the order of `slots`."""
     css = ""
     canvas = _Canvas(slots, interface.background if interface.background in slots else "")
     turned = [needs_turning(page, slots) for page in interface.pages]
@@ -53,27 +52,27 @@ def grid_css(interface: Interface, slots: Sequence[str]) -> str:
 
 
 class _Canvas(NamedTuple):
-    """What the pictures are filled with."""
+    """The slots of a page, and its background."""
 
     slots: Sequence[str]
     background: str
-    """Slot behind everything; what is empty lets it through, so it keeps its full size."""
+    """Slot behind all others; it shows through empty cells, which keep their full size."""
 
 
 def _left_hand(page: Tab, right: Mapping[str, Grid], canvas: _Canvas) -> dict[str, Grid]:
-    """Return the pictures for who works with the left hand: drawn, mirrored, or the same."""
+    """Return the layouts for left-handed operators: designed, mirrored or unchanged."""
     if page.left:
         turn = mirrored if page.is_mirrored else Grid._replace
         others = {screen: turn(grid) for screen, grid in page.grids.items()}
         return _placed({**others, **page.left}, canvas)
     if not page.is_mirrored:
         return dict(right)
-    # What is stacked is in reading order for everybody, so this comes last.
+    # Mirrored after stacking, because a stack keeps the reading order.
     return {screen: mirrored(grid) for screen, grid in right.items()}
 
 
 def mirrored(grid: Grid) -> Grid:
-    """Return the grid with its columns the other way round."""
+    """Return the grid with its columns in reverse order."""
     slots = tuple(
         slot._replace(column=grid.columns - slot.column - slot.column_span) for slot in grid.slots
     )
@@ -81,14 +80,14 @@ def mirrored(grid: Grid) -> Grid:
 
 
 def needs_turning(page: Tab, slots: Sequence[str]) -> bool:
-    """Return whether a phone that is held upright shows another picture than was drawn."""
+    """Return whether a phone in portrait shows another layout than the designed one."""
     base = _placed(page.grids, _Canvas(slots, "")).get("base")
     is_drawn = "phone" in page.grids or "tall" in page.grids
     return base is not None and not is_drawn and _cropped(base).columns > PHONE_COLUMNS
 
 
 def _placed(grids: Mapping[str, Grid], canvas: _Canvas) -> dict[str, Grid]:
-    """Return the grid for each kind of screen, without the slots that nobody fills."""
+    """Return the grid for each kind of screen, without empty slots."""
     if not grids:
         return {}
     crop = Grid._replace if canvas.background else _cropped
@@ -101,7 +100,7 @@ def _placed(grids: Mapping[str, Grid], canvas: _Canvas) -> dict[str, Grid]:
     upright = grids.get("phone") or grids.get("tall") or wide
     phone = crop(_filled(upright, canvas.slots))
     if "phone" not in grids and phone.columns > PHONE_COLUMNS:
-        # The first row stays empty where there is something to see behind it.
+        # The first row stays empty over a background, which shows through it.
         phone = _stacked(phone, first=1 if canvas.background else 0)
     placed[PHONE] = phone
     return placed
@@ -116,14 +115,14 @@ def _screens(place: str, grids: Mapping[str, Grid], canvas: _Canvas) -> str:
 
 
 def _filled(grid: Grid, names: Sequence[str]) -> Grid:
-    """Return the grid without the slots that nobody fills."""
+    """Return the grid without empty slots."""
     return Grid(grid.rows, grid.columns, tuple(slot for slot in grid.slots if slot.name in names))
 
 
 def _rules(place: str, grid: Grid, canvas: _Canvas, row: str) -> str:
     empty_row, empty_column = _WINDOW if canvas.background else (_MARGIN, _MARGIN)
     if canvas.background and row == _LOW_ROW:
-        empty_row = _MARGIN  # it gives way: what steers must not lie below the edge
+        empty_row = _MARGIN  # shrinks, so that no control lies below the edge
     used_rows = _used((slot.row, slot.row_span) for slot in grid.slots)
     used_columns = _used((slot.column, slot.column_span) for slot in grid.slots)
     rows = _tracks(grid.rows, used_rows, row, empty_row)
@@ -166,7 +165,7 @@ def _cropped(grid: Grid) -> Grid:
 
 
 def _stacked(grid: Grid, first: int) -> Grid:
-    """Return the slots one below the other, in reading order, from the row `first`."""
+    """Return the slots in one column, in reading order, from the row `first`."""
     ordered = sorted(grid.slots, key=lambda slot: (slot.row, slot.column))
     slots = tuple(Slot(slot.name, row, 0) for row, slot in enumerate(ordered, first))
     return Grid(len(slots) + first, 1, slots)

@@ -1,10 +1,10 @@
-"""Renders the templates of foreign widgets in a process of its own, with little memory and time.
+"""Renders the templates of third-party widgets in a separate process, with little memory and time.
 
 ``python -m urc.web.show.markup_apart`` reads templates with their variables from its standard
-input, as JSON, and writes their markup. Floor 5.
+input, as JSON, and writes their markup. Layer 5.
 
-A sandbox keeps a template from reaching out, and does not keep it from taking for ever. What a
-template gives depends on nothing but its variables and the language, so it is kept.
+The sandbox blocks access to Python objects, but not endless loops. The markup depends only on the
+variables and the language, so it is cached.
 """
 
 import json
@@ -24,9 +24,9 @@ from urc.web.show.sandbox import fault_line, widget_template
 __all__ = ["MOST_CHARACTERS", "Made", "markup_of"]
 
 MOST_CHARACTERS: Final = 65536
-"""Of the markup of one cell."""
+"""Most characters in the markup of one cell."""
 TOTAL_S: Final = 20.0
-"""Longest time for some templates together; it is much, for small machines that are busy."""
+"""Time limit for several templates together, in seconds; generous, for small busy machines."""
 PROCESSOR_S: Final = 4
 MEMORY_BYTES: Final = 512 << 20
 _COMMAND: Final = ("-P", "-m", "urc.web.show.markup_apart")
@@ -34,14 +34,14 @@ _KEPT: Final = 256
 
 
 class Made(NamedTuple):
-    """What became of a template."""
+    """The result of a template."""
 
     html: Markup
-    """"" where it failed."""
+    """The markup; "" after a failure."""
     fault: str
-    """Why it failed, in one line; "" where it did not."""
+    """Why it failed, in one line, or ""."""
     line: int = 1
-    """Of the template in which it failed, from 1."""
+    """Line of the template in which it failed, from 1."""
 
 
 _made: dict[str, Made] = {}
@@ -49,10 +49,9 @@ _lock = Lock()
 
 
 def markup_of(wanted: Sequence[tuple[str, Mapping[str, object]]]) -> list[Made]:
-    """Return the markup of templates, in the current language; it waits for another process.
+    """Return the markup of templates in the current language; blocks until it is rendered.
 
-    Args:
-        wanted: source and variables of each.
+    `wanted` has the source and the variables of each template.
     """
     language = words.language.get()
     jobs = [json.dumps([language, source, _plain(variables)]) for source, variables in wanted]
@@ -68,7 +67,7 @@ def markup_of(wanted: Sequence[tuple[str, Mapping[str, object]]]) -> list[Made]:
 
 
 def _rendered(jobs: list[str]) -> list[Made]:
-    """Return what a process makes of some templates; one that ends it costs its own cell only."""
+    """Return the markup of some templates; a template that kills the process only fails itself."""
     said = _asked(jobs)
     if said is not None:
         return said
@@ -82,7 +81,7 @@ def _rendered(jobs: list[str]) -> list[Made]:
 
 
 def _asked(jobs: list[str]) -> list[Made] | None:
-    """Return what the process says; None where it ended without a word."""
+    """Return the output of the process; None if it ended early."""
     try:
         done = subprocess.run(  # noqa: S603 (our own program)
             [sys.executable, *_COMMAND],
@@ -94,12 +93,12 @@ def _asked(jobs: list[str]) -> list[Made] | None:
         said = json.loads(done.stdout)
     except (subprocess.TimeoutExpired, ValueError):
         return None
-    # Autoescaped, and mounted in a frame without an origin.
+    # Safe: autoescaped, and mounted in a frame without an origin.
     return [Made(Markup(html), fault, line) for html, fault, line in said]  # noqa: S704
 
 
 def _plain(value: object) -> Any:
-    """Return a variable as JSON has it; a record becomes a mapping of its fields."""
+    """Return a variable in the types of JSON; a record becomes a mapping of its fields."""
     if value is None or isinstance(value, (bool, int, float, str)):
         return value
     if isinstance(value, Template):
@@ -124,7 +123,7 @@ def _render(job: str) -> tuple[str, str, int]:
             if count > MOST_CHARACTERS:
                 return "", f"it gives more than {MOST_CHARACTERS} characters", 1
             pieces.append(piece)
-    except Exception as error:  # whatever a template raises costs its own cell
+    except Exception as error:  # a template may raise anything
         text = str(error).partition("\n")[0][:500]
         return "", f"{type(error).__name__}: {text}", fault_line(error)
     return "".join(pieces), "", 1

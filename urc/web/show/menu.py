@@ -1,6 +1,6 @@
-"""The menu: every robot that is served, what is set for it, and the ways from here.
+"""The menu: every served robot with its settings, and the navigation between pages.
 
-Floor 5. Pure. `menu.html.j2` sees `MenuPage`; all pages around the dashboard have `Nav`.
+Layer 5. Pure. `menu.html.j2` sees `MenuPage`; all pages around the dashboard have `Nav`.
 """
 
 from collections.abc import Mapping, Sequence
@@ -22,16 +22,16 @@ __all__ = ["Card", "MenuPage", "Nav", "SettingRow", "Ways", "menu_page", "settin
 
 @dataclass(frozen=True, slots=True)
 class Ways:
-    """Which pages there are on this server."""
+    """Navigation links of this server."""
 
     has_managers: bool = False
-    """Drivers, interfaces, settings."""
+    """Whether the pages for drivers, interfaces, widgets and settings exist."""
     has_dev: bool = False
 
 
 @dataclass(frozen=True, slots=True)
 class Nav:
-    """``nav.html.j2``: the ways between the pages around the dashboard."""
+    """``nav.html.j2``: the navigation bar of the pages around the dashboard."""
 
     current: str
     """``menu``, ``drivers``, ``interfaces``, ``widgets``, ``dev``, or "" for none of them."""
@@ -45,7 +45,7 @@ class SettingRow:
     title: str
     name: str
     value: str
-    """As shown; "" when nothing is set."""
+    """Value as shown; "" without a value."""
     description: str
     is_missing: bool
 
@@ -55,34 +55,34 @@ class Card:
     """One robot on the menu."""
 
     name: str
-    """In its URL."""
+    """Its name in URLs."""
     title: str
     summary: str
     url: str
     driver: str
-    """What it is driven with: an installed package, or a file."""
+    """The driver: an installed package, or a file."""
     interface: str
-    """Title of the interface that is shown first."""
+    """Title of the first interface."""
     rows: tuple[SettingRow, ...]
     missing: tuple[str, ...]
     """Titles of the settings that keep Connect disabled."""
     missing_names: tuple[str, ...]
     """Their names, for a command line."""
     settings_url: str = ""
-    """Of its settings; "" where they cannot be changed."""
+    """URL of its settings; "" where they are fixed."""
     dev_url: str = ""
-    """Of its dev page; "" where there are none."""
+    """URL of its developer page, or ""."""
     is_looked_at: bool = False
-    """Whether there is a live picture before anybody is connected."""
+    """Whether a live image exists without a connection."""
     fault: str = ""
-    """Why it cannot be used at all; "" when it can."""
+    """Why it cannot be used, or ""."""
     recorded: str = ""
-    """When, where it is a recording; "": it is a robot."""
+    """Time of the recording; "" for a robot."""
 
 
 @dataclass(frozen=True, slots=True)
 class MenuPage:
-    """``menu.html.j2``: the robots that are served, and what is set for each."""
+    """``menu.html.j2``: the served robots and their settings."""
 
     head: Head
     nav: Nav
@@ -100,11 +100,11 @@ def menu_page(
     """Return the menu.
 
     Args:
-        head: of the page.
-        robots: by the name in their URL.
-        ways: which pages there are.
-        drivers: name → the installed package that the robot is, with its version.
-        broken: robots that should be here and cannot.
+        head: head of the page.
+        robots: the robots, by the name in their URL.
+        ways: navigation links of this server.
+        drivers: name of a robot → its installed package with version.
+        broken: robots that cannot be used.
     """
     cards = [
         _card(name, robot, ways, (drivers or {}).get(name, "")) for name, robot in robots.items()
@@ -116,7 +116,7 @@ def menu_page(
 
 
 def setting_row(setting: Setting, value: Value) -> SettingRow:
-    """Return a setting as people read it; what is secret is not shown."""
+    """Return a setting in readable form; a secret is hidden."""
     if value is None or value == "":
         shown = ""
     elif setting.is_secret:

@@ -1,6 +1,6 @@
-"""What the page must know of a binding: ``cell.js``, ``output.js`` and ``input.js`` read it.
+"""The bindings of a widget as JSON for ``cell.js``, ``output.js`` and ``input.js``.
 
-Floor 5. Pure.
+Layer 5. Pure.
 """
 
 from collections.abc import Mapping
@@ -21,7 +21,7 @@ _NOTHING_GIVEN = Given()
 
 
 def inputs_config(use: WidgetUse, widget: Widget, driver: Driver) -> dict[str, object]:
-    """Return what the inputs are bound to, and how values get into the units that they ask for."""
+    """Return the signals of the inputs, and the conversions to the units of the widget."""
     bound: dict[str, str | list[str]] = {**use.inputs}
     bound |= {name: list(many) for name, many in use.lists.items()}
     found: dict[str, list[dict[str, object] | None]] = {}
@@ -68,9 +68,9 @@ def output_config(use: WidgetUse, output: str, widget: Widget, driver: Driver) -
 
 
 def _moves(command: Command, given: Given) -> bool:
-    """Return whether it moves something by itself, whatever is given to it here.
+    """Return whether the command always starts autonomous motion with these fixed arguments.
 
-    Where that depends on what somebody chooses, the server says so when it is chosen.
+    Where that depends on a chosen value, the server checks the choice.
     """
     condition = command.moves_if
     is_told = condition is None or condition.names <= given.fixed.keys()
@@ -78,7 +78,7 @@ def _moves(command: Command, given: Given) -> bool:
 
 
 def _arguments(command: Command | None, given: Given) -> dict[str, dict[str, object]]:
-    """Return what the arguments are that are not fixed, by the names of the command."""
+    """Return the arguments that are not fixed, by their names in the command."""
     found: dict[str, dict[str, object]] = {}
     for name, one in (command.arguments if command is not None else {}).items():
         if name not in given.fixed:
@@ -98,7 +98,7 @@ def _arguments(command: Command | None, given: Given) -> dict[str, dict[str, obj
 
 
 def asked_before(command: Command | None) -> list[dict[str, object]]:
-    """Return what people are asked: before the command, or before one value of an argument."""
+    """Return the confirmations: of the command, or of one value of an argument."""
     if command is None:
         return []
     asked = [] if command.confirm is None else [("", "", command.confirm)]
@@ -124,11 +124,11 @@ def motion_lines(driver: Driver) -> list[str]:
 
 
 def _line(command: Command | None, driver: Driver) -> str:
-    """Return the transport without which a command cannot be given."""
+    """Return the transport that a command needs."""
     line = command.transport if command else ""
     spec = driver.transports.get(line)
-    # A line that is only made for a command is tried again by the next command, and by nothing
-    # else: one that is lost must not keep anybody from giving it.
+    # A transport that opens on demand is only opened again by the next command. A lost one must
+    # therefore not disable the control.
     is_made_for_it = (
         spec is not None
         and spec.connection == "per_request"
@@ -138,7 +138,7 @@ def _line(command: Command | None, driver: Driver) -> str:
 
 
 def _ranges(command: Command | None, port: Port, given: Given) -> dict[str, dict[str, object]]:
-    """Return what -1 to 1 of the widget means for each argument that has a range of its own."""
+    """Return the meaning of -1 to 1 for each argument that has a range of its own."""
     if command is None:
         return {}
     found: dict[str, dict[str, object]] = {}
@@ -163,7 +163,7 @@ def _rest(command: Command, argument: Argument, least: float) -> float:
 
 
 def _neutral(command: Command | None, port: Port, given: Given) -> dict[str, Reading]:
-    """Return the values that stop what this output moves, where the command says them."""
+    """Return the values that stop the motion of this output, if the command has them."""
     if command is None:
         return {}
     release = _release_of(command)
@@ -175,7 +175,7 @@ def _release_of(command: Command) -> Mapping[str, Reading]:
 
 
 def mark(text: str) -> str:
-    """Return `text`; the mark puts it into the catalogues, and the page translates it."""
+    """Return `text`. The mark adds it to the catalogues; the page translates it."""
     return text
 
 

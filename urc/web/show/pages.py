@@ -1,7 +1,7 @@
 """Jinja → HTML. Each template has one documented context: the dataclass that it is rendered with.
 
-Floor 5. Templates see the dataclass as ``page`` and nothing else; logic beyond ``for`` and ``if``
-belongs here; the cells of a page are made in `urc.web.show.cells`.
+Layer 5. Templates see the dataclass as ``page`` and nothing else. Logic beyond ``for`` and ``if``
+belongs here; `urc.web.show.cells` makes the cells of a page.
 """
 
 import json
@@ -47,10 +47,10 @@ __all__ = [
 
 @dataclass(frozen=True, slots=True)
 class Head:
-    """What every page needs in its head."""
+    """Data for the head of every page."""
 
     nonce: str
-    """Of this one response; every script and style element carries it."""
+    """Nonce of this response; every script and style element carries it."""
     title: str
     import_map: Mapping[str, object] = field(default_factory=lambda: with_words({"imports": {}}))
     widget_styles: tuple[str, ...] = ()
@@ -69,31 +69,31 @@ class RobotPage:
     socket: str
     """Path and query of the WebSocket."""
     interfaces: tuple[Choice, ...]
-    """All that the robot has."""
+    """All interfaces of the robot."""
     tabs: tuple[PageTab, ...]
-    """Pages of this interface; empty when it has but one."""
+    """Pages of this interface; empty if it has only one."""
     number: int
-    """Of the page that is open."""
+    """Number of the open page."""
     is_turned: bool
-    """Whether the picture is only seen as it was drawn on a phone that lies on its side."""
+    """Whether a phone shows the designed layout only in landscape."""
     is_part: bool
-    """Whether ``interfaces.js`` asks, which takes out the stage and what its style is made of."""
+    """Whether the request is from ``interfaces.js``, which extracts the grid and its style."""
     debug: DebugPart | None
-    """What stands in place of a grid, in the interface for finding faults."""
+    """Content in place of a grid, for the debug interface."""
     cells: tuple[Cell, ...]
     stop_url: str
-    """Where STOP goes when the socket is down."""
+    """URL of STOP while the socket is down."""
     lines: str
     """JSON list of the transports over which STOP reaches the robot."""
     can_move: bool
     """Whether the controls and STOP are shown."""
     tape: str
-    """Path at which a recording is asked for; "" where a robot is shown."""
+    """Path of the playback's state; "" for a robot."""
 
 
 @dataclass(frozen=True, slots=True)
 class ErrorPage:
-    """``error.html.j2``: one sentence, and the way back."""
+    """``error.html.j2``: one sentence, and a link back."""
 
     head: Head
     status: int
@@ -117,17 +117,17 @@ def robot_page(
     """Return the page of one interface.
 
     Args:
-        nonce: of this response.
-        name: of the robot in its URL.
-        profile: what it is.
+        nonce: nonce of this response.
+        name: name of the robot in its URL.
+        profile: profile of the robot.
         interface: one of its interfaces.
         modules: the import map.
-        is_watching: the page is never to drive.
-        tab: name of the page of it that is open; "" or an unknown one: the first.
-        wire: path of the dev page; "" where there is none for who asks.
-        tape: path at which a recording is asked for; "" where a robot is shown.
-        is_part: a page that is open already wants the interface in place of another.
-        border: which widgets live in frames.
+        is_watching: whether the page never drives.
+        tab: name of the open page; "" or an unknown one selects the first.
+        wire: path of the developer page; "" if this visitor has none.
+        tape: path of the playback's state; "" for a robot.
+        is_part: whether an open page swaps its interface.
+        border: tells third-party widgets from trusted ones.
     """
     uses = _uses(profile, interface)
     slots = tuple(uses)
@@ -165,23 +165,23 @@ def robot_page(
 
 
 def with_words(modules: Mapping[str, object]) -> Mapping[str, object]:
-    """Return the import map with the words of the reader's language in it."""
+    """Return the import map with the catalogue of the user's language."""
     imports = cast("Mapping[str, str]", modules["imports"])
     return {"imports": {**imports, "urc/words": words.address(words.language.get())}}
 
 
 def error_page(nonce: str, status: int, message: str) -> str:
-    """Return a page that says what is wrong in one sentence."""
+    """Return a page with an error message of one sentence."""
     return render("error.html.j2", ErrorPage(Head(nonce, f"{status}"), status, message))
 
 
 def render(template: str, page: object) -> str:
-    """Return a page's HTML; `page` is the dataclass that the template is documented with."""
+    """Return a page's HTML; `page` is the dataclass that the template documents."""
     return _pages().get_template(template).render(page=page)
 
 
 def _uses(profile: Profile, interface: Interface) -> dict[str, WidgetUse]:
-    """Return slot → widget, in reading order; slots that nobody fills are left out."""
+    """Return slot → widget, in reading order, without empty slots."""
     found = {
         name: interface.widgets.get(name) or profile.slots.get(name) for name in interface.shown
     }

@@ -1,6 +1,7 @@
-"""What the templates of widgets are compiled in: Jinja without a way out, and few words.
+"""The sandboxed Jinja environment for the templates of widgets, with few globals.
 
-Floor 5. It bounds neither time nor memory: `urc.web.show.markup_apart` does, for foreign widgets.
+Layer 5. It limits neither time nor memory; for third-party widgets
+`urc.web.show.markup_apart` does.
 """
 
 import traceback
@@ -59,12 +60,12 @@ def _parser() -> "MarkdownIt":
 
 TEMPLATE: Final = "template.html.j2"
 _CODE: Final = "<template>"
-"""What Jinja calls the file of a template that it was given as text."""
+"""Jinja's file name of a template from text."""
 
 
 @lru_cache(maxsize=1)
 def widget_environment() -> Environment:
-    """Return what the templates of widgets are compiled in."""
+    """Return the Jinja environment for the templates of widgets."""
     widgets = ImmutableSandboxedEnvironment(
         autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
@@ -75,12 +76,12 @@ def widget_environment() -> Environment:
 
 @lru_cache(maxsize=256)
 def widget_template(source: str) -> Template:
-    """Return a compiled template; raise what Jinja raises."""
+    """Return a compiled template; pass on Jinja's exceptions."""
     return widget_environment().from_string(source)
 
 
 def fault_line(fault: Exception) -> int:
-    """Return the line of a widget's template in which it failed, from 1."""
+    """Return the line of the template in which it failed, from 1."""
     if isinstance(fault, TemplateSyntaxError):
         return fault.lineno
     frames = traceback.extract_tb(fault.__traceback__)

@@ -1,7 +1,7 @@
 """The checks of a widget's template, module and demo, for `urc validate` and the pages.
 
-Floor 5. Each is read as the dashboard reads it; the module is only looked at, for nothing here runs
-JavaScript.
+Layer 5. Each file is read as the dashboard reads it. The module is only searched as text, because
+nothing here runs JavaScript.
 """
 
 import re
@@ -25,7 +25,7 @@ __all__ = ["FILES", "check_widget"]
 
 MODULE: Final = "widget.js"
 FILES: Final = (TEMPLATE, MODULE, "demo.yaml")
-"""What is read beside the manifest."""
+"""Files of a widget besides the manifest."""
 MOST_BYTES: Final = 1 << 20
 _EXPORT: Final = re.compile(
     r"(?:^|[;}])\s*export\s+(?:default\b|\{[^}]*\bdefault\b[^}]*\})", re.MULTILINE
@@ -34,11 +34,11 @@ _ANY: Final = re.compile(r"^export\b.*", re.MULTILINE)
 
 
 def check_widget(widget: Widget, *, with_demo: bool = True) -> list[Problem]:
-    """Return what is wrong with the files of a widget whose manifest is sound.
+    """Return the problems in the files of a widget with a valid manifest.
 
     Args:
-        widget: it may have come from anywhere.
-        with_demo: its author wants to know of the demo; a page that shows the widget needs none.
+        widget: a widget from any source.
+        with_demo: whether to check the demo, which pages do not need.
     """
     problems: list[Problem] = []
     if widget.name in OURS and Border().is_foreign(widget):
@@ -64,23 +64,23 @@ def check_widget(widget: Widget, *, with_demo: bool = True) -> list[Problem]:
 
 
 def _text(widget: Widget, name: str) -> str:
-    """Return a file of a widget; raise `ProblemsError`."""
+    """Return the text of a widget's file; raise `ProblemsError`."""
     return read_bytes(str(widget.folder / name), MOST_BYTES).decode("utf-8", "replace")
 
 
 def _rendered(widget: Widget, states: list[DemoState], template: "_TemplateCheck") -> list[Problem]:
-    """Return why the template cannot be rendered in a state; one finding is enough."""
+    """Return the first failure to render the template in a state, if any."""
     for state in states:
         context = widget_context(state.use, widget, state.profile, uid="cell-0")
         try:
             render_widget(widget, context)
-        except Exception as error:  # whatever a template of somebody else raises
+        except Exception as error:  # a third-party template may raise anything
             return [template.fault(error, f", in the state {state.name!r}")]
     return []
 
 
 def _module(widget: Widget, text: str) -> list[Problem]:
-    """Return that the module exports nothing by default, as far as its text tells."""
+    """Return a problem if the module's text has no default export."""
     if _EXPORT.search(text):
         return []
     nearest = _ANY.search(text)
@@ -105,7 +105,7 @@ class _TemplateCheck:
         self._lines = source.splitlines()
 
     def problems(self) -> list[Problem]:
-        """Return why it cannot be compiled, or the names in it that mean nothing."""
+        """Return the syntax error of the template, or its unknown names."""
         environment = widget_environment()
         try:
             environment.from_string(self._source)
@@ -125,7 +125,7 @@ class _TemplateCheck:
         return sorted(dict.fromkeys(found), key=lambda one: (one.line, one.column))
 
     def fault(self, error: Exception, where: str) -> Problem:
-        """Return what it raised when it was rendered, at its line."""
+        """Return an exception of the rendering as a problem at its line."""
         text = str(error).partition("\n")[0] or type(error).__name__
         return self._problem("bad-template", f"{text}{where}", fault_line(error))
 
@@ -141,10 +141,10 @@ class _TemplateCheck:
     def _keys(
         self, tree: nodes.Template, asked: set[int], table: str, declared: Iterable[str]
     ) -> Iterator[Problem]:
-        """Yield what is taken out of a mapping, as ``options.label``, and is not in it."""
+        """Yield a problem for each undeclared key, such as ``options.label``, of a mapping."""
         known = frozenset(declared)
         if any(node.name == table and node.ctx != "load" for node in tree.find_all(nodes.Name)):
-            return  # it is another thing here
+            return  # the template assigns the name itself
         looked_up: list[nodes.Getattr | nodes.Getitem] = [*tree.find_all(nodes.Getattr)]
         looked_up += tree.find_all(nodes.Getitem)
         for node in looked_up:
@@ -170,14 +170,14 @@ class _TemplateCheck:
 
 
 def _asked(tree: nodes.Template) -> set[int]:
-    """Return the nodes of which a template only asks whether they exist."""
+    """Return the nodes whose existence the template tests."""
     tests = [one.node for one in tree.find_all(nodes.Test) if one.name in ("defined", "undefined")]
     filters = [one.node for one in tree.find_all(nodes.Filter) if one.name in ("default", "d")]
     return {id(node) for node in (*tests, *filters)}
 
 
 def _key(node: nodes.Getattr | nodes.Getitem) -> str:
-    """Return the key that is looked up, or "" when it is computed."""
+    """Return the key of a look-up, or "" for a computed key."""
     if isinstance(node, nodes.Getattr):
         return node.attr
     key = node.arg.value if isinstance(node.arg, nodes.Const) else ""

@@ -1,1 +1,1 @@
-"""What goes over a dashboard's sockets: message shapes, and nothing else."""
+"""Message types of a dashboard's sockets, without behaviour."""

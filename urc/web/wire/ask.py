@@ -1,6 +1,6 @@
-"""What a page and the server say about questions and sequences: message shapes, and nothing else.
+"""Message types about questions and sequences, without behaviour.
 
-Floor 5. Part of `urc.web.wire.messages`, which says who sends what.
+Layer 5. Part of `urc.web.wire.messages`, which lists the direction of each message.
 """
 
 from typing import Literal
@@ -27,13 +27,13 @@ class _Ask(Outbound, tag="ask", omit_defaults=False, frozen=True):
     n: int
     """Number of the question."""
     id: int
-    """Of the command that waits for it, on the screen that gave it; 0 on the others."""
+    """Number of its command, on the page that asks; 0 on other pages."""
     who: str
     command: str
     text: str
     level: str
     left: int
-    """Milliseconds until nobody has said yes."""
+    """Time until the question fails, in milliseconds."""
 
 
 class _Asked(Outbound, tag="asked", frozen=True):
@@ -58,7 +58,7 @@ class _AllProgress(Outbound, tag="progress", omit_defaults=False, frozen=True):
 
 
 class Agree(msgspec.Struct, tag_field="t", tag="agree", forbid_unknown_fields=True, frozen=True):
-    """What somebody says to the question `n`; no from the screen that asks takes it back."""
+    """The answer to question `n`; no from the asking page withdraws it."""
 
     n: int
     yes: bool
@@ -66,23 +66,23 @@ class Agree(msgspec.Struct, tag_field="t", tag="agree", forbid_unknown_fields=Tr
 
 _Scalar = bool | int | float | str
 Arguments = dict[str, bool | int | float | str | tuple[_Scalar, ...] | None]
-"""Of a command, as a page says them."""
+"""Arguments of a command, as a page sends them."""
 
 
 class Prepare(
     msgspec.Struct, tag_field="t", tag="prepare", forbid_unknown_fields=True, frozen=True
 ):
-    """Somebody has said yes to just this command: asks for the `token` that lets it be given."""
+    """The operator's confirmation of exactly this command; requests the `token` for it."""
 
     id: int
     command: str
     arguments: Arguments = {}
     stops: int | None = None
-    """As of `Run`, which is what counts."""
+    """As in `Run`, whose value counts."""
 
 
 class Steer(msgspec.Struct, tag_field="t", tag="steer", forbid_unknown_fields=True, frozen=True):
-    """What somebody wants of a sequence."""
+    """A request about a sequence: pause, step, resume or end."""
 
     command: str
     verb: Pull
@@ -97,22 +97,22 @@ def encode_ask(
     level: Literal["normal", "hazardous"],
     left_s: float,
 ) -> str:
-    """Return a question that a second person is asked, and the first one is told of."""
+    """Return a question for the second person, which the first one also sees."""
     return encoded(_Ask(number, run, who, command, cut(text), level, milliseconds(left_s)))
 
 
 def encode_asked(number: int) -> str:
-    """Return that a question is over."""
+    """Return the end of a question."""
     return encoded(_Asked(number))
 
 
 def encode_token(run: int, token: str) -> str:
-    """Return what lets the command `run` be given, once and soon."""
+    """Return the token that allows the command `run`, once and soon."""
     return encoded(_Token(run, token))
 
 
 def encode_progress(all_progress: tuple[Progress, ...]) -> str:
-    """Return where the sequences stand."""
+    """Return the state of the sequences."""
     return encoded(
         _AllProgress(
             [

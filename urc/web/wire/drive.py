@@ -1,6 +1,6 @@
-"""What a page and the server say about the controls: message shapes, and nothing else.
+"""Message types about the controls, without behaviour.
 
-Floor 5. Part of `urc.web.wire.messages`, which says who sends what.
+Layer 5. Part of `urc.web.wire.messages`, which lists the direction of each message.
 """
 
 from typing import Literal
@@ -39,24 +39,24 @@ class _Person(msgspec.Struct, frozen=True):
 class _Lease(Outbound, tag="lease", omit_defaults=False, frozen=True):
     you: str
     name: str
-    """What the others call this screen."""
+    """Name of this page, as other pages show it."""
     epoch: int
     holder: _Person | None
     asker: _Person | None
     left: int
-    """Milliseconds until the asker gets the controls."""
+    """Time until the asking page gets the controls, in milliseconds."""
     latched: str
-    """Who pressed STOP; "" while nothing is latched."""
+    """Name of the operator who pressed STOP; "" while nothing is latched."""
     stops: int
-    """How often it was pressed."""
+    """Number of STOPs so far."""
     confirmed: bool
-    """Whether the robot's lines have taken the stop."""
+    """Whether the robot's transports have taken the stop."""
     drives: bool
-    """Whether this screen may drive, ..."""
+    """Whether this page may drive."""
     forces: bool
-    """... and take the controls from whoever has them."""
+    """Whether this page may take the controls from another page."""
     spare: str
-    """Names the seat of this screen on a second line; nobody else is told. "" for viewers."""
+    """Secret key for the redundant socket of this page; "" for watchers."""
 
 
 class _Beat(Outbound, tag="beat", frozen=True):
@@ -78,14 +78,14 @@ Verb = Literal["take", "ask", "yes", "no", "force", "leave", "reset"]
 
 
 class Drive(msgspec.Struct, tag_field="t", tag="drive", forbid_unknown_fields=True, frozen=True):
-    """What a screen wants with the controls; `for_s` is how long the holder has to answer."""
+    """A request about the controls; `for_s` is the time that the holder has to answer."""
 
     verb: Verb
     for_s: float = REQUEST_S
 
 
 class Tick(msgspec.Struct, tag_field="t", tag="tick", forbid_unknown_fields=True, frozen=True):
-    """A sample of what is held. See `urc.motion.fresh.Input`."""
+    """A sample of a held control. See `urc.motion.fresh.Input`."""
 
     command: str
     epoch: int
@@ -97,38 +97,38 @@ class Tick(msgspec.Struct, tag_field="t", tag="tick", forbid_unknown_fields=True
 class Release(
     msgspec.Struct, tag_field="t", tag="release", forbid_unknown_fields=True, frozen=True
 ):
-    """A control was let go. `number` counts with the ticks; 0: there is no second line."""
+    """The end of a held control. `number` counts with the ticks; 0 without redundant socket."""
 
     command: str
     number: int = 0
 
 
 class Stop(msgspec.Struct, tag_field="t", tag="stop", forbid_unknown_fields=True, frozen=True):
-    """STOP; `number` as of `Release`."""
+    """STOP; `number` as in `Release`."""
 
     number: int = 0
 
 
 Driving = Drive | Tick | Release | Stop
 decode_tick = msgspec.json.Decoder(Tick).decode
-"""Of a text that is most likely one; raises what is in `NO_TICK`."""
+"""Decodes a text that is probably a tick; raises the exceptions in `NO_TICK`."""
 NO_TICK = (msgspec.MsgspecError, UnicodeError, RecursionError)
 _TICK_OF = b'{"t":"tick","command":"'
-"""So a page's ticks begin; written otherwise they only take the longer way."""
+"""First bytes of a page's tick; a tick in another spelling takes the slower path."""
 
 
 def command_of(data: bytes) -> str:
-    """Return whose tick this is by its first bytes, without reading the rest; "" where unclear."""
+    """Return the command of a tick from its first bytes; "" if they do not show it."""
     end = data.find(b'"', len(_TICK_OF)) if data.startswith(_TICK_OF) else -1
     return data[len(_TICK_OF) : end].decode("ascii", "replace") if end > 0 else ""
 
 
 Doubled = Tick | Release | Stop
-"""What a screen may say on its second line."""
+"""Messages that a page may also send on its redundant socket."""
 
 
 class Spare(msgspec.Struct, tag_field="t", tag="spare", forbid_unknown_fields=True, frozen=True):
-    """First on a second line: whose it is, by the key of the lease."""
+    """First message of a redundant socket: the key from the page's lease."""
 
     key: str
 
@@ -136,7 +136,7 @@ class Spare(msgspec.Struct, tag_field="t", tag="spare", forbid_unknown_fields=Tr
 def encode_lease(
     state: LeaseState, you: Client, *, left_s: float, is_confirmed: bool, spare: str = ""
 ) -> str:
-    """Return who has the controls, as one screen is told; `spare` is the key of its seat."""
+    """Return the lease message for one page; `spare` is the key for its redundant socket."""
     return encoded(
         _Lease(
             you=you.id,
@@ -156,17 +156,17 @@ def encode_lease(
 
 
 def encode_beat(number: int) -> str:
-    """Return a number to be echoed."""
+    """Return a heartbeat number, which the page echoes."""
     return encoded(_Beat(number))
 
 
 def encode_stopped(command: str, reason: Reason) -> str:
-    """Return that a control stopped without being let go."""
+    """Return the report of a control that stopped before it was let go."""
     return encoded(_Stopped(command, reason))
 
 
 def encode_refused(about: str, command: str, message: str) -> str:
-    """Return why a tick, or a wish about the controls, was not taken."""
+    """Return the reason why a tick, or a request about the controls, was refused."""
     return encoded(_Refused(about, cut(message), command))
 
 

@@ -1,35 +1,35 @@
-"""What goes over a dashboard's WebSocket: message shapes, and nothing else.
+"""Message types of a dashboard's WebSocket, without behaviour.
 
-Floor 5. JSON text both ways. Times are milliseconds on the server's monotonic clock; ages are
+Layer 5. JSON text both ways. Times are milliseconds on the server's monotonic clock; ages are
 milliseconds at the moment of encoding. Values travel as index arrays over the names of `Hello`.
 
 Server → page, by ``t``::
 
-    hello   once, first: names, what each signal means, the server's clock
-    v       changed signals: i indexes, v values, a ages (one number when all are equally old),
-            s alarms (left out when all are normal). Of signals of which each reading counts there
-            may be several, oldest first; e has the number of the first one, by index
+    hello   once, first: names, meaning of each signal, the server's clock
+    v       changed signals: i indexes, v values, a ages (one number if all are equal),
+            s alarms (left out if all are normal). A signal with a history may have several values,
+            oldest first; e has the number of its first one, by index
     links   the state of every transport
-    log     lines, oldest first; numbers run on, so that a gap shows what was dropped
-    reply   the one answer to a command
-    pong    the answer to a ping
-    error   a message of the page that could not be used, or why the socket is about to close
+    log     lines, oldest first; a gap in the numbers shows dropped lines
+    reply   the only reply to a command
+    pong    the reply to a ping
+    error   the reason why a message was invalid, or why the socket closes
 
-    lease   who has the controls, who asks for them, and whether a stop is latched
-    beat    a number for the screen that has the controls, every 50 ms: its ticks echo it
-    stopped a control stopped without being let go: nothing moves before a new gesture
-    refused a tick, or a wish about the controls, was not taken
+    lease   the page that drives, the page that asks to, and the latch of STOP
+    beat    a heartbeat number every 50 ms for the page that drives: its ticks echo it
+    stopped a control stopped before it was let go: it needs a new gesture
+    refused a tick, or a request about the controls, was refused
 
-    ask     a question that a second person must answer; ``asked``: it is over
-    token   the answer to ``prepare``: lets one command be given, once, within 5 s
-    progress where the sequences stand
+    ask     a question for a second person; ``asked``: it is over
+    token   the reply to ``prepare``: allows one command, once, within 5 s
+    progress the state of the sequences
 
 Images go as binary messages, see `wire_picture`.
 
 Page → server: ``ping``, ``run``, ``show``, ``agree``, ``prepare``, ``steer``, and for the controls
-``drive``, ``tick``, ``release`` and ``stop``; the last three also on a second line, which begins
-with ``spare`` and is told beats. The types below bound their nesting: anything deeper than an
-argument map of plain values is refused by the decoder without being read further.
+``drive``, ``tick``, ``release`` and ``stop``. The last three also go over a redundant socket, which
+begins with ``spare`` and receives heartbeats. The types below bound the nesting: the decoder
+refuses anything deeper than a map of plain arguments.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -71,9 +71,9 @@ __all__ = [
 
 VERSION = 1
 INBOUND_BYTES = 64 * 1024
-"""Longest message taken from a page."""
+"""Longest accepted message of a page, in bytes."""
 _AS_THEY_ARE = frozenset((float, bool, type(None)))
-_EXACT = 2**53 - 1  # beyond it a browser's numbers skip integers
+_EXACT = 2**53 - 1  # a browser's numbers skip integers beyond it
 
 CLOSE_BAD_MESSAGES = 4400
 CLOSE_NOT_LET_IN = 4401
@@ -85,7 +85,7 @@ CLOSE_FULL = 4503
 
 
 class BadMessage(Exception):
-    """A page sent something that is no message; the text says what was expected."""
+    """The error for an invalid message of a page; the text says what was expected."""
 
 
 class _Signal(msgspec.Struct, omit_defaults=True, frozen=True):
@@ -100,15 +100,15 @@ class _Signal(msgspec.Struct, omit_defaults=True, frozen=True):
     limits: dict[str, float] | None = None
     stale_after_s: float = 0.0
     sources: tuple[str, ...] = ()
-    """Transports that bring it: when none of them is live, the value is old at once."""
+    """Transports with its readings: without a live one, the value is stale at once."""
     axes: str = ""
-    """Which way its axes point; "" says nothing of it."""
+    """Direction of its axes, or "" if unknown."""
 
 
 class _Hello(Outbound, tag="hello", omit_defaults=False, frozen=True):
     version: int
     session: str
-    """Changes when the robot was connected anew: the log's numbers begin again."""
+    """Identifier of the session: a new one means that log numbers start again."""
     robot: str
     title: str
     now: int
@@ -121,7 +121,7 @@ class _Values(Outbound, tag="v", frozen=True):
     i: msgspec.Raw
     v: Sequence[object]
     a: int | Sequence[int]
-    """One for all where all are equally old."""
+    """Ages in milliseconds; one number if all are equal."""
     s: Sequence[str] | None = None
     e: Mapping[int, int] | None = None
 
@@ -165,7 +165,7 @@ class _Pong(Outbound, tag="pong", frozen=True):
     c: float
     n: int
     u: int = 0
-    """Milliseconds since 1970, by the server's clock; left out where nobody has told it."""
+    """Server time in milliseconds since 1970; left out if it is not known."""
 
 
 class _Error(Outbound, tag="error", frozen=True):
@@ -174,7 +174,7 @@ class _Error(Outbound, tag="error", frozen=True):
 
 
 class Ping(msgspec.Struct, tag_field="t", tag="ping", forbid_unknown_fields=True, frozen=True):
-    """Asks for a `pong` with the same `c`, the page's own clock in milliseconds."""
+    """Requests a `pong` with the same `c`, the page's own clock in milliseconds."""
 
     c: float
 
@@ -186,9 +186,9 @@ class Run(msgspec.Struct, tag_field="t", tag="run", forbid_unknown_fields=True, 
     command: str
     arguments: Arguments = {}
     token: str = ""
-    """Answer to `Prepare`, where the driver wants people to be asked: somebody said yes to this."""
+    """Token from `Prepare` if the driver requires a confirmation."""
     stops: int | None = None
-    """Of the lease that the page knew when somebody wished it; None: nobody looks."""
+    """Number of STOPs that the page knew at the operator's click; None skips the check."""
 
 
 Inbound = Ping | Run | Show | Agree | Prepare | Steer | Drive | Tick | Release | Stop
@@ -197,7 +197,7 @@ _decoder: msgspec.json.Decoder[Inbound] = msgspec.json.Decoder(Inbound)
 
 
 def decode(text: str | bytes) -> Inbound:
-    """Return the message, or raise `BadMessage` saying what is wrong with it."""
+    """Return the message; raise `BadMessage` with the reason if it is invalid."""
     if len(text) > INBOUND_BYTES:
         raise BadMessage(f"longer than {INBOUND_BYTES} bytes")
     try:
@@ -207,7 +207,7 @@ def decode(text: str | bytes) -> Inbound:
 
 
 def encode_hello(profile: Profile, session: str, now_s: float) -> str:
-    """Return the first message: what every later index means."""
+    """Return the first message: it gives later indexes their meaning."""
     sources = _sources(profile.driver)
     signals = profile.driver.signals
     return encoded(
@@ -224,7 +224,7 @@ def encode_hello(profile: Profile, session: str, now_s: float) -> str:
 
 
 class Indexes:
-    """Which number each name has; mostly those are asked for that were asked for last."""
+    """Names to index numbers, with the last look-up cached."""
 
     def __init__(self, index: Mapping[str, int]) -> None:
         self._index = index
@@ -232,11 +232,11 @@ class Indexes:
         self._found = msgspec.Raw(b"[]")
 
     def keyed(self, numbers: Mapping[str, int]) -> dict[int, int]:
-        """Return numbers of signals by their index instead of their name."""
+        """Return a mapping by signal with indexes in place of names."""
         return {self._index[name]: number for name, number in numbers.items()}
 
     def of(self, names: tuple[str, ...]) -> msgspec.Raw:
-        """Return the numbers as they stand in a message."""
+        """Return the indexes of names, already encoded as JSON."""
         if names is not self._names and names != self._names:
             found = [*map(self._index.__getitem__, names)]
             self._names, self._found = names, msgspec.Raw(msgspec.json.encode(found))
@@ -251,7 +251,7 @@ def encode_values(
     names, values, times, alarms = zip(*samples, strict=True)
     count, first_s = len(names), times[0]
     ages: int | list[int]
-    if times.count(first_s) == count:  # what came together is equally old
+    if times.count(first_s) == count:  # samples of one moment are equally old
         ages = max(0, round((now_s - first_s) * 1000))
     else:
         ages = [max(0, milliseconds(now_s - time_s)) for time_s in times]
@@ -285,7 +285,7 @@ def encode_links(links: Iterable[LinkStatus], now_s: float) -> str:
 
 
 def encode_log(notes: Iterable[Note], first: int, now_s: float) -> str:
-    """Return lines of the log, the first of which has the number `first` in its session."""
+    """Return lines of the log; `first` is the number of the first line in its session."""
     lines = [
         _Line(max(0, milliseconds(now_s - note.time_s)), note.level, note.source, cut(note.text))
         for note in notes
@@ -296,7 +296,7 @@ def encode_log(notes: Iterable[Note], first: int, now_s: float) -> str:
 def encode_reply(
     run: Run, *, values: Mapping[str, Reading] | None = None, code: str = "", message: str = ""
 ) -> str:
-    """Return the answer to a command: its values, or `code` and `message` when it failed."""
+    """Return the reply to a command: its values, or `code` and `message` of a failure."""
     if code:
         return encoded(_Reply(run.id, ok=False, code=code, message=cut(message)))
     plain = {name: _plain(value) for name, value in (values or {}).items()}
@@ -304,17 +304,17 @@ def encode_reply(
 
 
 def encode_pong(ping: Ping, now_s: float, utc_s: float = 0.0) -> str:
-    """Return the answer to a ping; `utc_s` is the time of day, in seconds since 1970."""
+    """Return the reply to a ping; `utc_s` is the time of day, in seconds since 1970."""
     return encoded(_Pong(ping.c, milliseconds(now_s), milliseconds(utc_s)))
 
 
 def encode_error(code: str, message: str) -> str:
-    """Return why a message was not used, or why the socket closes."""
+    """Return the reason why a message was invalid, or why the socket closes."""
     return encoded(_Error(code, cut(message)))
 
 
 def _plain(value: object) -> object:
-    """Return the value as a browser can hold it; of bytes, only how many there are."""
+    """Return the value as a browser can hold it; of bytes, only their number."""
     if isinstance(value, str):
         return cut(value)
     if type(value) is int and not -_EXACT <= value <= _EXACT:
@@ -353,7 +353,7 @@ def _signal(signal: Signal, sources: tuple[str, ...]) -> _Signal:
 
 
 def _sources(driver: Driver) -> dict[str, tuple[str, ...]]:
-    """Return which transports bring each signal, by the fields of what is read."""
+    """Return the transports of each signal, from the fields of all messages."""
     asked: tuple[Poll | Command, ...] = (*driver.polls, *driver.commands.values())
     reads = [(message.transport, message.read) for message in driver.messages.values()]
     reads += [(each.transport, each.reply.read) for each in asked if each.reply]
@@ -367,7 +367,7 @@ def _sources(driver: Driver) -> dict[str, tuple[str, ...]]:
 
 
 def _add_sources(name: str, driver: Driver, found: dict[str, dict[str, None]]) -> dict[str, None]:
-    """Return the sources of a signal; of a computed one those of its inputs, which are added."""
+    """Return the transports of a signal; a computed signal has those of its inputs."""
     signal = driver.signals.get(name)
     if signal is not None and signal.formula is not None and name not in found:
         found[name] = {}

@@ -1,13 +1,13 @@
 """Images and other bytes of a signal, as binary messages over a dashboard's WebSocket.
 
-Floor 5. Pure. One message is one image, never a piece of one; ``frames.js`` reads it::
+Layer 5. Pure. One message is one whole image; ``frames.js`` reads it::
 
-    0  u8   1: a picture            4  u32  its age in milliseconds at the moment of encoding
+    0  u8   1: an image             4  u32  its age in milliseconds at the moment of encoding
     1  u8   length of the type      8  f64  the server's clock then, in milliseconds
     2  u16  index of the signal    16       media type in ASCII, then the bytes
 
-The same bytes go to every client, so they are made into a WebSocket frame once as well (RFC 6455,
-section 5.2: a server does not mask).
+All clients get the same bytes, so the WebSocket frame is also built only once (RFC 6455, section
+5.2: a server does not mask).
 """
 
 import struct
@@ -24,11 +24,11 @@ _HEADER = struct.Struct(">BBHId")
 _OLDEST_MS = 2**32 - 1
 _FINAL_TEXT, _FINAL_BINARY = b"\x81", b"\x82"
 _SHORT, _MEDIUM = 126, 1 << 16
-"""A frame's length takes one byte below the first, three below the second, else nine."""
+"""The length of a frame takes one byte below the first, three below the second, else nine."""
 
 
 class Show(msgspec.Struct, tag_field="t", tag="show", forbid_unknown_fields=True, frozen=True):
-    """Says which images the page shows now; all others are not sent."""
+    """Selects the images that the page shows; no others are sent."""
 
     signals: Annotated[
         tuple[Annotated[str, msgspec.Meta(max_length=256)], ...], msgspec.Meta(max_length=64)
@@ -39,8 +39,8 @@ def encode_picture(index: int, data: bytes, age_ms: int, now_ms: int) -> bytes:
     """Return the message of an image.
 
     Args:
-        index: of the signal in the names of `Hello`.
-        data: the image, as the robot sent it.
+        index: index of the signal in the names of `Hello`.
+        data: the image from the robot.
         age_ms: its age at `now_ms`.
         now_ms: the server's clock.
     """
@@ -50,7 +50,7 @@ def encode_picture(index: int, data: bytes, age_ms: int, now_ms: int) -> bytes:
 
 
 def as_frame(message: bytes, *, is_text: bool = False) -> bytes:
-    """Return a message as one WebSocket frame, ready for any client's line."""
+    """Return a message as one WebSocket frame, ready for any client."""
     return (_FINAL_TEXT if is_text else _FINAL_BINARY) + _length(len(message)) + message
 
 

@@ -1,6 +1,6 @@
-"""How messages for a page become text: the base of their shapes, and what is cut or mended.
+"""Encoding of messages to a page: their base type, and the repair of texts.
 
-Floor 5.
+Layer 5.
 """
 
 import msgspec
@@ -16,7 +16,7 @@ __all__ = [
 ]
 
 TEXT_CHARACTERS = 4096
-"""Longest text value sent to a page; a longer one is cut and ends in an ellipsis."""
+"""Longest text value for a page; a longer one is cut and ends in an ellipsis."""
 
 _encode = msgspec.json.Encoder().encode
 
@@ -31,16 +31,16 @@ def encoded(message: msgspec.Struct) -> str:
 
 
 def encoded_bytes(message: msgspec.Struct) -> bytes:
-    """Return it in UTF-8."""
+    """Return the JSON text of a message in UTF-8."""
     try:
         return _encode(message)
     except UnicodeEncodeError:
-        # A lone surrogate in a robot's text; it must not stop everybody's values.
+        # A robot's text may hold a lone surrogate; all other values must still arrive.
         return _encode(repaired(msgspec.to_builtins(message)))
 
 
 def repaired(tree: object) -> object:
-    """Return what can be encoded: with a question mark for each lone surrogate."""
+    """Return a tree of values with a question mark for each lone surrogate."""
     if isinstance(tree, str):
         return tree.encode("utf-8", "replace").decode()
     if isinstance(tree, (list, tuple)):
@@ -51,7 +51,7 @@ def repaired(tree: object) -> object:
 
 
 def cut(text: str) -> str:
-    """Return a text that is not longer than a page is sent."""
+    """Return a text, cut to the longest that a page gets."""
     return text if len(text) <= TEXT_CHARACTERS else text[: TEXT_CHARACTERS - 1] + "…"
 
 
