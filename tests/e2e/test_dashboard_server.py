@@ -244,7 +244,7 @@ async def test_a_request_that_drips_in_is_given_up(begin: bytes) -> None:
         status, headers, body = await answer_to_drips(address, begin)
         if begin.endswith(b"GET / HTTP/1.1\r\n"):
             status, headers, body = last_answer(status, headers, body)
-        text = "The request was not here within 0.5 s."
+        text = "The request did not arrive within 0.5 s."
         check_refusal((status, headers, body), 408, text)
 
 

@@ -146,7 +146,7 @@ async def test_a_save_is_loaded_and_a_mistake_changes_nothing(
         await ring.get_by_role("button", name="Send").click()
         await expect(ring.locator(".dev-result")).to_contain_text("✓ done")
         file.write_text(good + "  hum: { title: Hum, send: HUM }\n", "utf-8")
-        await expect(state).to_contain_text("was saved, and is running now")
+        await expect(state).to_contain_text("was saved and is running now")
         await expect(finding).to_have_count(0)
         await until(lambda: sum(line.startswith(b"LOGIN") for line in bell.lines) == 2)
         hum = page.locator(".dev-command", has_text="Hum")

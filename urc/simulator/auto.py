@@ -1,8 +1,8 @@
-"""The emulated robot that needs no rules: it answers whatever the driver declares.
+"""The emulated robot without rules: it replies to all requests that the driver declares.
 
-Pure: no socket, no clock. A frame is held against everything that the driver can send on that
-line; the answer is made by the same declaration that would read it, out of plausible values. What a
-command sets is remembered, where an argument and a signal share a name.
+Pure: no socket, no clock. A received frame is matched against all requests that the driver can send
+on that transport. The declaration that would decode the reply builds it from plausible values. If
+an argument of a command and a signal share a name, the signal takes the value of the argument.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
@@ -42,11 +42,11 @@ _FASTEST_S: Final = 0.1
 
 
 class Unanswered(Exception):
-    """Why a declared request gets no answer, for people."""
+    """The reason why a declared request has no reply, for people."""
 
 
 class Answer(NamedTuple):
-    """One frame that answers a request, or text that nothing ends."""
+    """One reply frame, or text without an end mark."""
 
     spec: ReadSpec
     reader: Reader | None
@@ -54,10 +54,10 @@ class Answer(NamedTuple):
     prompt: Pattern | None = None
     match: Template | None = None
     needed: frozenset[str] = frozenset()
-    """Fields of the document that whoever reads it needs, for an answer of its own."""
+    """The document's own fields that the receiver needs for its own reply."""
 
     def fits(self, fields: Mapping[str, object]) -> bool:
-        """Return whether there is a frame with these fields."""
+        """Return whether a frame with these fields exists."""
         try:
             return self.reader is not None and self.reader.write(fields) is not None
         except NotWritable:
@@ -65,14 +65,14 @@ class Answer(NamedTuple):
 
 
 class AutoMessage(NamedTuple):
-    """What the robot says without being asked."""
+    """An unsolicited message of the robot."""
 
     every_s: float
     answer: Answer
 
 
 class _Request(NamedTuple):
-    """Something that the driver can send."""
+    """A request that the driver can send."""
 
     label: str
     writer: Writer
@@ -82,7 +82,7 @@ class _Request(NamedTuple):
 
 
 class Asked(NamedTuple):
-    """A request that came, with the arguments in it."""
+    """A received request, with its arguments."""
 
     request: _Request
     arguments: Mapping[str, object]
@@ -90,7 +90,7 @@ class Asked(NamedTuple):
 
 
 class AutoRobot:
-    """What all connections of one emulated robot share: its values."""
+    """The shared values of all connections of one emulated robot."""
 
     def __init__(self, driver: Driver, settings: Mapping[str, Value], values: Values) -> None:
         self.driver = driver
@@ -102,9 +102,9 @@ class AutoRobot:
         """Return the robot's side of one transport.
 
         Args:
-            transport: name of it.
-            framing: of the robot's side.
-            talks: whether messages are sent without being asked.
+            transport: its name.
+            framing: framing of the robot's side.
+            talks: whether it sends unsolicited messages.
         """
         return AutoLine(self, self.driver.transports[transport], framing, talks=talks)
 
@@ -114,7 +114,7 @@ class AutoRobot:
         return self._raw[name](self.values.of(name, now_s))
 
     def fields(self, spec: ReadSpec, known: Mapping[str, object], now_s: float) -> Fields:
-        """Return raw fields for a frame: what was set, else something plausible."""
+        """Return raw fields for a frame: set values, else plausible ones."""
         numbers: dict[str, object] = {}
         others: dict[str, object] = {}
         for name in spec.fields:
@@ -125,12 +125,12 @@ class AutoRobot:
             try:
                 raw = self._raw_of(name, now_s)
             except BadValue:
-                continue  # this conversion has no way back
+                continue  # this conversion has no inverse
             if not is_set and signal.conversion.polynomial and isinstance(raw, float):
                 raw = round(raw)
             is_number = isinstance(raw, (int, float, tuple, list)) or is_set
             (numbers if is_number else others)[name] = raw
-        # A field of the document's own, `_kind`, is what the robot's state says of `kind`.
+        # A field `_kind` of the document takes the value `kind` of the robot's state.
         state = self.values.state
         own: dict[str, object] = {
             name: state[name[1:]]
@@ -149,7 +149,7 @@ class AutoLine:
     def __init__(
         self, robot: AutoRobot, spec: TransportSpec, framing: Framing, *, talks: bool
     ) -> None:
-        """Made by `AutoRobot.line`."""
+        """Prepare; `AutoRobot.line` calls this."""
         self._robot = robot
         self._spec = spec
         self._framing = framing
@@ -165,14 +165,14 @@ class AutoLine:
             ]
 
     def greet(self, now_s: float) -> list[Payload]:
-        """Return what the robot says as soon as somebody is there; raise `Unanswered`."""
+        """Return the frames that the robot sends to a new client; raise `Unanswered`."""
         return [data for one in self.opening for data in self.say(one, now_s)]
 
     def answer(self, frame: Frame, now_s: float) -> list[Payload] | None:
-        """Return the answer to a frame, or None when the driver never sends it.
+        """Return the reply to a frame, or None for a frame that the driver never sends.
 
         Raises:
-            Unanswered: the answer cannot be made.
+            Unanswered: no reply can be built.
         """
         asked = self.asked(frame)
         if asked is None:
@@ -181,7 +181,7 @@ class AutoLine:
         return self.answers(asked, now_s)
 
     def answers(self, asked: Asked, now_s: float) -> list[Payload]:
-        """Return the declared answers to a request; raise `Unanswered`."""
+        """Return the declared replies to a request; raise `Unanswered`."""
         known, label = asked.arguments, asked.request.label
         try:
             said = [data for one in asked.request.answers for data in self.say(one, now_s, known)]
@@ -191,14 +191,14 @@ class AutoLine:
         return [numbered(data, asked.frame) for data in said]
 
     def framing_of(self, label: str) -> Framing:
-        """Return how the answer to a command or poll is framed."""
+        """Return the framing of the reply to a command or poll."""
         for request in self._requests:
             if request.label == label and request.answers:
                 return request.answers[0].framing
         return self._framing
 
     def message(self, name: str) -> Answer:
-        """Return a declared message, to be said."""
+        """Return a declared message, to be sent."""
         message = self._robot.driver.messages[name]
         names = message.answer.names if message.answer is not None else frozenset()
         needed = frozenset(one for one in message.read.fields if one.startswith("_")) & names
@@ -207,7 +207,7 @@ class AutoLine:
     def say(
         self, answer: Answer, now_s: float, known: Mapping[str, object] = NOTHING
     ) -> list[Payload]:
-        """Return the frames of one answer or message; raise `Unanswered`."""
+        """Return the frames of one reply or message; raise `Unanswered`."""
         if answer.prompt is not None:
             return [example(answer.prompt, {}).encode(self._spec.encoding, "replace")]
         if answer.reader is None or self._robot.values.faults.drops(
@@ -230,11 +230,11 @@ class AutoLine:
         raise Unanswered(f"no answer can be made by its {answer.spec.form}: {why}")
 
     def asked(self, frame: Frame, label: str = "") -> Asked | None:
-        """Return what a frame asks, and its arguments; what gives this very frame goes first.
+        """Return the request in a frame with its arguments; an exact match goes first.
 
         Args:
-            frame: as it came.
-            label: a command or poll that is meant where several give the same frame; "" for any.
+            frame: the received frame.
+            label: the preferred command or poll if several send the same frame; "" for any.
         """
         near: Asked | None = None
         best: Asked | None = None
@@ -245,17 +245,17 @@ class AutoLine:
             best = best or one
             if label in ("", best.request.label):
                 return best
-            # Of a poll and a command that send the same bytes, either may be meant.
+            # A poll and a command may send the same bytes: either may be meant.
             if one.request.label == label and not (one.request.names or best.request.names):
                 return one
         best = best or near
         return best if best is not None and label in ("", best.request.label) else None
 
     def asked_too(self, frame: Frame, label: str) -> Asked | None:
-        """Return what a frame asks as the command `label`, where what gives it first says nothing.
+        """Return a frame as a request of the command `label` if its first match has no reply.
 
-        What stops a robot is often both what a command sends when it is released and a text of its
-        own: a good-bye, or a command without an answer.
+        Two declarations often send the same stop: the release of a held command, and a close
+        message or a command without reply.
         """
         best = self.asked(frame)
         if best is None or best.request.names or best.request.answers:
@@ -266,13 +266,13 @@ class AutoLine:
         return None
 
     def labels(self, frame: Frame) -> set[str]:
-        """Return every command, poll and script that sends this very frame, else the nearest."""
+        """Return every command, poll and sequence that sends this exact frame, else the nearest."""
         found = list(self._readings(frame))
         exact = {one.request.label for one in found if self._gives(one)}
         return exact or {one.request.label for one in found[:1]}
 
     def _readings(self, frame: Frame) -> Iterator[Asked]:
-        """Yield all requests that a frame may be, the constant ones first."""
+        """Yield all requests that a frame may be, constant ones first."""
         for request in self._requests:
             found = request.writer.read(frame)
             arguments = None if found is None else typed_arguments(found, request.arguments)
@@ -285,7 +285,7 @@ class AutoLine:
             yield Asked(request, arguments, frame)
 
     def _gives(self, asked: Asked) -> bool:
-        """Return whether a request gives this very frame with the arguments in it."""
+        """Return whether a request with its arguments encodes to this exact frame."""
         request, arguments, frame = asked
         if not request.names:
             return True
@@ -300,7 +300,7 @@ class AutoLine:
             return False
 
     def _declared(self) -> Iterator[_Request]:
-        """Yield what commands, polls and sequences send on this line; constants first."""
+        """Yield the requests of commands, polls and sequences; constant ones first."""
         driver, name = self._robot.driver, self._spec.name
         requests = []
         for command in driver.commands.values():
@@ -353,7 +353,7 @@ class AutoLine:
         return Answer(read, build_reader(read, self._context), own, match=match)
 
     def _script(self, label: str, steps: Iterable[Step]) -> tuple[list[Answer], list[_Request]]:
-        """Return what is expected before anything is sent, and what is after each thing sent."""
+        """Return the frames expected before the first send, and those after each send."""
         opening: list[Answer] = []
         requests: list[tuple[WriteSpec, list[Answer]]] = []
         for step in _main_way(steps):
@@ -371,7 +371,7 @@ class AutoLine:
         return opening, [self._sent(label, send, tuple(after)) for send, after in requests]
 
     def _period_s(self, read: ReadSpec) -> float:
-        """Return how often a message is said, so that none of its signals grows old."""
+        """Return the period of a message that keeps all its signals fresh."""
         signals = self._robot.driver.signals
         ages = [signals[name].stale_after_s for name in read.fields if name in signals]
         return min(_SLOWEST_S, max(_FASTEST_S, min(ages, default=_SLOWEST_S) / 3))
@@ -387,7 +387,7 @@ def _main_way(steps: Iterable[Step]) -> Iterator[Step]:
 
 
 def numbered(data: Payload, request: Frame) -> Payload:
-    """Return what answers a request: with its number, where the request has one."""
+    """Return a reply with the number of its request, if the request has one."""
     asked = request.payload
     if not isinstance(asked, Envelope):
         return data

@@ -1,7 +1,7 @@
-"""What a field must be for an expression over it to give a value: chains of filters, turned round.
+"""Inversion of expressions: the field value for which an expression gives a wanted value.
 
-Pure. An expression that is one field with filters behind it is taken apart from its end on. Pieces
-of the same bytes (``unpack`` at several places) are put together. What has no way back gives None.
+Pure. An expression of one field with a chain of filters is inverted from its end. Pieces of the
+same bytes (``unpack`` at several offsets) are merged. An expression without inverse gives None.
 """
 
 import ast
@@ -21,11 +21,11 @@ _MOST_BYTES: Final = 4096
 
 
 def computed_fields(spec: ReadSpec, raw: Callable[[str], object]) -> dict[str, object]:
-    """Return the fields from which signals are computed by expressions of one field.
+    """Return the fields from which expressions of one field compute signals.
 
     Args:
         spec: the frame.
-        raw: signal → its raw value; it raises `BadValue` where there is none.
+        raw: signal → its raw value; raises `BadValue` without one.
     """
     wanted: dict[str, list[tuple[Template, object]]] = {}
     for name, template in spec.sets.items():
@@ -41,17 +41,17 @@ def computed_fields(spec: ReadSpec, raw: Callable[[str], object]) -> dict[str, o
         if whole is not None:
             fields[field] = whole
         elif not any(_takes_apart(template) for template, _ in pairs):
-            fields[field] = pairs[0][1]  # most others only turn the text of a field into a number
+            fields[field] = pairs[0][1]  # most others only convert text to a number
     return fields
 
 
 def _takes_apart(template: Template) -> bool:
-    """Return whether a plain value would surely be none of its field's."""
+    """Return whether the expression takes its field apart, so that it cannot be a plain value."""
     return any(f"_filter_{name}(" in template.python for name in ("split", *CUT_FILTERS, *_TEXTS))
 
 
 def field_of(wanted: Iterable[tuple[Template, object]]) -> object | None:
-    """Return what the one field of all these expressions is, for them to give these values."""
+    """Return the value of the one field for which all expressions give their wanted values."""
     whole: bytearray | None = None
     last: Callable[[bytes], object] | None = None
     found: object | None = None
@@ -77,7 +77,7 @@ Step = tuple[str, tuple[Any, ...]]
 
 
 def _chain(python: str) -> list[Step]:
-    """Return the filters behind the field, the last one first; none where it is anything else."""
+    """Return the filters after the field, the last one first; [] for any other expression."""
     node, steps = ast.parse(python, mode="eval").body, list[Step]()
     while isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.args:
         subject, *rest = node.args
@@ -90,11 +90,11 @@ def _chain(python: str) -> list[Step]:
 
 
 def _undone(chain: list[Step], value: Any) -> tuple[object, int]:
-    """Return the field, or the bytes of it and where they stand."""
+    """Return the field, or bytes of it with their offset."""
     at = 0
     for name, arguments in chain:
         if name in _TEXTS:
-            break  # the bytes of several expressions may be one text
+            break  # several expressions may read bytes of one text
         match name, arguments:
             case "unpack", (type_name, *place):
                 value, at = _packed(type_name, value), int(place[0]) if place else 0
@@ -117,7 +117,7 @@ def _undone(chain: list[Step], value: Any) -> tuple[object, int]:
 
 
 def _packed(type_name: str, value: Any) -> bytes:
-    """Return a value as bytes, and the nearest that there is where it does not fit."""
+    """Return a value as bytes, clamped to the range of the type."""
     number = number_of(type_name)
     if number is None:
         raise ValueError(type_name)
@@ -142,4 +142,4 @@ _TEXTS: Final[dict[str, Callable[[bytes], object]]] = {
     "b64decode": _base64,
     "hexbytes": lambda data: data.hex().upper(),
 }
-"""Filters that make bytes of a text, and how bytes become that text."""
+"""Filters from bytes to text → their inverse."""

@@ -1,7 +1,7 @@
-"""What an answer repeats of its request, and what a frame must say to be the one that is meant.
+"""Fields of a reply that repeat the request, and fields that identify a frame.
 
-Pure. Works on the equalities and lists of constants in ``when`` and ``match``: nothing else in an
-expression can be turned round.
+Pure. It inverts equalities and lists of constants in ``when`` and ``match``, and no other part of
+an expression.
 """
 
 import re
@@ -25,21 +25,21 @@ _ONE_OF = re.compile(
     ('[^'\\]*'|"[^"\\]*"|0x[0-9A-Fa-f]+|-?\d+(?:\.\d+)?)\s*[,\])]""",
     re.VERBOSE | re.ASCII,
 )
-"""A name, and the first of the constants that it may be."""
+"""A name, and the first of its possible constants."""
 
 
 _MATCH = re.compile(
     r"(?<![\w.])(_?[A-Za-z]\w*)\s+is\s+(?:match|search)\(\s*'([^']*)'\s*\)", re.ASCII
 )
-"""A name, and the pattern that it must fit."""
+"""A name, and the pattern of its value."""
 
 
 _HEMISPHERE = re.compile(r"\|\s*ddmm\(\s*(_?[A-Za-z]\w*)\s*\)", re.ASCII)
-"""What says on which half of the earth a number of degrees and minutes is."""
+"""The name with the hemisphere of a number of degrees and minutes."""
 
 
 def rule_for(driver: Driver, transport: str, label: str) -> str:
-    """Return what to write where no answer can be made, for people: a rule, and under which key."""
+    """Return the hint for a request without automatic reply: a rule with its key, for people."""
     if label in driver.commands and not driver.commands[label].steps:
         trigger = f"command: {label}"
     elif any(label == poll.name != f"polls.{at}" for at, poll in enumerate(driver.polls)):
@@ -50,7 +50,7 @@ def rule_for(driver: Driver, transport: str, label: str) -> str:
 
 
 def own_fields(spec: ReadSpec, known: Mapping[str, object]) -> dict[str, object]:
-    """Return the fields that are the document's own: constants, and echoes of the request."""
+    """Return the document's own fields: constants, and echoes of the request."""
     own: dict[str, object] = {}
     if spec.when is not None:
         for left, right in _equalities(spec.when):
@@ -100,7 +100,7 @@ def _constant(text: str) -> object:
 
 
 def correlated(match: Template, known: Mapping[str, object]) -> dict[str, object]:
-    """Return the reply's fields that must repeat something of the request, or are constants."""
+    """Return the reply's fields that are constants, or repeat a field of the request."""
     return {
         left: known[right] if isinstance(right, _Name) else right
         for left, right in _equalities(match)
@@ -111,7 +111,7 @@ def correlated(match: Template, known: Mapping[str, object]) -> dict[str, object
 def typed_arguments(
     found: Mapping[str, object], arguments: Mapping[str, Argument]
 ) -> dict[str, object] | None:
-    """Return the arguments in a frame with their types, or None when they are not of them."""
+    """Return the arguments in a frame with their types, or None if they do not fit."""
     typed: dict[str, object] = {}
     for name, raw in found.items():
         argument = arguments.get(name)
@@ -125,9 +125,9 @@ def typed_arguments(
 def guesses(
     arguments: Mapping[str, Argument], found: Mapping[str, object]
 ) -> Iterator[dict[str, object]]:
-    """Yield arguments with each value of the one that no frame says plainly, as ``on`` for true.
+    """Yield arguments with each value of a missing one, for example where true is sent as ``on``.
 
-    Only where it is one, and there are few values that it can have.
+    Only one argument may be missing, and it may have only a few values.
     """
     left = [one for name, one in arguments.items() if name not in found]
     if len(left) == 1:
@@ -137,7 +137,7 @@ def guesses(
 
 
 def is_alike(made: Payload, came: Payload) -> bool:
-    """Return whether a frame is the one that is made; an envelope may say more of its way."""
+    """Return whether a frame equals the built one; an envelope may have more attributes."""
     if not isinstance(made, Envelope) or not isinstance(came, Envelope):
         return made == came
     said = came.attributes
@@ -172,6 +172,6 @@ def _as(kind: str, raw: object) -> object:
 
 
 def _is_whole(raw: str) -> bool:
-    """Return whether text is a whole number as an expression writes it."""
+    """Return whether text is an integer as an expression writes it."""
     digits = raw.removeprefix("-")
     return digits.isdecimal() and digits.isascii() and str(int(raw)) == raw

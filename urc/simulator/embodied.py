@@ -1,7 +1,7 @@
-"""An emulated robot that has a body: its state drives the body, and the body gives its signals.
+"""The body of an emulated robot: its state drives the body, and the body gives its signals.
 
-Pure: no socket, no clock. What the robot does when commands stop is done here, whether anybody is
-connected or not: that of the document (`failsafe`), else that of its held commands (`watchdog`).
+Pure: no socket, no clock. The robot's fail-safe behaviour runs here, with or without a connection:
+the one of the document (`failsafe`), else the one of its held commands (`watchdog`).
 """
 
 import logging
@@ -19,23 +19,23 @@ __all__ = ["Embodied", "failsafe_of"]
 
 log = logging.getLogger("urc.simulator.twin")
 _KEPT = ("flies", "cut")
-"""Inputs that are no motion: a robot that hears nothing more stays in the air."""
+"""Inputs that are no motion: a robot without commands stays in the air."""
 
 _LOOKS = re.compile(r"_item\(ns\['world'\], '(laser|picture|panorama)'\)")
-"""What needs numpy."""
+"""Sensors that need numpy."""
 
 Evaluate = Callable[[Template, float], object]
 """A template and the time → its value over the robot's signals and state."""
 
 
 class Embodied:
-    """The body of one emulated robot, and what it has heard.
+    """The body of one emulated robot.
 
     Args:
-        spec: as declared.
-        driver: of the robot.
-        evaluate: gives the value of a template.
-        put: sets something of the robot's state.
+        spec: the declaration of its world.
+        driver: the driver of the robot.
+        evaluate: returns the value of a template.
+        put: sets a value in the robot's state.
     """
 
     def __init__(
@@ -51,33 +51,33 @@ class Embodied:
         self._evaluate = evaluate
         self._put = put
         self._heard_s = -math.inf
-        """When a command of those that keep it going last came."""
+        """Time of the last command that keeps the robot moving."""
         self._is_safe = True
-        """Whether the fail-safe has done its work since."""
+        """Whether the fail-safe has acted since."""
         self._last_fault = ""
 
     def hear(self, labels: Iterable[str], now_s: float) -> None:
-        """Take note of the commands in a frame."""
+        """Record the commands in a frame."""
         if self.failsafe is not None and not {*labels}.isdisjoint(self.failsafe.without):
             self._heard_s, self._is_safe = now_s, False
 
     def prepare(self) -> None:
-        """Load what lasers and cameras need, where a signal is told by one; may block."""
+        """Load the modules for lasers and cameras if a signal needs them; may block."""
         if any(_LOOKS.search(one.python) for one in self.spec.senses.values()):
             import urc.simulator.world.laser
             import urc.simulator.world.picture  # noqa: F401  # loaded is all that is wanted
 
     def view(self, now_s: float) -> View:
-        """Return what can be read of the world at `now_s`."""
+        """Return the sensor view of the world at `now_s`."""
         return self.world.view(now_s)
 
     def sense(self, name: str, now_s: float) -> object:
-        """Return what a signal is now by the world; raise `ExpressionError` if it has no value."""
+        """Return the value of a signal from the world; raise `ExpressionError` without one."""
         self.world.advance(now_s)
         return self._evaluate(self.spec.senses[name], now_s)
 
     def picture(self, name: str, now_s: float) -> bytes | None:
-        """Return the picture that is the value of a signal, None when it is none."""
+        """Return the image that is the value of a signal, or None."""
         value = self.sense(name, now_s)
         return value if isinstance(value, bytes) else None
 
@@ -121,7 +121,7 @@ class Embodied:
 
 
 def failsafe_of(driver: Driver) -> Failsafe | None:
-    """Return what the held commands say of it, by `watchdog` or `step`; None: it never stops."""
+    """Return the fail-safe of the held commands, from `watchdog` or `step`; None without one."""
     held = {name: one.hold for name, one in driver.commands.items() if one.hold is not None}
     times = [hold.step_s or hold.watchdog_s for hold in held.values()]
     if not times or any(one is None or not math.isfinite(one) for one in times):

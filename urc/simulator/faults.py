@@ -1,6 +1,6 @@
-"""What goes wrong on demand with an emulated robot: slow, lossy, noisy, with sensors that fail.
+"""Fault injection for an emulated robot: delay, loss, noise and failed sensors.
 
-Pure. The same faults and the same traffic lose the same frames.
+Pure. The same faults lose the same frames of the same traffic.
 """
 
 import math
@@ -18,7 +18,7 @@ from urc.simulator.world.chance import uniform
 __all__ = ["FAULTS", "Fault", "Faults", "Late", "parse_fault"]
 
 MOST_LATE: Final = 1024
-"""Frames of one line that wait for their time; beyond them the newest are lost."""
+"""Most delayed frames of one connection; beyond them the newest are lost."""
 _LONGEST_S: Final = 60.0
 _LOUDEST: Final = 1000.0
 
@@ -31,26 +31,26 @@ FAULTS: Final[Mapping[str, str]] = {
     "stuck": "stuck=SIGNAL",
     "low-battery": "low-battery",
 }
-"""Fault → how it is written."""
+"""Fault → its syntax."""
 
 
 class Fault(NamedTuple):
-    """One thing that goes wrong."""
+    """One injected fault."""
 
     name: str
     amount: float = 0.0
-    """Seconds of a delay, share of frames that are lost, how many times as noisy."""
+    """Delay in seconds, share of lost frames, or factor on the noise."""
     signal: str = ""
-    """Signal that drops out or is stuck."""
+    """Name of the signal that drops out or is stuck."""
     text: str = ""
-    """As it was written."""
+    """The text that was parsed."""
 
 
 def parse_fault(text: str) -> Fault:
-    """Return what is written like one of `FAULTS`.
+    """Parse a fault in the syntax of `FAULTS`.
 
     Raises:
-        UrcError: it is none; one line that says which there are.
+        UrcError: the text is no fault; the message lists the faults.
     """
     name, _, value = text.strip().partition("=")
     if name not in FAULTS:
@@ -91,42 +91,42 @@ def _within(value: float, low: float, high: float, wanted: UrcError) -> float:
 
 
 class Faults:
-    """What is wrong with one robot now."""
+    """The active faults of one robot."""
 
     def __init__(self) -> None:
-        """Begin with nothing wrong."""
+        """Begin without faults."""
         self.active: dict[str, Fault] = {}
-        """By name, and the signal where there is one."""
+        """Faults by name, and by signal for faults of a signal."""
         self.dropped: frozenset[str] = frozenset()
         """Signals whose sensors have failed."""
         self.stuck: dict[str, Reading] = {}
-        """Signals that no longer change, with the value at which they stopped."""
+        """Stuck signals, with their last value."""
         self._frames = 0
 
     @property
     def delay_s(self) -> float:
-        """How late everything is said."""
+        """Delay of every reply, in seconds."""
         fault = self.active.get("delay")
         return fault.amount if fault is not None else 0.0
 
     @property
     def is_silent(self) -> bool:
-        """Whether nothing is said at all."""
+        """Whether all replies are lost."""
         return "silent" in self.active
 
     def add(self, fault: Fault) -> None:
-        """Let something go wrong, too; a second one of a kind takes the first one's place."""
+        """Add a fault; it replaces one of the same kind."""
         key = f"{fault.name} {fault.signal}".strip()
         self.active[key] = fault
 
     def clear(self) -> None:
-        """Let nothing be wrong any more."""
+        """Remove all faults."""
         self.active.clear()
         self.dropped = frozenset()
         self.stuck.clear()
 
     def loses(self) -> bool:
-        """Return whether the next frame is lost, in whichever direction."""
+        """Return whether the next frame, in either direction, is lost."""
         fault = self.active.get("loss")
         if fault is None:
             return False
@@ -134,7 +134,7 @@ class Faults:
         return uniform(1, self._frames, "loss") < fault.amount
 
     def said(self, frames: Iterable[Payload]) -> list[Payload]:
-        """Return what is left of frames on their way to a client."""
+        """Return the frames to a client that are not lost."""
         return [] if self.is_silent else [one for one in frames if not self.loses()]
 
     def drops(self, names: Iterable[str]) -> bool:
@@ -143,17 +143,17 @@ class Faults:
 
 
 class Late:
-    """What one line says later than it should."""
+    """The delayed frames of one connection."""
 
     def __init__(self) -> None:
-        """Begin with nothing."""
+        """Begin without frames."""
         self._waiting: deque[tuple[float, Payload]] = deque()
         self.lost = 0
-        """Frames for which there was no room."""
+        """Frames beyond the limit, which are lost."""
 
     @property
     def due_s(self) -> float:
-        """When the first is due, by the clock of `put`; ``inf`` when none waits."""
+        """Due time of the first frame, by the clock of `put`; ``inf`` without frames."""
         return self._waiting[0][0] if self._waiting else math.inf
 
     def put(self, frames: Sequence[Payload], due_s: float) -> None:
@@ -165,7 +165,7 @@ class Late:
                 self._waiting.append((due_s, one))
 
     def take(self, now_s: float) -> list[Payload]:
-        """Return what is due."""
+        """Remove and return the due frames."""
         due: list[Payload] = []
         while self._waiting and self._waiting[0][0] <= now_s + 1e-9:
             due.append(self._waiting.popleft()[1])

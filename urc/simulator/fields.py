@@ -1,4 +1,4 @@
-"""Raw fields of a frame that the emulated robot says, and what of them a frame can carry.
+"""Raw fields for a frame of the emulated robot, and the subsets that a frame can carry.
 
 Pure.
 """
@@ -10,21 +10,21 @@ __all__ = ["Fields"]
 
 
 class Fields(NamedTuple):
-    """What is known for one frame."""
+    """The known fields for one frame."""
 
     numbers: dict[str, object]
     others: dict[str, object]
     own: dict[str, object]
-    """Those of the document: constants of ``when``, and what correlates with the request."""
+    """The document's own fields: constants of ``when``, and echoes of the request."""
     unknown: tuple[str, ...] = ()
-    """Those of the document that nothing says anything about."""
+    """The document's own fields without any known value."""
 
     def attempts(self, fits: Callable[[dict[str, object]], bool]) -> Iterator[dict[str, object]]:
-        """Yield fields to write, from all to the least; the frame decides what it can carry."""
+        """Yield fields to encode, from all to the fewest; the encoder decides."""
         whole = {name: _rounded(raw) for name, raw in self.numbers.items()}
         yield self.numbers | self.others | self.own
         yield whole | self.others | self.own
-        # Some exclude each other: one by one, as long as there is a frame with all of them.
+        # Some exclude each other: add them one by one while a frame with all of them exists.
         most = dict(self.own)
         for name, raw in (self.numbers | self.others).items():
             for value in (raw, whole.get(name, raw)):

@@ -1,4 +1,4 @@
-"""Puts faults into an emulated robot, and takes them out again.
+"""Injects faults into an emulated robot, and removes them.
 
 Pure.
 """
@@ -16,10 +16,10 @@ __all__ = ["inject", "mend"]
 
 
 def inject(fault: Fault, values: Values, now_s: float) -> None:
-    """Let `fault` be wrong with the robot of `values`.
+    """Inject `fault` into the robot of `values`.
 
     Raises:
-        UrcError: this robot cannot have it.
+        UrcError: this robot cannot have the fault.
     """
     body, faults = values.body, values.faults
     if fault.name in ("noise", "low-battery") and body is None:
@@ -39,7 +39,7 @@ def inject(fault: Fault, values: Values, now_s: float) -> None:
 
 
 def mend(values: Values) -> None:
-    """Let nothing be wrong any more."""
+    """Remove all faults."""
     values.faults.clear()
     if values.body is not None:
         values.body.world.noise = 1.0
@@ -55,7 +55,7 @@ def _check_signal(fault: Fault, values: Values) -> None:
 
 
 def _dropped(name: str, values: Values) -> Iterator[str]:
-    """Yield the signals that have no value any more once a signal or a sensor has none."""
+    """Yield the signals that lose their value with a signal or a sensor."""
     body = values.body
     if body is not None and name not in values.driver.signals and name in READINGS:
         body.world.dropped.add(name)

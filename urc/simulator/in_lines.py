@@ -1,4 +1,4 @@
-"""Answers of several lines, as the emulated robot says them: with the mark that ends them.
+"""Multiline replies of an emulated robot, with their end mark.
 
 Pure.
 """
@@ -12,13 +12,13 @@ __all__ = ["in_lines"]
 def in_lines(
     payload: bytes, lines: int | Pattern | None, reader: Reader | None, encoding: str
 ) -> list[bytes]:
-    """Return the frames of an answer.
+    """Return the frames of a reply.
 
     Args:
-        payload: the whole answer, as its form writes it.
-        lines: how many there are, or what the last one looks like; None: it is one frame.
-        reader: of the whole answer.
-        encoding: of the line.
+        payload: the whole reply.
+        lines: number of lines, or the pattern of the last line; None for a single frame.
+        reader: decoder of the whole reply.
+        encoding: encoding of the transport.
     """
     if lines is None:
         return [payload]
@@ -28,7 +28,7 @@ def in_lines(
     if reader is None or _ends(pieces[-1], lines, encoding):
         return pieces
     end = example(lines, {}).encode(encoding, "replace")
-    # What the form itself has in its last line may only stand there for the mark.
+    # The last line of the payload may be a placeholder for the end mark.
     choices = [[*pieces[:-1], end], [*pieces, end]] if len(pieces) > 1 else [[*pieces, end]]
     meant = _says(pieces, reader, encoding)
     said = [_says(one, reader, encoding) for one in choices]
@@ -38,7 +38,7 @@ def in_lines(
 
 
 def _says(pieces: list[bytes], reader: Reader, encoding: str) -> dict[str, object] | None:
-    """Return what lines say to whoever reads them: all but the names of the document itself."""
+    """Return the decoded fields of lines, without the fields of the document itself."""
     try:
         found = reader.read(Frame(b"\n".join(pieces), encoding))
     except BadText:

@@ -1,4 +1,4 @@
-"""The rules that a document gives its emulated robot, made ready for one of its lines.
+"""The simulator rules of a document, compiled for one transport.
 
 Pure: no socket, no clock.
 """
@@ -25,7 +25,7 @@ __all__ = ["Course", "Ruled", "Rules", "not_taken"]
 
 
 class Deed(NamedTuple):
-    """A reaction, ready to be done."""
+    """A compiled reaction."""
 
     what: Reaction
     writer: Writer | None
@@ -34,7 +34,7 @@ class Deed(NamedTuple):
 
 
 class Ruled(NamedTuple):
-    """A rule, ready to be held against frames."""
+    """A compiled rule."""
 
     what: SimulatorRule
     reader: Reader | None
@@ -42,7 +42,7 @@ class Ruled(NamedTuple):
 
 
 class Course:
-    """The reactions of one rule, as far as they are done."""
+    """The pending reactions of one rule."""
 
     __slots__ = ("asked", "deeds", "frame", "has_waited", "left_s", "names", "sets")
 
@@ -56,29 +56,29 @@ class Course:
         sets: bool = True,
     ) -> None:
         self.deeds = deeds
-        """What is still to be done."""
+        """Pending reactions."""
         self.names = names
-        """What the frame said."""
+        """Names and values from the frame."""
         self.asked = asked
-        """What was asked, where a declared request set the rule off."""
+        """The declared request that triggered the rule, if any."""
         self.frame = frame
-        """What came; None when nothing did."""
+        """The received frame; None for a timed rule."""
         self.sets = sets
-        """Whether it is for this line to change the robot."""
+        """Whether this connection performs the changes to the robot."""
         self.left_s = 0.0
-        """Seconds until the first of `deeds` is due."""
+        """Time until the first of `deeds` is due, in seconds."""
         self.has_waited = False
 
 
 class Rules:
-    """The rules of one line, in the order of the document.
+    """The rules of one transport, in the order of the document.
 
     Args:
-        rules: of this line.
-        spec: of its transport.
-        framing: of the robot's side.
-        auto: answers what is declared.
-        values: of the robot.
+        rules: the rules.
+        spec: the transport.
+        framing: framing of the robot's side.
+        auto: replies to declared requests.
+        values: values of the robot.
     """
 
     def __init__(
@@ -96,7 +96,7 @@ class Rules:
         self._counters = Counters()
         ready = [self._ready(rule) for rule in rules]
         self.asked = tuple(rule for rule in ready if rule.what.every_s is None)
-        """Those that frames set off."""
+        """Rules that frames trigger."""
         self.periodic = tuple(rule for rule in ready if rule.what.every_s is not None)
 
     def _ready(self, rule: SimulatorRule) -> Ruled:
@@ -116,10 +116,10 @@ class Rules:
         )
 
     def find(self, frame: Frame, now_s: float) -> Course | None:
-        """Return what the first rule that takes a frame does, or None when none takes it.
+        """Return the reactions of the first rule that matches a frame, or None.
 
         Raises:
-            Unanswered: the condition of a rule cannot be told, or a field has no value.
+            Unanswered: the condition of a rule has no value, or a field has none.
         """
         for rule in self.asked:
             asked: Asked | None = None
@@ -132,7 +132,7 @@ class Rules:
             course = self._course(rule, names, asked, frame, now_s)
             if course is not None:
                 return course
-        # Nothing is written for the first that sends these bytes; for another that does, maybe.
+        # The first request with these bytes has no rule; another one with the same bytes may have.
         for rule in self.asked:
             asked = self._auto.asked_too(frame, rule.what.request) if rule.what.request else None
             names = None if asked is None else asked.arguments
@@ -149,7 +149,7 @@ class Rules:
         frame: Frame,
         now_s: float,
     ) -> Course | None:
-        """Return what a rule does with a frame that says `names`, None when it is passed over."""
+        """Return the reactions of a rule to a frame with `names`; None if its condition fails."""
         for name, value in (names or NOTHING).items():
             if isinstance(value, Unusable):
                 raise Unanswered(f"{name}: {value.why}")
@@ -171,7 +171,7 @@ class Rules:
             raise Unanswered(str(error)) from None
 
     def do(self, deed: Deed, course: Course, now_s: float) -> list[Payload]:
-        """Do one thing and return what is said; raise `Unanswered` for what cannot be done."""
+        """Perform one reaction and return its frames; raise `Unanswered` if that is impossible."""
         what = deed.what
         said: list[Payload] = []
         try:
@@ -195,11 +195,11 @@ class Rules:
         return said
 
     def _is_dropped(self, what: Reaction) -> bool:
-        """Return whether something that is said tells what has dropped out."""
+        """Return whether a reply contains a signal that has dropped out."""
         return what.send is not None and self._values.faults.drops(what.send.names)
 
     def _wants_dropped(self, what: Reaction) -> bool:
-        """Return whether a reaction may have failed because a sensor of the world has."""
+        """Return whether a reaction may have failed because of a failed sensor."""
         body = self._values.body
         names = {
             name for one in what.sets.values() if isinstance(one, Template) for name in one.names
@@ -214,7 +214,7 @@ class Rules:
             name: one.evaluate(names) if isinstance(one, Template) else one
             for name, one in what.sets.items()
         }
-        for name, value in values.items():  # all are computed from what was before
+        for name, value in values.items():  # all use the values from before
             self._values.put(name, value)
 
     def _written(self, deed: Deed, writer: Writer, course: Course, now_s: float) -> Payload:
@@ -223,13 +223,13 @@ class Rules:
         payload = writer.write(names)
         self._counters.count(draw)
         said = deed.framing.encode(payload) if isinstance(payload, bytes) else payload
-        if isinstance(said, Envelope) and said.verb == "publish":  # a message to who listens
+        if isinstance(said, Envelope) and said.verb == "publish":  # a message to subscribers
             said = Envelope("message", {"topic": said.attributes.get("topic")}, said.body)
         return said if course.frame is None else numbered(said, course.frame)
 
 
 def _names_in(rule: Ruled, came: Frame) -> Mapping[str, object] | None:
-    """Return what a frame says by a rule's own pattern or form; None when it is another one."""
+    """Return the names in a frame by a rule's own pattern or form; None without a match."""
     frame = came if isinstance(came.payload, bytes) else frame_of(came.payload, came.encoding)
     try:
         if rule.reader is not None:
@@ -241,7 +241,7 @@ def _names_in(rule: Ruled, came: Frame) -> Mapping[str, object] | None:
 
 
 def not_taken(frame: Frame) -> str:
-    """Return what to tell about a frame that nothing takes, for people."""
+    """Return the fault text for an unexpected frame, for people."""
     if not isinstance(frame.payload, bytes):
         shown = traffic_of(frame.payload).decode("utf-8", "replace")[:60]
         return f"no rule takes {shown!r}, and the driver never sends it"

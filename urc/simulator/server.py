@@ -46,15 +46,15 @@ async def serve(
     """Emulate the robot of `profile` until the context ends.
 
     Args:
-        profile: its `simulator` rules answer.
-        settings: for ports and templates; a port of 0 lets the system choose.
-        host: address to listen on; the default can be reached from this machine only.
-        now: seconds since the epoch, the templates' ``now``.
-        is_anywhere: listen on free ports, and ignore the profile's own ports and paths.
+        profile: the profile with its `simulator` rules.
+        settings: values for ports and templates; a port of 0 lets the system choose.
+        host: address to listen on; the default is reachable from this machine only.
+        now: returns seconds since the epoch, the templates' ``now``.
+        is_anywhere: whether to listen on free ports, and ignore the profile's ports and paths.
         twin: the emulated robot; made from the profile by default.
 
     Returns:
-        Transport → where it listens.
+        Transport → its endpoint.
 
     Raises:
         UrcError: a transport cannot be emulated, or an address is not available.
@@ -73,7 +73,7 @@ async def serve(
                 name=name,
                 spec=spec,
                 options=_options_of(spec, settings),
-                # Only the robot itself reaches a transport that goes through another one.
+                # Only the robot itself connects to a transport behind another one.
                 host=_LOOPBACK if spec.via else host,
                 line=lambda name=name: robot.line(name),  # type: ignore[misc] # of this turn
                 now=now,
@@ -106,7 +106,7 @@ def _server(context: ServerContext) -> SimulatedServer:
 
 
 def _depth(transports: Mapping[str, TransportSpec], name: str) -> int:
-    """Return the number of transports that this one goes through."""
+    """Return the number of transports in front of this one."""
     via = transports[name].via
     return 1 + _depth(transports, via) if via else 0
 
@@ -114,7 +114,7 @@ def _depth(transports: Mapping[str, TransportSpec], name: str) -> int:
 def _put_inside(
     inside: dict[tuple[str, int], Endpoint], context: ServerContext, found: Endpoint
 ) -> Endpoint:
-    """Let clients reach a transport through another one; return the endpoint as they see it."""
+    """Make a transport reachable through another one; return the endpoint for its clients."""
     host, port, url = _known_as(context)
     if not isinstance(host, str) or not isinstance(port, int):
         message = f"{context.spec.type} cannot be emulated behind another transport"

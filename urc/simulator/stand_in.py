@@ -1,6 +1,6 @@
-"""A profile whose lines lead to its own emulated robot, on ports that happen to be free.
+"""A profile that connects to its own emulated robot, on free ports.
 
-Floor 4. `urc demo` and `urc serve --simulate` use it; `urc simulate` keeps the real ports instead.
+Layer 4. `urc demo` and `urc serve --simulate` use it; `urc simulate` keeps the real ports instead.
 """
 
 from collections.abc import AsyncIterator, Mapping
@@ -21,12 +21,12 @@ async def stand_in(
     """Emulate `profile` until the context ends; return the profile that connects to it.
 
     Args:
-        profile: of the robot.
-        settings: for its templates.
-        twin: the emulated robot, for who wants to look at it; made from the profile by default.
+        profile: the profile of the robot.
+        settings: values for its templates.
+        twin: the emulated robot, for observers; made from the profile by default.
 
     Raises:
-        UrcError: a transport that cannot be emulated.
+        UrcError: a transport cannot be emulated.
     """
     async with serve(profile, settings, is_anywhere=True, twin=twin) as listening:
         places = {name: endpoint.options for name, endpoint in listening.items()}

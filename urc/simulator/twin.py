@@ -1,10 +1,10 @@
-"""The emulated robot: frames in, bytes out, by the rules a profile carries about itself.
+"""The emulated robot: frames in, bytes out, by the simulator rules of a profile.
 
-What no rule takes is answered by the driver's own declarations (`urc.simulator.auto`).
+The driver's own declarations reply to frames without a matching rule (`urc.simulator.auto`).
 
-Pure: no socket, no clock. The framing is the driver's own, turned round, so what it says is cut and
-joined exactly as the real robot would. Each client has a line of its own; what the robot knows of
-itself is the same for all of them.
+Pure: no socket, no clock. The framing is the inverse of the driver's, so frames are split and built
+exactly as the real robot does it. Each client has a connection of its own; the robot's state is the
+same for all of them.
 """
 
 import logging
@@ -54,10 +54,10 @@ class Setters:
 
 
 MOST_COURSES: Final = 256
-"""Answers of one line that may wait for their time."""
+"""Most delayed replies of one connection."""
 
 log = logging.getLogger(__name__)
-"""Told of every fault, as ``(transport, text)``."""
+"""Receives every fault, as ``(transport, text)``."""
 
 
 class Twin:
@@ -84,13 +84,13 @@ class Twin:
         return TwinLine(spec, framing, ruled, auto, self._setters, self._values)
 
     def picture(self, transport: str, topics: Iterable[str], now_s: float) -> bytes | None:
-        """Return the picture of the robot's world that is listened to by one of `topics`, or None.
+        """Return the image of the robot's world for one of `topics`, or None.
 
-        It is b"" while it has dropped out.
+        It is b"" while the sensor has dropped out.
 
         Args:
-            transport: on which it is listened to.
-            topics: names under which it may be known there.
+            transport: name of the transport of the subscription.
+            topics: names of the image's topic there.
             now_s: seconds since the epoch.
         """
         body = self._values.body
@@ -105,51 +105,50 @@ class Twin:
 
     @property
     def body(self) -> Embodied | None:
-        """What moves in its world; None where it has none."""
+        """The body in its world; None without a world."""
         return self._values.body
 
     def prepare(self) -> None:
-        """Load what looking at the world needs, so that the first look does not wait; may block."""
+        """Load the modules for images, so that the first image is not late; may block."""
         if self._values.body is not None:
             self._values.body.prepare()
 
     @property
     def faults(self) -> tuple[str, ...]:
-        """What is wrong on demand, as it was written."""
+        """The injected faults, as they were written."""
         return tuple(one.text for one in self._values.faults.active.values())
 
     def inject(self, text: str, now_s: float) -> None:
-        """Let something go wrong from now on, written like one of `FAULTS`.
+        """Inject a fault in the syntax of `FAULTS`.
 
         Args:
             text: such as ``loss=5%``.
             now_s: seconds since the epoch.
 
         Raises:
-            UrcError: there is no such fault, or not with this robot; one line.
+            UrcError: the fault is unknown, or impossible for this robot; one line.
         """
         inject(parse_fault(text), self._values, now_s)
 
     def mend(self) -> None:
-        """Let nothing be wrong any more; a battery that is nearly empty stays so."""
+        """Remove all faults; a low battery stays low."""
         mend(self._values)
 
     def camera(self, now_s: float) -> bytes | None:
-        """Return what the robot's camera sees, as JPEG; None where it tells no picture of a world.
+        """Return the robot's camera image as JPEG; None without a camera in a world.
 
-        Args:
-            now_s: seconds since the epoch.
+        `now_s` is in seconds since the epoch.
         """
         body = self._values.body
         name = next(iter(self._pictures.values()), None)
         return None if body is None or name is None else body.picture(name, now_s)
 
     def top_view(self, width: int, height: int, now_s: float) -> bytes | None:
-        """Return the robot in its world from above, as JPEG; None where it has no world.
+        """Return the robot in its world from above, as JPEG; None without a world.
 
         Args:
-            width: points, 16 to 2000.
-            height: points, 16 to 2000.
+            width: pixels, 16 to 2000.
+            height: pixels, 16 to 2000.
             now_s: seconds since the epoch.
         """
         body = self._values.body
@@ -159,10 +158,9 @@ class Twin:
         return body.world.top_view(width, height)
 
     def readings(self, now_s: float) -> Mapping[str, Reading]:
-        """Return what the robot's signals are, for who looks at it without a line.
+        """Return the values of the robot's signals, for an observer without a connection.
 
-        Args:
-            now_s: seconds since the epoch.
+        `now_s` is in seconds since the epoch.
         """
         return {name: self._values.of(name, now_s) for name in self._values.driver.signals}
 
@@ -170,7 +168,7 @@ class Twin:
 def _pictures(
     driver: Driver, settings: Mapping[str, Value], senses: Iterable[str]
 ) -> Mapping[tuple[str, str], str]:
-    """Return transport and topic → signal, for pictures that the world gives."""
+    """Return transport and topic → signal, for images from the world."""
     return {
         (message.transport, topic_of(message.read, settings)): name
         for message in driver.messages.values()
@@ -182,7 +180,7 @@ def _pictures(
 
 
 def _speaks(rule: SimulatorRule) -> bool:
-    """Return whether a rule says that the robot speaks otherwise than the driver declares."""
+    """Return whether a rule defines messages of its own, in place of the declared ones."""
     if rule.request:
         return False
     says = any(one.send or one.message for one in rule.reactions)
@@ -194,7 +192,7 @@ class _Periodic:
     what: Ruled | AutoMessage
     every_s: float
     left_s: float
-    """Seconds until it is due."""
+    """Time until it is due, in seconds."""
 
 
 class TwinLine:
@@ -209,7 +207,7 @@ class TwinLine:
         setters: Setters,
         values: Values,
     ) -> None:
-        """Made by `Twin.line`."""
+        """Prepare; `Twin.line` calls this."""
         self._body = values.body
         self._flaws = values.faults
         self._late = Late()
@@ -229,15 +227,15 @@ class TwinLine:
         self._periodic += [_Periodic(one, one.every_s, one.every_s) for one in auto.messages]
         self._now_s = 0.0
         self.is_over = False
-        """The robot ends the connection, once all that it said is taken."""
+        """Whether the robot ends the connection, after all its data was taken."""
         self.faults = 0
-        """Frames that were none, that no rule took, or whose answer could not be made."""
+        """Number of invalid frames, and of frames without a matching rule or a reply."""
         self.last_fault = ""
-        """One line about the newest of them."""
+        """Text of the newest fault, one line."""
 
     @property
     def due_in_s(self) -> float | None:
-        """Seconds until `step` has something to say; None when it never has."""
+        """Time until `step` has data to send, in seconds; None if it never has."""
         if not self._is_greeted:
             return 0.0
         left = [one.left_s for one in self._periodic]
@@ -250,12 +248,12 @@ class TwinLine:
         return max(0.0, min(left)) if left else None
 
     def receive(self, data: Payload, now_s: float, limit: int | None = None) -> list[Payload]:
-        """Take what the client says and return the answers, each a whole frame.
+        """Take data of the client and return the replies, each a whole frame.
 
         Args:
-            data: any piece of the stream, or an envelope on a line that carries messages.
+            data: any piece of the stream, or an envelope on a message transport.
             now_s: seconds since the epoch, the templates' ``now``.
-            limit: most answers to give; what the client sent beyond them is dropped. None: all.
+            limit: most replies; requests beyond it are dropped. None: no limit.
         """
         return self._flawed(self._heard(data, now_s, limit, self._answer_or_lose), now_s)
 
@@ -284,15 +282,15 @@ class TwinLine:
         return answers
 
     def step(self, dt_s: float, now_s: float) -> list[Payload]:
-        """Let `dt_s` seconds pass and return what the robot says by itself.
+        """Let `dt_s` seconds pass and return the robot's unsolicited frames.
 
-        A rule that was due several times speaks once: a pause is not made up for.
+        A rule that was due several times sends once: a pause causes no burst.
         """
         said = self._flawed(self._due(dt_s, now_s), now_s)
         return self._late.take(now_s) + said if self.has_late else said
 
     def _flawed(self, said: list[Payload], now_s: float) -> list[Payload]:
-        """Return what can be said at once of what the robot says; the rest is late, or lost."""
+        """Return the frames to send now; injected faults delay or lose the others."""
         if not self._flaws.active:
             return said
         said = self._flaws.said(said)
@@ -304,22 +302,22 @@ class TwinLine:
 
     @property
     def has_late(self) -> bool:
-        """Whether something waits that should have been said before."""
+        """Whether a delayed frame is due."""
         return self._late.due_s < math.inf
 
     @property
     def loses(self) -> bool:
-        """Whether the next answer is lost, or nothing is said at all."""
+        """Whether the next reply is lost."""
         return self._flaws.is_silent or self._flaws.loses()
 
     @property
     def delay_s(self) -> float:
-        """How late everything is said on demand."""
+        """Injected delay of every reply, in seconds."""
         return self._flaws.delay_s
 
     @property
     def is_incomplete(self) -> bool:
-        """Whether some signal has dropped out on demand."""
+        """Whether an injected fault has made a signal drop out."""
         return bool(self._flaws.dropped)
 
     def _due(self, dt_s: float, now_s: float) -> list[Payload]:
@@ -344,7 +342,7 @@ class TwinLine:
         return said
 
     def _pass(self, now_s: float) -> None:
-        """Let the world go on to the present before anything changes in it."""
+        """Advance the world to the present, before its inputs change."""
         self._now_s = now_s
         if self._body is not None:
             self._body.world.advance(now_s)
@@ -383,7 +381,7 @@ class TwinLine:
         return said or []
 
     def _go_on(self, course: Course, now_s: float) -> list[Payload]:
-        """Do what is due of a course, and keep the rest for later."""
+        """Perform the due reactions, and keep the others for later."""
         said: list[Payload] = []
         while course.deeds and not self.is_over:
             deed = course.deeds[0]
@@ -404,7 +402,7 @@ class TwinLine:
         self._courses.append(course)
 
     def _made(self, make: Callable[[], list[Payload] | None]) -> list[Payload] | None:
-        """Return what `make` returns; what it cannot answer is counted and told."""
+        """Return the result of `make`; count and log a frame without reply."""
         try:
             return make()
         except Unanswered as problem:

@@ -1,4 +1,4 @@
-"""What an emulated robot knows of itself: the values of its signals, and its own state.
+"""The state of an emulated robot: values of its signals, and names of its own.
 
 Pure. All connections of one robot share it.
 """
@@ -86,13 +86,13 @@ def _quaternion(now_s: float) -> dict[str, Value]:
 
 
 _DIGITS: Final = 7
-"""Of what the world tells: a centimetre on the earth."""
+"""Decimals of the world's values: a centimetre on the earth."""
 _DEEPEST: Final = 16
-"""Signals that are computed from each other, one upon the other."""
+"""Deepest chain of computed signals."""
 
 
 class Unsettable(UrcError):
-    """A value that a signal cannot have; the message is for people."""
+    """An invalid value for a signal; the message is for people."""
 
 
 class Values:
@@ -105,26 +105,26 @@ class Values:
         initial: Mapping[str, Reading] = NOTHING,
         world: WorldSpec | None = None,
     ) -> None:
-        """Begin with `initial` values, of signals and of its own state; maybe in a world."""
+        """Begin with `initial` values of signals and state, optionally in a world."""
         self.driver = driver
         self.settings: Mapping[str, Value] = dict(settings)
         self.state: dict[str, Reading] = {}
-        """What is no signal."""
+        """Values that are no signals."""
         self.chosen: dict[str, Reading] = {}
-        """Signals that were set."""
+        """Signals with a set value."""
         self.body: Embodied | None = None
-        """What moves and senses; None where the document gives it no world."""
+        """The body with its sensors; None without a world."""
         self.senses: Mapping[str, object] = NOTHING
-        """Signals that the world tells."""
+        """Signals that the world gives."""
         self.faults = Faults()
-        """What is wrong with the robot on demand."""
+        """Injected faults of the robot."""
         for name, value in initial.items():
             self.put(name, value)
         if world is not None:
             self.body, self.senses = Embodied(world, driver, self.evaluate, self.put), world.senses
 
     def remember(self, arguments: Mapping[str, object]) -> None:
-        """Keep what a command sets, where an argument and a signal share a name."""
+        """Store the arguments of a command whose names are signals."""
         for name, value in arguments.items():
             signal = self.driver.signals.get(name)
             if signal is None or name in self.senses:
@@ -133,13 +133,13 @@ class Values:
                 try:
                     self.chosen[name] = _kept(signal, value)
                 except BadValue:
-                    continue  # the command means something else by that name
+                    continue  # the command uses the name with another meaning
 
     def put(self, name: str, value: object) -> None:
-        """Set a signal, within its range, or something of the robot's own state.
+        """Set a signal, within its range, or a value of the robot's own state.
 
         Raises:
-            Unsettable: the signal cannot have the value.
+            Unsettable: the value is invalid for the signal.
         """
         signal = self.driver.signals.get(name)
         if signal is None:
@@ -151,7 +151,7 @@ class Values:
             raise Unsettable(f"{name}: {error}") from None
 
     def of(self, name: str, now_s: float, depth: int = 0) -> Reading:
-        """Return the value of a signal: as set, as computed, else something plausible."""
+        """Return the value of a signal: as set, as computed, else a plausible one."""
         if name in self.faults.stuck:
             return self.faults.stuck[name]
         signal = self.driver.signals[name]
@@ -169,7 +169,7 @@ class Values:
         return plausible(signal, now_s)
 
     def evaluate(self, template: Template, now_s: float) -> object:
-        """Return the value of a template over all that the robot knows; raise `ExpressionError`."""
+        """Return the value of a template over the robot's values; raise `ExpressionError`."""
         return template.evaluate(Names(self, now_s))
 
 
@@ -216,7 +216,7 @@ class Names(Mapping[str, object]):
 
 
 def _sensed(body: Embodied, signal: Signal, now_s: float) -> Reading:
-    """Return what the world says of a signal; None where that is no value of it."""
+    """Return the world's value of a signal; None if it is invalid."""
     try:
         value = body.sense(signal.name, now_s)
         if isinstance(value, bytes):
@@ -229,7 +229,7 @@ def _sensed(body: Embodied, signal: Signal, now_s: float) -> Reading:
 
 
 def _kept(signal: Signal, value: object) -> Reading:
-    """Return what `signal` is once it has been set to `value`; raise `BadValue`."""
+    """Return the value of `signal` after it was set to `value`; raise `BadValue`."""
     words = dict(signal.states)
     if words and value is not None:
         word = str(value)
@@ -243,7 +243,7 @@ def _kept(signal: Signal, value: object) -> Reading:
 
 
 def _within(signal: Signal, value: object) -> object:
-    """Return a number within the range of its signal: a robot stops at its ends."""
+    """Return a number, clamped to the range of its signal."""
     if isinstance(value, bool) or not isinstance(value, (int, float)) or signal.states:
         return value
     if signal.type == "integer":

@@ -54,37 +54,37 @@ _CALLS: Final = (
     _Call("/healthz", "Whether the server runs, and its version.", Healthy, is_post=False),
     _Call(
         "/api/v1/packages",
-        "What is installed, what repositories have, and the job that is under way.",
+        "Installed packages, packages of repositories, and the current job.",
         Shelf,
         is_post=False,
         query=("kinds", "words"),
     ),
     _Call(
         "/api/v1/repositories/ask",
-        "Begin to ask the repositories what they have.",
+        "Start a refresh of the package lists.",
         Line,
         Ask,
         status=202,
     ),
-    _Call("/api/v1/repositories", "Connect to a repository: it must answer.", Line, Url),
+    _Call("/api/v1/repositories", "Add a repository; it must respond.", Line, Url),
     _Call("/api/v1/repositories/remove", "Forget a repository.", Line, Url),
     _Call(
         "/api/v1/packages/install",
-        "Begin a job that fetches a package and all that it needs, and says what it may do.",
+        "Start a job that downloads a package with its dependencies and lists its permissions.",
         JobNews,
         Package,
         status=202,
     ),
     _Call(
         "/api/v1/packages/add",
-        "Begin a job with a package at a path in a repository, or on this machine.",
+        "Start a job with a package at a path in a repository or on this machine.",
         JobNews,
         Add,
         status=202,
     ),
     _Call(
         "/api/v1/packages/upload",
-        "Begin a job with a package, bundle or interface.yaml: the body is the file.",
+        "Start a job with an uploaded package, bundle or interface.yaml; the body is the file.",
         JobNews,
         bytes,
         status=202,
@@ -92,55 +92,55 @@ _CALLS: Final = (
     ),
     _Call(
         "/api/v1/packages/update",
-        "Begin a job that fetches a newer version, and says what it changes.",
+        "Start a job that downloads a newer version and lists its changes.",
         JobNews,
         Package,
         status=202,
     ),
-    _Call("/api/v1/packages/back", "Put back the version before an update.", Gone, Package),
+    _Call("/api/v1/packages/back", "Restore the version before an update.", Gone, Package),
     _Call(
         "/api/v1/packages/remove",
-        "Remove a package; without yes, only tell what would go.",
+        "Remove a package; without yes, only list the packages that would go.",
         Gone,
         Package,
     ),
-    _Call("/api/v1/job/agree", "Install what the job has planned.", JobNews, Agree),
-    _Call("/api/v1/job/cancel", "Give the job up; nothing has changed.", JobNews, Agree),
+    _Call("/api/v1/job/agree", "Install the planned package.", JobNews, Agree),
+    _Call("/api/v1/job/cancel", "Cancel the job; nothing has changed.", JobNews, Agree),
     _Call(
         "/api/v1/robots/{name}/settings",
-        "Try settings for real, keep them, and use them at once.",
+        "Test settings with the robot, store them, and use them at once.",
         SettingsAnswer,
         SettingsAsked,
     ),
-    _Call("/api/v1/robots/{name}/stop", "Stop a robot, and latch.", Stopped),
+    _Call("/api/v1/robots/{name}/stop", "Stop a robot and latch.", Stopped),
     _Call(
         "/api/v1/robots/{name}/controls",
-        "Who drives a robot, and who stopped it.",
+        "The operator who drives a robot, and the latch of STOP.",
         ControlState,
         is_post=False,
     ),
     _Call(
         "/api/v1/robots/{name}/timeline",
-        "What made a robot move, newest first; with the start key only.",
+        "Audit log of a robot's motion, newest first; needs the start key.",
         Timeline,
         is_post=False,
         query=("last", "since"),
     ),
     _Call(
         "/api/v1/robots/{name}/recording",
-        "Where the recording stands that is shown in place of a robot.",
+        "State of a playback.",
         TapeState,
         is_post=False,
     ),
     _Call(
         "/api/v1/robots/{name}/recording/move",
-        "Let it run, stand, or go on from somewhere else.",
+        "Play, pause or move a playback.",
         TapeState,
         TapeAsked,
     ),
     _Call(
         "/api/v1/robots/{name}/dev/start",
-        "Read a robot's documents anew; with --dev, and the start key only.",
+        "Reload a robot's documents; needs --dev and the start key.",
         Started,
     ),
 )
@@ -183,7 +183,7 @@ def _operation(call: _Call) -> dict[str, Any]:
     parameters += [
         {"name": one, "in": "query", "required": False, "schema": text} for one in call.query
     ]
-    failure = {"description": "Why not, in one line.", "content": _json(Failure)}
+    failure = {"description": "The reason of the failure, in one line.", "content": _json(Failure)}
     found: dict[str, Any] = {
         "summary": call.summary,
         "responses": {

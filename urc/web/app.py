@@ -314,7 +314,7 @@ class _Routes:
         if station is None:
             return JSONResponse({"error": "no robot of that name is served here"}, 404, _PAGE)
         if not station.controls.desk.can_move or station.robot.tape is not None:
-            return JSONResponse({"error": "this robot has nothing that moves"}, 409, _PAGE)
+            return JSONResponse({"error": "this robot has no motion to stop"}, 409, _PAGE)
         station.controls.stop(guest_of(request).place or "a screen of this machine")
         is_confirmed = await station.deliver_stop()
         by = station.controls.desk.lease.state.latched_by

@@ -122,7 +122,7 @@ class Client:
         except* WebSocketDisconnect:
             pass
         except* TimeoutError:
-            log.warning("a client took nothing for %g s and was cut off", STALL_S)
+            log.warning("a client took nothing for %g s and was disconnected", STALL_S)
             self._flow.abort()
         finally:
             if self._seat is not None:
@@ -273,7 +273,7 @@ class Client:
     def _count_bad(self, reason: str) -> None:
         self.bad_messages += 1
         if self.bad_messages >= BAD_MESSAGES:
-            self._close(wire.CLOSE_BAD_MESSAGES, f"{BAD_MESSAGES} messages could not be used")
+            self._close(wire.CLOSE_BAD_MESSAGES, f"{BAD_MESSAGES} messages were invalid")
         else:
             self._answer(wire.encode_error("bad-message", reason))
 

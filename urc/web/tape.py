@@ -19,7 +19,7 @@ __all__ = ["move_tape", "tape_state"]
 def tape_state(tape: Tape | None) -> Response:
     """Return the state of the playback as a response; 404 for None."""
     if tape is None:
-        return told(404, "this is no recording")
+        return told(404, "this robot is no recording")
     return answer(
         TapeState(
             began_s=tape.began_s,
@@ -34,7 +34,7 @@ def tape_state(tape: Tape | None) -> Response:
 async def move_tape(request: Request, tape: Tape | None) -> Response:
     """Run, pause or move the playback, and return its state as a response."""
     if tape is None:
-        return told(404, "this is no recording")
+        return told(404, "this robot is no recording")
     try:
         asked = await body_of(request, TapeAsked)
     except Refusal as refusal:

@@ -34,7 +34,7 @@ async def timeline(
         text = "the timeline needs the key in the address that URC printed"
         return JSONResponse({"error": text}, 403, _HEADERS)
     if log is None:
-        text = "no audit is kept: this server has no folder for its data"
+        text = "there is no audit log: this server has no folder for its data"
         return JSONResponse({"error": text}, 404, _HEADERS)
     try:
         last = int(request.query_params.get("last", USUAL))

@@ -227,7 +227,7 @@ async def test_bad_messages_are_counted_answered_and_then_close_the_line() -> No
         assert it.line.closed is None
         it.line.say("[]")
         await settle()
-        assert it.line.closed == (4400, "10 messages could not be used")
+        assert it.line.closed == (4400, "10 messages were invalid")
 
 
 async def test_too_many_messages_close_the_line() -> None:
@@ -357,7 +357,7 @@ async def test_a_tick_that_has_just_come_is_taken_at_once_and_nothing_else() -> 
         assert it.line.sink(tick)
         await settle()
         (refused,) = it.line.of_type("refused")
-        assert "'go' is no held command" in refused["message"]
+        assert "'go' is not a held command" in refused["message"]
         for other in (b'{"t":"stop"}', b"", b"\xff", tick[:-1], b'{"t":"tick","a":1}', b"[" * 9999):
             assert not it.line.sink(other)
         it.line.say({"t": "ping", "n": 1, "c": 2.0})

@@ -107,13 +107,13 @@ async def test_a_command_that_asks_is_refused_when_nobody_was_asked() -> None:
         (reply,) = line.of_type("reply")
         assert (reply["code"], reply["message"]) == (
             "not-confirmed",
-            "nobody was asked first: Dock now?",
+            "a confirmation is missing: Dock now?",
         )
         await run(line, "dock")
         await settle()
         assert it.robot.confirmed_by == [("screen 1",)]
         assert [entry.outcome for entry in it.audit] == [
-            "not-confirmed: nobody was asked first: Dock now?",
+            "not-confirmed: a confirmation is missing: Dock now?",
             "done; confirmed by screen 1",
         ]
 
@@ -135,7 +135,7 @@ async def test_stop_ends_questions_and_takes_back_what_was_agreed_to() -> None:
         assert it.robot.commands == []
         assert [reply["message"] for reply in asker.of_type("reply")] == [
             "STOP was pressed meanwhile: give it anew",
-            "the yes is used up or too old: Dock now?",
+            "the confirmation is no longer valid: Dock now?",
         ]
 
 
@@ -186,7 +186,7 @@ async def test_no_is_no_whoever_says_it(who: str) -> None:
         assert it.robot.commands == []
         (reply,) = asker.of_type("reply")
         assert reply["code"] == "not-confirmed"
-        assert ("within 30 s" if who == "nobody" else "somebody said no") in reply["message"]
+        assert ("within 30 s" if who == "nobody" else "refused by another operator") in reply["message"]
         other.say({"t": "agree", "n": number, "yes": True})  # too late
         await settle()
         assert it.robot.commands == []
@@ -243,12 +243,12 @@ async def test_a_yes_that_is_played_back_counts_no_second_time() -> None:
         it.robot.commands.clear()
         for _ in range(3):
             give(line, "dock", token)
-            assert await refused(it, line) == "the yes is used up or too old: Dock now?"
+            assert await refused(it, line) == "the confirmation is no longer valid: Dock now?"
         token = await token_for(line, "dock")
         give(line, "dock", token, place="ceiling")
         await refused(it, line)
         give(line, "dock", token)
-        assert await refused(it, line) == "the yes is used up or too old: Dock now?"
+        assert await refused(it, line) == "the confirmation is no longer valid: Dock now?"
 
 
 @pytest.mark.parametrize(
@@ -266,7 +266,7 @@ async def test_a_yes_to_something_else_is_none(command: str, arguments: dict[str
         line = await it.come()
         token = await token_for(line, "dock", place="home")
         give(line, command, token, **arguments)
-        assert (await refused(it, line)).startswith("the yes was to something else: ")
+        assert (await refused(it, line)).startswith("the confirmation does not match: ")
 
 
 async def test_a_yes_that_was_held_up_on_its_way_is_none() -> None:
@@ -276,7 +276,7 @@ async def test_a_yes_that_was_held_up_on_its_way_is_none() -> None:
         token = await token_for(line, "dock")
         await it.clock.advance(TOKEN_S)
         give(line, "dock", token)
-        assert await refused(it, line) == "the yes is used up or too old: Dock now?"
+        assert await refused(it, line) == "the confirmation is no longer valid: Dock now?"
         token = await token_for(line, "dock")
         await it.clock.advance(TOKEN_S - 0.1)
         give(line, "dock", token)

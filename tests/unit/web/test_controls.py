@@ -223,7 +223,7 @@ async def test_a_refused_tick_is_told_unless_the_control_moves_all_the_same() ->
         assert told["message"] == "it is not newer than the last one"
         it.controls.hear(ann, wire.Tick("beep", epoch, 9, 9))
         (told,) = it.read(ann)
-        assert told["message"] == "'beep' is no held command of this robot"
+        assert told["message"] == "'beep' is not a held command of this robot"
 
 
 async def test_a_hostile_page_makes_nothing_grow() -> None:
@@ -292,7 +292,7 @@ async def test_the_audit_names_whoever_was_refused_and_why() -> None:
         refused = [one for one in audited(it) if one.startswith("refused")]
         assert refused[0] == "refused screen 2 at 192.168.1.7 drive screen 1 has the controls"
         assert refused[1].startswith("refused screen 2 at 192.168.1.7 force ")
-        assert refused[2].endswith("'beep' is no held command of this robot")
+        assert refused[2].endswith("'beep' is not a held command of this robot")
         assert "STOP by vic" in audited(it)
 
 
@@ -340,13 +340,13 @@ async def test_a_latch_that_cannot_be_written_is_told_and_stops_all_the_same(
         assert it.controls.desk.is_confirmed
         (note,) = it.hub.notes
         assert (note.level, note.source) == ("error", "URC")
-        assert note.text.startswith("STOP works, but would not outlast a restart")
+        assert note.text.startswith("STOP works, but would not survive a restart")
         told = [one for one in it.read(bob) if one["t"] == "refused"]
         assert [one["message"] for one in told] == [note.text]
         (tmp_path / "latches").unlink()
         it.say(bob, "reset")
         await file.settle()
-        assert it.hub.notes[-1].text == "STOP outlasts a restart of the server again"
+        assert it.hub.notes[-1].text == "STOP survives a restart of the server again"
 
 
 async def test_a_stop_that_is_owed_stays_so_with_another_driver_and_after_a_restart(

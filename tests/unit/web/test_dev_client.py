@@ -164,7 +164,7 @@ async def test_a_page_that_talks_nonsense_is_closed() -> None:
         for _ in range(BAD_MESSAGES):
             it.line.say({"t": "boo"})
         await settle()
-        assert it.line.closed == (4400, f"{BAD_MESSAGES} messages could not be used")
+        assert it.line.closed == (4400, f"{BAD_MESSAGES} messages were invalid")
 
 
 async def test_a_page_that_talks_too_fast_is_closed() -> None:
@@ -233,7 +233,7 @@ async def test_a_version_waits_while_somebody_drives(tmp_path: Path) -> None:
         assert watch._go_on()
         await settle()
         assert list(it.station.robot.profile.driver.commands) == ["new"]
-        assert (watch.state, watch.told) == ("running", "was saved, and is running now")
+        assert (watch.state, watch.told) == ("running", "was saved and is running now")
 
 
 async def test_a_version_that_cannot_be_made_changes_nothing() -> None:

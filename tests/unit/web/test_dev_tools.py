@@ -96,7 +96,7 @@ def test_bytes_are_pasted_as_hex_or_as_text() -> None:
         pasted_bytes(r"a\q", is_hex=False, encoding="utf-8")
     with pytest.raises(UrcError, match="cannot be written in ascii"):
         pasted_bytes("ü", is_hex=False, encoding="ascii")
-    with pytest.raises(UrcError, match="65536 are tried out"):
+    with pytest.raises(UrcError, match="at most 65536 are parsed"):
         pasted_bytes("x" * 70_000, is_hex=False, encoding="utf-8")
 
 
@@ -134,7 +134,7 @@ def test_nobody_takes_it_and_each_says_why(robot: Driver) -> None:
     (piece,) = try_out(robot, {}, "wire", b"S idle 2\n").pieces
     assert piece.takers == ()
     assert "message level: ^BAT (?P<battery>[0-9]+)$ does not match" in piece.reasons
-    assert "message mood: its when is not true: _n == '1'" in piece.reasons
+    assert "message mood: its 'when' is not true: _n == '1'" in piece.reasons
     (piece,) = try_out(robot, {}, "wire", b"\xff\n").pieces
     assert all("is not utf-8 text" in reason for reason in piece.reasons)
 

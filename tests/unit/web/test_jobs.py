@@ -27,7 +27,7 @@ async def test_one_job_at_a_time_and_it_can_be_given_up(tmp_path: Path) -> None:
         jobs.begin(FileSource("dial.zip", [dial], [dial.manifest.key]))
     jobs.give_up(job.number)
     assert job.news().state == "cancelled"
-    with pytest.raises(Busy, match="nothing to agree to"):
+    with pytest.raises(Busy, match="no job waits for approval"):
         await jobs.agree(job.number)
     with pytest.raises(Busy, match="another page"):
         jobs.give_up(job.number + 1)

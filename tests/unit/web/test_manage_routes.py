@@ -295,12 +295,12 @@ def fleet_of(client: TestClient) -> Any:
 @pytest.mark.parametrize(
     ("name", "text", "line"),
     [
-        ("x.yaml", "kind: driver\nname: x\n", "this is no interface"),
+        ("x.yaml", "kind: driver\nname: x\n", "expected an interface"),
         ("x.yaml", "kind: interface\nname: A B\n", "'name' is expected"),
         ("x.yaml", "a: [", "x.yaml:"),
         ("x.zip", "rubbish", "x.zip"),
         ("x.exe", "rubbish", "x.exe"),
-        ("../../x.yaml", "kind: driver\n", "x.yaml: this is no interface"),
+        ("../../x.yaml", "kind: driver\n", "x.yaml: expected an interface"),
     ],
 )
 def test_what_is_uploaded_must_be_a_package(

@@ -81,7 +81,7 @@ def dashboard(data: Path | None, *, has_key: bool = True) -> TestClient:
     [
         (True, True, "nobody", 404, "no robot of that name is served here"),
         (True, False, "puppet", 403, "needs the key in the address that URC printed"),
-        (False, True, "puppet", 404, "no audit is kept: this server has no folder"),
+        (False, True, "puppet", 404, "there is no audit log: this server has no folder"),
     ],
 )
 def test_where_there_is_no_timeline_a_line_says_why(

@@ -49,23 +49,23 @@ class LastPeer:
 
 
 class ServerContext(NamedTuple):
-    """What a server needs to know: its transport, its address, and the robot behind it."""
+    """The context of a server: its transport, its address, and the robot behind it."""
 
     name: str
-    """Of the transport in the driver."""
+    """Name of the transport in the driver."""
     spec: TransportSpec
     options: Mapping[str, object]
-    """Of the transport, evaluated over the settings."""
+    """Options of the transport, evaluated over the settings."""
     host: str
-    """Address to listen on, where the kind of transport has one."""
+    """Address to listen on, for kinds of transport that listen."""
     line: Callable[[], TwinLine]
     """Makes the robot's side of a new connection."""
     now: Callable[[], float]
     """Seconds since the epoch, the templates' ``now``."""
     topics: Mapping[str, Mapping[str, Value]] = NOTHING
-    """Subscriptions of the driver, on a transport that carries messages: topic → options."""
+    """Subscriptions of the driver, on a message transport: topic → options."""
     is_anywhere: bool = False
-    """Listen on any free port, whatever the options say."""
+    """Whether to listen on any free port, in place of the port of the options."""
     picture: Callable[[Sequence[str]], bytes | None] = lambda _: None
     """Names of a topic → the current image of the robot's world, None without one."""
     last_peer: LastPeer | None = None
@@ -111,7 +111,7 @@ def option_port(context: ServerContext, key: str = "port", default: int | None =
     """Return the port to listen on, 0..65535; 0 lets the system choose.
 
     Args:
-        context: of the server.
+        context: context of the server.
         key: name of the option.
         default: the usual port of this kind of transport.
 
@@ -127,7 +127,7 @@ def option_port(context: ServerContext, key: str = "port", default: int | None =
 
 
 def host_and_port(host: str, port: int) -> str:
-    """Return a host and port as people write them."""
+    """Return a host and port in the usual notation."""
     return f"[{host}]:{port}" if ":" in host else f"{host}:{port}"
 
 
@@ -138,7 +138,7 @@ def cannot_listen(context: ServerContext, port: int, fault: OSError, kind: str =
 
 
 def reason(fault: OSError) -> str:
-    """Return the system's own words: asyncio repeats the address in its error."""
+    """Return the system's error text without the address, which asyncio repeats."""
     if isinstance(fault, socket.gaierror) or not fault.errno:
         return str(fault.strerror or fault).lower()
     return os.strerror(fault.errno).lower()

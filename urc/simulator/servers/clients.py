@@ -18,7 +18,7 @@ from urc.simulator.twin import TwinLine
 __all__ = ["MAX_CLIENTS", "READ_BYTES", "TAKEN_WITHIN_S", "ClientConnection", "Clients", "converse"]
 
 MAX_CLIENTS = 64
-"""Connections on one transport."""
+"""Most connections on one transport."""
 READ_BYTES = 4096
 TAKEN_WITHIN_S = 5.0
 """A client that accepts no reply for this long is disconnected."""
@@ -62,7 +62,7 @@ class Clients:
         """
         if len(self._talks) >= self._limit:
             silent = min(self._talks, key=lambda client: client.active_s)
-            silent.active_s = math.inf  # it is leaving, and must not be chosen again
+            silent.active_s = math.inf  # it is closing, and must not be chosen again
             silent.abort()
             self._talks[silent].cancel()
         client = ClientConnection(self._context.line(), abort)
@@ -103,11 +103,11 @@ async def converse(
     """Talk to one client until it closes, or the robot does (``connection: per_request``).
 
     Args:
-        context: of the server.
+        context: context of the server.
         client: its line replies.
-        take: returns the next payload of the client, None or b"" at its end. It may be cancelled
-            and called again, and must lose nothing.
-        put: sends the robot's payloads, and waits while the client accepts no more.
+        take: returns the next payload of the client; None or b"" at its end. It may be cancelled
+            and called again without loss.
+        put: sends the robot's payloads, and waits while the client's buffer is full.
 
     Raises:
         TimeoutError: the client accepts no data.
@@ -122,7 +122,7 @@ async def converse(
                 said_by_client = await take()
         except TimeoutError:
             if not wait.expired():
-                raise  # the system has given the client up
+                raise  # the system reports the client as lost
         if not said_by_client and not wait.expired():
             return
         now_s, was_late = clock(), line.has_late

@@ -87,15 +87,15 @@ class Asked(NamedTuple):
 
     method: str
     target: str
-    """As it was sent."""
+    """The request target as received."""
     path: str
-    """Below the path of the driver's URL, decoded, without the query."""
+    """Decoded path below the path of the driver's URL, without the query."""
     headers: Mapping[str, str]
     body: bytes
 
     @property
     def ways(self) -> list[Envelope]:
-        """The request as a driver may have written it: with a query, or with all in the path."""
+        """The request in both notations of a driver: with a query, or with all in the path."""
         query = urlsplit(self.target).query
         attributes: dict[str, object] = {"method": self.method, "path": self.path}
         attributes["headers"] = self.headers
@@ -205,14 +205,14 @@ class _Talk:
             await self._answer(*_written(self._asks(client.line, asked)), asked)
 
     async def _suffer(self, line: TwinLine) -> None:
-        """Delay or lose the reply: faults that were switched on."""
+        """Delay or lose the reply, as the injected faults demand."""
         if line.loses:
             raise ConnectionResetError("lost on demand")
         if line.delay_s:
             await asyncio.sleep(line.delay_s)
 
     def _asks(self, line: TwinLine, asked: Asked) -> Envelope:
-        """Return the robot's reply, or a status for a request without one."""
+        """Return the robot's reply, or an error status."""
         for envelope in asked.ways:
             before = line.faults
             for one in line.ask(envelope, self._context.now()):
@@ -226,7 +226,7 @@ class _Talk:
         return Envelope("response", {"ok": False, "status": 404, "reason": reason})
 
     def _kind(self, asked: Asked) -> str:
-        """Return the kind of stream of the driver's subscription to that path, "" without one."""
+        """Return the stream kind of the driver's subscription to that path, "" without one."""
         if asked.method != "GET":
             return ""
         ways = self._context.topics.items()
@@ -311,7 +311,7 @@ class _Talk:
 
 
 def _written(answer: Envelope) -> tuple[int, list[tuple[str, str]], bytes]:
-    """Return status, headers and body of the robot's answer."""
+    """Return status, headers and body of the robot's reply."""
     attributes, body = answer.attributes, answer.body
     is_ok = bool(attributes.get("ok", True))
     status = attributes.get("status")
@@ -333,7 +333,7 @@ def _bytes(body: object) -> bytes:
 
 
 def _piece(kind: str, event: str, body: bytes) -> bytes:
-    """Return a message as it goes into an event stream, or as a line."""
+    """Return a message as an event of a stream, or as a line."""
     if kind == "lines":
         return body.replace(b"\n", b" ") + b"\n"
     name = [b"event: " + event.encode()] if event else []

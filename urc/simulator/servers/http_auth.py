@@ -25,8 +25,8 @@ class HttpAuth:
         """Return the challenge for a request without valid credentials, None for a valid one.
 
         Args:
-            method: of its request.
-            target: of its request, as it was sent.
+            method: method of the request.
+            target: target of the request, as received.
             given: its header Authorization.
         """
         kind = self._auth.get("type")

@@ -25,7 +25,7 @@ class Listener(NamedTuple):
     """A listening socket of asyncio or of a library."""
 
     address: tuple[Any, ...]
-    """Host and port, and what else the system says."""
+    """Host and port, and further values of the system."""
     close: Callable[[], None]
     """Stops accepting connections."""
     wait_closed: Callable[[], Awaitable[None]]
@@ -35,7 +35,7 @@ class ListeningServer(ABC):
     """One listening port and its clients."""
 
     DEFAULT_PORT: ClassVar[int | None] = None
-    """Port of this kind of transport, where the driver names none."""
+    """Default port of this kind of transport."""
 
     def __init__(self, context: ServerContext) -> None:
         """Prepare the server; `open` listens."""
@@ -76,7 +76,7 @@ class UrlServer(ListeningServer):
     """A server that the driver addresses by the option `url`."""
 
     SCHEME: ClassVar[str]
-    """Without TLS."""
+    """URL scheme without TLS."""
     _path = "/"
 
     def _port(self) -> int:

@@ -1,7 +1,7 @@
 """The emulated robot as a client of a real MQTT broker.
 
 A broker must run at the address of the settings, as for the real robot. The robot receives every
-message on it, except on topics that the driver subscribes to: there the robot itself publishes.
+message of the broker, except on topics to which the driver subscribes: the robot publishes those.
 """
 
 import asyncio
@@ -21,9 +21,9 @@ __all__ = ["MqttRobot"]
 
 OPEN_S = 5.0
 AGAIN_S = 1.0
-"""Pause before a new attempt, after the broker has gone."""
+"""Delay before a new attempt after the loss of the broker, in seconds."""
 _NOT_OURS = ("client_id", "will")
-"""Options that the driver keeps: two clients of one name would disconnect each other."""
+"""Options of the driver alone: two clients of one name would disconnect each other."""
 
 log = logging.getLogger(__name__)
 
@@ -83,7 +83,7 @@ class MqttRobot:
             return None
 
         async def put(said: Sequence[Payload]) -> None:
-            with suppress(TransportError):  # the broker has gone: `take` sees it, too
+            with suppress(TransportError):  # the broker is gone: `take` notices it, too
                 for payload in said:
                     if isinstance(payload, Envelope) and payload.verb == "message":
                         topic = payload.attributes.get("topic")

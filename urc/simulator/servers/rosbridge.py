@@ -390,7 +390,7 @@ class RosbridgeServer(MessageServer):
     def __init__(self, context: ServerContext) -> None:
         """Prepare the server; `open` listens."""
         super().__init__(context)
-        # A bridge spells types as its ROS does. A document without a version means ROS 2.
+        # A bridge names types in the style of its ROS version. The default is ROS 2.
         ros = {1: 1, 2: 2, "auto": 2}.get(context.options.get("ros"))
         types = {name: str(how.get("type") or "") for name, how in context.topics.items()}
         self._bridge = Bridge({name: spelled(kind, "msg", ros) for name, kind in types.items()})
@@ -410,7 +410,7 @@ class RosbridgeServer(MessageServer):
         clock = asyncio.get_running_loop().time
 
         def send(frame: str | bytes) -> None:
-            # Neither waits: a message to one client must not delay the others.
+            # No wait: a message to one client must not delay the others.
             if socket.transport.get_write_buffer_size() <= MAX_UNSENT_BYTES:
                 broadcast([socket], frame)
 
@@ -418,7 +418,7 @@ class RosbridgeServer(MessageServer):
         asked: list[tuple[Envelope, int]] = []
 
         async def take() -> Payload | None:
-            if asked:  # answered by now, or never
+            if asked:  # with the reply, if there is any
                 envelope, faults = asked.pop()
                 if client.line.faults > faults:
                     member.refuses(envelope)

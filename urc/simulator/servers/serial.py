@@ -40,7 +40,7 @@ class SerialServer:
         return await self._server.open()
 
     async def close(self) -> None:
-        """Unplug it."""
+        """Remove the port."""
         await self._server.close()
 
 

@@ -1,7 +1,7 @@
 """The emulated robot behind an SSH server.
 
-A shell, or the command that the driver starts, talks to the robot. Forwarded connections lead to
-the other lines of the same robot, and to nothing else.
+A shell, or the command of the driver, talks to the robot. Forwarded connections only lead to the
+other transports of the same robot.
 """
 
 import asyncio
@@ -33,7 +33,7 @@ __all__ = ["SshServer"]
 LOGIN_WITHIN_S = 10.0
 _WINDOW = 65536
 _NOT_FOUND = 127
-"""What a shell says of a command that it does not know."""
+"""Exit status of a shell for an unknown command."""
 
 
 class SshServer(ListeningServer):
@@ -96,18 +96,18 @@ class SshServer(ListeningServer):
 
 
 class _Lock:
-    """The credentials that the driver's options name."""
+    """The credentials in the driver's options."""
 
     def __init__(self, context: ServerContext) -> None:
         options = context.options
         self.username = str(options.get("username", ""))
         self.options: dict[str, Any] = {}
-        """Options with which the driver's transport logs in."""
+        """Login options for the driver's transport."""
         self.password = str(options.get("password") or "")
         self._key: asyncssh.SSHKey | None = None
         self._takes_any_key = options.get("agent") is True
         if context.is_anywhere:
-            # The emulated robot needs no key of the real one.
+            # The emulated robot does not need the key of the real one.
             self.password = secrets.token_urlsafe(16)
             self.options = {"password": self.password, "key": None, "agent": False}
         elif key := str(options.get("key") or ""):
@@ -221,13 +221,13 @@ class _Talk:
 
 
 def _own_key() -> asyncssh.SSHKey:
-    """Return the host key of this user's emulated robots: made once, so that it is trusted once."""
+    """Return this user's host key for emulated robots; it is kept, so that it is trusted once."""
     file = data_folder() / "simulator_host_key"
     try:
         return asyncssh.read_private_key(file)
     except (OSError, asyncssh.KeyImportError):
         key = asyncssh.generate_private_key("ssh-ed25519")
-    with suppress(OSError):  # then it is another one the next time
+    with suppress(OSError):  # without a file the next start makes another one
         file.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
         _write(file, key.export_private_key("openssh"))
     return key
@@ -242,7 +242,7 @@ def _write(file: Path, content: bytes) -> None:
 def _private_key(
     context: ServerContext, key: str, passphrase: str | None
 ) -> asyncssh.SSHKey | None:
-    """Return the key of the options; None when this machine does not have it."""
+    """Return the key in the options; None if this machine lacks it."""
     try:
         if "-----BEGIN" in key:
             return asyncssh.import_private_key(key.strip() + "\n", passphrase)

@@ -1,4 +1,4 @@
-"""The emulated robot behind a TCP port, or calling the driver (``mode: listen``)."""
+"""The emulated robot behind a TCP port, or as a client of the driver (``mode: listen``)."""
 
 import asyncio
 import socket
@@ -13,7 +13,7 @@ from urc.simulator.servers.listening import StreamServer
 __all__ = ["TcpServer"]
 
 CALLS_EVERY_S = 0.5
-"""Pause between two attempts of a robot that calls the driver."""
+"""Pause between two attempts to connect to the driver, in seconds."""
 
 
 class TcpServer(StreamServer):
@@ -25,13 +25,13 @@ class TcpServer(StreamServer):
         self._calls: asyncio.Task[None] | None = None
 
     async def open(self) -> Endpoint:
-        """Listen on the port of the options, or on any; or call the driver that listens."""
+        """Listen on the port of the options, or on any port; or connect to a listening driver."""
         if self._context.options.get("mode") == "listen":
             return self._call(self._port())
         return await super().open()
 
     async def close(self) -> None:
-        """Stop calling and listening, and cut every connection."""
+        """Stop connecting and listening, and close every connection."""
         if self._calls is not None:
             self._calls.cancel()
             await asyncio.gather(self._calls, return_exceptions=True)

@@ -59,7 +59,7 @@ class _Talk:
                 typed = self._keys.read(typed)
             if typed:
                 return typed
-            # A client that only negotiates must take the answers, too.
+            # A client that only negotiates must read the responses, too.
             async with asyncio.timeout(TAKEN_WITHIN_S):
                 await self._writer.drain()
         return b""

@@ -1,8 +1,8 @@
 """The emulated robot behind a UDP port.
 
 A client is the source address of a datagram. If the driver listens on a port (``listen``), the
-robot sends there from the start: to this machine, until one of its UDP ports receives a datagram
-from another host.
+robot sends there from the start. It sends to this machine until one of its UDP ports receives a
+datagram from another host.
 """
 
 import asyncio
@@ -40,7 +40,7 @@ class UdpServer(asyncio.DatagramProtocol):
         self._line: asyncio.DatagramTransport | None = None
         self._inboxes: dict[_Address, asyncio.Queue[bytes]] = {}
         self._told: _Address | None = None
-        """Where the driver listens."""
+        """Address on which the driver listens."""
 
     async def open(self) -> Endpoint:
         """Bind the port of the options, or any free port."""
@@ -111,7 +111,7 @@ class UdpServer(asyncio.DatagramProtocol):
         await converse(self._context, client, inbox.get, put)
 
     def _now_at(self, address: _Address) -> _Address:
-        """Return the address to send to: unasked, the robot sends to its last peer."""
+        """Return the address for unsolicited datagrams: the robot sends to its last peer."""
         last_peer = self._context.last_peer
         if address != self._told or last_peer is None or not last_peer.host:
             return address

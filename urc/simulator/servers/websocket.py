@@ -27,7 +27,7 @@ class MessageServer(ListeningServer):
 
     async def _listen(self, host: str, port: int) -> Listener:
         server = await self._serve(host, port)
-        # `Clients` cuts the connections: no closing handshake with each.
+        # `Clients` closes the connections, without a closing handshake each.
         refuse = partial(server.close, close_connections=False)
         return Listener(next(iter(server.sockets)).getsockname(), refuse, server.wait_closed)
 
@@ -74,7 +74,7 @@ class WebSocketServer(UrlServer, MessageServer):
         )
 
     def _check(self, socket: ServerConnection, request: Request) -> Response | None:
-        """Refuse who asks for another path, or may not come in."""
+        """Refuse an unknown path, or a client without valid credentials."""
         given = request.headers.get("Authorization", "")
         challenge = self._auth.challenge("GET", request.path, given)
         if challenge is not None:

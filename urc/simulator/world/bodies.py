@@ -1,7 +1,7 @@
-"""How bodies move: one step of each kind, from what it is told.
+"""Motion of bodies: one step of each kind, from its inputs.
 
-Pure. Metres, seconds, radians; x ahead, y to the left, z up, as REP 103 says. Wheels follow the arc
-of the step exactly, so that the length of a step does not matter while nothing changes.
+Pure. Metres, seconds, radians; x ahead, y to the left, z up, as in REP 103. Wheels follow the exact
+arc of the step, so the length of a step does not matter while the inputs are constant.
 """
 
 import math
@@ -15,16 +15,16 @@ __all__ = ["GRAVITY", "Motion", "joints_of", "legs_of", "move"]
 
 GRAVITY: Final = 9.80665
 _LANDS_AT: Final = 0.4
-"""Speed with which a quadrotor goes down to land, in m/s."""
+"""Descent speed of a landing quadrotor, in m/s."""
 _LEAN: Final = 0.02
-"""Radians that a body on springs leans for each m/s²."""
+"""Lean of a body on springs, in radians for each m/s²."""
 
 Inputs = Mapping[str, float]
 
 
 @dataclass(slots=True)
 class Motion:
-    """Where a body is, and how it moves."""
+    """Pose and velocity of a body."""
 
     x: float = 0.0
     y: float = 0.0
@@ -35,34 +35,34 @@ class Motion:
     pitch: float = 0.0
     """Nose down is positive."""
     forward: float = 0.0
-    """Speed along its own x; so `sideways` and `climb`."""
+    """Speed along its own x axis; `sideways` and `climb` are those along y and z."""
     sideways: float = 0.0
     climb: float = 0.0
     turn: float = 0.0
-    """To the left, in rad/s."""
+    """Turn rate to the left, in rad/s."""
     steer: float = 0.0
-    """Of the front wheels."""
+    """Steering angle of the front wheels."""
     phase: float = 0.0
-    """Of the wave along a body, in turns."""
+    """Phase of the wave along a body, in turns."""
     drive: float = 0.0
-    """How strong the wave is, 0 to 1."""
+    """Strength of the wave, 0 to 1."""
     bend: float = 0.0
-    """-1 to 1, to the left."""
+    """Bend, -1 to 1, to the left."""
     is_up: bool = False
-    """It flies and has reached its height once."""
+    """Whether it flies and has reached its height once."""
     accelerations: list[float] = field(default_factory=lambda: [0.0, 0.0, 0.0])
-    """Along its own axes, without gravity."""
+    """Accelerations along its own axes, without gravity."""
     rates: list[float] = field(default_factory=lambda: [0.0, 0.0])
-    """Of roll and pitch."""
+    """Rates of roll and pitch."""
     told_forward: float = 0.0
-    """What its wheels or tracks do, whatever comes of it; so `told_turn`."""
+    """Speed of its wheels or tracks, also against an obstacle; likewise `told_turn`."""
     told_turn: float = 0.0
     effort: float = 0.0
-    """Share of its strength that is in use, 0 to 1."""
+    """Used share of its power, 0 to 1."""
 
 
 def move(body: BodySpec, motion: Motion, inputs: Inputs, dt_s: float) -> None:
-    """Move for `dt_s` seconds as `inputs` say; walls are the world's matter."""
+    """Move for `dt_s` seconds with `inputs`; the world handles collisions."""
     before = motion.forward, motion.sideways, motion.climb, motion.roll, motion.pitch
     _MOVES[body.type](body, motion, inputs, dt_s)
     turn = motion.turn
@@ -76,7 +76,7 @@ def move(body: BodySpec, motion: Motion, inputs: Inputs, dt_s: float) -> None:
 
 
 def joints_of(body: BodySpec, motion: Motion) -> tuple[float, ...]:
-    """Return the angle of each joint from the head on: a wave that runs down, about a bend."""
+    """Return the angle of each joint from the head on: a travelling wave around a bend."""
     return tuple(
         motion.drive * body.amplitude * math.sin(2 * math.pi * (motion.phase - place / body.joints))
         + motion.bend * body.amplitude / 3
@@ -111,7 +111,7 @@ def _within(value: float, most: float) -> float:
 
 
 def _arc(motion: Motion, dt_s: float) -> None:
-    """Go along the arc of the present speeds."""
+    """Follow the arc of the present speeds."""
     angle = motion.turn * dt_s
     if abs(angle) < 1e-9:
         sine, cosine = dt_s, angle * dt_s / 2
@@ -175,7 +175,7 @@ def _swimmer(body: BodySpec, motion: Motion, inputs: Inputs, dt_s: float) -> Non
     motion.phase = (motion.phase + body.frequency * motion.drive * dt_s) % 1.0
     target = body.speed * motion.drive * (1 - 0.4 * abs(motion.bend))
     motion.forward = _toward(motion.forward, target, body.acceleration * dt_s)
-    # Only a wave that runs turns a bent body.
+    # A bent body only turns while the wave runs.
     motion.turn = body.turn * motion.bend * motion.drive
     motion.told_forward, motion.told_turn = motion.forward, motion.turn
     motion.effort = motion.drive
@@ -199,7 +199,7 @@ def _quadrotor(body: BodySpec, motion: Motion, inputs: Inputs, dt_s: float) -> N
     if motion.z == 0.0 and motion.climb <= 0:
         motion.climb, motion.forward, motion.sideways, motion.turn = 0.0, 0.0, 0.0, 0.0
         motion.is_up = False
-    # It leans into what accelerates it, and a little against the air.
+    # It leans into its acceleration, and a little against the drag.
     along = (motion.forward - before[0]) / dt_s + 0.4 * motion.forward
     across = (motion.sideways - before[1]) / dt_s + 0.4 * motion.sideways
     motion.pitch += (math.atan(along / GRAVITY) - motion.pitch) * 0.2
@@ -212,7 +212,7 @@ def _quadrotor(body: BodySpec, motion: Motion, inputs: Inputs, dt_s: float) -> N
 def _climb(
     body: BodySpec, motion: Motion, inputs: Inputs, flies: bool, cut: bool, dt_s: float
 ) -> float:
-    """Return the new speed upwards: it rises to its height by itself, lands, or falls."""
+    """Return the new vertical speed: it climbs to its height by itself, lands, or falls."""
     if cut:
         return motion.climb - GRAVITY * dt_s
     if not flies:

@@ -1,6 +1,6 @@
 """A laser scanner: rays from the middle of the robot, with noise.
 
-Pure. Imports numpy, so it is imported only where it is read.
+Pure. It imports numpy, so it is imported on first use.
 """
 
 import math
@@ -14,11 +14,11 @@ from urc.simulator.world.sensors import Moment
 __all__ = ["sweep"]
 
 _HEIGHT_M = 0.15
-"""Of the scanner above the robot's foot."""
+"""Height of the scanner above the robot's foot, in metres."""
 
 
 def sweep(faces: Faces, moment: Moment) -> Mapping[str, object]:
-    """Return ``world.laser``; a ray that meets nothing within reach has None."""
+    """Return ``world.laser``; a ray without echo within range has None."""
     spec, motion = moment.spec.laser, moment.motion
     step = (spec.last - spec.first) / spec.rays
     angles = motion.yaw + spec.first + step * np.arange(spec.rays, dtype=np.float64)

@@ -1,7 +1,7 @@
-"""What a camera of the emulated robot sees, as JPEG: walls, ground and sky, drawn by rays.
+"""The camera image of the emulated robot, as JPEG: walls, ground and sky, drawn by rays.
 
-Pure. Imports numpy and Pillow, so it is imported only where somebody looks. Each column of the
-picture is one direction on the ground; what stands there is drawn from the farthest to the nearest.
+Pure. It imports numpy and Pillow, so it is imported on first use. Each column of the image is one
+direction on the ground; its obstacles are drawn from the farthest to the nearest.
 """
 
 import io
@@ -20,23 +20,23 @@ __all__ = ["Eye", "camera_picture", "jpeg", "panorama_picture"]
 
 Array = NDArray[np.float32]
 _BINS: Final = 1440
-"""Directions on the ground, all round."""
+"""Number of directions around the camera."""
 _LAYERS: Final = 4
-"""Edges behind each other that are looked at: a low box hides only the foot of the wall."""
+"""Most edges in one direction that are drawn: a low box hides only the foot of the wall."""
 _SKY: Final = ((150, 184, 222), (226, 233, 240))
-"""Above, and at the horizon."""
+"""Colour of the sky at the top, and at the horizon."""
 _GROUNDS: Final = {
     "floor": ((150, 146, 138), (128, 124, 118)),
     "grass": ((104, 138, 84), (92, 126, 74)),
     "water": ((70, 122, 150), (62, 112, 142)),
 }
 _FAR_M: Final = 25.0
-"""Here half of a colour has become that of the horizon."""
+"""Distance at which a colour is half that of the horizon, in metres."""
 _QUALITY: Final = 80
 
 
 class Eye(NamedTuple):
-    """Where the camera is and how it is held; metres and radians."""
+    """Pose of the camera; metres and radians."""
 
     x: float
     y: float
@@ -51,14 +51,14 @@ class Eye(NamedTuple):
 def camera_picture(
     plan: Plan, faces: Faces, eye: Eye, size: tuple[int, int], view: float
 ) -> NDArray[np.uint8]:
-    """Return what is seen ahead, rows by columns by red, green and blue.
+    """Return the image ahead, as rows by columns by red, green and blue.
 
     Args:
-        plan: where the camera is.
-        faces: of that plan.
-        eye: of the camera.
+        plan: the obstacles.
+        faces: edges of the plan.
+        eye: pose of the camera.
         size: columns and rows.
-        view: angle from the left to the right edge, below pi.
+        view: horizontal field of view, below pi.
     """
     ahead = _straight(*size, view)
     rotated = ahead @ _rotation(eye.pitch, eye.roll).T
@@ -70,7 +70,7 @@ def camera_picture(
 def panorama_picture(
     plan: Plan, faces: Faces, eye: Eye, size: tuple[int, int]
 ) -> NDArray[np.uint8]:
-    """Return all that is seen: a column a direction, ahead in the middle, a row a height."""
+    """Return the panorama: a column for each direction, a row for each height."""
     columns, rows = size
     azimuth = np.linspace(math.pi, -math.pi, columns, endpoint=False, dtype=np.float32)
     height = np.linspace(math.pi / 2 - 0.01, -math.pi / 2 + 0.01, rows, dtype=np.float32)
@@ -88,7 +88,7 @@ def panorama_picture(
 
 
 def jpeg(picture: NDArray[np.uint8], *, flip: bool = False, mirror: bool = False) -> bytes:
-    """Return a picture as JPEG, turned upside down or mirrored if need be."""
+    """Return an image as JPEG, optionally upside down or mirrored."""
     if flip:
         picture = picture[::-1]
     if mirror:
@@ -100,7 +100,7 @@ def jpeg(picture: NDArray[np.uint8], *, flip: bool = False, mirror: bool = False
 
 @lru_cache(maxsize=8)
 def _straight(columns: int, rows: int, view: float) -> Array:
-    """Return the direction of each point for a camera that is held level: ahead, left, up."""
+    """Return the direction of each pixel for a level camera: ahead, left, up."""
     focus = columns / 2 / math.tan(view / 2)
     left = (columns / 2 - 0.5 - np.arange(columns, dtype=np.float32)) / focus
     up = (rows / 2 - 0.5 - np.arange(rows, dtype=np.float32)) / focus
@@ -110,7 +110,7 @@ def _straight(columns: int, rows: int, view: float) -> Array:
 
 
 def _rotation(pitch: float, roll: float) -> Array:
-    """Return what turns a direction of the camera into one of the level world, but for yaw."""
+    """Return the rotation from camera directions to level directions, without yaw."""
     sp, cp, sr, cr = math.sin(pitch), math.cos(pitch), math.sin(roll), math.cos(roll)
     rows = ((cp, sp * sr, sp * cr), (0.0, cr, -sr), (-sp, cp * sr, cp * cr))
     return np.array(rows, dtype=np.float32)
@@ -149,7 +149,7 @@ def _open_country(plan: Plan, eye: Eye, direction: Array, slope: Array) -> Array
 def _paint_edges(
     picture: Array, faces: Faces, eye: Eye, bins: NDArray[np.int32], slope: Array
 ) -> None:
-    """Draw what stands there, from the farthest to the nearest."""
+    """Draw the obstacles, from the farthest to the nearest."""
     horizon = np.array(_SKY[1], dtype=np.float32)
     angles = (np.arange(_BINS, dtype=np.float64) + 0.5) * (2 * math.pi / _BINS)
     distance, share = cast(faces, eye.x, eye.y, angles)
@@ -160,7 +160,7 @@ def _paint_edges(
         far = distance[rows, which]
         if not np.isfinite(far).any():
             continue
-        # Faces along x are a little darker than those along y; stripes show how fast one goes by.
+        # Faces along x are a little darker than those along y; stripes make speed visible.
         shade = 0.82 + 0.18 * np.abs(faces.along[which, 0]) / np.maximum(faces.length[which], 1e-6)
         stripe = np.floor(share[rows, which] * faces.length[which] * 2).astype(np.int64) & 1
         colour = faces.colour[which] * (shade * (1 - 0.08 * stripe))[:, None]

@@ -1,4 +1,4 @@
-"""What stands in the world: edges to bump into and to see, and holes.
+"""The map of the world: obstacles as edges, and holes.
 
 Pure. Lengths in metres.
 """
@@ -26,12 +26,12 @@ class Edge(NamedTuple):
 
 
 class Touch(NamedTuple):
-    """Where a circle went into an edge."""
+    """Overlap of a circle with an edge."""
 
     x: float
     y: float
     depth: float
-    """How far, at least 0."""
+    """Depth of the overlap, at least 0."""
 
 
 ROOM: Final = PlanSpec(
@@ -54,15 +54,15 @@ ROOM: Final = PlanSpec(
     ),
     holes=(Box(5.2, -0.6, 1.0, 1.0),),
 )
-"""The room that every robot has by itself: 10 by 7 m, two halves with a door between them, boxes,
-four coloured posts, and stairs down."""
+"""The default room, 10 by 7 m: two halves with a door between them, boxes, four coloured posts, and
+stairs down."""
 
 
 class Plan:
-    """A plan, ready to be moved about in."""
+    """A map, prepared for collision tests."""
 
     def __init__(self, spec: PlanSpec) -> None:
-        """Take what `spec` says."""
+        """Prepare the obstacles of `spec`."""
         self.spec = spec
         edges = [Edge(*wall) for wall in spec.walls]
         for box in spec.boxes:
@@ -71,7 +71,7 @@ class Plan:
 
     @cached_property
     def bounds(self) -> tuple[float, float, float, float]:
-        """Least x and y, greatest x and y of what there is; a square of 10 m around nothing."""
+        """Least x and y, greatest x and y of all obstacles; a square of 10 m without obstacles."""
         if not self.edges:
             return -5.0, -5.0, 5.0, 5.0
         xs = [value for edge in self.edges for value in (edge.x1, edge.x2)]
@@ -79,7 +79,7 @@ class Plan:
         return min(xs), min(ys), max(xs), max(ys)
 
     def touch(self, x: float, y: float, z: float, radius: float) -> Touch | None:
-        """Return where a circle at a height goes deepest into an edge; None when it is free."""
+        """Return the deepest overlap of a circle at a height with an edge; None if it is free."""
         deepest: Touch | None = None
         for edge in self.edges:
             if z >= edge.height:
@@ -91,7 +91,7 @@ class Plan:
         return deepest
 
     def is_hole(self, x: float, y: float) -> bool:
-        """Return whether the ground is missing there."""
+        """Return whether the ground is missing at a point."""
         return any(
             abs(x - hole.x) <= hole.width / 2 and abs(y - hole.y) <= hole.depth / 2
             for hole in self.spec.holes

@@ -1,6 +1,6 @@
 """Rays against the edges of a plan, all at once.
 
-Pure. Imports numpy, so it is imported only where something is looked at.
+Pure. It imports numpy, so it is imported on first use.
 """
 
 from typing import Final
@@ -17,10 +17,10 @@ _NEAREST: Final = 1e-6
 
 
 class Faces:
-    """The edges of a plan as columns of numbers."""
+    """The edges of a plan as arrays."""
 
     def __init__(self, plan: Plan) -> None:
-        """Take the edges as they are."""
+        """Convert the edges of `plan`."""
         edges: tuple[Edge, ...] = plan.edges
         self.start: Numbers = np.array([(one.x1, one.y1) for one in edges]).reshape(-1, 2)
         end: Numbers = np.array([(one.x2, one.y2) for one in edges]).reshape(-1, 2)
@@ -31,16 +31,16 @@ class Faces:
 
 
 def cast(faces: Faces, x: float, y: float, angles: Numbers) -> tuple[Numbers, Numbers]:
-    """Return how far each ray goes to each edge, and where along the edge it meets it.
+    """Return distance and position along the edge, for each ray and each edge.
 
     Args:
-        faces: what is there.
-        x: where the rays begin.
-        y: where the rays begin.
-        angles: of the rays, in radians from the x axis to the left.
+        faces: the edges.
+        x: origin of the rays.
+        y: origin of the rays.
+        angles: directions of the rays, in radians from the x axis to the left.
 
     Returns:
-        Two arrays of rays by edges: metres, ``inf`` where they do not meet; and 0 to 1.
+        Two arrays of rays by edges: metres, ``inf`` without intersection; and 0 to 1.
     """
     cosine, sine = np.cos(angles)[:, None], np.sin(angles)[:, None]
     ax, ay = faces.start[:, 0] - x, faces.start[:, 1] - y
@@ -54,7 +54,7 @@ def cast(faces: Faces, x: float, y: float, angles: Numbers) -> tuple[Numbers, Nu
 
 
 def first_hits(faces: Faces, x: float, y: float, z: float, angles: Numbers) -> Numbers:
-    """Return how far each ray at the height `z` goes, ``inf`` where it meets nothing."""
+    """Return the range of each ray at the height `z`, ``inf`` without an edge."""
     if not len(faces.height):
         return np.full(len(angles), np.inf)
     distance, _ = cast(faces, x, y, angles)

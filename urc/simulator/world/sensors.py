@@ -1,7 +1,7 @@
-"""What the sensors of an emulated robot tell of its world.
+"""The sensors of an emulated robot in its world.
 
-Pure. Every reading is a number for people as documents have them: metres, radians, seconds, volts;
-only bearings and places on the earth are degrees.
+Pure. Readings are in metres, radians, seconds and volts; only bearings, latitudes and longitudes
+are in degrees.
 """
 
 import math
@@ -18,17 +18,17 @@ __all__ = ["Battery", "Moment", "Odometry", "contact", "gps", "imu", "odometry",
 
 _EQUATOR_M: Final = 6378137.0
 _SQUARE_OF_ECCENTRICITY: Final = 0.00669437999014
-"""Of the ellipsoid WGS 84."""
+"""Squared eccentricity of the ellipsoid WGS 84."""
 _EMPTY: Final = 5.0
-"""Per cent at which a battery is changed by somebody,"""
+"""Battery level at which the simulation replaces the battery, in per cent."""
 _CHANGED_AFTER_S: Final = 30.0
-"""once the robot has stood still so long: a demo must not end because nobody charges it."""
+"""Standstill before the replacement, in seconds: a demo must not end with an empty battery."""
 _REACH_M: Final = 0.06
-"""How far cliff sensors look over the robot's edge."""
+"""Distance of cliff sensors beyond the robot's edge, in metres."""
 
 
 class Moment(NamedTuple):
-    """All that a sensor may look at."""
+    """The inputs of all sensors."""
 
     spec: WorldSpec
     plan: Plan
@@ -36,17 +36,17 @@ class Moment(NamedTuple):
     touch: Touch | None
     tick: int
     time_s: float
-    """Since the epoch."""
+    """Time, in seconds since the epoch."""
     noise: float = 1.0
-    """How many times as noisy as declared."""
+    """Factor on the declared noise."""
 
     def gauss(self, name: str) -> float:
-        """Return this moment's error of deviation 1."""
+        """Return this moment's error with a standard deviation of 1."""
         return self.noise * gauss(self.spec.seed, self.tick, name)
 
 
 def quaternion(roll: float, pitch: float, yaw: float) -> tuple[float, float, float, float]:
-    """Return x, y, z, w of three turns, about z, then y, then x."""
+    """Return x, y, z, w of three rotations, about z, then y, then x."""
     sr, cr = math.sin(roll / 2), math.cos(roll / 2)
     sp, cp = math.sin(pitch / 2), math.cos(pitch / 2)
     sy, cy = math.sin(yaw / 2), math.cos(yaw / 2)
@@ -59,10 +59,10 @@ def quaternion(roll: float, pitch: float, yaw: float) -> tuple[float, float, flo
 
 
 class Odometry:
-    """Where the robot thinks it is, by its wheels: always a little wrong, the same way."""
+    """Pose from the wheels, with a constant systematic error."""
 
     def __init__(self, spec: WorldSpec) -> None:
-        """Begin where the world begins."""
+        """Begin at the start pose of the world."""
         self.x, self.y, self.yaw = spec.start
         scale = spec.odometry.scale
         self._stride = 1 + scale * (2 * uniform(spec.seed, 0, "stride") - 1)
@@ -70,11 +70,11 @@ class Odometry:
         track = spec.body.track
         self._half_track = spec.body.radius * 0.8 if track is None else track / 2
         self.left = 0.0
-        """Metres that the left wheel has turned; backwards counts back."""
+        """Distance of the left wheel, in metres; backwards counts down."""
         self.right = 0.0
 
     def step(self, motion: Motion, dt_s: float, noise: float) -> None:
-        """Reckon one step on."""
+        """Integrate one step."""
         stride, turn = 1 + noise * (self._stride - 1), 1 + noise * (self._turn - 1)
         ahead, angle = motion.told_forward * stride * dt_s, motion.told_turn * turn * dt_s
         aside = motion.sideways * stride * dt_s
@@ -110,7 +110,7 @@ def odometry(moment: Moment, reckoned: Odometry) -> Mapping[str, object]:
 
 
 def imu(moment: Moment) -> Mapping[str, object]:
-    """Return ``world.imu``: what an accelerometer feels, gravity included, and how it lies."""
+    """Return ``world.imu``: acceleration with gravity, and attitude."""
     motion = moment.motion
     roll = motion.roll + 0.001 * moment.gauss("roll")
     pitch = motion.pitch + 0.001 * moment.gauss("pitch")
@@ -138,7 +138,7 @@ def imu(moment: Moment) -> Mapping[str, object]:
 
 
 def place_on_earth(spec: WorldSpec, x: float, y: float) -> tuple[float, float]:
-    """Return latitude and longitude of a point some metres east (x) and north (y) of the datum."""
+    """Return latitude and longitude of a point, in metres east (x) and north (y) of the datum."""
     latitude, longitude, _ = spec.datum
     sine = math.sin(math.radians(latitude))
     root = 1 - _SQUARE_OF_ECCENTRICITY * sine * sine
@@ -179,14 +179,14 @@ def gps(moment: Moment) -> Mapping[str, object]:
 
 
 def _ddmm(degrees: float, width: int) -> str:
-    """Return degrees and minutes as NMEA 0183 writes them, without the hemisphere."""
+    """Return degrees and minutes in the format of NMEA 0183, without the hemisphere."""
     minutes = round(abs(degrees) * 60, 4)
     whole, rest = divmod(minutes, 60)
     return f"{int(whole):0{width}}{rest:07.4f}"
 
 
 def contact(moment: Moment) -> Mapping[str, object]:
-    """Return ``world.contact``: what is touched, and where the ground ends."""
+    """Return ``world.contact``: bumpers, and cliffs."""
     motion, body = moment.motion, moment.spec.body
     left = right = False
     if moment.touch is not None:
@@ -217,25 +217,25 @@ def _is_cliff(moment: Moment, body: BodySpec, angle: float) -> bool:
 
 
 class Battery:
-    """What the robot lives on; never below empty, and changed once it stands there with nothing."""
+    """The battery; never below empty, and replaced once the robot stands still without charge."""
 
     def __init__(self, spec: WorldSpec) -> None:
         """Begin with the declared level."""
         self._spec = spec.battery
         self.charge = spec.battery.capacity * spec.battery.level / 100
-        """A·h."""
+        """Charge, in A·h."""
         self.current = spec.battery.idle
-        """A that are drawn now."""
+        """Present current, in A."""
         self._stands_s = 0.0
-        """Time that it has stood still with an empty battery."""
+        """Time at standstill with an empty battery, in seconds."""
 
     @property
     def level(self) -> float:
-        """0 to 100 %."""
+        """Level, 0 to 100 %."""
         return 100 * self.charge / self._spec.capacity
 
     def step(self, effort: float, dt_s: float) -> None:
-        """Draw for `dt_s` seconds what a body at an effort of 0 to 1 needs."""
+        """Draw the current of a body at an effort of 0 to 1, for `dt_s` seconds."""
         self.current = self._spec.idle + self._spec.drive * effort
         self.charge = max(0.0, self.charge - self.current * dt_s / 3600)
         is_waiting = effort == 0 and self.level <= _EMPTY
@@ -244,11 +244,11 @@ class Battery:
             self.charge = self._spec.capacity * max(self._spec.level, 2 * _EMPTY) / 100
 
     def drain(self, level: float) -> None:
-        """Be at most at `level` per cent from now on."""
+        """Limit the charge to `level` per cent."""
         self.charge = min(self.charge, self._spec.capacity * level / 100)
 
     def readings(self) -> Mapping[str, object]:
-        """Return ``world.battery``; the current is positive while it is discharged."""
+        """Return ``world.battery``; a discharging current is positive."""
         spec, share = self._spec, self.level / 100
         sag = 0.02 * (spec.full - spec.empty) * self.current / max(spec.idle + spec.drive, 1e-6)
         voltage = spec.empty + (spec.full - spec.empty) * share - sag

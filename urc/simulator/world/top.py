@@ -1,6 +1,6 @@
-"""The world from above, as JPEG: for cards and pages that show what an emulated robot does.
+"""The world from above, as JPEG, for cards and pages of an emulated robot.
 
-Pure. Imports Pillow, so it is imported only where somebody looks.
+Pure. It imports Pillow, so it is imported on first use.
 """
 
 import io
@@ -22,13 +22,13 @@ _TRAIL: Final = "#7f8fa3"
 _ROBOT: Final = "#1f6fd6"
 _NOSE: Final = "#ffffff"
 _OPEN_M: Final = 8.0
-"""Width of what is shown where nothing stands."""
+"""Width of the image in a world without obstacles, in metres."""
 
 Point = tuple[float, float]
 
 
 class _Map:
-    """From metres to points of the picture."""
+    """The transform from metres to pixels."""
 
     def __init__(self, plan: Plan, motion: Motion, size: tuple[int, int]) -> None:
         low_x, low_y, high_x, high_y = plan.bounds
@@ -47,13 +47,13 @@ class _Map:
 def top_picture(
     plan: Plan, body: BodySpec, motion: Motion, trail: Iterable[Point], size: tuple[int, int]
 ) -> bytes:
-    """Return the picture, north (y) up.
+    """Return the image, north (y) up.
 
     Args:
-        plan: what stands there.
-        body: of the robot.
-        motion: where it is.
-        trail: where it was, the oldest first.
+        plan: the obstacles.
+        body: shape of the robot.
+        motion: pose of the robot.
+        trail: its past positions, oldest first.
         size: columns and rows, at least 16 each.
     """
     place = _Map(plan, motion, size)
@@ -85,7 +85,7 @@ def top_picture(
 
 
 def _draw_grid(draw: ImageDraw.ImageDraw, place: _Map, motion: Motion) -> None:
-    """Draw lines a metre apart, so that one sees it move where nothing stands."""
+    """Draw lines a metre apart, so that motion is visible in open space."""
     reach = math.ceil(max(place.size) / place.scale)
     for step in range(-reach, reach + 1):
         x, y = math.floor(motion.x) + step, math.floor(motion.y) + step
@@ -101,7 +101,7 @@ def _draw_robot(draw: ImageDraw.ImageDraw, place: _Map, body: BodySpec, motion: 
         return
     x, y = place(motion.x, motion.y)
     radius = max(5.0, body.radius * place.scale)
-    if motion.z > 0.02:  # its shadow stays behind while it rises
+    if motion.z > 0.02:  # its shadow stays behind while it climbs
         shift = min(20.0, motion.z * place.scale / 4)
         _dot(draw, (x + shift, y + shift), radius, "#a9a9a4")
     _dot(draw, (x, y), radius, _ROBOT)
@@ -120,7 +120,7 @@ def _dot(draw: ImageDraw.ImageDraw, at: Point, radius: float, colour: str) -> No
 
 
 def _spine(body: BodySpec, motion: Motion) -> list[Point]:
-    """Return the points of a body of joints, from the head to the tail."""
+    """Return the points of a jointed body, from the head to the tail."""
     length = 3 * body.radius / max(1, body.joints) * 2
     x, y = motion.x, motion.y
     angle = motion.yaw + math.pi

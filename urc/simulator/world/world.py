@@ -1,7 +1,7 @@
-"""One emulated robot in its world: a body that is told what to do, and sensors that tell of it.
+"""The world of one emulated robot: a body with inputs, and sensors.
 
-Pure: no clock, no socket. Time is passed in; the world goes on in steps of `STEP_S`, however often
-it is looked at, so that the same commands at the same times give the same world.
+Pure: no clock, no socket. The time is an argument, and the world advances in steps of `STEP_S`. The
+same commands at the same times therefore give the same world, however often it is observed.
 """
 
 import math
@@ -30,30 +30,30 @@ if TYPE_CHECKING:
 __all__ = ["FARTHEST_S", "STEP_S", "View", "World"]
 
 STEP_S: Final = 0.02
-"""Length of a step."""
+"""Length of a step, in seconds."""
 FARTHEST_S: Final = 60.0
-"""Most that is made up for: a world that nobody looks at for longer stands still for the rest."""
+"""Longest simulated gap between two observations, in seconds; the rest of the gap is skipped."""
 _ASKED_EVERY_S: Final = 0.1
-"""How often inputs that depend on the time are asked for while much is made up for."""
+"""Interval for reading time-dependent inputs while a long gap is simulated, in seconds."""
 _TRAIL_EVERY_M: Final = 0.05
 _TRAIL_MOST: Final = 400
 _LOW: Final = 12.0
-"""Per cent of the battery that are left by the fault of that name."""
+"""Battery level of the fault of that name, in per cent."""
 _PANORAMA: Final = (512, 256)
-"""Columns and rows of a still that shows all around."""
+"""Columns and rows of a panorama image."""
 
 Inputs = Callable[[float], Mapping[str, float]]
-"""Time → what the body is told."""
+"""Time → inputs of the body."""
 
 
 class World:
     """One robot's world.
 
     Args:
-        spec: as declared.
-        inputs: gives the inputs of the body for a time; it may look at the world, which then
-            tells of the present step.
-        holds: whether something of the camera holds now, where a document has a template for it.
+        spec: the declaration.
+        inputs: returns the inputs of the body for a time; it may observe the world, which then
+            shows the present step.
+        holds: evaluates a condition about the camera, if a document has a template for it.
     """
 
     def __init__(
@@ -72,22 +72,22 @@ class World:
         self.tick = 0
         """Steps since the beginning."""
         self.time_s: float | None = None
-        """When the last step ended, in seconds since the epoch; None before the first look."""
+        """End of the last step, in seconds since the epoch; None before the first observation."""
         self.noise = 1.0
         self.dropped: set[str] = set()
-        """Names of `READINGS` that have failed: nothing reads them."""
+        """Names of failed `READINGS`, which have no value."""
         self._inputs = inputs
         self._holds = holds
         self._is_busy = False
         self._trail: deque[tuple[float, float]] = deque([(x, y)], _TRAIL_MOST)
         self._kept: dict[object, tuple[float, bytes]] = {}
-        """Picture → when it was made, and itself."""
+        """Kind of image → its time, and its bytes."""
         self._faces: Faces | None = None
 
     def advance(self, now_s: float) -> None:
-        """Go on to `now_s`, in whole steps; what is left waits for the next time."""
+        """Advance to `now_s` in whole steps; the remainder waits for the next call."""
         if self.time_s is None or now_s < self.time_s - FARTHEST_S:
-            self.time_s = now_s  # the first look, or the clock was put back
+            self.time_s = now_s  # the first observation, or the clock was set back
         if self._is_busy:
             return
         self.time_s = max(self.time_s, now_s - FARTHEST_S)
@@ -101,20 +101,18 @@ class World:
             self._is_busy = False
 
     def low_battery(self) -> None:
-        """Let the battery be nearly empty from now on."""
+        """Set the battery to nearly empty."""
         self.battery.drain(_LOW)
 
     def view(self, now_s: float) -> "View":
-        """Return what can be read at `now_s`."""
+        """Return the sensor view at `now_s`."""
         self.advance(now_s)
         return View(self)
 
     def top_view(self, width: int, height: int) -> bytes:
         """Return the world from above as JPEG, at most five new ones a second.
 
-        Args:
-            width: points, 16 to 2000.
-            height: points, 16 to 2000.
+        `width` and `height` are in pixels, 16 to 2000.
         """
         size = min(2000, max(16, width)), min(2000, max(16, height))
 
@@ -127,7 +125,7 @@ class World:
         return self._once(("top", size), 0.2, draw)
 
     def picture(self) -> bytes:
-        """Return what the robot's camera sees, as JPEG, at most ten new ones a second."""
+        """Return the robot's camera image as JPEG, at most ten new ones a second."""
         flip, mirror = self._holds(self.spec.camera.flip), self._holds(self.spec.camera.mirror)
 
         def draw() -> bytes:
@@ -142,7 +140,7 @@ class World:
         return self._once(("camera", flip, mirror), 0.1, draw)
 
     def panorama(self) -> bytes:
-        """Return all around as JPEG: left is behind, the middle ahead, a row a height."""
+        """Return a panorama as JPEG: ahead in the middle, a row for each height."""
 
         def draw() -> bytes:
             from urc.simulator.world.picture import jpeg, panorama_picture
@@ -198,7 +196,7 @@ class World:
             self._trail.append((motion.x, motion.y))
 
     def _collide(self) -> None:
-        """Put a body that went into something back to its edge."""
+        """Move a body that overlaps an obstacle back to its edge."""
         motion, self.touch = self.motion, None
         for _ in range(3):  # a corner has two edges
             touch = self.plan.touch(motion.x, motion.y, motion.z, self.spec.body.radius)
@@ -214,12 +212,12 @@ class World:
 
 
 class View(Mapping[str, object]):
-    """What can be read of a world now: the names of `READINGS`, made when they are asked for."""
+    """The sensor view of a world: the names of `READINGS`, computed on access."""
 
     __slots__ = ("_world",)
 
     def __init__(self, world: World) -> None:
-        """Look at `world`, which does not go on meanwhile."""
+        """Observe `world`, which must not advance meanwhile."""
         self._world = world
 
     def __getitem__(self, name: str) -> object:

@@ -125,7 +125,7 @@ class DevClient:
         except* WebSocketDisconnect:
             pass
         except* TimeoutError:
-            log.warning("a dev page took nothing for %g s and was cut off", STALL_S)
+            log.warning("a developer page took nothing for %g s and was disconnected", STALL_S)
             self._flow.abort()
         finally:
             self._watch.listeners.discard(self._news.set)
@@ -167,7 +167,7 @@ class DevClient:
                     self._put(note_row(one))
             if tap.dropped > dropped:
                 lost, dropped = tap.dropped - dropped, tap.dropped
-                text = f"{lost} pieces of traffic were lost: they came faster than they are read"
+                text = f"{lost} rows of traffic were lost: the server cannot keep up"
                 self._put(note_row(self._note(text)))
 
     def _note(self, text: str) -> Note:
@@ -241,12 +241,12 @@ class DevClient:
         except BadMessage as error:
             self._bad += 1
             if self._bad >= BAD_MESSAGES:
-                self._close(CLOSE_BAD_MESSAGES, f"{BAD_MESSAGES} messages could not be used")
+                self._close(CLOSE_BAD_MESSAGES, f"{BAD_MESSAGES} messages were invalid")
             else:
                 self._say(encode_error("bad-message", str(error)))
             return
         if len(self._answers) > MOST_ANSWERS:
-            self._close(CLOSE_TOO_FAST, "the answers are not taken")
+            self._close(CLOSE_TOO_FAST, "the page does not take its replies")
             return
         if isinstance(asked, Ping):
             self._say(encode_pong(asked, now_s))
@@ -254,7 +254,7 @@ class DevClient:
         try:
             self._questions.put_nowait(asked)
         except asyncio.QueueFull:
-            self._say(_refused(asked, f"{QUESTIONS} questions wait to be answered"))
+            self._say(_refused(asked, f"{QUESTIONS} requests are pending already"))
 
     def _close(self, code: int, reason: str) -> None:
         self._closing = (code, reason)
@@ -278,7 +278,7 @@ def _answered(asked: wire.Try | wire.Show, known: _Known) -> str:
     try:
         return _tried(asked, known) if isinstance(asked, wire.Try) else _shown(asked, known)
     except Exception as bug:  # a supervisor: a bug costs the answer
-        log.exception("a question of a dev page was not answered")
+        log.exception("a request of a developer page failed")
         return _refused(asked, f"it failed inside URC ({type(bug).__name__}: {bug})")
 
 

@@ -93,7 +93,7 @@ def _frames(
     for step in sequence.all_steps(command.steps):
         if isinstance(step, sequence.SendStep):
             if step.is_secret:
-                yield Written("", b"", f"sends something secret on {step.transport}")
+                yield Written("", b"", f"sends a secret on {step.transport}")
             else:
                 yield _written(driver, settings, step.transport, step.send, names)
         elif isinstance(step, sequence.RunStep) and depth < MOST_WITHIN:
@@ -118,7 +118,7 @@ def _run(
         }
         yield from _frames(driver, settings, inner, check_arguments(inner, given), depth + 1)
     except ExpressionError as error:
-        yield Written("", b"", f"what it is given is only known then: {error}")
+        yield Written("", b"", f"its arguments are only known at run time: {error}")
 
 
 def _written(
@@ -142,7 +142,7 @@ def _written(
 def _in_words(step: sequence.Step) -> str:
     match step:
         case sequence.ExpectStep(transport):
-            return f"waits for an answer on {transport}"
+            return f"waits for a reply on {transport}"
         case sequence.PromptStep(transport):
             return f"waits for a prompt on {transport}"
         case sequence.WaitStep(seconds):
@@ -150,11 +150,11 @@ def _in_words(step: sequence.Step) -> str:
         case sequence.UntilStep(condition):
             return f"waits until {condition.source}"
         case sequence.RepeatStep(_, times):
-            return f"repeats what follows, {times} times at most"
+            return f"repeats the next steps, at most {times} times"
         case sequence.SetStep(values):
             return f"sets {', '.join(values)}"
         case sequence.IfStep(condition):
-            return f"goes on only if {condition.source}, else by its other steps"
+            return f"continues if {condition.source}, else takes its other steps"
         case sequence.FailStep():
             return "ends without success"
         case sequence.RunStep(command) | sequence.SendStep(command):

@@ -125,7 +125,7 @@ class Dev:
         elif not self._is_here(websocket):
             await websocket.close(wire.CLOSE_NO_ROBOT, _ONLY_HERE)
         elif self._open >= CLIENTS:
-            await websocket.close(wire.CLOSE_FULL, f"{CLIENTS} dev pages are open already")
+            await websocket.close(wire.CLOSE_FULL, f"{CLIENTS} developer pages are open already")
         else:
             self._open += 1
             try:

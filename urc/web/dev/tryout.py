@@ -98,7 +98,7 @@ def pasted_bytes(text: str, *, is_hex: bool, encoding: str) -> bytes:
     """
     data = _from_hex(text) if is_hex else _from_text(text, encoding)
     if len(data) > MOST_BYTES:
-        raise UrcError(f"{len(data)} bytes; {MOST_BYTES} are tried out at a time")
+        raise UrcError(f"{len(data)} bytes; at most {MOST_BYTES} are parsed at a time")
     return data
 
 
@@ -188,7 +188,7 @@ def _take(
     reasons: tuple[str, ...] = ()
     if not takers:
         told = [f"{one.name}: {_why_not(_anew(frame), one, spec, settings)}" for one in asked]
-        reasons = tuple(told[:MOST_REASONS]) or (f"nothing is read on {spec.name}",)
+        reasons = tuple(told[:MOST_REASONS]) or (f"the driver reads nothing on {spec.name}",)
     return tuple(takers), reasons
 
 
@@ -232,13 +232,13 @@ def _why_not(
     except (BadItem, BadText) as error:
         return str(error)
     if found is not None and read.when is not None:
-        return f"its when is not true: {read.when.source}"
+        return f"its 'when' is not true: {read.when.source}"
     pattern = read.options.get("pattern")
     if isinstance(pattern, Pattern):
         return f"{pattern.source} does not match"
     if read.lines is not None:
-        return "it has several lines, and they are not complete"
-    return f"it cannot be read as this {read.form}"
+        return "the multiline reply is incomplete"
+    return f"it cannot be decoded as {read.form}"
 
 
 def _candidates(
@@ -297,7 +297,7 @@ def _from_hex(text: str) -> bytes:
     digits = re.sub(r"0[xX]|[\s,:;]", " ", text).split()
     for number, word in enumerate(digits, 1):
         if len(word) % 2 or not re.fullmatch(r"[0-9A-Fa-f]+", word):
-            raise UrcError(f"hex: pairs of digits are expected, word {number} is {word[:20]!r}")
+            raise UrcError(f"hex: expected pairs of digits; word {number} is {word[:20]!r}")
     return bytes.fromhex("".join(digits))
 
 

@@ -94,8 +94,8 @@ class ProfileWatch:
                 found = await asyncio.to_thread(examine, self.file)
                 self._judge(found)
             except Exception as bug:  # a supervisor: the old version goes on
-                log.exception("%s could not be looked at", self.file)
-                self._tell("broken", f"looking at it failed ({type(bug).__name__}: {bug})")
+                log.exception("%s could not be checked", self.file)
+                self._tell("broken", f"the check failed ({type(bug).__name__}: {bug})")
 
     async def _settled(self, watched: Watched) -> None:
         """Wait until the files are stable: a program may write a file in several steps."""
@@ -115,12 +115,12 @@ class ProfileWatch:
             self._tell("broken", "cannot be used; the version before it goes on")
         elif found.profile.name != name:
             self._next = None
-            text = f"it is called {found.profile.name!r} now, {name!r} goes on: restart to apply"
+            text = f"its name is {found.profile.name!r} now; {name!r} keeps running: restart URC"
             self._tell("broken", text)
         else:
             self._next = found.profile
             if not self._go_on():
-                text = "is good, and waits until nobody drives and every stop has arrived"
+                text = "is valid, and waits until the controls are free and every stop has arrived"
                 self._tell("waiting", text)
 
     def _go_on(self) -> bool:
@@ -136,7 +136,7 @@ class ProfileWatch:
             return True
         self._robot = robot
         failed = " with findings" if has_errors(self.problems) else ""
-        self._tell("running", f"was saved, and is running now{failed}")
+        self._tell("running", f"was saved and is running now{failed}")
         return True
 
     def _tell(self, state: State, told: str) -> None:

@@ -99,11 +99,11 @@ class Consent:
             return ()
         text = asks[0].text or known.title or known.name
         if not token:
-            raise CommandFailed("not-confirmed", f"nobody was asked first: {text}")
+            raise CommandFailed("not-confirmed", f"a confirmation is missing: {text}")
         if yes is None or yes.asker is not asker or self._clock.now() >= yes.until_s:
-            raise CommandFailed("not-confirmed", f"the yes is used up or too old: {text}")
+            raise CommandFailed("not-confirmed", f"the confirmation is no longer valid: {text}")
         if yes.meant != _meant(known.name, arguments):
-            raise CommandFailed("not-confirmed", f"the yes was to something else: {text}")
+            raise CommandFailed("not-confirmed", f"the confirmation does not match: {text}")
         two = next((one for one in asks if one.is_two_person), None)
         if two is None:
             return (asker.client.name,)
@@ -129,14 +129,14 @@ class Consent:
             async with within(self._clock, WAIT_S):
                 second = await answer
         except TimeoutError:
-            text = f"{confirm.text}: no second person said yes within {WAIT_S:g} s"
+            text = f"{confirm.text} : no second person approved within {WAIT_S:g} s"
             raise CommandFailed("not-confirmed", text) from None
         finally:
             del self._questions[one.number]
             for each in self._seats():
                 each.notice(f"ask {one.number}", wire.encode_asked(one.number))
         if second is None:
-            raise CommandFailed("not-confirmed", f"{confirm.text}: somebody said no")
+            raise CommandFailed("not-confirmed", f"{confirm.text}: refused by another operator")
         return second.client.name
 
     def stop(self) -> None:

@@ -254,7 +254,7 @@ class Controls:
     def _thin(self, seat: Seat, tick: wire.Tick) -> None:
         now = self._clock.now()
         if not self.desk.holds(tick.command):
-            text = f"{tick.command!r} is no held command of this robot"
+            text = f"{tick.command!r} is not a held command of this robot"
             seat.notice("tick", wire.encode_refused("tick", "", text))
             self.trail.refused(seat.client, tick.command, text, now)
             return
@@ -334,12 +334,12 @@ class Controls:
     def _latch_fault(self, fault: str) -> None:
         """Report that STOP would not survive a restart, or that it would again."""
         if fault:
-            text = f"STOP works, but would not outlast a restart of the server: {fault}"
+            text = f"STOP works, but would not survive a restart of the server: {fault}"
             self._tell("error", text)
             for seat in self._seats.values():
                 seat.notice("latch", wire.encode_refused("latch", "", text))
         else:
-            self._tell("info", "STOP outlasts a restart of the server again")
+            self._tell("info", "STOP survives a restart of the server again")
 
     def _held_up(self, late_s: float, is_first: bool) -> None:
         if late_s > TOO_LATE_S:

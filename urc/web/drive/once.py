@@ -26,7 +26,7 @@ __all__ = ["HELD", "NotAdmitted", "Once", "can_move", "needs_holding"]
 AGAIN_S = 1.0
 """Delay before the next try while a STOP has not reached the robot, in seconds."""
 _STOP = Client("", "STOP")
-HELD = "this command moves the robot for as long as it is held, and nothing here can hold it"
+HELD = "this command moves the robot only while a control is held; it cannot be sent once"
 
 
 class NotAdmitted(CommandFailed):

@@ -49,7 +49,7 @@ class Spare:
         try:
             seat = await self._seat()
             if seat is None:
-                await self._line.close(CLOSE_NO_SEAT, "it belongs to no page that is open")
+                await self._line.close(CLOSE_NO_SEAT, "no open page has this key")
                 return
             if seat.spare is not None:
                 seat.spare.end()
@@ -84,7 +84,7 @@ class Spare:
     async def _listen(self, seat: Seat) -> None:
         while (message := await self._line.receive())["type"] != "websocket.disconnect":
             if not self._take(seat, message.get("text") or message.get("bytes") or b""):
-                await self._line.close(CLOSE_NOT_TAKEN, "it is for held controls alone")
+                await self._line.close(CLOSE_NOT_TAKEN, "only held controls may use this socket")
                 return
 
     def _take(self, seat: Seat, data: str | bytes) -> bool:

@@ -1,6 +1,6 @@
 """Sends the readings of one robot to every page that shows it, at most once a display frame.
 
-Floor 5. No client has a queue. A flush wakes every client. Each client takes everything newer than
+Layer 5. No client has a queue. A flush wakes every client. Each client takes everything newer than
 its last frame as soon as its own line is free. A frame is encoded once for all clients at the same
 place. A client that fell behind gets the newest values in one frame, and delays no other client.
 """

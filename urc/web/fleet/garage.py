@@ -194,7 +194,7 @@ class Garage:
     def fitted(self, added: Added, profile: Profile) -> Fitted:
         """Return an installed interface with its bindings on a robot."""
         if added.lock.key.name in profile.interfaces:
-            return Fitted(None, fault="this robot has an interface of that name")
+            return Fitted(None, fault="this robot has an interface of that name already")
         return fit_interface(added.document, profile, shelf_of(added.document))
 
     def interfaces(self) -> list[Added]:

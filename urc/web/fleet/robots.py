@@ -302,8 +302,8 @@ class Station:
                 self._fail(str(error))
                 await self.clock.sleep(RETRY_S)
             except Exception:  # a supervisor: one robot's bug must not end the others
-                log.exception("the session of %s broke", self.robot.profile.name)
-                self._fail("the robot's session broke; the server's log says why")
+                log.exception("the session of %s failed", self.robot.profile.name)
+                self._fail("the robot's session failed; the server's log has the reason")
                 await self.clock.sleep(RETRY_S)
 
     async def _serve(self, session: SessionLike) -> None:

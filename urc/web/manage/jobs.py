@@ -156,9 +156,9 @@ class Jobs:
     def begin(self, what: Wanted) -> Job:
         """Plan an install; raise `Busy` while another job runs."""
         if self.newest is not None and self.newest.state == "working":
-            raise Busy(f"{self.newest.title} is under way: wait for it, or give it up")
+            raise Busy(f"{self.newest.title} is under way: wait for it, or cancel it")
         if self._left >= _LEFT_MOST:
-            raise Busy("too many servers that were given up still hang: try again in two minutes")
+            raise Busy("too many cancelled downloads are still open: try again in two minutes")
         title = what.name if isinstance(what, FileSource) else str(what)
         job = self.newest = Job(next(self._numbers), title)
         loop = asyncio.get_running_loop()
@@ -186,7 +186,7 @@ class Jobs:
         job = self._asked(number)
         planned = job.planned
         if job.state != "asks" or planned is None:
-            raise Busy("there is nothing to agree to: begin again")
+            raise Busy("no job waits for approval: start again")
         if planned.risks and not takes_risks:
             raise PackageError(
                 f"{planned.plan.lock} uses something of this machine by itself: agree to that, too"
@@ -227,7 +227,7 @@ class Jobs:
 
     def _asked(self, number: int) -> Job:
         if self.newest is None or self.newest.number != number:
-            raise Busy("another page has begun something else meanwhile")
+            raise Busy("another page has started another job meanwhile")
         return self.newest
 
     async def _work(self, job: Job, plan: Callable[[], _Planned]) -> None:
@@ -304,13 +304,13 @@ class Jobs:
 
     def _fetched(self, job: Job, what: Wanted, known: Sequence[Source]) -> Plan:
         if isinstance(what, (Wish, Lock)) and not known:
-            raise PackageError("no repository is known: connect to one first")
+            raise PackageError("there is no repository: add one first")
         if isinstance(what, Wish):
             return plan_wish(what, known, self._store, job.notes.append)
         if isinstance(what, Lock):
             plan = plan_update(what, known, self._store, job.notes.append)
             if plan is None:
-                raise PackageError(f"{what} is the newest there is")
+                raise PackageError(f"{what} is the newest version already")
             return plan
         source = what if isinstance(what, FileSource) else self._source_at(what)
         return plan_file(source, known, self._store, job.notes.append)

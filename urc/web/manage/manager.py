@@ -179,7 +179,7 @@ class Manager:
                 if self._is_behind:
                     self._seen = None
             except (UrcError, OSError) as error:  # the managers' pages show it, too
-                log.warning("what is installed cannot be read: %s", error)
+                log.warning("the installed packages cannot be read: %s", error)
 
     async def connect(self, url: str) -> None:
         """Add a repository that responds; raise `PackageError`."""
@@ -296,7 +296,7 @@ class Manager:
         """Raise `Busy` while a robot is driven."""
         driver = self.fleet.driven_by(name)
         if driver:
-            raise Busy(f"{name} is being driven ({driver}): wait until the controls are given back")
+            raise Busy(f"{name} is being driven ({driver}): wait until the controls are free")
 
     # Data for pages
 

@@ -118,7 +118,7 @@ def answer(value: object, status: int = 200) -> Response:
 async def body_of(request: Request, kind: type[_T]) -> _T:
     """Return the JSON body of a request as a `kind`; raise `Refusal`."""
     if request.headers.get("content-type", "").partition(";")[0].strip() != "application/json":
-        raise Refusal(415, "a body of application/json is expected")
+        raise Refusal(415, "expected a body of type application/json")
     try:
         return msgspec.json.decode(await request.body(), type=kind)
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
@@ -274,7 +274,7 @@ class ManageRoutes:
         """Start the install of an uploaded package, bundle or interface: the request body."""
         self.check(request)
         if request.headers.get("content-type") != "application/octet-stream":
-            raise Refusal(415, "a body of application/octet-stream is expected")
+            raise Refusal(415, "expected a body of type application/octet-stream")
         name = request.query_params.get("name", "")[:200]
         data = await request.body()
         source = await asyncio.to_thread(
@@ -341,7 +341,9 @@ class ManageRoutes:
             except PackageError:
                 pass  # a folder of this machine may have that name
         if not self._is_here(request):
-            raise Refusal(403, "a path of this machine is only named with the key that URC printed")
+            raise Refusal(
+                403, "a path of this machine needs the key in the address that URC printed"
+            )
         place = Path(path).expanduser()
         if not place.is_absolute():
             raise PackageError(

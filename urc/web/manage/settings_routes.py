@@ -108,7 +108,7 @@ class SettingsRoutes:
             self._manage.check(request)
             said = await body_of(request, SettingsAsked)
             if name in self._trying:
-                raise Busy(f"the settings of {name} are being tried already")
+                raise Busy(f"the settings of {name} are being tested already")
             self._trying.add(name)
             try:
                 return answer(await self._save(name, said))

@@ -142,7 +142,7 @@ class Connection(H11Protocol):
     def _give_up(self) -> None:
         self._alarm = None
         if self._has_spoken:
-            text = f"The request was not here within {self._request_s:g} s."
+            text = f"The request did not arrive within {self._request_s:g} s."
             self._refuse(HTTPStatus.REQUEST_TIMEOUT, text)
         else:  # a browser that connects in advance takes an early response for a fault
             self.transport.close()

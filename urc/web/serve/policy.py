@@ -220,7 +220,7 @@ class Policy:
                 if has_place:
                     await self._app(scope, _limited(scope, receive), answer.send)
                 else:
-                    await answer.refuse(503, "Too much is under way from this address.")
+                    await answer.refuse(503, "Too many requests from this address are under way.")
 
     def _refusal(self, scope: Scope) -> tuple[int, str] | None:
         hosts = _values(scope, b"host")

@@ -121,7 +121,7 @@ def _render(job: str) -> tuple[str, str, int]:
         for piece in widget_template(source).generate(variables):
             count += len(piece)
             if count > MOST_CHARACTERS:
-                return "", f"it gives more than {MOST_CHARACTERS} characters", 1
+                return "", f"its markup has more than {MOST_CHARACTERS} characters", 1
             pieces.append(piece)
     except Exception as error:  # a template may raise anything
         text = str(error).partition("\n")[0][:500]

@@ -153,7 +153,7 @@ class _TemplateCheck:
             if not is_of_table or not key or id(node) in asked:
                 continue
             if key not in known and not hasattr(dict, key):
-                text = f"{key!r} is none of the {table} in the manifest"
+                text = f"{key!r} is not among the {table} in the manifest"
                 yield self._unknown(text, node.lineno, key, known)
 
     def _unknown(self, text: str, line: int, name: str, known: Iterable[str]) -> Problem:
