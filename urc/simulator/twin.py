@@ -37,14 +37,14 @@ class _Line(Protocol):
 
 
 class Setters:
-    """Rule → the line that does what it sets, while that line is there."""
+    """Rule → the connection that performs its changes, while that connection lives."""
 
     def __init__(self) -> None:
-        """Begin without any line."""
+        """Begin without connections."""
         self._lines: dict[int, weakref.ref[_Line]] = {}
 
     def sets(self, rule: SimulatorRule, line: _Line) -> bool:
-        """Return whether `line` is the one that does what `rule` sets; the first to ask is."""
+        """Return whether `line` performs the changes of `rule`; the first caller does."""
         known = self._lines.get(id(rule))
         before = known() if known is not None else None
         if before is None or before.is_over:

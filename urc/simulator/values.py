@@ -23,18 +23,18 @@ __all__ = ["Names", "Unsettable", "Values"]
 
 
 _PERIOD_S: Final = 60.0
-"""Time in which a value goes up and down once."""
+"""Period of the variation, in seconds."""
 _WIDTH: Final = (0.0, 100.0)
-"""Where numbers are that have no range."""
+"""Range of a number without a declared one."""
 _ELEMENTS: Final = 4
 _PIXEL: Final = a2b_base64(
     "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAQAAAC1HAwCAAAAC0lEQVR42mNkYAAAAAYAAjCB0C8AAAAASUVORK5CYII="
 )
-"""A picture of one grey point, as PNG."""
+"""An image of one grey pixel, as PNG."""
 
 
 def plausible(signal: Signal, now_s: float) -> Reading:
-    """Return a value of `signal` at `now_s` that no limit complains about."""
+    """Return a value of `signal` at `now_s` that violates no limit."""
     if signal.type in ("image", "blob"):
         return _PIXEL if signal.size is None or signal.size >= len(_PIXEL) else b""
     if signal.type == "object":
@@ -55,7 +55,7 @@ def _single(signal: Signal, kind: ElementType | SignalType, place: int, now_s: f
     if kind == "string":
         return signal.name
     low, high = _range(signal)
-    # Each signal at its own place of the same slow wave.
+    # Each signal has its own phase of the same slow wave.
     phase = crc32(signal.name.encode()) / 2**32 + place / 8
     value = low + (high - low) * (0.5 + 0.4 * math.sin(2 * math.pi * (now_s / _PERIOD_S + phase)))
     if kind == "integer":
@@ -64,7 +64,7 @@ def _single(signal: Signal, kind: ElementType | SignalType, place: int, now_s: f
 
 
 def _range(signal: Signal) -> tuple[float, float]:
-    """Return where the value may be without any alarm."""
+    """Return the range of values without any alarm."""
     limits: Limits = signal.limits
     lowest, highest = signal.min, signal.max
     floors = [one for one in (signal.min, limits.lolo, limits.low) if one is not None]

@@ -87,10 +87,8 @@ def build_app(
         linger_s: time for which a robot stays connected after its last client, in seconds.
         data: folder of the latches and the audit log, or None.
         tiles: folder of map tiles, ``z/x/y.png``, or None.
-        remake: makes a robot from its saved document; turns the developer pages on. None turns
-            them off.
-        workshop: makes robots at run time; turns the managers and the settings pages on. None
-            turns them off.
+        remake: makes a robot from its saved document; None for a server without developer pages.
+        workshop: options of the robot factory; None for a server without managers and settings.
         trusted: third-party widgets that run in the page all the same.
 
     Raises:

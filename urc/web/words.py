@@ -34,7 +34,7 @@ __all__ = [
 
 
 def spoken(line: str) -> str:
-    """Return a line in the current language; what is no phrase stays as it is."""
+    """Return a line in the current language; text that is no phrase stays as it is."""
     if not isinstance(line, Phrase):
         return line
     if line.pieces:

@@ -279,7 +279,9 @@ async def test_what_the_driver_asks_is_asked_in_the_place_of_the_widget(
             assert robot.lines == []
             if answer == "Refuse":
                 await asked.get_by_role("button", name=answer).click()
-                await beam.locator(".button-note", has_text="refused by another operator").wait_for()
+                await beam.locator(
+                    ".button-note", has_text="refused by another operator"
+                ).wait_for()
             else:
                 agree = asked.get_by_role("slider", name=answer)
                 await agree.focus()

@@ -26,13 +26,13 @@ __all__ = ["HttpServer"]
 
 
 _BLOCKS: Final = (20, 15)
-"""Columns and rows of 8 by 8 points: 160 by 120 points."""
+"""Columns and rows of blocks of 8 by 8 pixels: 160 by 120 pixels."""
 _PERIOD_S: Final = 12.0
-"""Time in which the colour goes once round."""
+"""Period of the colour cycle, in seconds."""
 
 
 def picture(now_s: float) -> bytes:
-    """Return the picture of the time `now_s`, in seconds."""
+    """Return the image at the time `now_s`, in seconds."""
     red, green, blue = colorsys.hsv_to_rgb(now_s / _PERIOD_S % 1.0, 0.6, 0.9)
     luma = 0.299 * red + 0.587 * green + 0.114 * blue
     means = (luma - 0.5, 0.564 * (blue - luma), 0.713 * (red - luma))
@@ -44,7 +44,7 @@ def picture(now_s: float) -> bytes:
 
 
 def _mean(difference: int) -> str:
-    """Return a difference from the mean before: four bits of its length, and itself."""
+    """Return a difference from the mean before: four bits of length, and the number."""
     if difference == 0:
         return "0000"
     length = abs(difference).bit_length()
@@ -61,7 +61,7 @@ _SIZE: Final = (8 * _BLOCKS[1]).to_bytes(2, "big") + (8 * _BLOCKS[0]).to_bytes(2
 _HEAD: Final = (
     b"\xff\xd8"
     + _segment(0xE0, b"JFIF\0\x01\x01\0\0\x01\0\x01\0\0")
-    # Quantised by 8 everywhere: the mean of a block is then written as it is.
+    # All quantisers are 8: the mean of a block is then encoded unchanged.
     + _segment(0xDB, b"\0" + b"\x08" * 64)
     + _segment(0xC0, b"\x08" + _SIZE + b"\x03\x01\x11\0\x02\x11\0\x03\x11\0")
     # The lengths 0 to 11 as codes of four bits, and "nothing else in this block" as one bit.

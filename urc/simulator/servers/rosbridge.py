@@ -21,9 +21,9 @@ __all__ = ["RosbridgeServer"]
 
 
 MAX_TOPICS = 512
-"""Topics, services and subscriptions that one client may name."""
+"""Most topics, services and subscriptions of one client."""
 _ENDS = {True: 4, False: 6}
-"""Of an action: succeeded or aborted."""
+"""Result of an action → status code: succeeded or aborted."""
 
 _decode = msgspec.json.Decoder().decode
 _encode = msgspec.json.Encoder().encode
@@ -51,7 +51,7 @@ class Bridge:
         self._count = 0
 
     def passed_on(self, service: str, client: "BridgeClient", number: object, args: object) -> None:
-        """Let the client that offers a service answer another one's call."""
+        """Forward a call to the client that offers the service."""
         self._count += 1
         key = f"call_service:{service}:{self._count}"
         while len(self.asked) >= MAX_TOPICS:
@@ -144,7 +144,7 @@ class BridgeClient:
         self._shown_s[topic] = now_s
         operation = {"op": "publish", "topic": topic, "msg": message}
         if wanted.compression == "cbor":
-            import cbor2  # only where a client asks for it
+            import cbor2  # only on demand
 
             self._send(cbor2.dumps(operation))
         elif wanted.compression == "png":

@@ -61,7 +61,7 @@ class _Update(NamedTuple):
 class Pacer:
     """A rate limiter that passes the first event of a burst at once, then a steady rate.
 
-    It tolerates one period of jitter: a source at exactly this rate is never delayed, and no second
+    It tolerates one period of jitter, so a source at exactly this rate is never delayed. No second
     has more than one event above the rate.
     """
 

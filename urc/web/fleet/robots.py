@@ -118,7 +118,7 @@ class Live:
     number: str
     """Unique number of this session, also across restarts of the server."""
     ended: asyncio.Event
-    """Set when the session is over, whatever the reason."""
+    """Set when the session is over, for any reason."""
 
 
 class SessionFailed(UrcError):

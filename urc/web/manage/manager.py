@@ -44,7 +44,7 @@ class Manager:
         """Prepare.
 
         Args:
-            garage: makes the robots.
+            garage: the source of robots.
             fleet: the served robots.
             now: returns the time, in seconds.
             renew: switches to another version of a robot; raises `UrcError`.

@@ -34,26 +34,26 @@ KINDS = {
     "interfaces": ("interface",),
     "widgets": ("widget",),
 }
-"""Page → kinds of packages that it is about."""
+"""Page → kinds of packages."""
 
 
 @dataclass(frozen=True, slots=True)
 class ManagePage:
-    """``manage.html.j2``: repositories, what is installed, what could be."""
+    """``manage.html.j2``: repositories, installed packages and available packages."""
 
     head: Head
     nav: Nav
     title: str
     about: str
-    """What these packages are, in one sentence."""
+    """One sentence about these packages."""
     kinds: str
-    """Kinds of packages, with commas between."""
+    """Kinds of packages, separated by commas."""
     may_manage: bool
-    """Whether who asks may change anything."""
+    """Whether this visitor may change anything."""
     may_name_paths: bool
-    """Whether a path of this machine may be named: only with the start key."""
+    """Whether the visitor may name paths of this machine: only with the start key."""
     is_shown: bool
-    """Whether the menu has what is installed."""
+    """Whether the menu shows installed robots."""
 
 
 def manage_page(

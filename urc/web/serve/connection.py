@@ -1,8 +1,8 @@
 """One HTTP connection: requests have a time limit, and every refusal carries the policy headers.
 
-Layer 5. A thin layer over uvicorn's protocol; only `server` uses it. uvicorn answers two cases
-before any application is called: bytes that are no HTTP, and too many connections. Without this
-layer those responses would lack the page policy.
+Layer 5. A thin layer over uvicorn's protocol; only `server` uses it. uvicorn itself
+refuses bytes that are no HTTP, and connections above its limit. Without this layer those responses
+would lack the page policy.
 """
 
 import asyncio
@@ -52,9 +52,9 @@ def _stops(data: bytes) -> bool:
 class Connection(H11Protocol):
     """uvicorn's HTTP/1.1 protocol with a time limit on the arrival of a request.
 
-    WARNING: it depends on parts of the base class: asyncio's protocol methods, the arguments of the
-    constructor, `send_400_response`, and the attributes `conn`, `connections`, `loop` and
-    `transport`. tests/e2e/test_dashboard_server.py fails when one of them changes its meaning.
+    WARNING: it depends on asyncio's protocol methods and on parts of the base class. These are the
+    arguments of the constructor, `send_400_response`, and the attributes `conn`, `connections`,
+    `loop` and `transport`. tests/e2e/test_dashboard_server.py fails when one of them changes.
     """
 
     def __init__(

@@ -1,8 +1,8 @@
 """Access checks and page policy for every request, before any route is looked up.
 
 Layer 5. Pure ASGI middleware around the whole application, so that error responses pass through it
-too. It blocks three attacks: a foreign name that resolves to this machine (Host), a foreign page
-that opens our WebSocket or posts to us (Origin), and injected markup (page policy, framing). It
+too. It checks Host against foreign names that resolve to this machine. It checks Origin against
+foreign pages that open a WebSocket or post a form. Its policy headers stop injected markup. It
 knows no route, no robot and no template.
 """
 

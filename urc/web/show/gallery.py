@@ -36,22 +36,21 @@ __all__ = ["DemoPage", "Gallery", "GalleryPage"]
 
 
 class Found(NamedTuple):
-    """A widget that there is."""
+    """An existing widget."""
 
     folder: Path
     widget: Widget | None
-    """None: its manifest is broken."""
+    """None if its manifest is broken."""
     problems: tuple[Problem, ...] = ()
-    """Why."""
+    """Problems of the manifest."""
 
 
 class Lookup:
-    """The widgets there are now.
+    """The existing widgets.
 
     Args:
         profiles: returns the robots' profiles.
-        is_fresh: manifests are read anew each time; else those of the robots are as the robots'
-            pages show them.
+        is_fresh: whether each look-up reads manifests again; else the robots' loaded widgets count.
     """
 
     def __init__(self, profiles: Callable[[], Iterable[Profile]], *, is_fresh: bool) -> None:
@@ -59,13 +58,13 @@ class Lookup:
         self._is_fresh = is_fresh
 
     def names(self) -> list[str]:
-        """Return the names of all widgets, broken ones too."""
+        """Return the names of all widgets, with broken ones."""
         profiles = list(self._profiles())
         names = {name for shelf in self._shelves(profiles) for name in shelf.names()}
         return sorted(names.union(*(profile.widgets for profile in profiles)))
 
     def find(self, name: str) -> Found | None:
-        """Return a widget, or None when there is none of that name."""
+        """Return a widget, or None for an unknown name."""
         profiles = list(self._profiles())
         mine = next((one.widgets[name] for one in profiles if name in one.widgets), None)
         if mine is not None:
@@ -76,7 +75,7 @@ class Lookup:
         return next((_on(shelf, name) for shelf in shelves if shelf.has(name)), None)
 
     def folder(self, name: str) -> Path | None:
-        """Return the folder of a widget, whose manifest is not read; None when there is none."""
+        """Return the folder of a widget without a look at its manifest, or None."""
         profiles = list(self._profiles())
         mine = [one.widgets[name].folder for one in profiles if name in one.widgets]
         shelves = self._shelves(profiles)
@@ -84,7 +83,7 @@ class Lookup:
         return next(iter(mine), None) or next(on_shelf, None)
 
     def _shelves(self, profiles: Iterable[Profile]) -> list[Shelf]:
-        """Return where widgets are looked up: what ships with URC is replaced by nothing there."""
+        """Return the folders of widgets; none of them can replace a widget of URC."""
         files = dict.fromkeys(one.file for one in profiles)
         return [Shelf(shipped("widgets")), *(shelf_of(file) for file in files)]
 

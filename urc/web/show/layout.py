@@ -4,7 +4,7 @@ Layer 5. Pure. The rules contain only numbers, so no text of a document can end 
 
 A row or column without a slot is a margin: it keeps its place, with an eighth of the room of
 others. Phones have no margins. A phone in portrait shows the ``phone`` grid, else the ``tall`` one,
-else the ``wide`` one; the latter two are stacked in reading order if they have more than two
+else the ``wide`` one. The latter two are stacked in reading order if they are wider than two
 columns. A phone in landscape shows the ``low`` grid, else the ``wide`` one.
 
 Over a background, an empty cell is a window with its full size on every screen. Only on a screen of

@@ -23,7 +23,7 @@ __all__ = ["TEMPLATE", "fault_line", "markdown", "widget_environment", "widget_t
 
 
 FIRST_HEADING = 4
-"""Level of ``#``: the page and the cells have the levels above it."""
+"""Heading level of ``#``: page and cells use the levels above it."""
 
 
 def markdown(text: str) -> Markup:
@@ -42,7 +42,7 @@ def _lower_headings(tokens: Sequence["Token"]) -> None:
 
 
 def _open_links_elsewhere(tokens: Sequence["Token"]) -> None:
-    """A link that takes the page away would take the controls away."""
+    """Open links in a new tab: leaving the page would end the control."""
     for token in tokens:
         for child in token.children or ():
             if child.type == "link_open":
@@ -52,7 +52,7 @@ def _open_links_elsewhere(tokens: Sequence["Token"]) -> None:
 
 @lru_cache(maxsize=1)
 def _parser() -> "MarkdownIt":
-    from markdown_it import MarkdownIt  # only pages with such a widget need it
+    from markdown_it import MarkdownIt  # few pages need it
 
     parser = MarkdownIt("commonmark", {"html": False, "linkify": False})
     return parser.enable(["table", "strikethrough"]).disable("image")

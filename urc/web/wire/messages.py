@@ -85,7 +85,7 @@ CLOSE_FULL = 4503
 
 
 class BadMessage(Exception):
-    """The error for an invalid message of a page; the text says what was expected."""
+    """The error for an invalid message of a page; its text has the expected form."""
 
 
 class _Signal(msgspec.Struct, omit_defaults=True, frozen=True):
