@@ -1,10 +1,10 @@
 """URC: describe a robot in one YAML file and drive it from any browser.
 
-Only names a Python user needs live here, and they are imported on first use: ``urc --version``
-must not pay for a web server.
+This module has only the names for Python users, imported on first use: ``urc --version`` must not
+load a web server.
 """
 
-TYPE_CHECKING = False  # type checkers know this name; `typing` is half the cost of --version
+TYPE_CHECKING = False  # for type checkers; importing `typing` would slow down --version
 if TYPE_CHECKING:
     from urc.runtime.scripting import connect, load
 

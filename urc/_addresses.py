@@ -1,8 +1,8 @@
-"""The addresses of this machine's network interfaces, asked of the system: no packet is sent.
+"""Addresses of the network interfaces of this machine, without sending a packet.
 
-A name server or a host's own name would not do: many machines know themselves only as
-127.0.1.1. The C library's getifaddrs is there on Linux, macOS and the BSDs. Where it isn't, the
-routing table is asked which address it would send from.
+Name servers and the host name are unreliable: many machines resolve themselves only as 127.0.1.1.
+Linux, macOS and the BSDs have getifaddrs in the C library. Elsewhere, the routing table gives the
+source address of an outgoing packet.
 """
 
 import ctypes
@@ -17,12 +17,12 @@ __all__ = ["Address", "is_of_this_machine", "local_addresses", "unmapped"]
 Address = ipaddress.IPv4Address | ipaddress.IPv6Address
 
 _IS_UP = 0x1
-# Addresses of documentation and of the private networks: nobody is asked anything there.
+# Addresses for documentation and of private networks; they receive no packet.
 _ROUTED_TO = ("192.0.2.1", "10.255.255.254", "172.31.255.254", "192.168.255.254", "2001:db8::1")
 
 
 class _Interface(ctypes.Structure):
-    """The head of C's ``struct ifaddrs``; what follows differs from system to system."""
+    """The beginning of ``struct ifaddrs`` in C; the rest differs between systems."""
 
     _fields_ = (
         ("next", ctypes.c_void_p),
@@ -35,7 +35,7 @@ class _Interface(ctypes.Structure):
 def local_addresses() -> tuple[Address, ...]:
     """Return the addresses under which others may reach this machine, IPv4 first.
 
-    Loopback is left out, and so is IPv6's link-local range: no browser opens those.
+    Loopback and link-local IPv6 addresses are left out: browsers cannot open them.
     """
     found = _all()
     usable = [each for each in found if not each.is_loopback and not each.is_unspecified]
@@ -44,16 +44,16 @@ def local_addresses() -> tuple[Address, ...]:
 
 
 def is_of_this_machine(address: Address) -> bool:
-    """Return whether what is sent to `address` stays on this machine, as far as it is known here.
+    """Return whether `address` belongs to an interface of this machine.
 
-    An address that a router or a container's host leads back to this machine is not.
+    False for an address that a router or a container host forwards to this machine.
     """
     plain = unmapped(address)
     return plain.is_loopback or plain.is_unspecified or plain in _all()
 
 
 def unmapped(address: Address) -> Address:
-    """Return the IPv4 address inside an IPv6 one that stands for it; else `address`, bare."""
+    """Return the IPv4 address of an IPv4-mapped IPv6 address; else `address`, without its scope."""
     if address.version == 4:
         return address
     return address.ipv4_mapped or ipaddress.IPv6Address(int(address))
@@ -83,9 +83,9 @@ def _of_interfaces() -> Iterator[Address]:
 
 
 def _decoded(place: int) -> Iterator[Address]:
-    """Yield the address in the ``struct sockaddr`` at `place`, if it is one of the internet's."""
+    """Yield the address in the ``struct sockaddr`` at `place`, if it is IPv4 or IPv6."""
     head = ctypes.string_at(place, 2)
-    # The BSDs, and macOS with them, have a length before the family.
+    # BSD systems, including macOS, store a length before the family.
     is_bsd = sys.platform == "darwin" or "bsd" in sys.platform
     family = head[1] if is_bsd else int.from_bytes(head, sys.byteorder)
     if family == socket.AF_INET:
@@ -95,7 +95,7 @@ def _decoded(place: int) -> Iterator[Address]:
 
 
 def _of_routes() -> Iterator[Address]:
-    """Yield where a datagram would be sent from; connecting such a socket sends nothing."""
+    """Yield the source addresses of routes; connecting a UDP socket sends no packet."""
     for target in _ROUTED_TO:
         family = socket.AF_INET6 if ":" in target else socket.AF_INET
         with suppress(OSError), socket.socket(family, socket.SOCK_DGRAM) as asker:

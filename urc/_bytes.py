@@ -1,7 +1,7 @@
-"""Filters of expressions that make bytes, and those that hash or spell bytes.
+"""Filters of expressions that make bytes, hash them, or write them as text.
 
-Floor 1, private to `urc._filters`. Text that is hashed is UTF-8. Each is total over what documents
-can hold: it returns a value or raises TypeError or ValueError with words for a person.
+Private to `urc._filters`. Hashed text is UTF-8. Each filter accepts every value of a document: it
+returns a result, or raises TypeError or ValueError with a text for people.
 """
 
 import binascii
@@ -19,7 +19,7 @@ _YEAR_10000: Final = 253402300800
 
 
 def written_number(name: str, value: object) -> bytes:
-    """Return `value` as the bytes of the type called `name`, whole numbers rounded."""
+    """Return `value` as the bytes of the type called `name`; whole numbers are rounded."""
     number = number_of(name)
     if number is None:
         raise ValueError(f"there is no type {_short(name)}")
@@ -48,7 +48,7 @@ def _short(value: object) -> str:
 
 
 def _data(value: object) -> bytes:
-    """Return bytes as they are, and text as UTF-8."""
+    """Return bytes unchanged, and text as UTF-8."""
     data = value.encode("utf-8", "surrogatepass") if isinstance(value, str) else value
     if not isinstance(data, bytes):
         raise TypeError(f"text is expected, found {_short(value)}")
@@ -58,7 +58,7 @@ def _data(value: object) -> bytes:
 
 
 def together(left: object, right: object) -> bytes:
-    """Return bytes one after the other; a text among them is UTF-8."""
+    """Return the concatenation of two values as bytes; text becomes UTF-8."""
     return _data(_data(left) + _data(right))
 
 
@@ -113,7 +113,7 @@ BYTE_FILTERS: Final[dict[str, Callable[..., Any]]] = {
     "hexbytes": _hexbytes,
     "utf8": _data,
 }
-"""Filters that give bytes; none takes an argument."""
+"""Filters that return bytes; they take no argument."""
 TEXT_FILTERS: Final[dict[str, tuple[Callable[..., Any], int]]] = {
     "b64encode": (_b64encode, 0),
     "hmac_sha256": (_hmac_sha256, 1),
@@ -122,4 +122,4 @@ TEXT_FILTERS: Final[dict[str, tuple[Callable[..., Any], int]]] = {
     "sha1": (_hash("sha1"), 0),
     "sha256": (_hash("sha256"), 0),
 }
-"""Filters that give text → function and number of arguments."""
+"""Filters that return text → function and number of arguments."""

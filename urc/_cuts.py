@@ -1,8 +1,8 @@
-"""Filters that take apart what one field of a frame holds: tables, spelt numbers, packed numbers.
+"""Filters that parse the content of one field: tables, digits, packed numbers.
 
-Floor 1, private to `urc._filters`. Each is total over what documents can hold, linear in what it is
-given, and gives no more than `MAX_PARTS` values: it returns them or raises TypeError or ValueError
-with words for a person.
+Private to `urc._filters`. Each filter accepts every value of a document, takes linear time, and
+returns at most `MAX_PARTS` values. It returns a result, or raises TypeError or ValueError with a
+text for people.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -47,12 +47,12 @@ def _check_count(count: int, what: str) -> None:
 
 
 def _column(value: Any, key: Any, between: Any = None) -> list[Any]:
-    """Return one part of every row: by its name, by its place, or by its place in a text."""
+    """Return one part of every row, by name, by position, or by position in a separated text."""
     rows = _list(value)
     if between is not None:
         if not _text(between):
-            raise ValueError("'column' needs something to cut the rows at")
-        # Counted before any row is cut: one text may stand in the list many times.
+            raise ValueError("'column' needs a separator for rows of text")
+        # Count before splitting: one text may be in the list many times.
         rows = [_text(row) for row in rows if row]
         _check_count(sum(row.count(between) + 1 for row in rows), "parts")
     found = []
@@ -83,18 +83,18 @@ def _cut(value: Any, start: Any, stop: Any = None) -> list[Any]:
 
 
 def _digits(value: Any, width: Any, base: Any, zero: Any = 48) -> list[int]:
-    """Return the numbers that are spelt with `width` characters each, the highest digit first."""
+    """Return the numbers with `width` characters each, the highest digit first."""
     text, size = _text(value), _whole(width, "a width", 1, 16)
     radix = _whole(base, "a base", 2, 256)
     first = ord(zero) if isinstance(zero, str) and len(zero) == 1 else zero
     least = _whole(first, "the code of the digit zero", 0, 0x10FFFF)
     if len(text) % size:
-        raise ValueError(f"{len(text)} characters are no numbers of {size} each")
+        raise ValueError(f"{len(text)} characters cannot be split into numbers of {size} each")
     numbers, number = [], 0
     for place, char in enumerate(text, 1):
         digit = ord(char) - least
         if not 0 <= digit < radix:
-            raise ValueError(f"{char!r} is no digit of base {radix}")
+            raise ValueError(f"{char!r} is not a digit of base {radix}")
         number = number * radix + digit
         if place % size == 0:
             numbers.append(number)
@@ -103,17 +103,17 @@ def _digits(value: Any, width: Any, base: Any, zero: Any = 48) -> list[int]:
 
 
 def _signed(value: Any, bits: Any) -> int:
-    """Return the number that is meant by `bits` bits in two's complement."""
+    """Return the value of a two's complement number of `bits` bits."""
     size = _whole(bits, "the bits", 1, _MOST_BITS)
     number = _whole(value, "the number", 0, (1 << size) - 1)
     return number - (1 << size) if number >> size - 1 else number
 
 
 class _Short(ValueError):
-    """There is no such number in these bytes."""
+    """The bytes contain no such number."""
 
 
-@cache  # of the names of types, which are few
+@cache  # the type names are few
 def _reader(name: str) -> Callable[[bytes, int, int], tuple[Any, int]]:
     number = number_of(name)
     if number is None:
@@ -128,7 +128,7 @@ def _bytes(value: Any) -> bytes:
 
 
 def _unpack(value: Any, name: Any, at: Any = 0) -> int | float:
-    """Return the number of that type at a place of the bytes."""
+    """Return the number of that type at an offset of the bytes."""
     read = _reader(_text(name))
     data, place = _bytes(value), _whole(at, "a place", 0, MAX_PARTS)
     try:
@@ -139,7 +139,7 @@ def _unpack(value: Any, name: Any, at: Any = 0) -> int | float:
 
 
 def _numbers(value: Any, name: Any) -> list[int | float]:
-    """Return all numbers of that type that the bytes hold, one behind the other."""
+    """Return all consecutive numbers of that type in the bytes."""
     read, data = _reader(_text(name)), _bytes(value)
     _check_count(len(data), "bytes")
     found, place = [], 0
@@ -157,7 +157,7 @@ def _hexdigits(value: Any) -> str:
 
 
 def _ramp(value: Any, step: Any, count: Any) -> list[float]:
-    """Return `count` numbers, the first of which is the subject, each by `step` above the last."""
+    """Return `count` numbers from the subject upwards, with the distance `step`."""
     for one in (value, step):
         if not isinstance(one, (int, float)):
             raise TypeError(f"a number is expected, found {_short(one)}")
@@ -174,4 +174,4 @@ CUT_FILTERS: Final[dict[str, tuple[Callable[..., Any], tuple[int, int]]]] = {
     "signed": (_signed, (1, 1)),
     "unpack": (_unpack, (1, 2)),
 }
-"""Filter → function, and the least and most arguments behind its subject."""
+"""Filter → function, and its least and largest number of arguments after the subject."""

@@ -1,6 +1,6 @@
-"""Files, read with care: never a directory, a pipe, or more than was asked for.
+"""Bounded reading of ordinary files, never of directories or pipes.
 
-Floor 0, private to `urc.source`.
+Private to `urc.source`.
 """
 
 import os
@@ -12,10 +12,10 @@ __all__ = ["read_bytes", "refused", "similar_file", "too_large"]
 
 
 def read_bytes(path: str, most: int) -> bytes:
-    """Return what an ordinary file holds.
+    """Return the content of an ordinary file.
 
     Raises:
-        ProblemsError: it cannot be read, or holds more than `most` bytes.
+        ProblemsError: the file cannot be read, or has more than `most` bytes.
     """
     try:
         status = os.stat(path)
@@ -26,7 +26,7 @@ def read_bytes(path: str, most: int) -> bytes:
                 "this is a directory, a document is a file",
                 _documents_in(path),
             )
-        # Opening a pipe or a device could wait for ever.
+        # Opening a pipe or a device could block.
         if not stat.S_ISREG(status.st_mode):
             raise refused(path, "not-a-file", "this is not an ordinary file")
         if status.st_size > most:
@@ -48,14 +48,14 @@ def read_bytes(path: str, most: int) -> bytes:
         reason = (error.strerror or str(error)).lower()
         raise refused(path, "not-readable", f"this file cannot be read: {reason}") from None
     except ValueError:
-        raise refused(path, "not-readable", "this is no name of a file") from None
+        raise refused(path, "not-readable", "this is not a valid file name") from None
     if len(content) > most:
         raise refused(path, "too-large", too_large(most))
     return content
 
 
 def too_large(most: int) -> str:
-    """Say what the largest size is."""
+    """Return the message for a file that is too large."""
     return f"a document has at most {most // 1024} KiB"
 
 
@@ -73,7 +73,7 @@ def _documents_in(folder: str) -> str:
 
 
 def similar_file(path: str) -> str:
-    """Return the name in the same folder that is nearly that of `path`, or ""."""
+    """Return a similar name in the folder of `path`, or ""."""
     from difflib import get_close_matches
 
     folder, name = os.path.split(path)

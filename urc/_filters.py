@@ -1,8 +1,8 @@
-"""Operators and filters of expressions: what the compiled Python of a template may call.
+"""Operators and filters of expressions: the functions that compiled templates call.
 
-Floor 1, private to `urc.expressions`. Every function is total over what documents can hold: it
-returns a value or raises TypeError, ValueError or ArithmeticError with words for a person. None
-turns small operands into a large result.
+Private to `urc.expressions`. Every function accepts all values of a document: it returns a result,
+or raises TypeError, ValueError or ArithmeticError with a text for people. No function turns small
+operands into a large result.
 """
 
 from collections.abc import Callable, Iterable, Mapping
@@ -16,9 +16,9 @@ __all__ = ["FILTERS", "SCOPE", "filter_names"]
 
 MAX_TEXT = 65536
 MAX_BITS = 4096
-"""Integers stay below 2**4096."""
+"""Bound of integers: they stay below 2**4096."""
 MAX_DIGITS = 15
-"""Digits that a number has: `round` takes no more, to either side of the point."""
+"""Digits on either side of the decimal point that `round` accepts."""
 
 
 def _number(value: object) -> Any:
@@ -72,7 +72,7 @@ def _pow(left: Any, right: Any) -> Any:
         if base.bit_length() * abs(exponent) > MAX_BITS:
             raise ValueError("the number is too large")
     elif base < 0:
-        raise ValueError("a negative number has no broken power")
+        raise ValueError("a negative number has no fractional power")
     return base**exponent
 
 
@@ -152,7 +152,7 @@ def _float(value: Any, fallback: Any = None) -> Any:
 
 def _round(value: Any, digits: Any = 0) -> Any:
     places = _number(digits)
-    if not -MAX_DIGITS <= places <= MAX_DIGITS:  # Python counts with as many digits as are asked
+    if not -MAX_DIGITS <= places <= MAX_DIGITS:  # Python would accept any number of digits
         raise ValueError(f"'round' takes -{MAX_DIGITS} to {MAX_DIGITS} digits, found {places}")
     return round(_number(value), int(places))
 
@@ -209,14 +209,14 @@ def _sign(value: Any) -> str:
 
 
 class Filter(NamedTuple):
-    """A filter of the language: its function, and how many arguments follow the subject."""
+    """A filter: its function, and the number of arguments after the subject."""
 
     function: Callable[..., Any]
     arity: tuple[int, int]
     gives_bytes: bool = False
-    """Only what is sent by ``hex:`` and ``bytes:`` may end in it."""
+    """Whether it returns bytes, which only ``hex:`` and ``bytes:`` can send."""
     refuses: Callable[[str], str] | None = None
-    """Word → what is wrong with it as the first argument, "" for nothing."""
+    """Check of a constant first argument: returns the error, or ""."""
 
 
 FILTERS: dict[str, Filter] = {
@@ -278,12 +278,12 @@ _OPERATORS = (_add, _sub, _mul, _div, _floordiv, _mod, _pow, _item, _join)
 _TESTS = (_is_defined, _is_none, _is_number, _is_string)
 
 SCOPE: dict[str, Any] = {"__builtins__": {}}
-"""The only names that compiled Python can reach."""
+"""The only names that compiled templates can reach."""
 SCOPE |= {"_slice": _lists.sliced, "_match": _lists.is_match, "_search": _lists.is_search}
 SCOPE |= {function.__name__: function for function in (*_OPERATORS, *_TESTS)}
 SCOPE |= {f"_filter_{name}": filter_.function for name, filter_ in FILTERS.items()}
 
 
 def filter_names() -> str:
-    """Return the names of all filters, for messages; those that give bytes are too many."""
+    """Return the names of all filters for messages, without the many that return bytes."""
     return ", ".join(sorted(name for name, one in FILTERS.items() if not one.gives_bytes))

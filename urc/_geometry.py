@@ -1,6 +1,6 @@
 """Angles, roots and rounding for expressions.
 
-Floor 0, private to `urc._filters`. Angles are radians. What has no value (the root of a negative
+Private to `urc._filters`. Angles are in radians. An undefined result (the root of a negative
 number, the arc sine of 2) raises ValueError, as everywhere in expressions.
 """
 
@@ -19,7 +19,7 @@ def _number(value: object) -> float:
 
 
 def _of(name: str, function: Callable[..., float], where: str = "") -> Callable[..., float]:
-    """Return `function` over numbers; `where` says of which numbers it has a value."""
+    """Return `function` over numbers; `where` describes its domain in errors."""
 
     def filtered(*values: object) -> float:
         numbers = [_number(value) for value in values]
@@ -50,4 +50,4 @@ GEOMETRY_FILTERS: Final[dict[str, tuple[Callable[..., Any], tuple[int, int]]]] =
     "sqrt": (_of("sqrt", math.sqrt, "it takes numbers from 0"), (0, 0)),
     "tan": (_of("tan", math.tan), (0, 0)),
 }
-"""Filter → function, and the least and most arguments behind its subject."""
+"""Filter → function, and its least and largest number of arguments after the subject."""

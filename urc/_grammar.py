@@ -1,12 +1,11 @@
-"""The grammar of expressions: text → Python source, for the forms that documents may use.
+"""The grammar of expressions: text → Python source, for the supported subset of Jinja.
 
-Floor 1, private to `urc.expressions`. The grammar and its precedence are Jinja's (its template
-designer documentation, "Expressions"), read by a parser of our own: every fault has its column, and
-no command pays 40 ms for importing a template engine. `tests/unit/test_expressions.py` holds both
-together, Jinja being the oracle.
+Private to `urc.expressions`. Grammar and precedence are those of Jinja ("Expressions" in its
+template designer documentation). A parser of our own gives the column of every error, and saves 40
+ms for importing a template engine. `tests/unit/test_expressions.py` compares it with Jinja.
 
-WARNING: the result is passed to eval. Everything put into it is a repr() of a constant, the text
-that `resolve` returns, or a name out of `urc._filters.SCOPE`; keep it so.
+WARNING: the result is passed to eval. It may contain only the `repr()` of constants, the text that
+`resolve` returns, and names of `urc._filters.SCOPE`.
 """
 
 import math
@@ -22,7 +21,7 @@ from urc.problems import UrcError
 __all__ = ["COUNTERS", "MAX_DEPTH", "NONCE", "Refused", "translate"]
 
 MAX_DEPTH: Final = 40
-"""Levels of brackets, and operators of one kind in a row."""
+"""Largest nesting depth, and largest number of consecutive operators of one kind."""
 
 _CONSTANTS = {
     "true": "True",
@@ -42,9 +41,9 @@ _TESTS = (
 )  # fmt: skip
 _PATTERNS = ("match", "search")
 COUNTERS: Final = "seq()"
-"""The root name under which a namespace keeps its counters; no name of a document can be so."""
+"""Root name of the counters of a namespace; no name of a document can equal it."""
 NONCE: Final = "nonce()"
-"""The root name under which a namespace keeps its fresh bytes."""
+"""Root name of the nonce of a namespace."""
 _MOST_NONCE: Final = 64
 _NONCE_ALONE = re.compile(r"\(\d+\)")
 _COUNTER = re.compile(r"[a-z][a-z0-9_]{0,63}")
@@ -61,14 +60,14 @@ def translate(
     """Return Python for the expression `text`.
 
     Args:
-        text: without braces.
-        resolve: root name → the Python that reads it.
-        names: takes the root names used.
-        settings: takes every NAME of ``settings.NAME``.
+        text: expression without braces.
+        resolve: root name → Python source that reads it.
+        names: receives the root names used.
+        settings: receives every NAME of ``settings.NAME``.
         allows_bytes: whether the value may be bytes.
 
     Raises:
-        Refused: it is no expression of the language.
+        Refused: the text is not a valid expression.
     """
     parser = _Parser(tokens_of(text), resolve, names, settings)
     parser.allows_bytes = allows_bytes
@@ -81,7 +80,7 @@ def translate(
 
 
 class _Parser:
-    """Recursive descent, one method per level of precedence, from the loosest to the tightest."""
+    """A recursive descent parser with one method per level of precedence, loosest first."""
 
     def __init__(
         self,
@@ -97,10 +96,10 @@ class _Parser:
         self._names = names
         self._settings = settings
         self.allows_bytes = False
-        """Whether a filter that gives bytes may come last."""
+        """Whether the last filter may return bytes."""
 
     def expression(self) -> str:
-        """``a if test else b``, and everything tighter."""
+        """Parse ``a if test else b``, and everything with tighter precedence."""
         self._depth += 1
         if self._depth > MAX_DEPTH:
             raise Refused("the expression is nested too deeply", self._next.offset)
@@ -114,7 +113,7 @@ class _Parser:
         return value
 
     def expect_end(self) -> None:
-        """Complain about whatever follows the expression."""
+        """Raise an error for text after the expression."""
         if self._next.kind != "end":
             raise self._surprise()
 
@@ -128,7 +127,7 @@ class _Parser:
         return token
 
     def _take(self, text: str) -> bool:
-        """Step over `text` when it is next; strings do not count as the word they hold."""
+        """Skip `text` if it is next; a string literal does not count."""
         if self._next.text == text and self._next.kind in ("operator", "name"):
             self._place += 1
             return True
@@ -245,13 +244,13 @@ class _Parser:
         return repr(token.text)
 
     def _subscript(self, value: str, is_settings: bool) -> str:
-        """``[key]``, or a part such as ``[1:3]``."""
+        """Parse ``[key]``, or a slice such as ``[1:3]``."""
         token = self._next
         key = "None" if token.text == ":" and token.kind == "operator" else self.expression()
         if self._take(":"):
             stop = "None" if self._next.text == "]" else self.expression()
             if self._next.text == ":":
-                raise Refused("a part of a row has a begin and an end, no step", self._next.offset)
+                raise Refused("a slice has a start and an end, but no step", self._next.offset)
             self._expect("]")
             return f"_slice({value}, {key}, {stop})"
         if is_settings and token.kind == "string" and self._next.text == "]":
@@ -286,7 +285,7 @@ class _Parser:
         raise self._surprise()
 
     def _counter(self, token: Token) -> str:
-        """``seq('name', low, high)``, the only call: the next number of a counter."""
+        """Parse ``seq('name', low, high)``: the next number of a counter."""
         name, low, high = self._next, None, None
         self._place += 1
         if name.kind != "string" or not _COUNTER.fullmatch(string_of(name)):
@@ -303,7 +302,7 @@ class _Parser:
         return f"{self._resolve(COUNTERS)}({string_of(name)!r}, {low}, {high})"
 
     def _nonce(self, token: Token) -> str:
-        """``nonce()`` or ``nonce(8)``: so many fresh bytes, 16 where nothing is said."""
+        """Parse ``nonce()`` or ``nonce(8)``: that many nonce bytes, 16 by default."""
         size = 16 if self._next.text == ")" else self._whole()
         if size is None or not self._take(")"):
             raise Refused("write nonce(), or nonce(8) with a number of bytes", token.offset)
@@ -339,12 +338,12 @@ class _Parser:
                 return value
 
     def _pattern(self, test: Token) -> str:
-        """``('regular expression')`` behind a test: compiled with the expression, never later."""
+        """Parse ``('regular expression')`` after a test; it is compiled with the expression."""
         self._expect("(")
         token = self._advance()
         if token.kind != "string":
             raise Refused(f"{test.text!r} takes a pattern in quotes", token.offset)
-        source = token.text[1:-1]  # as written: a backslash is the pattern's
+        source = token.text[1:-1]  # unchanged: a backslash belongs to the pattern
         self._expect(")")
         try:
             compiled(source, test.text)
@@ -371,12 +370,12 @@ class _Parser:
             text = f"{token.text!r} gives bytes, which only 'hex:' and 'bytes:' can send"
             raise Refused(text, token.offset)
         if token.text == "default":
-            # The only filter that may meet a missing name, so its subject is evaluated inside it.
+            # The only filter with a possibly missing name, so it evaluates its subject itself.
             subject = f"lambda: {subject}"
         return f"_filter_{token.text}({', '.join((subject, *arguments))})"
 
     def _check_word(self, name: str, first: Token, arguments: list[str]) -> None:
-        """Refuse a constant that the filter `name` cannot take."""
+        """Raise an error for a constant that the filter `name` does not accept."""
         refuses = _filters.FILTERS[name].refuses
         if refuses is None or first.kind != "string" or not arguments:
             return

@@ -1,7 +1,7 @@
-"""Headers that no document may set: they say who asks, or how the request itself is read.
+"""HTTP headers that documents must not set, because they identify the sender or frame the request.
 
-A browser keeps them from scripts for the same reason. A document that could set them would pass for
-a page of the dashboard, of another program, or for a proxy that vouches for somebody.
+Browsers withhold them from scripts for the same reason. With them, a document could pretend to be a
+page of the dashboard, a page of another program, or a proxy.
 """
 
 from typing import Final
@@ -19,6 +19,6 @@ _PREFIXES: Final = ("sec-", "proxy-", "x-forwarded-")
 
 
 def is_reserved(name: str) -> bool:
-    """Return whether `name`, in any case, is such a header."""
+    """Return whether `name`, in any case, is a reserved header."""
     low = name.strip().lower()
     return low in _NAMES or low.startswith(_PREFIXES)

@@ -1,7 +1,7 @@
-"""Filters and operators of expressions over lists and texts: parts of them, joined and cut.
+"""Filters and operators of expressions over lists and texts.
 
-Floor 1, private to `urc._filters`. Each is total over what documents can hold: it returns a value
-or raises TypeError or ValueError with words for a person, and is bounded by what it is given.
+Private to `urc._filters`. Each function accepts every value of a document: it returns a result, or
+raises TypeError or ValueError with a text for people. The size of its input bounds its result.
 """
 
 import re
@@ -36,7 +36,7 @@ def _list(value: object) -> Sequence[Any]:
 def _numbers(value: object) -> Sequence[Any]:
     items = _list(value)
     if not items:
-        raise ValueError("an empty list has none")
+        raise ValueError("an empty list has no minimum or maximum")
     for item in items:
         if not isinstance(item, (int, float)):
             raise TypeError(f"a list of numbers is expected, {_short(item)} is in it")
@@ -50,7 +50,7 @@ def _text(value: object) -> str:
 
 
 def sliced(value: Any, start: Any, stop: Any) -> Any:
-    """Return the part of a text, a list or bytes from `start` up to `stop`; None is its end."""
+    """Return the slice of a text, list or bytes from `start` up to `stop`; None for its end."""
     if not isinstance(value, (str, list, tuple, bytes)):
         raise TypeError(f"{_short(value)} has no parts in a row")
     for place in (start, stop):
@@ -61,20 +61,20 @@ def sliced(value: Any, start: Any, stop: Any) -> Any:
 
 @lru_cache(maxsize=512)
 def compiled(source: str, test: str) -> "Pattern":
-    """Return the pattern of a test; ``match`` begins where the text does. Raise `PatternError`."""
+    """Return the pattern of a test, anchored at the start for ``match``; raise `PatternError`."""
     from urc._patterns import compile_pattern  # 2 ms that only a driver with such a test pays
 
-    pattern = compile_pattern(source)  # so that a fault is told of what was written
+    pattern = compile_pattern(source)  # first, so that errors refer to the written text
     return compile_pattern(f"^(?:{source})") if test == "match" else pattern
 
 
 def is_match(value: Any, source: str) -> bool:
-    """Return whether the pattern takes the text from its beginning on."""
+    """Return whether the pattern matches at the beginning of the text."""
     return compiled(source, "match").search(_text(value)) is not None
 
 
 def is_search(value: Any, source: str) -> bool:
-    """Return whether the pattern takes any part of the text."""
+    """Return whether the pattern matches anywhere in the text."""
     return compiled(source, "search").search(_text(value)) is not None
 
 
@@ -101,7 +101,7 @@ def _end(place: int) -> Callable[[Any], Any]:
     def end(value: Any) -> Any:
         items: Sequence[Any] = value if isinstance(value, (str, bytes)) else _list(value)
         if not items:
-            raise ValueError("there is nothing in it")
+            raise ValueError("the list or text is empty")
         return items[place : place + 1 or None] if isinstance(items, str) else items[place]
 
     return end
@@ -112,7 +112,7 @@ def _sum(value: Any) -> Any:
 
 
 def _ddmm(value: Any, hemisphere: Any = "N") -> float | None:
-    """Return degrees of degrees and minutes written as one number; None where there is none."""
+    """Return the degrees of a number in the format DDMM.mmm; None for an empty value."""
     if value is None or value == "":
         return None
     sign = _HEMISPHERES.get(hemisphere) if isinstance(hemisphere, str) else None
@@ -135,4 +135,4 @@ LIST_FILTERS: Final[dict[str, tuple[Callable[..., Any], tuple[int, int]]]] = {
     "split": (_split, (0, 1)),
     "sum": (_sum, (0, 0)),
 }
-"""Filter → function, and the least and most arguments behind its subject."""
+"""Filter → function, and its least and largest number of arguments after the subject."""

@@ -1,4 +1,4 @@
-"""The event loop of processes that move robots: uvloop where it is installed."""
+"""The event loop of processes that move robots: uvloop if installed."""
 
 import asyncio
 import sys
@@ -17,8 +17,8 @@ def run(work: Coroutine[Any, Any, _Result]) -> _Result:
 
 
 def _fastest() -> Callable[[], asyncio.AbstractEventLoop] | None:
-    """Return what makes the fastest loop there is; None: Python's own is it."""
-    if sys.platform == "win32":  # the usual one there cannot watch the pipe to the guard
+    """Return the factory of the fastest available loop; None for the default of Python."""
+    if sys.platform == "win32":  # the default loop of Windows cannot watch the pipe to the guard
         return asyncio.SelectorEventLoop
     try:
         import uvloop

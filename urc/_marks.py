@@ -1,6 +1,6 @@
-"""Where the keys and values of a document stand.
+"""Positions of the keys and values of a document.
 
-Floor 0, private to `urc.source`.
+Private to `urc.source`.
 """
 
 from typing import Any, NamedTuple
@@ -9,7 +9,7 @@ __all__ = ["Mark", "Span", "Written"]
 
 
 class Span(NamedTuple):
-    """A place in the text: lines and columns are 1-based, the end is exclusive."""
+    """A range of the text: lines and columns are 1-based, the end is exclusive."""
 
     line: int
     column: int
@@ -18,7 +18,7 @@ class Span(NamedTuple):
 
 
 class Mark:
-    """Where one value stands, where its key stands, and the marks of what is inside it."""
+    """The position of one value and of its key, and the marks of its children."""
 
     __slots__ = ("children", "key", "origin", "span", "style", "written")
 
@@ -27,30 +27,30 @@ class Mark:
     ) -> None:
         self.span = span
         self.style = style
-        """"" plain, "'", '"', "|", ">", "{" a mapping or list, "*" an alias."""
+        """Style of the value: "" plain, "'", '"', "|", ">", "{" a mapping or list, "*" an alias."""
         self.key: Span | None = None
         self.children = {} if children is None else children
         self.origin: Any = None
-        """The document in which this and all inside it stand; None: the one around it."""
+        """Document that contains this value and its children; None: that of the parent."""
         self.written: Written | None = None
-        """The text as it stands there, when the value was made from it."""
+        """Original text, when the value was made from it."""
 
     def copy(self, children: "dict[str | int, Mark] | None" = None) -> "Mark":
-        """Return a mark of the same place, with other children when some are given."""
+        """Return a mark of the same place, with `children` if given."""
         mark = Mark(self.span, self.style, self.children if children is None else children)
         mark.key, mark.origin, mark.written = self.key, self.origin, self.written
         return mark
 
 
 class Written(NamedTuple):
-    """A text before names in it were filled in."""
+    """A text before its names were filled in."""
 
     text: str
     edits: tuple[tuple[int, int, int], ...]
-    """Where each name stood, how long it was, and the length of what came in its place."""
+    """Start of each name, its length, and the length of its replacement."""
 
     def offset(self, offset: int) -> int:
-        """Return the character of the written text that led to character `offset` of the value."""
+        """Return the offset in the original text for character `offset` of the value."""
         shift = 0
         for start, before, after in self.edits:
             begin = start + shift

@@ -1,8 +1,8 @@
-"""Numbers to bytes and back, for every type of `urc._numbers`.
+"""Conversion between numbers and bytes, for every type of `urc._numbers`.
 
-Floor 0. ``varint`` is LEB128 as Protocol Buffers have it, ``zigzag`` their signed form; ``bcd`` has
-a decimal digit in each half of a byte; ``f32cdab`` has its words of 16 bits swapped, and
-``u14by7le`` seven bits in each byte.
+``varint`` is LEB128 as in Protocol Buffers, ``zigzag`` their signed form. ``bcd`` has a decimal
+digit in each half of a byte. ``f32cdab`` has swapped words of 16 bits, and ``u14by7le`` seven bits
+in each byte.
 """
 
 import struct
@@ -22,7 +22,7 @@ __all__ = [
 ]
 
 _MOST_BYTES: Final = 10
-"""Of a varint of 64 bits."""
+"""Longest varint of 64 bits, in bytes."""
 _CODES = {
     ("integer", 8): "B",
     ("integer", 16): "H",
@@ -36,18 +36,18 @@ _CODES = {
 
 
 def format_of(number: Number) -> str:
-    """Return `struct`'s letter of a number, "" where it has none: 24, 40, 48 and 56 bits."""
+    """Return the format character of a number for `struct`; "" for 24, 40, 48 and 56 bits."""
     code = _CODES.get((number.kind, number.bits), "")
     return code.lower() if number.is_signed and number.kind == "integer" else code
 
 
 def order_of(number: Number) -> str:
-    """Return `struct`'s sign of a byte order."""
+    """Return the byte order character for `struct`."""
     return "<" if number.endian == "little" else ">"
 
 
 def plain_reader(number: Number) -> Callable[[bytes, int], Any]:
-    """Return the function from bytes and a place to the raw number; the bytes must be there."""
+    """Return the function from bytes and an offset to the raw number; the bytes must be present."""
     code = format_of(number)
     if code:
         unpack = struct.Struct(order_of(number) + code).unpack_from
@@ -57,9 +57,9 @@ def plain_reader(number: Number) -> Callable[[bytes, int], Any]:
 
 
 def plain_writer(number: Number) -> Callable[[Any], bytes]:
-    """Return the function from a raw number, which fits, to its bytes.
+    """Return the function from a raw number, which must fit, to its bytes.
 
-    It raises `OverflowError` or `struct.error` for a float too large for its 16 or 32 bits.
+    It raises `OverflowError` or `struct.error` for a float too large for 16 or 32 bits.
     """
     code = format_of(number)
     if not code:
@@ -71,9 +71,9 @@ def plain_writer(number: Number) -> Callable[[Any], bytes]:
 def reader_of(
     number: Number, fault: type[Exception]
 ) -> Callable[[bytes, int, int], tuple[Any, int]]:
-    """Return the function from data, begin and end to the raw number, and where it ends.
+    """Return the function from data, begin and end to the raw number and its end.
 
-    It raises `fault` when there is no such number.
+    It raises `fault` for an invalid number.
     """
     if number.is_variable:
         return _varint_reader(fault, is_zigzag=number.kind == "zigzag")
@@ -94,7 +94,7 @@ def reader_of(
 
 
 def writer_of(number: Number) -> Callable[[Any], bytes]:
-    """Return the function from a raw number, which fits, to its bytes."""
+    """Return the function from a raw number, which must fit, to its bytes."""
     if number.kind == "varint":
         return _written_varint
     if number.kind == "zigzag":
@@ -109,7 +109,7 @@ def writer_of(number: Number) -> Callable[[Any], bytes]:
 
 
 def words_turned(data: bytes) -> bytes:
-    """Return the words of 16 bits in the other order."""
+    """Return the words of 16 bits in reverse order."""
     return b"".join(data[place : place + 2] for place in range(len(data) - 2, -1, -2))
 
 

@@ -1,6 +1,6 @@
-"""The types of numbers in bytes: what ``u16be``, ``bcd24le`` or ``f32cdab`` means.
+"""Types of numbers in bytes, such as ``u16be``, ``bcd24le`` or ``f32cdab``.
 
-Floor 0. Items of a ``struct:`` and filters of expressions have the same names.
+Items of a ``struct:`` and filters of expressions share these names.
 """
 
 import re
@@ -15,44 +15,45 @@ _WIDTH = re.compile(r"([ui])([1-9]|[1-5][0-9]|6[0-3])")
 
 
 class Number(NamedTuple):
-    """How a number lies in its bytes, or in its bits."""
+    """The encoding of a number in bytes or bits."""
 
     kind: Literal["integer", "float", "boolean", "varint", "zigzag", "bcd"]
     bits: int
-    """8 to 64 in steps of 8; 1 to 64 inside of ``bits:`` and in packed arrays."""
+    """Width: 8 to 64 in steps of 8; 1 to 64 inside ``bits:`` and in packed arrays."""
     is_signed: bool = False
     endian: Literal["big", "little"] = "big"
     are_words_swapped: bool = False
-    """Its words of 16 bits stand the other way round: the byte order is that of each word."""
+    """Whether its words of 16 bits are in reverse order; `endian` is the byte order of each
+    word."""
     is_by_seven: bool = False
-    """Each byte holds seven of its bits, and a zero in front of them."""
+    """Whether each byte has seven bits of the number after a zero bit."""
 
     @property
     def size(self) -> int:
-        """Bytes; the least, where their number depends on the value."""
+        """Size in bytes; the least size of a variable number."""
         if self.is_by_seven:
             return self.bits // 7
         return 1 if self.is_variable else self.bits // 8
 
     @property
     def is_coded(self) -> bool:
-        """Whether it is no plain number of plain bytes."""
+        """Whether it has an encoding of its own."""
         is_odd = self.is_variable or self.kind == "bcd"
         return is_odd or self.are_words_swapped or self.is_by_seven
 
     @property
     def is_variable(self) -> bool:
-        """Whether large numbers take more bytes."""
+        """Whether its size depends on the value."""
         return self.kind in ("varint", "zigzag")
 
     @property
     def least(self) -> int:
-        """Smallest whole number that it holds."""
+        """Smallest whole number of the type."""
         return -(1 << self.bits - 1) if self.is_signed else 0
 
     @property
     def most(self) -> int:
-        """Largest whole number that it holds."""
+        """Largest whole number of the type."""
         if self.kind == "boolean":
             return 1
         if self.kind == "bcd":
@@ -61,7 +62,7 @@ class Number(NamedTuple):
 
 
 def number_of(name: str) -> Number | None:
-    """Return what ``u16be`` means; None when it is no number, or nobody says its byte order."""
+    """Return the type called ``u16be``; None for an unknown name or a missing byte order."""
     if name == "bool":
         return Number("boolean", 8)
     if name in ("varint", "zigzag"):
@@ -79,13 +80,13 @@ def number_of(name: str) -> Number | None:
 
 
 def _odd_number(name: str) -> Number | None:
-    """Return what ``f32cdab`` or ``u14by7le`` means."""
+    """Return the type called ``f32cdab`` or ``u14by7le``."""
     found = _SWAPPED.fullmatch(name)
     if found is not None:
         letters: str = found[2] or found[3]
         kind: Literal["integer", "float"] = "float" if found[1] == "f" else "integer"
         endian: Literal["big", "little"] = "little" if letters.startswith("b") else "big"
-        # "badc" are the words in their order, each with its low byte first: turned round, little.
+        # "badc" has words in normal order with the low byte first: reversed, it is little-endian.
         return Number(kind, 8 * len(letters), found[1] == "i", endian, are_words_swapped=True)
     found = _SEPTETS.fullmatch(name)
     if found is None:
@@ -95,7 +96,7 @@ def _odd_number(name: str) -> Number | None:
 
 
 def width_of(name: str) -> Number | None:
-    """Return what ``u11`` means, which only a packed array may be made of; None when nothing."""
+    """Return the type called ``u11``, for packed arrays only; None for an unknown name."""
     found = _WIDTH.fullmatch(name)
     return None if found is None else Number("integer", int(found[2]), found[1] == "i")
 
@@ -117,4 +118,4 @@ def _names() -> tuple[str, ...]:
 
 
 NUMBER_NAMES: Final = _names()
-"""Every name for which `number_of` has a number."""
+"""Names of all types that `number_of` knows."""

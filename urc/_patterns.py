@@ -1,18 +1,18 @@
 r"""Regular expressions of documents: matched in linear time, or refused.
 
-Floor 1, private to `urc.patterns` and `urc._lists`. The dialect is RE2's: no look-around, no
+Private to `urc.patterns` and `urc._lists`. The dialect is that of RE2: no look-around, no
 back-references, ``$`` is the very end, ``\d`` is ASCII. A pattern that `_is_linear` proves harmless
-runs on `re`, which is ten times faster on short lines; any other one runs on RE2. Where RE2 has no
-wheel, such a pattern is refused.
+runs on `re`, ten times faster on short lines; all others run on RE2. Without an installed RE2, such
+a pattern is refused.
 
-Theory of operation: backtracking costs more than linear time only when the same characters can be
-shared out between two parts of a pattern in many ways. So every repeat must be over one set of
-characters, that set must share nothing with what may come next, alternatives must differ in their
-first character, and the pattern must be anchored at the start.
+Theory of operation: backtracking exceeds linear time only if two parts of a pattern can share the
+same characters in many ways. So the pattern must be anchored at the start, and alternatives must
+differ in their first character. Every repeat must be over one set of characters, disjoint from the
+possible next characters.
 
-RE2 takes time in proportion to the text and to its program, into which ``{n}`` is written out. So
-the size of a pattern that is not proven is bounded. It is counted here, from the pattern as it is
-written: the answer is the same where RE2 is not installed.
+The time of RE2 is proportional to the text and to its program, in which ``{n}`` is expanded. So the
+size of an unproven pattern is bounded. The size is computed here, from the source: the result is
+the same without RE2.
 """
 
 import re
@@ -36,20 +36,21 @@ __all__ = [
 
 MAX_SOURCE: Final = 1024
 MAX_REPEAT: Final = 1000
-"""RE2's own limit on ``{n}``."""
+"""Limit of RE2 on ``{n}``."""
 MAX_COST: Final = 1000
-"""Parts of a pattern that is not proven, its repeats written out: about RE2's instructions.
+"""Size limit of an unproven pattern, its repeats expanded: about the instructions of RE2.
 
-A sentence of NMEA 0183, ``\\$[^\\r\\n]{1,80}\\r\\n``, counts to 802. The worst pattern of this size
-takes about half a second for a frame of 64 KiB."""
+A sentence of NMEA 0183, ``\\$[^\\r\\n]{1,80}\\r\\n``, has the size 802. The worst pattern at the
+limit takes about half a second for a frame of 64 KiB.
+"""
 _RE2_BYTES: Final = 4 << 20
-"""Memory that RE2 may take for one pattern. With 1 MiB, repeats of optional parts leave its fast
-automaton, and take a hundred times as long."""
+"""Memory limit of RE2 for one pattern. With 1 MiB, repeats of optional parts leave its fast
+automaton and take a hundred times as long."""
 _BEYOND_ASCII: Final = 6
-"""Instructions of RE2 for all characters outside ASCII: they are matched byte by byte."""
+"""Instructions of RE2 for all characters outside ASCII, which are matched byte by byte."""
 
 _OTHER = 128
-"""Stands for every character outside ASCII."""
+"""Represents all characters outside ASCII."""
 _ALL = frozenset(range(129))
 _DIGITS = frozenset(range(48, 58))
 _SPACES = frozenset(b" \t\n\r\f\v")
@@ -79,7 +80,7 @@ _INSTEAD[_constants.GROUPREF] = "; name both groups and compare them by 'when: a
 
 
 class PatternError(UrcError):
-    """A pattern that cannot be used; `offset` is the 0-based character of the fault."""
+    """An unusable pattern; `offset` is the 0-based character of the error."""
 
     def __init__(self, message: str, offset: int = 0) -> None:
         super().__init__(message)
@@ -91,17 +92,17 @@ class _Match(Protocol):
 
 
 class Pattern:
-    """A compiled pattern. Equal when its source is; safe to share."""
+    """A compiled pattern. Equal if the source is equal; safe to share."""
 
     __slots__ = ("_search", "groups", "is_proven", "source")
 
     def __init__(self, source: str, groups: tuple[str, ...], search: Any, is_proven: bool) -> None:
         self.source = source
-        """As written in the document."""
+        """Source as in the document."""
         self.groups = groups
         """Names of its groups, in order."""
         self.is_proven = is_proven
-        """Whether it runs on `re`; RE2 otherwise."""
+        """Whether it runs on `re`; otherwise on RE2."""
         self._search = search
 
     @property
@@ -112,7 +113,7 @@ class Pattern:
 
     @property
     def match(self) -> Callable[[str], "re.Match[str] | None"] | None:
-        """The compiled matcher of a pattern that is proven; None for one that runs on RE2."""
+        """The compiled matcher of a proven pattern; None for a pattern on RE2."""
         return self._search if self.is_proven else None
 
     def search(self, text: str) -> Mapping[str, str | None] | None:
@@ -134,17 +135,18 @@ def compile_pattern(text: str, *, is_over_bytes: bool = False) -> Pattern:
     """Compile a pattern.
 
     Args:
-        text: as written in the document.
-        is_over_bytes: whether it looks at bytes, each of which is one character, and not at text.
+        text: source as in the document.
+        is_over_bytes: whether it matches bytes, each as one character, instead of text.
 
     Raises:
-        PatternError: no pattern, one that uses what the dialect lacks, or needs an absent RE2.
+        PatternError: an invalid pattern, one outside of the dialect, or one that needs an absent
+            RE2.
     """
     if len(text) > MAX_SOURCE:
         raise PatternError(f"a pattern has at most {MAX_SOURCE} characters, found {len(text)}")
     try:
         with warnings.catch_warnings():
-            # Python means to read "[[", "--", "&&" in a class in another way one day.
+            # Python plans a new meaning for "[[", "--", "&&" in a class.
             warnings.simplefilter("error", FutureWarning)
             tree = _parser.parse(text, re.ASCII)
     except FutureWarning as error:
@@ -171,16 +173,16 @@ def compile_pattern(text: str, *, is_over_bytes: bool = False) -> Pattern:
 
 
 def example(pattern: Pattern, groups: Mapping[str, str], variant: int = 0) -> str:
-    """Return a short text made after `pattern`, with `groups` in the places of its named groups.
+    """Return a short text for `pattern`, with `groups` as its named groups.
 
-    Whether the pattern really takes the text is the caller's to check.
+    The caller must check that the pattern matches the text.
 
     Args:
-        pattern: what the text is made after.
+        pattern: pattern of the text.
         groups: name of a group → its text.
-        variant: at 0, what is optional is left out unless a given group is in it, the first of
-            several ways is taken, and a class of characters gives its first printable one. Other
-            numbers take other ways, characters and repeats.
+        variant: 0 omits optional parts without given groups, and takes the first alternative and
+            the first printable character of a class. Other numbers take other alternatives,
+            characters and repeats.
     """
     tree = _parser.parse(pattern.source, re.ASCII)
     names = {number: name for name, number in tree.state.groupdict.items()}
@@ -188,7 +190,7 @@ def example(pattern: Pattern, groups: Mapping[str, str], variant: int = 0) -> st
 
 
 def literal_prefix(pattern: Pattern) -> str:
-    """Return the text with which everything begins that a proven pattern takes."""
+    """Return the literal beginning of all matches of a proven pattern."""
     if not pattern.is_proven:
         return ""
     prefix = ""
@@ -200,20 +202,20 @@ def literal_prefix(pattern: Pattern) -> str:
 
 
 def is_plain_group(pattern: Pattern, name: str) -> bool:
-    """Return whether a group can hold neither ``_`` nor anything outside ASCII."""
+    """Return whether a group can contain neither ``_`` nor characters outside ASCII."""
     tree = _parser.parse(pattern.source, re.ASCII)
     found = _alphabet(tree, tree.state.groupdict[name])
     return found is not None and not found & {_OTHER, ord("_")}
 
 
 def can_be_empty(pattern: Pattern, name: str) -> bool:
-    """Return whether a group can take part in a match and hold no character."""
+    """Return whether a group can match an empty text."""
     tree = _parser.parse(pattern.source, re.ASCII)
     return bool(_least_width(tree, tree.state.groupdict[name]) == 0)
 
 
 def _least_width(tree: Any, number: int) -> int | None:
-    """Return the fewest characters that the group can hold, or None when it is not in `tree`."""
+    """Return the least length of the group, or None when it is not in `tree`."""
     for operation, argument in tree:
         if operation is _constants.SUBPATTERN and argument[0] == number:
             return int(argument[3].getwidth()[0])
@@ -225,7 +227,7 @@ def _least_width(tree: Any, number: int) -> int | None:
 
 
 def _alphabet(tree: Any, number: int) -> frozenset[int] | None:
-    """Return every character that the group can hold, or None when it is not in `tree`."""
+    """Return all possible characters of the group, or None when it is not in `tree`."""
     for operation, argument in tree:
         if operation is _constants.SUBPATTERN and argument[0] == number:
             return _letters(argument[3])
@@ -271,7 +273,7 @@ def _example(tree: Any, names: Mapping[int, str], groups: Mapping[str, str], var
 
 
 def _mentions(tree: Any, names: Mapping[int, str], groups: Mapping[str, str]) -> bool:
-    """Return whether one of `groups` stands in `tree`."""
+    """Return whether `tree` contains one of `groups`."""
     for operation, argument in tree:
         if operation is _constants.SUBPATTERN and names.get(argument[0], "") in groups:
             return True
@@ -312,12 +314,12 @@ def _parts(operation: Any, argument: Any) -> list[Any]:
 
 
 def cost_of(source: str) -> int:
-    """Return the number of parts of a pattern, its repeats written out."""
+    """Return the size of a pattern, its repeats expanded."""
     return _cost(_parser.parse(source, re.ASCII))
 
 
 def _cost(tree: Any, beyond: int = _BEYOND_ASCII) -> int:
-    """Return the parts of a program; `beyond` are those of all characters beyond ASCII."""
+    """Return the size of a program; `beyond` is that of all characters outside ASCII."""
     return sum(_cost_of_item(operation, argument, beyond) for operation, argument in tree)
 
 
@@ -361,7 +363,7 @@ def _re2_search(text: str) -> Any:
 
 
 class _NotProven(Exception):
-    """Raised at the first part that the proof does not cover; the pattern may still be harmless."""
+    """The proof does not cover a part of the pattern, which may still be harmless."""
 
 
 def _is_linear(tree: Any, text: str) -> bool:
@@ -381,9 +383,9 @@ def _is_linear(tree: Any, text: str) -> bool:
 
 
 def _first_of(items: list[Any], follow: frozenset[int]) -> frozenset[int]:
-    """Return which characters may come first in `items` followed by `follow`; check each item.
+    """Return the possible first characters of `items` followed by `follow`; check each item.
 
-    Walks from the end, so that at every item it is known what may come after it.
+    It goes backwards, so that the next characters of each item are known.
     """
     for operation, argument in reversed(items):
         follow = _first_of_item(operation, argument, follow)
@@ -437,7 +439,7 @@ def _first_of_repeat(argument: Any, follow: frozenset[int]) -> frozenset[int]:
 
 
 def _characters(operation: Any, argument: Any) -> frozenset[int] | None:
-    """Return the set of characters that one single-character item takes, else None."""
+    """Return the character set of a single-character item, else None."""
     if operation is _constants.LITERAL:
         return frozenset((min(argument, _OTHER),))
     if operation is _constants.NOT_LITERAL:
@@ -457,5 +459,5 @@ def _characters(operation: Any, argument: Any) -> frozenset[int] | None:
             union.update(range(min(value[0], _OTHER), min(value[1], _OTHER) + 1))
         else:
             union |= _CATEGORIES[value]
-    # A class that names some characters outside ASCII and is negated still takes all the others.
+    # A negated class of some characters outside ASCII still matches all others.
     return (_ALL - (union - {_OTHER})) if is_negated else frozenset(union)

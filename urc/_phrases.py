@@ -1,7 +1,7 @@
-"""Lines for people that can still be said in another language.
+"""Translatable texts for people.
 
-A phrase is its English text, and remembers what it is made of: who has a catalogue says it anew,
-see `urc.web.words`. `scripts.translations` finds the texts by the name of `phrase`.
+A phrase is its English text together with its parts, so that a catalogue can translate it later;
+see `urc.web.words`. `scripts.translations` finds the texts by the name `phrase`.
 """
 
 from collections.abc import Iterable, Mapping
@@ -10,20 +10,20 @@ __all__ = ["Phrase", "joined", "phrase"]
 
 
 class Phrase(str):
-    """A line in English."""
+    """A translatable text in English."""
 
     __slots__ = ("between", "names", "pieces", "text")
 
     text: str
-    """With ``{name}`` for each of `names`."""
+    """Text with ``{name}`` for each of `names`."""
     names: Mapping[str, str]
     pieces: tuple[str, ...]
-    """What it is put together of, where it has no text of its own."""
+    """Parts of a joined phrase, which has no `text`."""
     between: str
 
 
 def phrase(text: str, /, **names: object) -> Phrase:
-    """Return a line; what stands in a hole may be a phrase, too."""
+    """Return a phrase; its values may be phrases, too."""
     said = {name: one if isinstance(one, str) else str(one) for name, one in names.items()}
     made = Phrase(text.format_map(said))
     made.text, made.names, made.pieces, made.between = text, said, (), ""
@@ -31,7 +31,7 @@ def phrase(text: str, /, **names: object) -> Phrase:
 
 
 def joined(between: str, pieces: Iterable[str]) -> Phrase:
-    """Return phrases as one."""
+    """Return several phrases as one."""
     some = tuple(pieces)
     made = Phrase(between.join(some))
     made.text, made.names, made.pieces, made.between = "", {}, some, between

@@ -1,8 +1,8 @@
-"""Orientations: a quaternion to roll, pitch and yaw, in radians.
+"""Conversion of a quaternion to roll, pitch and yaw, in radians.
 
-Floor 0, private to `urc._filters`. A quaternion is [x, y, z, w] or {x, y, z, w}, of any length but
-zero; the angles are those of the axes it is told in, about x, then y, then z (REP-103). Without an
-orientation they are not a number, which stays so in any arithmetic and means "not available".
+Private to `urc._filters`. A quaternion is [x, y, z, w] or {x, y, z, w}, of any length but zero. The
+angles are about x, then y, then z in its axis convention (REP-103). Without an orientation they are
+not-a-number, which any arithmetic preserves and which means "not available".
 """
 
 import math
@@ -14,7 +14,7 @@ _Parts = tuple[float, float, float, float]
 
 
 def roll(value: object) -> float:
-    """Return the angle about x, -pi to pi; not a number when there is no orientation."""
+    """Return the angle about x, -pi to pi; not-a-number without an orientation."""
     q = _parts(value)
     if q is None:
         return math.nan
@@ -23,7 +23,7 @@ def roll(value: object) -> float:
 
 
 def pitch(value: object) -> float:
-    """Return the angle about y, -pi/2 to pi/2; not a number when there is no orientation."""
+    """Return the angle about y, -pi/2 to pi/2; not-a-number without an orientation."""
     q = _parts(value)
     if q is None:
         return math.nan
@@ -32,7 +32,7 @@ def pitch(value: object) -> float:
 
 
 def yaw(value: object) -> float:
-    """Return the angle about z, -pi to pi; not a number when there is no orientation."""
+    """Return the angle about z, -pi to pi; not-a-number without an orientation."""
     q = _parts(value)
     if q is None:
         return math.nan
@@ -41,7 +41,7 @@ def yaw(value: object) -> float:
 
 
 def _parts(value: object) -> _Parts | None:
-    """Return a unit quaternion, or None for one that is absent, zero or not finite."""
+    """Return a unit quaternion, or None for an absent, zero or infinite one."""
     if value is None:
         return None
     if isinstance(value, Mapping):

@@ -1,8 +1,8 @@
-"""How values become text: in templates, in lists that are joined, in paths and topics, in messages.
+"""Text forms of values: in templates, joined lists, paths, topics and messages.
 
-Floor 1, private to expressions. The same number is always spelt the same, whether it came as 20 or
-as 20.0: plain decimal digits, as few as tell it from its neighbours, and never an exponent, which
-few robots read.
+Private to expressions. The same number always has the same text, whether it arrived as 20 or as
+20.0. The text has as few decimal digits as distinguish it from its neighbours, and no exponent,
+which few robots can read.
 """
 
 import json
@@ -13,11 +13,11 @@ from urc.problems import printable
 __all__ = ["quoted", "spelt"]
 
 _ENDS = {"\n": "\\n", "\r": "\\r", "\t": "\\t"}
-"""As people know them."""
+"""Escapes in their familiar form."""
 
 
 def spelt(value: object) -> str:
-    """Return `value` as text: ``20``, ``0.0000001``, ``true``, ``[1, 2]``; nothing for None."""
+    """Return `value` as text: ``20``, ``0.0000001``, ``true``, ``[1, 2]``; "" for None."""
     if isinstance(value, str):
         return value
     if value is None:
@@ -32,13 +32,13 @@ def spelt(value: object) -> str:
 
 
 def quoted(value: object, most: int = 40) -> str:
-    """Return a value for a message to people: texts in quotation marks, bytes as hex digits.
+    """Return a value for a message to people: quoted text, or bytes as hex digits.
 
-    What acts on a terminal is escaped, once.
+    Terminal control characters are escaped, once.
 
     Args:
-        value: of any kind that a robot, a page or a document gives.
-        most: characters; longer ones are cut.
+        value: any value from a robot, a page or a document.
+        most: longest result in characters; longer ones are cut.
     """
     if value is None:
         return "“not available”"
@@ -56,7 +56,7 @@ def quoted(value: object, most: int = 40) -> str:
 
 
 def _json(value: object) -> str:
-    """Return a list or mapping as JSON has it, its numbers spelt as ever."""
+    """Return a list or mapping as JSON, with numbers in the form of `spelt`."""
     if isinstance(value, Mapping):
         parts = (
             f"{json.dumps(str(key), ensure_ascii=False)}: {_json(one)}"
@@ -71,7 +71,7 @@ def _json(value: object) -> str:
 
 
 def _decimal(text: str) -> str:
-    """Return Python's spelling of a float without exponent, and without a point if it is whole."""
+    """Return a float without an exponent, and without a decimal point if it is whole."""
     digits, _, exponent = text.partition("e")
     if exponent:
         sign = "-" if digits[0] == "-" else ""

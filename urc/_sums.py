@@ -1,7 +1,7 @@
-"""The arithmetic of checksums: what an algorithm is, and the function from bytes to its number.
+"""Checksum algorithms: their parameters, and the functions from bytes to numbers.
 
-Floor 0. That of CRCs is a library's (`anycrc`, or the standard library where it has that very one);
-sums and folds are one call into C each.
+A library computes CRCs (`anycrc`, or the standard library for its own two); sums and folds are one
+call into C each.
 """
 
 import binascii
@@ -40,22 +40,22 @@ class CrcSpec(NamedTuple):
 
 
 class FoldSpec(NamedTuple):
-    """All numbers of a window put together by one operation."""
+    """A checksum that combines all numbers of a range by one operation."""
 
     operation: Literal["sum", "xor"]
     bits: int = 8
-    """Width of the result."""
+    """Width of the result in bits."""
     of: int = 8
-    """Width of the numbers; the last one is filled up with zeros."""
+    """Width of the numbers in bits; the last one is padded with zeros."""
     complement: Literal["none", "ones", "twos"] = "none"
     mask: int | None = None
-    """Bits of the result that are kept."""
+    """Bits of the result to keep."""
     added: int = 0
-    """Number that is added to the result, after the mask."""
+    """Number to add to the result, after the mask."""
     ored: int = 0
-    """Bits of the result that are set, last of all."""
+    """Bits of the result to set, last of all."""
     is_odd_xored: bool = False
-    """A byte that is left over by numbers of 16 bits is put to the result by exclusive or."""
+    """Whether an odd last byte is combined by exclusive or, with numbers of 16 bits."""
 
 
 FOLDED: Final = {
@@ -78,7 +78,7 @@ PLAIN_CHECKSUMS: Final = {
 
 
 def algorithm_of(name: str) -> CrcSpec | FoldSpec | str | None:
-    """Return the algorithm called `name`; None when there is none."""
+    """Return the algorithm called `name`; None for an unknown name."""
     if name in PLAIN_CHECKSUMS:
         return name
     if name in FOLDED:
@@ -97,7 +97,7 @@ def algorithm_names() -> Iterable[str]:
     return {one.lower() for one in (*models, *aliases)} | FOLDED.keys() | PLAIN_CHECKSUMS.keys()
 
 
-@cache  # of the names of algorithms, which are few
+@cache  # the algorithm names are few
 def _named(name: str) -> Compute:
     algorithm = algorithm_of(name)
     if algorithm is None:
@@ -118,11 +118,11 @@ def sum_of(value: Any, name: Any) -> int:
 
 
 def build_algorithm(spec: CrcSpec | FoldSpec | str, *, is_big: bool = True) -> Compute:
-    """Return the function from bytes to the checksum's number.
+    """Return the function from bytes to the checksum.
 
     Args:
-        spec: which one.
-        is_big: order of bytes in numbers that are wider than one; only folds have such.
+        spec: the algorithm.
+        is_big: byte order of numbers wider than one byte, which only folds have.
     """
     if isinstance(spec, str):
         return NAMED[spec]
@@ -169,7 +169,7 @@ def _numbers(data: bytes, size: int, order: str) -> list[int]:
 
 
 def _fletcher(modulus: int, bits: int, size: int = 1) -> Compute:
-    """Return Fletcher's sum of sums; `size` is that of the little-endian numbers it adds up."""
+    """Return Fletcher's checksum; `size` is that of its little-endian numbers in bytes."""
 
     def compute(data: bytes) -> int:
         numbers = data if size == 1 else _numbers(data, size, "little")
@@ -195,7 +195,7 @@ NAMED: Final[Mapping[str, Compute]] = {
     "fletcher32": _fletcher(65535, 16, 2),
     "internet": _internet,
 }
-"""Algorithms that have no parameters."""
+"""Functions of the algorithms without parameters."""
 
 _BUILT_IN: Final[Mapping[CrcSpec, Compute]] = {
     CrcSpec(32, 0x04C11DB7, 0xFFFFFFFF, True, True, 0xFFFFFFFF): zlib.crc32,

@@ -1,6 +1,6 @@
-"""The words of expressions: text → tokens, and tokens → constants.
+"""Tokens of expressions: text → tokens, and tokens → constants.
 
-Floor 1, private to `urc._grammar`.
+Private to `urc._grammar`.
 """
 
 import re
@@ -23,7 +23,7 @@ _MAX_DIGITS: Final = 400
 
 
 class Refused(Exception):
-    """Why this text is no expression of the language, and the 0-based character of the fault."""
+    """An invalid expression, with the 0-based character of the error."""
 
     def __init__(self, message: str, offset: int) -> None:
         super().__init__(message)
@@ -62,7 +62,7 @@ def integer_of(token: Token) -> str:
     if len(text) > _MAX_DIGITS:
         raise Refused("the number is too large", token.offset)
     try:
-        # "010" is ten in some languages and eight in others; in this one it is a mistake.
+        # "010" means ten in some languages and eight in others; here it is an error.
         return repr(int(text, 0))
     except ValueError:
         raise Refused(f"{text!r} is not a number", token.offset) from None
@@ -84,7 +84,7 @@ def string_of(token: Token) -> str:
         if code:
             return chr(int(code, 16))
         if found[3] not in _ESCAPES:
-            text = f"'\\{found[3]}' is no escape in an expression"
+            text = f"'\\{found[3]}' is not an escape in an expression"
             raise Refused(text, token.offset + 1 + found.start())
         return _ESCAPES[found[3]]
 

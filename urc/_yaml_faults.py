@@ -1,7 +1,7 @@
-"""What a YAML parser says when it gives up → what a person can do about it.
+"""Translation of YAML parser errors into messages and hints for people.
 
-Floor 0, private to `urc.source`. Both of PyYAML's parsers are understood (the C one and the pure
-one): their wording differs, so the fault is told by the text at the place wherever that is enough.
+Private to `urc.source`. It handles both parsers of PyYAML (C and pure Python). Their messages
+differ, so the text at the place decides wherever possible.
 """
 
 import re
@@ -20,7 +20,7 @@ _SIGN: Final = "{!r} at the start of a value is a sign of YAML, not text"
 
 
 class Fault(NamedTuple):
-    """One syntax fault; `line` and `column` are 0-based, as the parser counts."""
+    """One syntax error; `line` and `column` are 0-based, as in the parser."""
 
     line: int
     column: int
@@ -30,7 +30,7 @@ class Fault(NamedTuple):
 
 
 class _Clue(NamedTuple):
-    """What the parser said, and the text it was looking at."""
+    """A parser message, and the text at its place."""
 
     said: str
     context: str
@@ -53,7 +53,7 @@ class _Clue(NamedTuple):
 
 
 def explain(error: yaml.YAMLError, lines: Sequence[str]) -> Fault:
-    """Return the fault that `error` means, at the place that a person would look at."""
+    """Return the syntax error that `error` means, at the most useful place."""
     mark = getattr(error, "problem_mark", None)
     opened = getattr(error, "context_mark", None) or mark
     said = str(getattr(error, "problem", None) or error).splitlines()[0]
@@ -151,7 +151,7 @@ def _indicator(at: _Clue) -> Fault | None:
                 _SIGN.format(char),
                 advice(at.opened_text, at.opened_column),
             )
-    # libyaml ends an alias before '?', so that `*IDN?` is an alias and the start of a key.
+    # libyaml ends an alias before '?', so `*IDN?` becomes an alias and the start of a key.
     found = _LAST_ALIAS.search(at.text[: at.column])
     if found is None:
         return None

@@ -1,7 +1,7 @@
-"""What an unquoted scalar means: YAML 1.2's core schema.
+"""Meaning of an unquoted scalar in the core schema of YAML 1.2.
 
-Floor 0, private to `urc.source`. So ``on``, ``yes`` and ``12:30:00`` are text, 010 is ten, 1e3 is a
-number, and a date is text.
+Private to `urc.source`. In this schema ``on``, ``yes`` and ``12:30:00`` are text, 010 is ten, 1e3
+is a number, and a date is text.
 """
 
 import re
@@ -11,7 +11,8 @@ from typing import Final
 __all__ = ["DIGITS_MAX", "resolve_plain"]
 
 DIGITS_MAX: Final = 40
-"""No number of a robot is longer; Python's own conversion is quadratic and refuses thousands."""
+"""Longest number of a robot. The conversion of Python is quadratic and refuses thousands of
+digits."""
 _SCALAR = re.compile(
     r"""(?P<null>~|null|Null|NULL|)
     |(?P<true>true|True|TRUE)|(?P<false>false|False|FALSE)
@@ -24,10 +25,10 @@ _SCALAR_STARTS = frozenset("~nNtTfF0123456789+-.")
 
 
 def resolve_plain(text: str) -> object:
-    """Return what an unquoted scalar means by YAML 1.2's core schema.
+    """Return the value of an unquoted scalar in the core schema of YAML 1.2.
 
     Raises:
-        ValueError: it is a number of more digits than any number here has.
+        ValueError: a number has more than `DIGITS_MAX` characters.
     """
     if text and text[0] not in _SCALAR_STARTS:
         return text

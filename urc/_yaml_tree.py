@@ -1,8 +1,8 @@
-"""YAML events → plain data and a tree of marks of the same shape.
+"""Conversion of YAML events into plain data and a tree of marks of the same shape.
 
-Floor 0, private to `urc.source`. The parser's events are walked here rather than composed by the
-library: so nesting and aliases are bounded *while* reading (a bomb costs what it takes to read its
-first lines), every key and value keeps its place, and scalars follow YAML 1.2's core rules.
+Private to `urc.source`. The reader handles the events of the parser itself instead of composing
+them by the library. So nesting and aliases are bounded *while* reading: a bomb costs only its first
+lines. Every key and value has its place, and scalars follow the core schema of YAML 1.2.
 """
 
 import re
@@ -20,22 +20,22 @@ __all__ = ["Limits", "StoppedError", "TreeReader"]
 _TAGS: Final = "tag:yaml.org,2002:"
 _PATH_SHOWN: Final = 12
 _PROBLEMS_MOST: Final = 100
-"""Findings after which a text is given up: each costs a look at its line, however long that is."""
+"""Most problems of one text: each of them reads its line, which may be long."""
 _CUT_COMMENT = re.compile(r" #[^\s#!]")
 
 
 class Limits(NamedTuple):
-    """What a document may hold."""
+    """Bounds of a document."""
 
     size_bytes: int = 1 << 20
     depth: int = 64
-    """Mappings and lists inside each other, aliases followed."""
+    """Largest nesting depth of mappings and lists, through aliases."""
     nodes: int = 10_000
-    """Keys, values, mappings and lists, counted as if every alias were written out."""
+    """Most keys, values, mappings and lists, with every alias expanded."""
 
 
 class StoppedError(Exception):
-    """The document was given up; the reason is the last of the reader's problems."""
+    """Reading has stopped; the last problem of the reader gives the reason."""
 
 
 class _Built(NamedTuple):
@@ -46,7 +46,7 @@ class _Built(NamedTuple):
 
 
 class TreeReader:
-    """Reads one document out of a parser's events; `problems` holds what was found on the way."""
+    """Reads one document from the events of a parser; `problems` has the problems found."""
 
     def __init__(self, parser: Any, lines: list[str], file: str, limits: Limits) -> None:
         self.problems: list[Problem] = []
@@ -57,13 +57,13 @@ class TreeReader:
         self._nodes = 0
         self._path: list[str] = []
         self._anchors: dict[str, _Built | None] = {}
-        """None while the anchor's own node is still being read."""
+        """Anchors by name; None while the node of the anchor is being read."""
 
     def read(self) -> tuple[object, Mark] | None:
         """Return data and marks, or None for a text without any document.
 
         Raises:
-            StoppedError: nothing after this place can be understood.
+            StoppedError: the rest of the text cannot be parsed.
             yaml.YAMLError: the text is not YAML.
         """
         self._next()  # the start of the stream
@@ -174,7 +174,7 @@ class TreeReader:
         return items, height + 1
 
     def _key(self, event: Any, start: Any, depth: int) -> str | None:
-        """Return the key, or None when it was reported and its value is to be skipped."""
+        """Return the key, or None when it was reported and its value is skipped."""
         if type(event) is not yaml.ScalarEvent:
             self._node(event, depth + 1)
             self._report_complex_key(event, start)
@@ -280,7 +280,7 @@ class TreeReader:
         self._report(event, "key-not-text", f"a key must be text, found {what}")
 
     def _is_bare(self, key: Any, value: Any) -> bool:
-        """Return whether a key has no colon behind it."""
+        """Return whether a key has no colon after it."""
         is_text = _is_plain(key) and type(value) is yaml.ScalarEvent
         if not is_text or value.value or value.style:
             return False
@@ -288,7 +288,7 @@ class TreeReader:
         return not self._line(end.line)[end.column :].lstrip().startswith(":")
 
     def _report_comma(self, event: Any, before: Any) -> None:
-        """Report a key without a colon: it is the rest of the text `before`."""
+        """Report a key without a colon, which is the rest of the text `before`."""
         self._report(
             event,
             "unquoted",
@@ -382,6 +382,6 @@ def path_text(path: Iterable[str | int]) -> str:
 
 
 def _close(mark: Mark, end: Any) -> None:
-    """Let the mark of a mapping or list reach to the event that ends it."""
+    """Extend the mark of a mapping or list to its end event."""
     line, column = end.end_mark.line + 1, end.end_mark.column + 1
     mark.span = mark.span._replace(end_line=line, end_column=column)

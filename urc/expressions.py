@@ -1,12 +1,12 @@
-"""Templates and expressions of documents: Jinja's grammar, compiled to one Python function each.
+"""Templates and expressions of documents: a subset of Jinja, compiled to Python functions.
 
-Floor 1. The forms that have a translation are those in `urc._grammar`, and no others. So there is
-nothing to break out of: no attribute of a Python object is ever read, no loop, no call but the
-filters in `urc._filters`, and no operator that turns a short text into a long one. Literal text is
-kept to the byte, where Jinja would turn CR into LF and drop a final newline. Where Jinja answers
-quietly (``'abc' | int`` is 0), URC raises: a reading must not become a zero by accident.
+`urc._grammar` defines the supported subset. It is a sandbox: no attributes of Python objects, no
+loops, and no operator that expands a short text. The only calls are the filters of `urc._filters`.
+Literal text is preserved to the byte, whereas Jinja converts CR to LF and drops a final newline.
+Where Jinja hides an error (``'abc' | int`` is 0), URC raises: a reading must not become zero by
+accident.
 
-A template that is exactly one ``{{ expression }}`` keeps the expression's type.
+A template of exactly one ``{{ expression }}`` keeps the type of the expression.
 """
 
 import ast
@@ -39,15 +39,15 @@ __all__ = [
 ]
 
 NOW: Final = "now"
-"""The root name of the time of day, in seconds since 1970."""
+"""Root name of the time of day, in seconds since 1970."""
 _HASHES: Final = frozenset(f"_filter_{name}" for name in ("md5", "sha1", "sha256", "hmac_sha256"))
 _SUMMARIES: Final = frozenset(("_filter_length", "_is_defined", "_is_none", "_match", "_search"))
-"""What tells too little of its operand to be of use."""
+"""Functions whose result reveals too little of their operand to matter."""
 _NONCE: Final = re.compile(rf"ns\['{re.escape(NONCE)}'\]\(\d+\)")
 MAX_SOURCE: Final = 4096
-"""Characters of one template."""
+"""Longest template, in characters."""
 MAX_OUTPUT: Final = 65536
-"""Characters that one rendering may give."""
+"""Longest result of a rendering, in characters."""
 
 
 _INSTEAD: Final = {
@@ -55,13 +55,13 @@ _INSTEAD: Final = {
     "if": "; write {{ 'a' if test else 'b' }}",
     "set": "; write the expression where its value stands",
 }
-"""Statement of Jinja → what to write instead."""
+"""Jinja statement → hint."""
 
 
 class ExpressionError(UrcError):
-    """A template that cannot be compiled, or evaluated with the values given.
+    """A template that cannot be compiled, or not be evaluated with the given values.
 
-    `offset` is the 0-based character in the template at which the fault stands.
+    `offset` is the 0-based character of the error in the template.
     """
 
     def __init__(self, message: str, offset: int = 0) -> None:
@@ -70,19 +70,19 @@ class ExpressionError(UrcError):
 
 
 class Template:
-    """A compiled template. Equal when its source is; safe to share."""
+    """A compiled template. Equal if the source is equal; safe to share."""
 
     __slots__ = ("_function", "is_constant", "names", "python", "settings", "source")
 
     def __init__(self, source: str, python: str, names: frozenset[str], settings: frozenset[str]):
         self.source = source
-        """As written in the document."""
+        """Source as in the document."""
         self.python = python
-        """The Python expression it became, over a mapping `ns`."""
+        """Compiled Python expression, over a mapping `ns`."""
         self.names = names
-        """Root names it uses: ``settings``, an argument, a signal."""
+        """Root names that it uses: ``settings``, an argument, a signal."""
         self.settings = settings
-        """Names used as ``settings.NAME``."""
+        """Names of the settings that it uses, as ``settings.NAME``."""
         self.is_constant = not names
         self._function: Callable[[Mapping[str, object]], Any] = _function(python)
 
@@ -115,10 +115,10 @@ class Template:
 
 
 def compile_template(text: str) -> Template:
-    """Compile text with ``{{ expression }}`` in it.
+    """Compile text that contains ``{{ expression }}``.
 
     Raises:
-        ExpressionError: with the offset of the fault in `text`.
+        ExpressionError: with the offset of the error in `text`.
     """
     _check_length(text)
     parts: list[str] = []
@@ -139,11 +139,11 @@ def compile_template(text: str) -> Template:
 
 
 def compile_expression(text: str, *, allows_bytes: bool = False) -> Template:
-    """Compile an expression written without braces, as in ``when: battery > 20``.
+    """Compile an expression without braces, as in ``when: battery > 20``.
 
     Args:
         text: the expression.
-        allows_bytes: whether its value may be bytes: where bytes are written, not text.
+        allows_bytes: whether its value may be bytes.
     """
     _check_length(text)
     if not text.strip():
@@ -155,7 +155,7 @@ def compile_expression(text: str, *, allows_bytes: bool = False) -> Template:
 
 
 def text_of(value: object) -> str:
-    """Return `value` as it goes into text."""
+    """Return `value` in its text form."""
     if isinstance(value, bytes):
         raise ExpressionError("bytes are no text; 'hex:' and 'bytes:' take them")
     return value if isinstance(value, str) else spelt(value)
@@ -170,9 +170,9 @@ def _function(python: str) -> Callable[[Mapping[str, object]], Any]:
     try:
         code = compile(f"lambda ns: {python}", f"<template {python[:60]}>", "eval")
     except (SyntaxError, RecursionError, MemoryError):
-        # Brackets of many long sums can add up to more than Python's own parser nests.
+        # Brackets of many long sums can exceed the nesting limit of the Python parser.
         raise ExpressionError("the expression is nested too deeply") from None
-    # `python` is made of constants and names of SCOPE only: see the warning in `urc._grammar`.
+    # `python` contains only constants and names of SCOPE: see the warning in `urc._grammar`.
     function: Callable[[Mapping[str, object]], Any] = eval(code, _filters.SCOPE)  # noqa: S307
     return function
 
@@ -203,12 +203,12 @@ def split_template(text: str) -> Iterator[tuple[int, str, str | None]]:
 
 
 def _word_behind(text: str, start: int) -> str:
-    """Return the word of the statement at `start`."""
+    """Return the keyword of the statement at `start`."""
     return next(iter(text[start + 2 :].lstrip("-+ ").split(maxsplit=1)), "")
 
 
 def _closing(text: str, start: int) -> int:
-    """Return where the ``}}`` stands that closes the ``{{`` at `start`."""
+    """Return the offset of the ``}}`` that closes the ``{{`` at `start`."""
     quote = ""
     depth = 0
     position = start + 2
@@ -234,7 +234,7 @@ def _closing(text: str, start: int) -> int:
 def _translate(
     text: str, offset: int, names: set[str], settings: set[str], *, allows_bytes: bool = False
 ) -> str:
-    """Return the Python for one expression; add what it uses to `names` and `settings`."""
+    """Return the Python for one expression; add its names to `names` and `settings`."""
     try:
         return translate(text, "ns[{!r}]".format, names, settings, allows_bytes=allows_bytes)
     except Refused as error:
@@ -243,13 +243,13 @@ def _translate(
 
 
 def last_filter(template: Template) -> str:
-    """Return the filter that makes the value of an expression, or ""."""
+    """Return the outermost filter of an expression, or ""."""
     name = template.python.partition("(")[0]
     return name.removeprefix("_filter_") if name.startswith("_filter_") else ""
 
 
 def defaulted_names(template: Template) -> frozenset[str]:
-    """Return the root names that an expression can do without: ``default`` stands behind each."""
+    """Return the optional root names of an expression: each has a ``default``."""
     if "_filter_default(" not in template.python:
         return frozenset()
     needed, spare = set[str](), set[str]()
@@ -258,7 +258,7 @@ def defaulted_names(template: Template) -> frozenset[str]:
 
 
 def _gather(node: ast.AST, needed: set[str], spare: set[str], *, has_default: bool) -> None:
-    """Sort the root names under `node` into those that must be there and those that need not."""
+    """Sort the root names under `node` into required and optional ones."""
     if isinstance(node, ast.Subscript) and ast.unparse(node.value) == "ns":
         (spare if has_default else needed).add(str(ast.literal_eval(node.slice)))
         return
@@ -269,9 +269,9 @@ def _gather(node: ast.AST, needed: set[str], spare: set[str], *, has_default: bo
 
 
 def digested_settings(template: Template) -> frozenset[str]:
-    """Return the settings that show nowhere but in hashes with something new in them, or in tests.
+    """Return the settings that appear only in tests and in hashes with a nonce or time.
 
-    Such a hash tells nothing about the setting, and is worth nothing a second time.
+    Such a hash reveals nothing about the setting, and is useless for a replay.
     """
     if not template.settings:
         return frozenset()
@@ -281,7 +281,7 @@ def digested_settings(template: Template) -> frozenset[str]:
 
 
 def _sort(node: ast.AST, shown: set[str], digested: set[str], *, is_digested: bool) -> None:
-    """Sort the settings under `node` into those that show and those that are in a hash."""
+    """Sort the settings under `node` into visible and hashed ones."""
     if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
         if node.func.id in _HASHES:
             roots = {one.value for one in ast.walk(node) if isinstance(one, ast.Constant)}
@@ -292,16 +292,16 @@ def _sort(node: ast.AST, shown: set[str], digested: set[str], *, is_digested: bo
         elif node.func.id == "_item" and ast.unparse(node.args[0]) == "ns['settings']":
             (digested if is_digested else shown).add(ast.literal_eval(node.args[1]))
     for inner in ast.iter_child_nodes(node):
-        # What only decides between two values shows no more than its length does.
+        # A condition between two values reveals no more than a length.
         is_test = isinstance(node, ast.Compare) or inner is getattr(node, "test", None)
         _sort(inner, shown, digested, is_digested=is_digested or is_test)
 
 
 def is_nonce(template: Template) -> bool:
-    """Return whether the value of an expression is nothing but ``nonce()``."""
+    """Return whether the value of an expression is only ``nonce()``."""
     return _NONCE.fullmatch(template.python) is not None
 
 
 def is_byte_filter(name: str) -> bool:
-    """Return whether a filter gives bytes."""
+    """Return whether a filter returns bytes."""
     return name in _filters.FILTERS and _filters.FILTERS[name].gives_bytes

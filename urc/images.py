@@ -1,8 +1,8 @@
-"""What an image is and how large its picture, read from its first bytes; nothing is unpacked.
+"""Media type and size of a picture from its first bytes, without decoding it.
 
-Floor 1. A few kilobytes may unpack to gigabytes in a browser, so the size of the picture counts,
-not that of the file. Sources: PNG (ISO/IEC 15948, 11.2.2), JPEG (ITU-T T.81, B.2.2), GIF89a
-(section 18), WebP (RFC 9649), BMP (BITMAPINFOHEADER).
+A few kilobytes may decode to gigabytes in a browser, so the size of the picture counts, not that of
+the file. Sources: PNG (ISO/IEC 15948, 11.2.2), JPEG (ITU-T T.81, B.2.2), GIF89a (section 18), WebP
+(RFC 9649), BMP (BITMAPINFOHEADER).
 """
 
 import struct
@@ -11,7 +11,7 @@ from typing import Final
 __all__ = ["MAX_PIXELS", "media_type", "picture_size", "pixels"]
 
 MAX_PIXELS: Final = 16_000_000
-"""Pixels of one picture: 64 MB in a browser."""
+"""Largest picture in pixels: 64 MB in a browser."""
 
 _OTHER: Final = "application/octet-stream"
 _SIGNS: Final = (
@@ -21,13 +21,13 @@ _SIGNS: Final = (
     (b"BM", "image/bmp"),
 )
 _SIZE_MARKERS: Final = frozenset((*range(0xC0, 0xD0),)) - {0xC4, 0xC8, 0xCC}
-"""JPEG: starts of a frame (SOF); the three others are tables and an extension."""
+"""JPEG markers that start a frame (SOF); the three excluded ones are tables and an extension."""
 _ALONE: Final = frozenset((0x01, *range(0xD0, 0xD9)))
-"""JPEG: markers without a length."""
+"""JPEG markers without a length."""
 
 
 def media_type(data: bytes) -> str:
-    """Return the media type by how the bytes begin; ``application/octet-stream`` if unknown."""
+    """Return the media type by the first bytes; ``application/octet-stream`` if unknown."""
     for sign, name in _SIGNS:
         if data.startswith(sign):
             return name
@@ -39,19 +39,19 @@ def media_type(data: bytes) -> str:
 
 
 def picture_size(data: bytes) -> tuple[int, int] | None:
-    """Return width and height in pixels, or None where the first bytes do not say.
+    """Return width and height in pixels, or None if the first bytes do not contain them.
 
-    AVIF says it in boxes within boxes, and browsers bound it themselves: None.
+    None for AVIF, too: its size is in nested boxes, and browsers limit it themselves.
     """
     read = _READERS.get(media_type(data))
     try:
         return None if read is None else read(data)
     except (struct.error, IndexError):
-        return None  # cut short: no browser unpacks it either
+        return None  # truncated: no browser decodes it either
 
 
 def pixels(data: bytes) -> int:
-    """Return how many pixels a picture has; 0 where its first bytes do not say."""
+    """Return the number of pixels of a picture; 0 if its first bytes do not contain the size."""
     width, height = picture_size(data) or (0, 0)
     return width * height
 
@@ -76,10 +76,10 @@ def _webp(data: bytes) -> tuple[int, int] | None:
     if kind == b"VP8X":  # two numbers of 24 bits, less one
         width, height = data[24:27], data[27:30]
         return int.from_bytes(width, "little") + 1, int.from_bytes(height, "little") + 1
-    if kind == b"VP8L":  # behind one byte, two numbers of 14 bits, less one
+    if kind == b"VP8L":  # after one byte, two numbers of 14 bits, less one
         (bits,) = struct.unpack_from("<I", data, 21)
         return (bits & 0x3FFF) + 1, (bits >> 14 & 0x3FFF) + 1
-    if kind == b"VP8 ":  # behind the frame tag and the start code
+    if kind == b"VP8 ":  # after the frame tag and the start code
         width, height = struct.unpack_from("<HH", data, 26)
         return width & 0x3FFF, height & 0x3FFF
     return None
@@ -91,7 +91,7 @@ def _jpeg(data: bytes) -> tuple[int, int] | None:
         if data[place] != 0xFF:
             return None
         marker = data[place + 1]
-        if marker == 0xFF:  # filled up
+        if marker == 0xFF:  # a fill byte
             place += 1
         elif marker in _ALONE:
             place += 2

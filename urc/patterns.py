@@ -1,6 +1,6 @@
 """Regular expressions of documents: matched in linear time, or refused.
 
-Floor 1. The work is done in `urc._patterns`, which expressions stand on, too.
+`urc._patterns` has the implementation, which expressions use, too.
 """
 
 from urc._patterns import (

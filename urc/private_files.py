@@ -1,6 +1,6 @@
-"""Files of their owner alone that are there whole or not at all, whenever the machine ends.
+"""Atomic writing of private files, safe against a power failure.
 
-Floor 1. For what is kept between two runs: settings, a latched stop, keys of hosts.
+For data that outlives a run: settings, a latched STOP, host keys.
 """
 
 import os
@@ -14,12 +14,12 @@ _OWN = 0o700
 
 
 def make_private(folder: Path) -> None:
-    """Make a folder, and those above it that are missing, for their owner alone.
+    """Make a folder and its missing parents, accessible to their owner only.
 
-    One that is there is left as it is.
+    An existing folder stays unchanged.
 
     Raises:
-        OSError: it cannot be made.
+        OSError: the folder cannot be made.
     """
     missing = [one for one in (folder, *folder.parents) if not one.exists()]
     for one in reversed(missing):
@@ -29,15 +29,15 @@ def make_private(folder: Path) -> None:
 
 
 def put_private(file: Path, data: bytes) -> None:
-    """Write a file: after this it holds `data`, even if the power goes; before, what it held.
+    """Write a file atomically: after a power failure it has either the old or the new content.
 
     Args:
-        file: what it is called; its folder is made, for its owner alone.
-        data: all of it.
+        file: path of the file; its folder is created, private to its owner.
+        data: complete content.
 
     Raises:
-        OSError: the disk is full, for example; then nothing has changed, unless all was written
-            and only the folder could not be forced to the disk.
+        OSError: for example a full disk. The old content then remains, unless only the sync of the
+            folder failed.
     """
     make_private(file.parent)
     # `mkstemp` makes files that only their owner can read.
@@ -56,7 +56,7 @@ def put_private(file: Path, data: bytes) -> None:
 
 
 def _keep_name(folder: Path) -> None:
-    """Have the disk know the new name of what is in it, where a system can do that."""
+    """Sync the folder to disk, where the system supports it."""
     if hasattr(os, "O_DIRECTORY"):
         number = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
         try:

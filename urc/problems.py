@@ -1,8 +1,7 @@
-"""One finding about a document, and how it is told to a person or a program.
+"""Problems of documents, and their output for people and programs.
 
-Floor 1. Knows nothing of YAML, robots or the command line. Every pass of the loader, the documents'
-own tests and the widget manifests report through `Problem`; text, JSON and the web editor are
-reporters over the same values.
+Independent of YAML, robots and the command line. All passes of the loader, the tests of documents
+and the widget manifests report a `Problem`. Text, JSON and the web editor show the same values.
 """
 
 from collections.abc import Iterable, Sequence
@@ -21,8 +20,8 @@ __all__ = [
 
 Severity = Literal["error", "warning"]
 
-# Control characters, C1 included; marks that reorder what a terminal shows, and ends of lines: a
-# robot's text must not be able to fake a line. Halves of pairs cannot be written at all.
+# Control characters including C1, characters that reorder the text of a terminal, and line ends:
+# the text of a robot must not be able to fake a line. Lone surrogates cannot be encoded at all.
 _CONTROLS = (*range(0x20), *range(0x7F, 0xA0))
 _MARKS = (0x061C, 0x200E, 0x200F, *range(0x2028, 0x202F), *range(0x2066, 0x206A))
 _HALVES = range(0xD800, 0xE000)
@@ -32,11 +31,11 @@ _IN_JSON = {code: f"\\u{code:04x}" for code in (*_CONTROLS[0x20:], *_MARKS, *_HA
 
 
 class UrcError(Exception):
-    """A failure that is told to a person in one line. Any other exception is a bug in URC."""
+    """An error with a one-line message for people. Any other exception is a bug in URC."""
 
 
 class ProblemsError(UrcError):
-    """A document that cannot be used, with every finding of the pass that stopped it."""
+    """An unusable document, with every problem of the pass that rejected it."""
 
     def __init__(self, problems: Sequence["Problem"]) -> None:
         self.problems = tuple(problems)
@@ -47,12 +46,12 @@ class ProblemsError(UrcError):
 
 
 class Problem(NamedTuple):
-    """One finding: where, what was found, what was expected, what to do."""
+    """One problem: the place, the found and the expected text, and a hint."""
 
     code: str
-    """Names the fault, never the remedy: ``unknown-key``."""
+    """Name of the fault, never of the hint: ``unknown-key``."""
     message: str
-    """One line: what was found and what was expected."""
+    """One line: the found and the expected text."""
     file: str
     line: int = 1
     """1-based."""
@@ -61,16 +60,16 @@ class Problem(NamedTuple):
     end_column: int = 0
     """1-based, exclusive, on the same line; 0 when only the start is known."""
     path: str = ""
-    """Where in the document, as ``transports.wire.port``."""
+    """Path in the document, as ``transports.wire.port``."""
     hint: str = ""
-    """What to do about it, when something sensible can be said."""
+    """Advice, if there is a sensible one."""
     source: str = ""
-    """The text of the line, for the caret."""
+    """Text of the line, shown above the caret."""
     severity: Severity = "error"
 
     @property
     def headline(self) -> str:
-        """The one line ``file:line:column: severity CODE path: message``."""
+        """The line ``file:line:column: severity CODE path: message``."""
         where = f" {self.path}" if self.path else ""
         text = f"{self.file}:{self.line}:{self.column}: {self.severity} {self.code}{where}: "
         return printable(text + self.message)
@@ -82,17 +81,17 @@ def printable(text: str) -> str:
 
 
 def printable_json(text: str) -> str:
-    """Return JSON with the same characters written as JSON escapes: it means what it meant."""
+    """Return equivalent JSON with the same characters written as JSON escapes."""
     return text.translate(_IN_JSON)
 
 
 def has_errors(problems: Iterable[Problem]) -> bool:
-    """Return whether any finding is more than a warning."""
+    """Return whether any problem is more than a warning."""
     return any(problem.severity == "error" for problem in problems)
 
 
 def to_text(problem: Problem) -> str:
-    """Return the headline, the source line with a caret under the fault, and the hint."""
+    """Return the headline, the source line with a caret under the error, and the hint."""
     lines = [problem.headline]
     if problem.source.strip():
         lines += _excerpt(problem)
@@ -102,7 +101,7 @@ def to_text(problem: Problem) -> str:
 
 
 def to_json(problem: Problem) -> dict[str, object]:
-    """Return the finding as a JSON object; the keys are part of the outside contract."""
+    """Return the problem as a JSON object; its keys are a stable interface."""
     return {
         "file": problem.file,
         "line": problem.line,
@@ -117,13 +116,13 @@ def to_json(problem: Problem) -> dict[str, object]:
 
 
 def _excerpt(problem: Problem, width: int = 96) -> list[str]:
-    """Return the source line, cut to `width` around the fault, and the caret line below it."""
+    """Return the source line, cut to `width` around the error, and the caret line below it."""
     start = problem.column - 1
     end = max(problem.end_column - 1, start + 1)
     left = max(0, start - width // 2) if len(problem.source) > width else 0
     shown = problem.source[left : left + width]
     before, marked = shown[: start - left], shown[start - left : end - left]
-    # Escapes are wider than the character they replace, so the caret is placed after escaping.
+    # Escapes are wider than the original characters, so place the caret after escaping.
     caret = " " * len(printable(before)) + "^" * max(1, len(printable(marked)))
     gutter = f"{problem.line:>5} | "
     return [gutter + printable(shown), " " * (len(gutter) - 2) + "| " + caret]

@@ -1,9 +1,9 @@
-"""Tables from a word in a document to the code that carries it out.
+"""Tables from words of documents to their implementations.
 
-Floor 1. A row names its factory as text and is imported when it is used, so that a robot on TCP
-never pays for SSH. The top floor gathers the tables into one `Catalog` and hands it down: that is
-how siblings on one floor meet without importing each other. Third parties add rows through the
-entry-point groups ``urc.transports`` and ``urc.framings``.
+A row names its factory as text, which is imported on first use: a robot on TCP never loads SSH. The
+top layer passes all tables down as one `Catalog`, so that modules of one layer need not import each
+other. Third parties add rows through the entry-point groups ``urc.transports`` and
+``urc.framings``.
 """
 
 from collections.abc import Iterator, Mapping
@@ -15,7 +15,7 @@ __all__ = ["Catalog", "Row", "Table"]
 
 
 class Row:
-    """One entry: the word used in documents and where its code is."""
+    """One entry: a word of documents, and the place of its code."""
 
     __slots__ = ("factory", "name")
 
@@ -31,7 +31,7 @@ class Row:
 
 
 class Table:
-    """Built-in rows, then whatever installed packages add to the same entry-point group."""
+    """Built-in rows, then those of installed packages in the same entry-point group."""
 
     def __init__(self, group: str, rows: Mapping[str, str]) -> None:
         self.group = group
@@ -43,7 +43,7 @@ class Table:
         return iter(self._rows)
 
     def get(self, name: str) -> Row | None:
-        """Return the row, or None. Reads entry points only when no built-in has the name."""
+        """Return the row, or None. Entry points are read only when no built-in row has the name."""
         if name not in self._rows:
             self._read_entry_points()
         return self._rows.get(name)

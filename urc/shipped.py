@@ -1,7 +1,7 @@
-"""Where the folders that ship with URC are: schemas, robots, widgets, templates, third-party JS.
+"""Location of the shipped folders: schemas, robots, widgets, templates, third-party JS.
 
-Floor 1. In a checkout they are read from the repository's top level, so an edit shows at once; in
-an installed wheel they stand inside the package.
+In a checkout, they are in the top folder of the repository, so that edits take effect at once. In
+an installed wheel, they are inside the package.
 """
 
 from importlib.util import find_spec
@@ -20,7 +20,7 @@ def shipped(name: Literal["schemas", "robots", "widgets", "templates"]) -> Path:
 
 
 def vendored() -> Path | None:
-    """Return the folder of third-party browser modules, or None when the build brought none."""
+    """Return the folder of third-party browser modules, or None if the build has none."""
     spec = find_spec("urc_vendor")
     places = list(spec.submodule_search_locations or ()) if spec else []
     return Path(places[0]) if places else None

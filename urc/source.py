@@ -1,7 +1,7 @@
-"""YAML text → `Document`: plain data, and a side table that knows where everything stands.
+"""Conversion of YAML text into a `Document`: plain data, and the position of every value.
 
-Floor 1. Knows YAML and nothing of robots. The only errors are `ProblemsError`, whose problems have
-the place and the remedy; whatever a file holds, reading it is bounded in time and memory.
+This module knows YAML, but nothing about robots. It raises only `ProblemsError`, whose problems
+have the place and a hint. Time and memory are bounded for any content.
 """
 
 import re
@@ -28,11 +28,11 @@ __all__ = [
 ]
 
 Path = tuple[str | int, ...]
-"""Keys and list indices from the top of a document to a value."""
+"""Keys and list indices from the root of a document to a value."""
 
 _LIMITS: Final = Limits()
-# What YAML's reader takes for the end of a line; marks count the same way. The patterns for all of
-# Unicode take milliseconds to compile, so they are made for texts that need them only.
+# Line ends as in the YAML reader, so that marks count the same lines. The Unicode patterns take
+# milliseconds to compile, so only texts that need them do so.
 _LINE_END = re.compile("\r\n|[\r\n]")
 _LINE_END_UNICODE: Final = "\r\n|[\r\n\x85\u2028\u2029]"
 _UNPRINTABLE = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\x7f]")
@@ -41,9 +41,9 @@ _ESCAPE = re.compile(r"\\(?:x.{2}|u.{4}|U.{8}|.)", re.DOTALL)
 
 
 class Document:
-    """One file's data with the place of every key and value. Not changed after it was read.
+    """The data of one file, with the position of every key and value. Immutable after reading.
 
-    Parts of the data may have come from other documents; their marks say from which (`source_of`).
+    Parts of the data may come from other documents; their marks name the origin (`source_of`).
     """
 
     __slots__ = ("data", "file", "findings", "lines", "mark", "text")
@@ -58,18 +58,18 @@ class Document:
         findings: tuple[Problem, ...] = (),
     ) -> None:
         self.file = file
-        """As the person wrote it: for messages, and to find what it refers to."""
+        """Original text, for messages and references."""
         self.text = text
         self.lines = lines
         self.data = data
         """Mappings with text keys, lists, text, numbers, booleans and None."""
         self.mark = mark
-        """Marks of the whole; `at` finds one."""
+        """Marks of the whole document; `at` finds one of them."""
         self.findings = findings
-        """Warnings of the reader; an error would have been raised."""
+        """Warnings of the reader; errors are raised."""
 
     def at(self, path: Path) -> Mark | None:
-        """Return the marks of the value at `path`, or None when there is no such value."""
+        """Return the marks of the value at `path`, or None for a missing value."""
         mark = self.mark
         for part in path:
             inner = mark.children.get(part)
@@ -79,7 +79,7 @@ class Document:
         return mark
 
     def source_of(self, path: Path) -> "Document":
-        """Return the document in whose text the value at `path` stands, or what is around it."""
+        """Return the document whose text contains the value at `path`, or its nearest parent."""
         return self._nearest(path)[0]
 
     def problem(
@@ -94,13 +94,13 @@ class Document:
         length: int = 1,
         severity: Severity = "error",
     ) -> Problem:
-        """Return a finding at the value of `path`, with its source line.
+        """Return a problem at the value of `path`, with its source line.
 
         Args:
-            path: where; when it does not exist, the nearest value around it is shown.
-            code: name of the fault.
-            message: what was found and what was expected.
-            hint: what to do about it.
+            path: the place; for a missing value, the nearest existing parent is shown.
+            code: name of the problem.
+            message: the found and the expected text.
+            hint: advice.
             key: point at the key instead of the value.
             offset: 0-based character inside the text at `path` to point at.
             length: characters to underline from `offset`.
@@ -126,7 +126,7 @@ class Document:
         )
 
     def _nearest(self, path: Path) -> tuple["Document", Mark, int]:
-        """Return the marks of `path`, else of the nearest value around it, and how deep it is."""
+        """Return document and marks of `path` or its nearest parent, and their depth."""
         home: Document = self.mark.origin or self
         mark, depth = self.mark, 0
         for part in path:
@@ -144,7 +144,7 @@ class Document:
         return value if isinstance(value, str) else None
 
     def inside(self, mark: Mark, text: str | None, offset: int, length: int) -> Span | None:
-        """Return the place of some characters of a text of this document, if it can be told."""
+        """Return the place of some characters of a text of this document, or None if unknown."""
         written = mark.written
         if written is not None:
             end = written.offset(offset + length)
@@ -163,11 +163,11 @@ class Document:
 
 
 def _span(mark: Mark, *, key: bool, is_inside: bool) -> Span:
-    """Return what to underline of a value: its key, itself, or the first character of it."""
+    """Return the span to underline for a value: its key, itself, or its first character."""
     wants_key = key or is_inside or mark.style == "{"
     if wants_key and mark.key is not None and (key or "{" in mark.style):
         return mark.key
-    # Of a mapping or list only the start says anything; underline its first character.
+    # The end of a mapping or list is not useful; underline its first character.
     return mark.span._replace(end_line=0) if mark.style == "{" else mark.span
 
 
@@ -175,16 +175,16 @@ def read_document(path: str, limits: Limits = _LIMITS) -> Document:
     """Read a file.
 
     Raises:
-        ProblemsError: it cannot be read, or is not a YAML document within `limits`.
+        ProblemsError: the file cannot be read, or is not a YAML document within `limits`.
     """
     return parse_document(read_bytes(path, limits.size_bytes), path, limits)
 
 
 def parse_document(content: bytes | str, file: str, limits: Limits = _LIMITS) -> Document:
-    """Read text; `file` is its name in messages.
+    """Parse text; `file` is its name in messages.
 
     Raises:
-        ProblemsError: it is not a YAML document within `limits`.
+        ProblemsError: the text is not a YAML document within `limits`.
     """
     text = content if isinstance(content, str) else _decode(content, file)
     text = text.removeprefix("\ufeff")
@@ -204,7 +204,7 @@ def parse_document(content: bytes | str, file: str, limits: Limits = _LIMITS) ->
         problems.append(_syntax_problem(error, file, lines))
     if reader is not None:
         told = {problem.line for problem in reader.problems}
-        # An unquoted value often upsets the parser further on; one finding per line is enough.
+        # An unquoted value often breaks the parser further on; one problem per line is enough.
         problems = [*reader.problems, *(p for p in problems if p.line not in told)]
     if has_errors(problems):
         raise ProblemsError(sorted(problems, key=lambda found: (found.line, found.column)))
@@ -325,10 +325,10 @@ def _raw_column(raw: str, start: int, style: str, offset: int) -> int:
 def _inside_lines(
     lines: Sequence[str], span: Span, value: str, offset: int, length: int
 ) -> Span | None:
-    """Return the place of a character in a scalar over several lines.
+    """Return the place of a character in a scalar of several lines.
 
-    The lines are looked up in the value one after the other, which holds for literal and folded
-    blocks and for plain and quoted text alike, as long as nothing in it is escaped.
+    The function looks up the lines in the value one by one. This works for literal and folded
+    blocks and for plain and quoted text, unless escapes occur.
     """
     position = 0
     last = min(span.end_line, len(lines))

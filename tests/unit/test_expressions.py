@@ -227,7 +227,7 @@ def test_a_fault_in_a_template_is_found_when_it_is_compiled(
         ("x[0:1]", "no parts in a row"),
         ("row['a':]", "a place in a row is a whole number"),
         ("word | join", "a list is expected"),
-        ("[] | max", "an empty list has none"),
+        ("[] | max", "an empty list has no minimum or maximum"),
         ("[] | first", "nothing in it"),
         ("['a'] | sum", "a list of numbers is expected"),
         ("word | split('')", "something to look for"),

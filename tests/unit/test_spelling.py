@@ -82,8 +82,8 @@ def test_filters_take_fields_apart(
         ("x | column('v')", {"x": [{"w": 1}]}, "the row {'w': 1} has no part 'v'"),
         ("x | column(5, ',')", {"x": ["a,b"]}, "the row ['a', 'b'] has no part 5"),
         ("x | cut(0, -1)", {"x": [3]}, "3 has no parts in a row"),
-        ("x | digits(3, 64)", {"x": "0000"}, "4 characters are no numbers of 3 each"),
-        ("x | digits(1, 10)", {"x": "A"}, "'A' is no digit of base 10"),
+        ("x | digits(3, 64)", {"x": "0000"}, "4 characters cannot be split into numbers of 3 each"),
+        ("x | digits(1, 10)", {"x": "A"}, "'A' is not a digit of base 10"),
         ("x | signed(8)", {"x": 256}, "the number is a whole number from 0 to 255, found 256"),
         ("x | hexbytes | unpack('u16le', 1)", {"x": "0102"}, "2 bytes have no 'u16le' at 1"),
         (

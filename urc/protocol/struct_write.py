@@ -1,9 +1,9 @@
 """Struct items written by closures: values → bytes.
 
 Pure. This is the reverse of `urc.protocol.struct_read`. Theory of operation: every item becomes a
-step ``(pen, scope)`` that appends its bytes. Two kinds of values leave a gap that is
-filled in: the size of a following text (its `Gap` waits in the scope), and expressions over the
-size of the whole frame (`Pen.late`).
+step ``(pen, scope)`` that appends its bytes. Two kinds of values leave a gap that is filled in
+later: the size of a following text (its `Gap` waits in the scope), and expressions over the size of
+the whole frame (`Pen.late`).
 """
 
 from collections.abc import Callable, Mapping
