@@ -38,15 +38,12 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _updates(*, is_json: bool) -> int:
     """Print the updates; 0 also without any, which is no failure."""
-    from urc.cli.failures import Misuse
     from urc.cli.output import complain, json_text
-    from urc.cli.packages import open_store, repositories
+    from urc.cli.packages import known_repositories, open_store
     from urc.packages.update import headline, newer
     from urc.problems import printable
 
-    known = repositories().all()
-    if not known:
-        raise Misuse("no repository is known; 'urc repo add URL' adds one")
+    known = known_repositories()
     for update in newer(open_store(), known, complain):
         old, new = update.old, update.new
         if is_json:

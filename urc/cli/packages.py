@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from urc.packages.lock import Lock
     from urc.packages.names import Key
     from urc.packages.plan import Plan
-    from urc.packages.repositories import Repositories
+    from urc.packages.repositories import Repositories, Repository
     from urc.packages.signature import Signer
     from urc.packages.store import Store
     from urc.packages.update import Difference
@@ -51,6 +51,18 @@ def repositories() -> "Repositories":
     from urc.packages.repositories import Repositories
 
     return Repositories(own_folder() / "packages", complain)
+
+
+def known_repositories() -> "list[Repository]":
+    """Return the repositories that this user added.
+
+    Raises:
+        Misuse: there are none.
+    """
+    known = repositories().all()
+    if not known:
+        raise Misuse("no repository is known; 'urc repo add URL' adds one")
+    return known
 
 
 def installed_document(word: str) -> Path | None:
@@ -225,9 +237,7 @@ def search_repositories(words: Sequence[str], kind: str = "", *, is_json: bool =
     from urc.packages.sources import merged
     from urc.problems import printable
 
-    known = repositories().all()
-    if not known:
-        raise Misuse("no repository is known; 'urc repo add URL' adds one")
+    known = known_repositories()
     found = merged(known, complain)
     hits = search([entry for some in found.values() for entry, _ in some], words, kind)
     for entry in hits:

@@ -38,11 +38,9 @@ def run(arguments: argparse.Namespace) -> int:
     """Update, or go back; 1 when something could not be."""
     if arguments.back:
         return _back(arguments)
-    from urc.cli.packages import open_store, repositories
+    from urc.cli.packages import known_repositories, open_store
 
-    store, known = open_store(), repositories().all()
-    if not known:
-        raise Misuse("no repository is known; 'urc repo add URL' adds one")
+    store, known = open_store(), known_repositories()
     code = 0
     wishes = [_installed(store, word) for word in arguments.packages] or _all(store)
     for lock, wanted in wishes:

@@ -248,7 +248,7 @@ def _line(offset: float, scale: float) -> Step:
 
 def divisor_of(scale: float) -> int:
     """Return n when `scale` is 1/n, else 0: 3 / 10 is exactly 0.3, but 3 * 0.1 is not."""
-    if not 0 < abs(scale) < 1:
+    if not 1e-15 < abs(scale) < 1:
         return 0
     divisor = round(1 / scale)
     return divisor if 1 / divisor == scale else 0

@@ -10,10 +10,11 @@ from collections.abc import Callable, Mapping
 from urc._number_bytes import format_of
 from urc.model.binary import Item
 from urc.protocol.codec import BadItem, Frame
+from urc.protocol.convert import divisor_of
 from urc.protocol.struct_lines import Lines
 from urc.protocol.struct_read import FAULT, OtherFrame, build_step, const_of
 from urc.protocol.struct_runs import Leaf, Run, runs_of
-from urc.protocol.struct_value import divisor_of, meaning_of, not_valid, text_of_bytes
+from urc.protocol.struct_value import meaning_of, not_valid, text_of_bytes
 
 __all__ = ["add_fixed", "generate_read"]
 

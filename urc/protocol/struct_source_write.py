@@ -12,13 +12,13 @@ from urc._number_bytes import format_of
 from urc.expressions import ExpressionError
 from urc.model.binary import Item, derived_sizes
 from urc.protocol.codec import NotWritable
+from urc.protocol.convert import divisor_of
 from urc.protocol.struct_lines import Lines
 from urc.protocol.struct_read import const_of
 from urc.protocol.struct_runs import Leaf, Run, runs_of
 from urc.protocol.struct_value import (
     bytes_of_text,
     checked_raw,
-    divisor_of,
     fixed_bytes,
     number_writer,
 )

@@ -12,11 +12,11 @@ from urc._number_bytes import plain_writer
 from urc.expressions import quoted
 from urc.model.binary import Item, Number
 from urc.protocol.codec import BadItem, NotWritable
+from urc.protocol.convert import divisor_of
 
 __all__ = [
     "bytes_of_text",
     "checked_raw",
-    "divisor_of",
     "fitting",
     "fixed_bytes",
     "meaning_of",
@@ -25,14 +25,6 @@ __all__ = [
     "raw_of",
     "text_of_bytes",
 ]
-
-
-def divisor_of(scale: float) -> int:
-    """Return n when `scale` is 1/n, else 0: x / 10 is exact, x * 0.1 is not."""
-    if not 1e-15 < abs(scale) < 1:
-        return 0
-    divisor = round(1 / scale)
-    return divisor if 1 / divisor == scale else 0
 
 
 def meaning_of(item: Item) -> Callable[[Any], Any]:

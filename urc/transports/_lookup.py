@@ -1,14 +1,18 @@
 """Looks names up without ever holding up the loop, or its end."""
 
 import asyncio
+import errno
 import socket
 import threading
+from collections.abc import Awaitable, Callable
 from contextlib import suppress
+from typing import TypeVar
 
 __all__ = ["Address", "Lookup"]
 
 Address = tuple[socket.AddressFamily, tuple[str | int, ...] | tuple[int, bytes]]
 """As a socket is made and connected with."""
+_Connected = TypeVar("_Connected")
 
 
 class Lookup:
@@ -35,6 +39,32 @@ class Lookup:
         if self._answer is None or self._answer.done():
             self._answer = _look_up(self._host, self._port, self._kind)
         return await asyncio.shield(self._answer)
+
+    async def first(
+        self, connect: Callable[[int, object], Awaitable[_Connected]], timeout_s: float
+    ) -> _Connected:
+        """Return what `connect` makes of the first address that accepts a connection.
+
+        The addresses are tried in turn, each with a fair share of the time that is left.
+
+        Raises:
+            OSError, UnicodeError: the name leads to no address, or none accepts a connection.
+        """
+        loop = asyncio.get_running_loop()
+        deadline = loop.time() + timeout_s
+        addresses = await self.addresses()
+        fault: OSError | None = None
+        for index, (family, address) in enumerate(addresses):
+            share_s = (deadline - loop.time()) / (len(addresses) - index)
+            try:
+                async with asyncio.timeout(share_s):
+                    return await connect(family, address)
+            except TimeoutError:
+                # The last address gets all that is left: then the time of the whole is up as well.
+                fault = fault or TimeoutError(errno.ETIMEDOUT, "timed out")
+            except OSError as refused:
+                fault = refused
+        raise fault or OSError("the name leads to no address")
 
 
 def _look_up(host: str, port: int, kind: socket.SocketKind) -> asyncio.Future[list[Address]]:

@@ -1,8 +1,8 @@
 """Opens a stream to a host and port: directly or through another transport, with TLS or not."""
 
 import asyncio
-import errno
 import socket
+from functools import partial
 
 from urc.transports._faults import explain, late, place_of
 from urc.transports._lookup import Lookup
@@ -55,21 +55,8 @@ class Reach:
     async def _connect(self, timeout_s: float) -> ByteStream:
         if self._via is not None:
             return await self._via.connect(self.host, self.port, timeout_s)
-        loop = asyncio.get_running_loop()
-        deadline = loop.time() + timeout_s
-        addresses = await self._lookup.addresses()
-        fault: OSError | None = None
-        for index, (family, address) in enumerate(addresses):
-            share_s = (deadline - loop.time()) / (len(addresses) - index)
-            try:
-                async with asyncio.timeout(share_s):
-                    return await _dial(family, address, self._read_ahead_bytes)
-            except TimeoutError:
-                # The last address gets all that is left: then the time of the whole is up as well.
-                fault = fault or TimeoutError(errno.ETIMEDOUT, "timed out")
-            except OSError as refused:
-                fault = refused
-        raise fault or OSError("the name leads to no address")
+        dial = partial(_dial, read_ahead_bytes=self._read_ahead_bytes)
+        return await self._lookup.first(dial, timeout_s)
 
 
 async def _dial(family: int, address: object, read_ahead_bytes: int) -> Stream:

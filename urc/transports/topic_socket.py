@@ -4,8 +4,6 @@ The libraries' own ways of connecting look names up in threads that a program wa
 this one does as the TCP transport does, and says the same when it fails.
 """
 
-import asyncio
-import errno
 import socket
 
 from urc.transports._faults import explain, place_of, reason
@@ -31,20 +29,7 @@ class Address:
         Raises:
             OSError, UnicodeError: what `explain` puts into words.
         """
-        loop = asyncio.get_running_loop()
-        deadline = loop.time() + timeout_s
-        addresses = await self._lookup.addresses()
-        fault: OSError | None = None
-        for place, (family, address) in enumerate(addresses):
-            share_s = (deadline - loop.time()) / (len(addresses) - place)
-            try:
-                async with asyncio.timeout(share_s):
-                    return await connected(family, address)
-            except TimeoutError:
-                fault = fault or TimeoutError(errno.ETIMEDOUT, "timed out")
-            except OSError as refused:
-                fault = refused
-        raise fault or OSError("the name leads to no address")
+        return await self._lookup.first(connected, timeout_s)
 
     def explain(self, fault: Exception) -> str:
         """Return one line for people about why `dial` could not connect."""

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable, Mapping
 
+from urc.config.link.cycles import cycle_from
 from urc.config.part import Findings, Part
 from urc.config.suggest import did_you_mean
 from urc.expressions import Template
@@ -37,7 +38,7 @@ def link_signals(part: Part, driver: Driver, check: _Check, findings: Findings) 
                 key=True,
                 hint="give one of them another name",
             )
-        cycle = _cycle(name, driver.signals)
+        cycle = cycle_from(name, lambda one: _needed(one, driver.signals))
         if cycle:
             findings.error(
                 place,
@@ -62,20 +63,7 @@ def _set_by_frames(driver: Driver) -> dict[str, str]:
     return found
 
 
-def _cycle(start: str, signals: Mapping[str, Signal]) -> list[str]:
-    """Return the names from `start` back to itself, or nothing."""
-    came_from: dict[str, str] = {}
-    waiting = [start]
-    while waiting:
-        name = waiting.pop(0)
-        one = signals.get(name)
-        for other in sorted(one.formula.names) if one and one.formula else ():
-            if other == start:
-                path = [name]
-                while path[-1] != start:
-                    path.append(came_from[path[-1]])
-                return [*reversed(path), start]
-            if other not in came_from and other in signals:
-                came_from[other] = name
-                waiting.append(other)
-    return []
+def _needed(name: str, signals: Mapping[str, Signal]) -> list[str]:
+    """Return the signals from which the signal `name` is computed."""
+    formula = signals[name].formula
+    return sorted(formula.names & signals.keys()) if formula else []

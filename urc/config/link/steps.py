@@ -1,5 +1,8 @@
 """Names in sequences: in frames, replies and runs; and no sequence may run itself."""
 
+from collections.abc import Iterator
+
+from urc.config.link.cycles import cycle_from
 from urc.config.link.flow import (
     Linker,
     find_command,
@@ -39,7 +42,7 @@ def link_sequences(linker: Linker, part: Part) -> None:
         if isinstance(inner.data, dict):
             link_requirements(linker, inner, command)
         _Walk(linker, is_named=True).steps(steps_of(inner), command.steps)
-        cycle = _cycle(name, linker.driver)
+        cycle = cycle_from(name, lambda one: _runs(one, linker.driver))
         if cycle:
             linker.findings.error(
                 inner,
@@ -190,32 +193,19 @@ def _loops(start: str, driver: Driver) -> str:
     waiting, seen = [start], {start}
     while waiting:
         name = waiting.pop(0)
-        command = driver.commands.get(name)
-        for step in sequence.all_steps(command.steps if command else ()):
-            if isinstance(step, sequence.RepeatStep):
-                return name
-            if isinstance(step, sequence.RunStep) and step.command not in seen:
-                seen.add(step.command)
-                waiting.append(step.command)
+        if any(isinstance(step, sequence.RepeatStep) for step in _steps_in(name, driver)):
+            return name
+        found = set(_runs(name, driver)) - seen
+        seen |= found
+        waiting += sorted(found)
     return ""
 
 
-def _cycle(start: str, driver: Driver) -> list[str]:
-    """Return the names from `start` back to itself, or nothing."""
-    came_from: dict[str, str] = {}
-    waiting = [start]
-    while waiting:
-        name = waiting.pop(0)
-        command = driver.commands.get(name)
-        for step in sequence.all_steps(command.steps if command else ()):
-            if not isinstance(step, sequence.RunStep):
-                continue
-            if step.command == start:
-                path = [name]
-                while path[-1] != start:
-                    path.append(came_from[path[-1]])
-                return [*reversed(path), start]
-            if step.command not in came_from:
-                came_from[step.command] = name
-                waiting.append(step.command)
-    return []
+def _runs(name: str, driver: Driver) -> list[str]:
+    """Return the commands and sequences that the sequence `name` runs."""
+    return [step.command for step in _steps_in(name, driver) if isinstance(step, sequence.RunStep)]
+
+
+def _steps_in(name: str, driver: Driver) -> Iterator[sequence.Step]:
+    command = driver.commands.get(name)
+    return sequence.all_steps(command.steps if command else ())

@@ -23,7 +23,7 @@ from urc.problems import Problem, to_text
 from urc.web.dev.preview import Preview, Written
 from urc.web.dev.rows import SHOWN_BYTES, Row, fill, grouped
 from urc.web.dev.tryout import Finding, Piece, Taker
-from urc.web.wire.messages import INBOUND_BYTES, BadMessage, Ping
+from urc.web.wire.messages import Ping, decoded
 from urc.web.wire.text import Outbound, cut, encoded, milliseconds
 
 __all__ = [
@@ -68,12 +68,7 @@ _decoder: msgspec.json.Decoder[Inbound] = msgspec.json.Decoder(Inbound)
 
 def decode(text: str | bytes) -> Inbound:
     """Return the message; raise `BadMessage` with the reason if it is invalid."""
-    if len(text) > INBOUND_BYTES:
-        raise BadMessage(f"longer than {INBOUND_BYTES} bytes")
-    try:
-        return _decoder.decode(text)
-    except (msgspec.MsgspecError, UnicodeError, RecursionError) as error:
-        raise BadMessage(str(error)) from error
+    return decoded(_decoder, text)
 
 
 # -- to the page

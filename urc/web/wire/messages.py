@@ -33,6 +33,7 @@ refuses anything deeper than a map of plain arguments.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
+from typing import TypeVar
 
 import msgspec
 
@@ -54,6 +55,7 @@ __all__ = [
     "CLOSE_NOT_READY",
     "CLOSE_TOO_FAST",
     "INBOUND_BYTES",
+    "decoded",
     "BadMessage",
     "Inbound",
     "Indexes",
@@ -193,17 +195,29 @@ class Run(msgspec.Struct, tag_field="t", tag="run", forbid_unknown_fields=True, 
 
 Inbound = Ping | Run | Show | Agree | Prepare | Steer | Drive | Tick | Release | Stop
 
+_Message = TypeVar("_Message")
+
+
+def decoded(decoder: msgspec.json.Decoder[_Message], text: str | bytes) -> _Message:
+    """Return the message of a page.
+
+    Raises:
+        BadMessage: it is too long, or none that `decoder` knows.
+    """
+    if len(text) > INBOUND_BYTES:
+        raise BadMessage(f"longer than {INBOUND_BYTES} bytes")
+    try:
+        return decoder.decode(text)
+    except (msgspec.MsgspecError, UnicodeError, RecursionError) as error:
+        raise BadMessage(str(error)) from error
+
+
 _decoder: msgspec.json.Decoder[Inbound] = msgspec.json.Decoder(Inbound)
 
 
 def decode(text: str | bytes) -> Inbound:
     """Return the message; raise `BadMessage` with the reason if it is invalid."""
-    if len(text) > INBOUND_BYTES:
-        raise BadMessage(f"longer than {INBOUND_BYTES} bytes")
-    try:
-        return _decoder.decode(text)
-    except (msgspec.MsgspecError, UnicodeError, RecursionError) as error:
-        raise BadMessage(str(error)) from error
+    return decoded(_decoder, text)
 
 
 def encode_hello(profile: Profile, session: str, now_s: float) -> str:
