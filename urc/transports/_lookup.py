@@ -3,10 +3,11 @@
 import asyncio
 import errno
 import socket
-import threading
 from collections.abc import Awaitable, Callable
-from contextlib import suppress
+from functools import partial
 from typing import TypeVar
+
+from urc._daemon import in_daemon
 
 __all__ = ["Address", "Lookup"]
 
@@ -68,32 +69,13 @@ class Lookup:
 
 
 def _look_up(host: str, port: int, kind: socket.SocketKind) -> asyncio.Future[list[Address]]:
-    loop = asyncio.get_running_loop()
-    answer: asyncio.Future[list[Address]] = loop.create_future()
     if (given := _numeric(host, port, kind)) is not None:
-        answer.set_result(given)
-        return answer
+        known: asyncio.Future[list[Address]] = asyncio.get_running_loop().create_future()
+        known.set_result(given)
+        return known
+    answer = in_daemon(partial(_resolve, host, port, kind), f"look up {host}")
     # Nobody may be waiting any more when the look-up fails: then its error is not news.
     answer.add_done_callback(lambda done: done.cancelled() or done.exception())
-
-    def settle(found: list[Address] | None, fault: OSError | UnicodeError | None) -> None:
-        if not answer.done():
-            if fault is not None:
-                answer.set_exception(fault)
-            else:
-                answer.set_result(found or [])
-
-    def work() -> None:
-        found: list[Address] | None = None
-        fault: OSError | UnicodeError | None = None
-        try:
-            found = _resolve(host, port, kind)
-        except (OSError, UnicodeError) as problem:
-            fault = problem
-        with suppress(RuntimeError):  # the loop has ended meanwhile
-            loop.call_soon_threadsafe(settle, found, fault)
-
-    threading.Thread(target=work, name=f"look up {host}", daemon=True).start()
     return answer
 
 

@@ -37,8 +37,7 @@ from urc.web.drive.once import can_move
 from urc.web.drive.spare import Spare
 from urc.web.fleet.fleet import Fleet
 from urc.web.fleet.garage import Garage, Workshop
-from urc.web.fleet.robots import LINGER_S, Robot, Station, missing_settings
-from urc.web.fleet.tape import Tape
+from urc.web.fleet.robots import LINGER_S, Robot, Station, Tape, missing_settings
 from urc.web.load.assets import Assets, import_map
 from urc.web.load.file_routes import FileRoutes
 from urc.web.load.foreign import Border

@@ -9,7 +9,7 @@ import math
 from starlette.requests import Request
 from starlette.responses import Response
 
-from urc.web.fleet.tape import Tape
+from urc.web.fleet.robots import Tape
 from urc.web.manage.routes import Refusal, answer, body_of, told
 from urc.web.manage.wire import TapeAsked, TapeState
 

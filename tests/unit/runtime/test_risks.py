@@ -11,7 +11,7 @@ from urc.config.load import check
 from urc.packages.store import Store
 from urc.runtime.apart import look_apart
 from urc.runtime.catalog import built_in_catalog
-from urc.runtime.risks import risks_of
+from urc.runtime.look import risks_of
 from urc.runtime.shelves import shelf_of
 
 ATTACK = Path(__file__).parents[2] / "attacks" / "drivers" / "key-user"

@@ -11,7 +11,7 @@ from urc.config.load import check
 from urc.config.parse.widget import Shelf
 from urc.model.interface import WidgetUse
 from urc.runtime.catalog import built_in_catalog
-from urc.runtime.permissions import permissions
+from urc.runtime.look import permissions
 from urc.shipped import shipped
 from urc.testing.dashboard import FakeRobot, dashboard_profile
 from urc.testing.entry import ACCESS, HERE

@@ -7,16 +7,254 @@ Items declared by name change the copies: ``joint_2: { unit: deg }`` changes one
 ``joint_2: null`` removes it.
 """
 
-from collections.abc import Iterator
-from typing import Any, Final
+import re
+from collections.abc import Iterator, Mapping
+from itertools import product
+from math import prod
+from typing import Any, Final, NamedTuple
 
-from urc.config.compose.copies import Expander, is_removal, item_at
-from urc.config.compose.fill import Budget, TooMuch
-from urc.config.compose.merge import Tree, children, count_nodes, item_name, mark_inside
+from urc.config.compose.fill import Budget, Names, TooMuch, fill, fill_key, report_unquoted
+from urc.config.compose.merge import Tree, children, count_nodes, item_name, mark_inside, merge
 from urc.config.part import Findings, Part
+from urc.config.schemas import fits
+from urc.config.suggest import did_you_mean
 from urc.source import Document, Mark, Path
 
 __all__ = ["expand"]
+
+
+_RESERVED: Final = ("params", "settings")
+
+
+class _Copy(NamedTuple):
+    """One item of the result."""
+
+    name: str | None
+    tree: Tree
+
+
+class Expander:
+    """Writes out the items of one document."""
+
+    def __init__(self, document: Document, findings: Findings, budget: Budget) -> None:
+        self.document = document
+        self.findings = findings
+        self.budget = budget
+        self.path: Path = ()
+        """The item in work."""
+
+    def collection(self, tree: Tree, path: Path) -> Tree:
+        """Return a mapping or list with every `each` of its items written out."""
+        if isinstance(tree.value, dict):
+            return self._mapping(tree, path)
+        return self._list(tree, path)
+
+    def _mapping(self, tree: Tree, path: Path) -> Tree:
+        made: dict[str, Tree] = {}
+        given: dict[str, Tree] = {}
+        order: dict[str, None] = {}
+        for key, inner in children(tree).items():
+            name = str(key)
+            names = self._variables(inner, (*path, name), name)
+            if names is None:
+                given[name] = inner
+                order[name] = None
+                continue
+            for copy in self._copies(inner, (*path, name), name, names):
+                self._take(made, copy, (*path, name))
+                order[str(copy.name)] = None
+        result: dict[str | int, Tree] = {}
+        for name in order:
+            if name not in made:
+                result[name] = given[name]
+            elif name not in given:
+                result[name] = made[name]
+            elif given[name].value is not None:
+                result[name] = merge(made[name], given[name], (*path, name))
+        marks = {key: mark_inside(inner, tree) for key, inner in result.items()}
+        value = {key: inner.value for key, inner in result.items()}
+        return Tree(value, tree.mark.copy(marks), tree.home)
+
+    def _list(self, tree: Tree, path: Path) -> Tree:
+        items: list[_Copy] = []
+        made: dict[str, Tree] = {}
+        for place, inner in children(tree).items():
+            names = self._variables(inner, (*path, place), item_name(inner.value))
+            if names is None:
+                items.append(_Copy(None, inner))
+                continue
+            for copy in self._copies(inner, (*path, place), item_name(inner.value), names):
+                if copy.name is not None:
+                    self._take(made, copy, (*path, place))
+                items.append(copy)
+        given = [copy for copy in items if copy.name is None and item_name(copy.tree.value) in made]
+        for _, inner in given:
+            name = str(item_name(inner.value))
+            changed = None if is_removal(inner.value) else merge(made[name], inner, (*path, name))
+            items = _changed(items, name, inner, changed)
+        marks: dict[str | int, Mark] = {
+            place: mark_inside(copy.tree, tree) for place, copy in enumerate(items)
+        }
+        return Tree([copy.tree.value for copy in items], tree.mark.copy(marks), tree.home)
+
+    def _take(self, made: dict[str, Tree], copy: _Copy, path: Path) -> None:
+        name = str(copy.name)
+        if name in made:
+            self.findings.error(
+                Part(self.document, path, None),
+                "duplicate-key",
+                f"'each' makes {name!r} twice",
+                at="each",
+                key=True,
+                hint="use every variable in the name, and give no value twice",
+            )
+        made.setdefault(name, copy.tree)
+
+    def _copies(
+        self, inner: Tree, path: Path, name: str | None, variables: Mapping[str, list[object]]
+    ) -> Iterator[_Copy]:
+        """Yield the item once for every combination of values."""
+        self.path = path
+        template = _without(inner, "each")
+        each = inner.value["each"]  # type: ignore[index]  # a mapping: it has variables
+        nodes = count_nodes(template.value) + 1
+        self.budget.spend((prod(map(len, variables.values())) - 1) * nodes - count_nodes(each))
+        for values in product(*variables.values()):
+            names: Names = dict(zip(variables, values, strict=True))
+            listener = _First(self, path) if values == _first(variables) else _Rest()
+            copy = fill(template, path, names, self.budget, listener)
+            yield _Copy(None if name is None else fill_key(name, names, self.budget), copy)
+
+    def _variables(
+        self, inner: Tree, path: Path, name: str | None
+    ) -> Mapping[str, list[object]] | None:
+        """Return the variables of an item, or None when it has no `each` that can be used.
+
+        An `each` of a wrong shape stays in the document; the shape pass reports it.
+        """
+        if not isinstance(inner.value, dict) or "each" not in inner.value:
+            return None
+        each: dict[str, list[object]] = inner.value["each"]
+        if not fits("driver.schema.json#/$defs/each", each):
+            return None
+        part = Part(self.document, (*path, "each"), each)
+        unlike = [variable for variable, values in each.items() if not _are_alike(values)]
+        if unlike:
+            self.findings.error(
+                part,
+                "unlike-values",
+                f"the values of {unlike[0]!r} are not alike",
+                at=unlike[0],
+                hint="all of them plain, or all of them mappings with the same keys",
+            )
+            return None
+        self._check_variables(part)
+        unused = [one for one in each if name is not None and not _uses(name, one)]
+        if unused:
+            self.findings.error(
+                part,
+                "same-name",
+                f"{name!r} is the same for every {unused[0]!r}",
+                at=unused[0],
+                key=True,
+                hint=f"write '{{{unused[0]}}}' in the name, such as \"{name}_{{{unused[0]}}}\"",
+            )
+            return None
+        return each
+
+    def _check_variables(self, part: Part) -> None:
+        for variable in part.data:
+            if variable in _RESERVED:
+                self.findings.error(
+                    part,
+                    "bad-name",
+                    f"a variable of 'each' cannot be called {variable!r}",
+                    at=variable,
+                    key=True,
+                )
+
+
+class _First:
+    """Reports faults in the texts of an item, while the first copy is made."""
+
+    def __init__(self, expander: Expander, path: Path) -> None:
+        self._expander = expander
+        self._each = item_at(expander.document.data, path)["each"]
+
+    def unknown(self, path: Path, name: str, word: str, offset: int) -> None:
+        """Report a word that the variable's mappings do not have."""
+        first: Any = self._each[name][0]
+        is_mapping = isinstance(first, dict)
+        plain = f"its values are plain: write {{{name}}}"
+        self._expander.findings.error(
+            Part(self._expander.document, path, None),
+            "unknown-variable",
+            f"{name!r} has no {word!r}" if word else f"{name!r} is several values; name one",
+            offset=offset,
+            length=len(name) + len(word) + bool(word),
+            hint=did_you_mean(word, first, "it has") if is_mapping else plain,
+        )
+
+    def unquoted(self, path: Path, text: str) -> None:
+        """Report a name in braces that YAML takes for a mapping."""
+        report_unquoted(Part(self._expander.document, path, None), text, self._expander.findings)
+
+
+class _Rest:
+    """Reports nothing: the first copy did."""
+
+    def unknown(self, path: Path, name: str, word: str, offset: int) -> None:
+        """Say nothing."""
+
+    def unquoted(self, path: Path, text: str) -> None:
+        """Say nothing."""
+
+
+def _are_alike(values: list[object]) -> bool:
+    """Return whether all are plain, or all are mappings of the same plain words."""
+    if isinstance(values[0], dict):
+        words = values[0].keys()
+        return all(isinstance(one, dict) and one.keys() == words for one in values)
+    return not any(isinstance(one, dict) for one in values)
+
+
+def _uses(name: str, variable: str) -> bool:
+    return re.search(rf"(?<!\{{)\{{{variable}(?:\.\w+)?\}}(?!\}})", name) is not None
+
+
+def _first(variables: Mapping[str, list[object]]) -> tuple[object, ...]:
+    return tuple(values[0] for values in variables.values())
+
+
+def _without(tree: Tree, key: str) -> Tree:
+    value = {name: item for name, item in tree.value.items() if name != key}  # type: ignore[attr-defined]
+    marks = {name: mark for name, mark in tree.mark.children.items() if name != key}
+    return Tree(value, tree.mark.copy(marks), tree.home)
+
+
+def _changed(items: list[_Copy], name: str, given: Tree, changed: Tree | None) -> list[_Copy]:
+    """Return the items with the one that was made of that name changed, or taken away."""
+    result = []
+    for copy in items:
+        if copy.name == name:
+            if changed is not None:
+                result.append(_Copy(name, changed))
+        elif copy.tree is not given:
+            result.append(copy)
+    return result
+
+
+def is_removal(item: object) -> bool:
+    """Return whether an item only takes another one away."""
+    return isinstance(item, dict) and item.get("remove") is True
+
+
+def item_at(data: Any, path: Path) -> Any:
+    """Return the data at a path that exists."""
+    for part in path:
+        data = data[part]
+    return data
+
 
 _NODES_MOST: Final = 10_000
 _NAMED: Final = ("signals", "messages", "commands", "sequences", "widgets")

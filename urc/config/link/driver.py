@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Iterable, Mapping
+from typing import Any, Final
 
 from urc.config.link.flow import (
     link_command,
@@ -12,7 +13,6 @@ from urc.config.link.flow import (
 )
 from urc.config.link.frames import check_frames
 from urc.config.link.messages import check_messages, check_via
-from urc.config.link.options import check_option
 from urc.config.link.signals import link_signals
 from urc.config.link.steps import link_sequences
 from urc.config.parse.form import read_form, write_form
@@ -20,6 +20,7 @@ from urc.config.parse.line import option_templates
 from urc.config.parse.reply import refuse
 from urc.config.parse.simulator import Simulated
 from urc.config.part import Findings, Part
+from urc.config.schemas import read_schema
 from urc.config.sources import Sources
 from urc.config.suggest import did_you_mean
 from urc.expressions import COUNTERS, NONCE, Template
@@ -30,6 +31,43 @@ from urc.model.values import NOTHING, Reading
 from urc.model.world import WorldSpec
 
 __all__ = ["Uses", "link_driver", "link_simulator"]
+
+
+_ONE_SETTING: Final = re.compile(r"\{\{\s*settings\.([a-z]\w*)\s*\}\}")
+_NUMBERS: Final = ("port", "integer", "number")
+
+
+def check_option(
+    part: Part, kind: str, template: Template, settings: Mapping[str, Setting], findings: Findings
+) -> None:
+    """Report a setting of the wrong type.
+
+    Args:
+        part: the option.
+        kind: type of the transport, a definition of the driver's schema where it is URC's own.
+        template: the option as a template.
+        settings: of the profile.
+        findings: collects the problems.
+    """
+    found = _ONE_SETTING.fullmatch(template.source)
+    setting = settings.get(found[1]) if found else None
+    if found is None or setting is None:
+        return
+    schema: Any = read_schema("driver.schema.json")
+    option = schema["$defs"].get(kind, {}).get("properties", {}).get(part.name, {})
+    wants_number = "pattern" in option and "integer" in option.get("type", ())
+    if wants_number and setting.type not in _NUMBERS:
+        wanted, hint = "a whole number", "port" if part.name == "port" else "integer"
+    elif part.name == "host" and setting.type in (*_NUMBERS, "boolean"):
+        wanted, hint = "a name or an address", "host"
+    else:
+        return
+    findings.error(
+        part,
+        "wrong-type",
+        f"'{part.name}' is {wanted}, and the setting {found[1]!r} is of type {setting.type}",
+        hint=f"give the setting 'type: {hint}'",
+    )
 
 
 class Uses:

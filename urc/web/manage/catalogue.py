@@ -11,12 +11,12 @@ from typing import Final
 
 import msgspec
 
+from urc._daemon import in_daemon
 from urc.packages.index import Entry, search
 from urc.packages.install import withdrawn_lines
 from urc.packages.lock import Lock
 from urc.packages.names import Key, PackageError, parse_key
 from urc.packages.repositories import Repositories, Repository
-from urc.web.daemon import in_daemon
 from urc.web.manage.wire import Place
 
 __all__ = ["FRESH_S", "Catalogue"]

@@ -12,6 +12,7 @@ from itertools import count
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
+from urc._daemon import in_daemon
 from urc._phrases import phrase
 from urc.packages.index import Entry
 from urc.packages.install import origin_lines, plan_file, plan_wish
@@ -24,7 +25,6 @@ from urc.packages.update import Difference, plan_update, staged_difference
 from urc.problems import UrcError, printable
 from urc.runtime.apart import Looks
 from urc.runtime.kept import DRIVEN
-from urc.web.daemon import in_daemon
 from urc.web.manage.given import source_at
 from urc.web.manage.wire import JobNews, JobState
 from urc.web.words import spoken

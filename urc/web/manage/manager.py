@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from urllib.parse import quote
 
+from urc._daemon import in_daemon
 from urc.model.profile import Profile
 from urc.packages.index import Entry
 from urc.packages.lock import Lock
@@ -17,7 +18,6 @@ from urc.packages.repositories import Repository
 from urc.packages.sources import Source
 from urc.problems import UrcError, printable
 from urc.runtime.kept import DRIVEN, in_use, names_kept, pin
-from urc.web.daemon import in_daemon
 from urc.web.fleet.fleet import Broken, Fleet
 from urc.web.fleet.garage import Garage
 from urc.web.fleet.robots import Robot

@@ -1,6 +1,6 @@
 """Work that may block, in a thread that delays neither the loop nor the exit of the process.
 
-Layer 5. The loop waits for `asyncio.to_thread` when it closes. A repository that hangs for two
+The loop waits for `asyncio.to_thread` when it closes. A repository that hangs for two
 minutes must not delay Ctrl-C by two minutes.
 """
 
