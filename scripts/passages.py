@@ -24,6 +24,11 @@ FEWEST_WORDS = 4
 
 _FENCE = re.compile(r"^\s*(```|~~~)")
 _ITEM = re.compile(r"^\s*(?:[-*+]|\d+\.)\s+|^\s*#+\s+|^\s*>\s?")
+_SECTIONS = ("Args:", "Attributes:", "Raises:", "Returns:", "Yields:")
+_ENTRY = re.compile(r"^\s+\*{0,2}\w+(?: \([^)]*\))?: ")
+"""The beginning of an entry under `Args:` or `Raises:`."""
+_QUERY = re.compile(r"(?:CREATE TABLE|DELETE FROM|INSERT INTO|PRAGMA|SELECT|WHERE)\b")
+"""The beginning of a piece of SQL, which is no prose."""
 _LINK = re.compile(r"!?\[([^\]]*)\]\([^)]*\)")
 _MARKED = re.compile(r"""\b(?:t|mark|phrase)\(\s*(?:"((?:[^"\\\n]|\\.)*)"|'((?:[^'\\\n]|\\.)*)')""")
 _WORD = re.compile(
@@ -145,11 +150,14 @@ def _constant(value: ast.expr) -> str:
 
 def _of_docstring(path: str, line: int, text: str) -> Iterator[Passage]:
     lines: list[tuple[int, str]] = []
-    after_blank = False
+    after_blank = is_section = False
     for number, one in enumerate([*text.splitlines(), ""], line):
         inner = one.lstrip()
+        if after_blank or not inner:
+            is_section = inner in _SECTIONS
+        is_entry = is_section and bool(_ENTRY.match(one))
         is_example = after_blank and len(one) - len(inner) > _indent(text) + 3
-        if not inner or _ITEM.match(one) or is_example:
+        if not inner or _ITEM.match(one) or is_entry or is_example:
             yield from _paragraph(path, "docstring", lines)
             lines = []
         if inner and not is_example:
@@ -165,7 +173,7 @@ def _indent(text: str) -> int:
 def _of_string(path: str, line: int, text: str) -> Iterator[Passage]:
     words = text.split()
     fit = sum(1 for word in words if _WORD.fullmatch(word))
-    if len(words) >= FEWEST_WORDS and fit >= 0.8 * len(words):
+    if len(words) >= FEWEST_WORDS and not _QUERY.match(text) and fit >= 0.8 * len(words):
         yield Passage(path, line, "string", text)
 
 

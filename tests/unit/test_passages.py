@@ -72,6 +72,23 @@ def test_python_has_docstrings_and_strings_for_people() -> None:
     ]
 
 
+def test_each_entry_of_a_docstring_is_on_its_own() -> None:
+    """A list of arguments has no ends of sentences; SQL has no sentences at all."""
+    text = (
+        'def f():\n    """Do it.\n\n    Args:\n        a: the first\n            one.\n'
+        '        b: another.\n\n    Raises:\n        UrcError: it cannot.\n    """\n'
+        'q = "SELECT this FROM that table"\n'
+    )
+    assert found("urc/x.py", text) == [
+        (2, "docstring", "Do it."),
+        (4, "docstring", "Args:"),
+        (5, "docstring", "a: the first one."),
+        (7, "docstring", "b: another."),
+        (9, "docstring", "Raises:"),
+        (10, "docstring", "UrcError: it cannot."),
+    ]
+
+
 def test_schemas_documents_and_pages_have_strings() -> None:
     """Only values of keys for people, and what is marked for translation."""
     schema = '{\n"description": "Says \\"so\\". Twice.", "pattern": "a. B"}'
