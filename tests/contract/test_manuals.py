@@ -147,4 +147,4 @@ def test_page_says_what_happens_when_control_is_lost(tmp_path: Path) -> None:
     assert "- held: sent every 100ms while it is held\n" in page
     assert "## When control is lost\n\n" in page
     assert "- `set`: `level 0, side a`\n" in page
-    assert "  - Whether the robot stops by itself when nothing more comes is not said.\n" in page
+    assert "  - The document does not say whether the robot stops by itself.\n" in page

@@ -247,6 +247,6 @@ def test_what_a_stranger_sends_is_looked_at_within_bounds(tmp_path: Path) -> Non
     assert [fault] == examine(document)
     assert "test 'it is heard'" in fault
     (fault,) = examine_apart(document, total_s=0.01)
-    assert fault == f"{document}: checking it took longer than 0.01 s"
+    assert fault == f"{document}: the check took longer than 0.01 s"
     (fault,) = examine_apart(document.with_name("gone.yaml"))
     assert "gone.yaml" in fault

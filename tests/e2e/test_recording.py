@@ -142,7 +142,7 @@ def test_a_robot_that_is_not_there_is_told(tmp_path: Path) -> None:
     ("words", "said"),
     [
         (("nosuch.mcap",), "urc replay: nosuch.mcap cannot be read: No such file or directory"),
-        ((PUPPET,), f"urc replay: {PUPPET} is no MCAP file"),
+        ((PUPPET,), f"urc replay: {PUPPET} is not an MCAP file"),
         (
             ("x.mcap", "--speed", "0"),
             "urc replay: argument --speed: a speed from 0.1 to 100 is expected, not '0'; try"

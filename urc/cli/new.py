@@ -47,7 +47,7 @@ def run(arguments: argparse.Namespace) -> int:
     except FileExistsError as error:
         raise UrcError(f"{folder} is there already") from error
     except OSError as error:
-        raise UrcError(f"{folder} cannot be made: {error.strerror or error}") from error
+        raise UrcError(f"{folder} cannot be created: {error.strerror or error}") from error
     print(folder)
     return 0
 

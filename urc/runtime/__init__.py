@@ -1,1 +1,1 @@
-"""A robot being driven: links, latest values, sessions."""
+"""Running robots: links, newest values, sessions."""

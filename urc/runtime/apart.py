@@ -1,7 +1,7 @@
-"""Looks at a stranger's documents in a process of its own, with little memory and time.
+"""A preview of a third-party document in a separate process with limited memory and time.
 
-``python -m urc.runtime.apart`` reads what to look at from its standard input, as JSON, and writes
-what it saw. Whatever a document costs, the program that asks for the look goes on meanwhile.
+``python -m urc.runtime.apart`` reads the task from its standard input, as JSON, and writes the
+preview. The cost of a document never affects the calling program.
 """
 
 import json
@@ -19,28 +19,28 @@ from urc.runtime.look import Look, look
 __all__ = ["Looks", "bound_this_process", "look_apart"]
 
 TOTAL_S: Final = 60.0
-"""Longest time that a look takes; it is much, for small machines that are busy."""
+"""Limit of a preview, in seconds; it is long, for small and busy machines."""
 PROCESSOR_S: Final = 30
 MEMORY_BYTES: Final = 1 << 30
 COMMAND: Final = ("-P", "-m", "urc.runtime.apart")
-"""What Python is told; -P: nothing is imported from the folder in which it is started."""
+"""Arguments of Python; -P prevents imports from the working folder."""
 _ANSWER_BYTES: Final = 16 << 20
 
 
 def look_apart(
     document: Path, folder: Path, widgets: Sequence[str], *, total_s: float = TOTAL_S
 ) -> Look:
-    """Return what `urc.runtime.look.look` returns, and raise what it raises.
+    """Return the result of `urc.runtime.look.look`, or raise its errors.
 
     Args:
-        document: the package's own.
-        folder: with all that the package needs.
-        widgets: names of the widgets that come along.
-        total_s: after which the look is given up.
+        document: the document of the package.
+        folder: folder with all files that the package needs.
+        widgets: names of the included widgets.
+        total_s: limit of the preview, in seconds.
 
     Raises:
-        ProblemsError: the document is broken.
-        UrcError: it refers to a file outside, or costs more than the memory and time there are.
+        ProblemsError: the document has errors.
+        UrcError: it refers to a file outside, or exceeds the limits of memory and time.
     """
     asked = json.dumps([str(document), str(folder), list(widgets)])
     command = [sys.executable, *COMMAND]
@@ -49,12 +49,12 @@ def look_apart(
             command, input=asked.encode(), capture_output=True, timeout=total_s, check=False
         )
     except subprocess.TimeoutExpired:
-        raise UrcError(f"{document.name}: looking at it took longer than {total_s:g} s") from None
+        raise UrcError(f"{document.name}: its preview took longer than {total_s:g} s") from None
     try:
         said = json.loads(done.stdout)
     except ValueError:
         raise UrcError(
-            f"{document.name}: it cannot be looked at with {PROCESSOR_S} s of processor time and"
+            f"{document.name}: its preview needs more than {PROCESSOR_S} s of processor time and"
             f" {MEMORY_BYTES >> 20} MiB of memory"
         ) from None
     if "problems" in said:
@@ -65,22 +65,22 @@ def look_apart(
 
 
 class Looks:
-    """Looks at each document once."""
+    """A cache of previews, one for each document."""
 
     def __init__(self) -> None:
         self._seen: dict[Path, Look] = {}
 
     def __call__(self, document: Path, folder: Path, widgets: Sequence[str]) -> Look:
-        """Return what `look_apart` returns; raise what it raises."""
+        """Return the result of `look_apart`, or raise its errors."""
         if document not in self._seen:
             self._seen[document] = look_apart(document, folder, widgets)
         return self._seen[document]
 
 
 def bound_this_process(processor_s: int, memory_bytes: int) -> None:
-    """Let this process have no more than that, and let what drives robots go before it.
+    """Limit this process, and lower its priority, so that motion comes first.
 
-    On Windows the caller's time-out is all there is.
+    On Windows, only the caller's timeout applies.
     """
     try:
         import resource
@@ -93,7 +93,7 @@ def bound_this_process(processor_s: int, memory_bytes: int) -> None:
 
 
 def _said(line: str) -> Any:
-    """Return a line as JSON that can be said in another language still."""
+    """Return a line as JSON, with its text in translatable form."""
     if not isinstance(line, Phrase):
         return line
     if line.pieces:
@@ -127,7 +127,7 @@ def _main() -> int:
         }
     text = json.dumps(said)
     if len(text) > _ANSWER_BYTES:
-        text = json.dumps({"fault": f"{document}: there is too much to be seen of it"})
+        text = json.dumps({"fault": f"{document}: its preview is too large"})
     sys.stdout.write(text)
     return 0
 

@@ -1,12 +1,12 @@
-"""The audit: who made a robot move, when, and what came of it, in one bounded SQLite file.
+"""The audit log: the motion commands of each operator, with times and results, in an SQLite file.
 
-Theory of operation. `AuditLog.note` puts an entry into a short queue and returns: it never waits
-for a disk, because motion and STOP pass by here. A thread of its own writes what waits, a batch a
-transaction. When the queue is full, or the disk is, entries are lost, and counted; the next one
-that can be written says how many. A file that has grown to its limit loses its oldest entries.
+Theory of operation. `AuditLog.note` puts an entry into a short queue and returns. It never waits
+for a disk, because motion and STOP call it. A separate thread writes the queue in batches, one
+transaction each. When the queue or the disk is full, entries are lost and counted; the next
+written entry has the count. When the file reaches its limit, the oldest entries are deleted.
 
-Each row carries a hash over itself and the row before it, so that a changed, removed or inserted
-row shows (`check`); it does not keep out who can write the whole file anew.
+Each row has a hash over itself and the row before it, so `check` finds a changed, removed or
+inserted row. The hash does not protect against an attacker who rewrites the whole file.
 """
 
 import hashlib
@@ -28,49 +28,49 @@ from urc.private_files import make_private
 __all__ = ["AuditLog", "Entry", "check", "read", "shown"]
 
 MOST_BYTES: Final = 32 * 1024 * 1024
-"""Of the file; the oldest entries go first."""
+"""Limit of the file, in bytes; the oldest entries are deleted first."""
 MOST_WAITING: Final = 4096
-"""Entries that wait to be written."""
+"""Limit of the queue, in entries."""
 _BATCH: Final = 512
 _GATHER_S: Final = 0.05
-"""How long a batch is gathered: one commit for many entries."""
+"""Time to gather a batch, in seconds, so that one commit writes many entries."""
 _RETRY_S: Final = 5.0
-"""After how long a disk that took nothing is tried again."""
+"""Time before the next attempt after a write error, in seconds."""
 _LOCKED_S: Final = 1.0
-"""How long whoever else writes the file, or looks at it, is waited for."""
+"""Time to wait for other readers and writers of the file, in seconds."""
 _CLOSE_S: Final = 2.0
 _LONGEST_TEXT: Final = 1000
 _SHARE: Final = 10
-"""One of so many rows goes when the file is full."""
+"""One of so many rows is deleted when the file is full."""
 _PAGE: Final = 4096
 
 log = logging.getLogger(__name__)
 
 
 class Entry(NamedTuple):
-    """One thing that happened. Nothing in it is secret: whoever makes it leaves secrets out."""
+    """One entry. Its maker must leave secrets out."""
 
     at: float
-    """UTC, in seconds since 1970, as this machine's clock had it."""
+    """UTC time of this machine's clock, in seconds since 1970."""
     robot: str
     what: str
     """``moved``, ``stopped``, ``refused``, ``lease``, ``STOP``, ``reset``, ``ran`` or ``lost``."""
     who: str = ""
-    """Name of the person or screen."""
+    """Name of the person or page."""
     role: str = ""
     client: str = ""
     """Id of the connection."""
     epoch: int = 0
-    """Of the lease."""
+    """Epoch of the lease."""
     command: str = ""
     arguments: str = ""
-    """As JSON."""
+    """Arguments as JSON."""
     data: str = ""
-    """Bytes as hex, or their hash when they are many: see `shown`."""
+    """Bytes in hex, or the hash of many bytes: see `shown`."""
     outcome: str = ""
-    """What came of it, for people."""
+    """Result, as text for people."""
     times: int = 1
-    """How many such things this one stands for."""
+    """Number of equal events that this entry stands for."""
     lasted_s: float = 0.0
 
 
@@ -90,7 +90,7 @@ _SELECT: Final = f"SELECT id, {', '.join(_COLUMNS)}, chain FROM entries"  # noqa
 
 
 class AuditLog:
-    """The one writer of a file. Use as a context, or call `close`."""
+    """A writer of one audit file. Use it as a context, or call `close`."""
 
     def __init__(
         self,
@@ -100,17 +100,17 @@ class AuditLog:
         most_waiting: int = MOST_WAITING,
         now: Callable[[], float] = time.time,
     ) -> None:
-        """Start the thread that writes; the file is made by it.
+        """Start the writer thread, which creates the file.
 
         Args:
-            file: where.
-            most_bytes: about how large the file may become.
-            most_waiting: entries that may wait to be written.
-            now: the time, UTC in seconds.
+            file: path of the file.
+            most_bytes: approximate limit of the file, in bytes.
+            most_waiting: limit of the queue, in entries.
+            now: source of UTC time, in seconds.
         """
         self.file = file
         self.fault = ""
-        """Why nothing can be written now; "" while all is well."""
+        """Reason why writing fails now, or ""."""
         self._most_bytes = most_bytes
         self._most_waiting = most_waiting
         self._now = now
@@ -123,7 +123,7 @@ class AuditLog:
         self._thread.start()
 
     def note(self, entry: Entry) -> None:
-        """Keep an entry soon. Returns at once, from any thread; never raises."""
+        """Queue an entry and return at once. Any thread may call it; it never raises."""
         with self._wakes:
             if len(self._waiting) >= self._most_waiting:
                 self._lost += 1
@@ -132,19 +132,19 @@ class AuditLog:
             self._wakes.notify()
 
     def settle(self, timeout_s: float = _CLOSE_S) -> bool:
-        """Wait until all that was noted is written; return whether it is."""
+        """Wait until all queued entries are written; return whether they are."""
         with self._wakes:
             return self._wakes.wait_for(lambda: not self._waiting and not self._is_busy, timeout_s)
 
     def close(self) -> None:
-        """Write what waits, for two seconds at most, and end the thread."""
+        """Write the queue for two seconds at most, and end the thread."""
         with self._wakes:
             self._is_closing = True
             self._wakes.notify_all()
         self._thread.join(_CLOSE_S)
 
     def __enter__(self) -> "AuditLog":
-        """Return it; it is closed with the block."""
+        """Return self; the end of the block closes it."""
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -161,7 +161,7 @@ class AuditLog:
                     base = self._opened()
                 self._write(base, batch)
                 self._well()
-            except Exception as error:  # a supervisor: whatever it is, the next batch is tried
+            except Exception as error:  # supervisor: the next batch is always tried
                 self._unwell(str(error), batch)
                 if base is not None:
                     with suppress(sqlite3.Error):
@@ -173,7 +173,7 @@ class AuditLog:
                 base.close()
 
     def _next_batch(self) -> list[Entry]:
-        """Return what waits, after a moment in which more may come; nothing: it is over."""
+        """Return the queued entries after a short wait for more, or [] at the end."""
         with self._wakes:
             self._is_busy = False
             self._wakes.notify_all()
@@ -189,17 +189,19 @@ class AuditLog:
         try:
             return self._connected()
         except sqlite3.OperationalError:
-            raise  # a disk that is full, a folder that may not be written: it may pass
+            raise  # possibly temporary: a full disk, or a folder without write permission
         except sqlite3.DatabaseError as error:
             aside = self.file.with_suffix(".broken")
-            log.warning("%s is no audit file (%s): it is now %s", self.file, error, aside.name)
+            log.warning(
+                "%s is not an audit file (%s); it was renamed to %s", self.file, error, aside.name
+            )
             self.file.replace(aside)
             for ending in ("-wal", "-shm"):
                 Path(f"{self.file}{ending}").unlink(missing_ok=True)
             return self._connected()
 
     def _connected(self) -> sqlite3.Connection:
-        # Before SQLite makes it: the files that it puts beside have the rights of this one.
+        # Created before SQLite does, because SQLite's other files copy the mode of this one.
         os.close(os.open(self.file, os.O_RDWR | os.O_CREAT, 0o600))
         for name in ("", "-wal", "-shm"):
             with suppress(FileNotFoundError):
@@ -211,7 +213,7 @@ class AuditLog:
             base.execute("PRAGMA synchronous = NORMAL")
             base.execute("PRAGMA journal_size_limit = 1048576")
             base.execute(_CREATE)
-            base.execute(_LAST)  # says whether it is a file of ours
+            base.execute(_LAST)  # fails if the file is not an audit file
         except sqlite3.Error:
             base.close()
             raise
@@ -222,11 +224,11 @@ class AuditLog:
             lost = self._lost
         entries = [*batch]
         if lost:
-            text = f"{lost} entries could not be kept"
+            text = f"{lost} entries could not be written"
             entries.append(Entry(self._now(), "", "lost", outcome=text, times=lost))
         base.execute("BEGIN IMMEDIATE")
         try:
-            last = base.execute(_LAST).fetchone()  # maybe of another server with this folder
+            last = base.execute(_LAST).fetchone()  # another server may write to this folder
             chain = last[0] if last else ""
             rows: list[tuple[object, ...]] = []
             for entry in entries:
@@ -243,7 +245,7 @@ class AuditLog:
             self._lost -= lost
 
     def _make_room(self, base: sqlite3.Connection) -> None:
-        """Let the oldest rows go while the file holds more than it may; the newest one stays."""
+        """Delete the oldest rows while the file exceeds its limit; keep the newest row."""
         while True:
             (pages,) = base.execute("PRAGMA page_count").fetchone()
             (free,) = base.execute("PRAGMA freelist_count").fetchone()
@@ -255,15 +257,15 @@ class AuditLog:
 
     def _well(self) -> None:
         if self.fault:
-            log.warning("the audit is kept again")
+            log.warning("the audit log can be written again")
         self.fault = ""
 
     def _unwell(self, fault: str, batch: Sequence[Entry]) -> None:
         with self._wakes:
             self._lost += len(batch)
-        if not self.fault:  # told once, however long it lasts
+        if not self.fault:  # log only the first of several failures
             log.warning(
-                "the audit cannot be kept: %s; robots are driven and stopped as ever", fault
+                "the audit log cannot be written: %s; robots can still be driven and stopped", fault
             )
         self.fault = fault
 
@@ -275,20 +277,20 @@ class AuditLog:
 
 
 def shown(data: bytes, most: int = 64) -> str:
-    """Return bytes for an entry: as hex, or the hash of more than `most`."""
+    """Return bytes as hex, or as a hash if there are more than `most`."""
     if len(data) <= most:
         return data.hex()
     return f"{len(data)} bytes, sha256 {hashlib.sha256(data).hexdigest()}"
 
 
 def read(file: Path, *, robot: str = "", since: float = 0.0, last: int = 200) -> list[Entry]:
-    """Return the newest entries, oldest first; none when there is no file.
+    """Return the newest entries, oldest first, or [] without a file.
 
     Args:
-        file: of an `AuditLog`, which may be writing it.
-        robot: of this one only, and what belongs to none; "": of all.
-        since: not those before this time, UTC in seconds.
-        last: at most so many.
+        file: file of an `AuditLog`, which may be writing it.
+        robot: only entries of this robot and of no robot; "" for all entries.
+        since: only entries from this time on, UTC in seconds.
+        last: limit of the number of entries.
 
     Raises:
         OSError: the file cannot be read.
@@ -305,7 +307,7 @@ def read(file: Path, *, robot: str = "", since: float = 0.0, last: int = 200) ->
 
 
 def check(file: Path) -> str:
-    """Return where the chain of hashes is broken, or "" when nothing was changed.
+    """Return the first broken place of the hash chain, or "" for an intact file.
 
     Raises:
         OSError: the file cannot be read.
@@ -331,7 +333,7 @@ def _link(before: str, entry: Entry) -> str:
 
 
 def _cut(entry: Entry) -> Entry:
-    """Return an entry whose texts have an end, and no lone surrogates, which no file takes."""
+    """Return an entry with shortened texts and without lone surrogates, which UTF-8 lacks."""
     return Entry._make(_text(one) if isinstance(one, str) else one for one in entry)
 
 

@@ -1,9 +1,9 @@
-"""The values of secret settings, taken out of all that is shown or kept.
+"""Redaction: removal of the values of secret settings from all shown or stored data.
 
-Floor 4, pure. The engine says which frames are secret and the link blanks them; a robot that echoes
-a password, or a command that carries a token, is blanked here, for the hub. A stream may bring an
-echo letter by letter: what may be the beginning of a secret is held back until more of it has come,
-or nothing has for a while.
+Layer 4, pure. The engine marks secret frames, and the link redacts them. This module redacts other
+data for the hub, such as the echo of a password or a command with a token. A stream may bring an
+echo letter by letter. So the possible beginning of a secret is delayed until more data arrives, or
+none for a while.
 """
 
 import base64
@@ -19,21 +19,21 @@ from urc.runtime.disguise import forms
 __all__ = ["REDACTED", "Blanker", "secret_texts", "stand_ins"]
 
 REDACTED = "‹secret›".encode()
-"""Stands for secret bytes in what is shown."""
+"""Replacement for secret bytes in shown data."""
 
 _SHORTEST = 3
-"""A shorter secret would blot out half of every frame; then the whole of it is blanked."""
+"""Shortest secret to cut out of a frame; shorter ones occur too often, so the frame is hidden."""
 _SHORTEST_CODED = 6
 _SHORTEST_PART = 4
-"""Letters of a secret that was cut off; fewer are in many words."""
+"""Shortest part of a cut secret to redact; shorter ones occur in many words."""
 _SHORTEST_NUMBER = 4
-"""Digits of a secret number; shorter ones would blank many a reading that only equals it."""
+"""Fewest digits of a secret number to redact; shorter ones equal too many readings."""
 _CUT = re.compile(rb"['\"]?\s*(?:\.\.\.|\xe2\x80\xa6|['\"]|$)")
-"""What follows a text that was cut: dots, or its quotation mark, or nothing."""
+"""Text after a cut: dots, a quotation mark, or the end."""
 
 
 def stand_ins(profile: Profile, settings: Mapping[str, Value]) -> dict[str, Value]:
-    """Return the settings with a word in place of every secret, for what is only tried out."""
+    """Return the settings with placeholders for secrets, for tests of a document."""
     return {
         name: "SECRET" if profile.settings[name].is_secret and isinstance(value, str) else value
         for name, value in settings.items()
@@ -51,16 +51,16 @@ def secret_texts(profile: Profile, settings: Mapping[str, Value]) -> list[str]:
 
 
 class Blanker:
-    """Takes secrets out of frames, texts and streams."""
+    """A remover of secrets from frames, texts and streams."""
 
     def __init__(self, secrets: Iterable[str], encodings: Iterable[str] = ("utf-8",)) -> None:
-        """Prepare for these, written in any of the encodings; empty ones are none."""
+        """Prepare for these secrets, written in any of the encodings; empty ones do not count."""
         names, texts = tuple(encodings), [text for text in secrets if text]
         written = [text.encode(name, "replace") for text in texts for name in names]
         self._plain = tuple(dict.fromkeys(written))
         coded = [code for secret in self._plain for code in _base64(secret)]
         coded += [form.encode("utf-8", "replace") for text in texts for form in forms(text)]
-        # Longest first: one secret may be part of another.
+        # The longest first, because one secret may be part of another.
         found = dict.fromkeys((*self._plain, *coded))
         self._all = tuple(sorted(found, key=len, reverse=True))
         self._long = tuple(secret for secret in self._all if len(secret) >= _SHORTEST)
@@ -69,7 +69,7 @@ class Blanker:
             for text in texts
             if len(text.encode("utf-8", "replace")) < _SHORTEST
         )
-        """They blank a text only where they stand alone: else they would blank nearly all."""
+        """Short secrets, redacted in a text only as whole words; else most texts would vanish."""
         self._numbers = frozenset(
             int(text) for text in texts if text.isdecimal() and len(text) >= _SHORTEST_NUMBER
         )
@@ -77,18 +77,18 @@ class Blanker:
 
     @classmethod
     def of(cls, profile: Profile, settings: Mapping[str, Value]) -> "Blanker":
-        """Return the one for a robot's secret settings."""
+        """Return the redactor for a robot's secret settings."""
         secrets = secret_texts(profile, settings)
         encodings = (spec.encoding for spec in profile.driver.transports.values())
         return cls(secrets, dict.fromkeys(("utf-8", *encodings)))
 
     @property
     def is_needed(self) -> bool:
-        """Whether there is any secret."""
+        """Whether the robot has any secret."""
         return bool(self._all)
 
     def whole(self, data: bytes) -> bytes:
-        """Return what is shown of one frame."""
+        """Return the redacted form of one frame."""
         for secret in self._all:
             if secret in data:
                 if len(secret) < _SHORTEST:
@@ -97,7 +97,7 @@ class Blanker:
         return data
 
     def text(self, text: str) -> str:
-        """Return what is shown of a text, which may quote the beginning of a secret and be cut."""
+        """Return the redacted form of a text, which may end with the cut beginning of a secret."""
         if not self._all:
             return text
         if any(word.search(text) for word in self._short):
@@ -108,7 +108,7 @@ class Blanker:
         return shown.decode("utf-8", "replace")
 
     def value(self, value: Any) -> Any:
-        """Return what is shown of a reading: of a number that is a secret, None."""
+        """Return the redacted form of a reading: None for a secret number."""
         if isinstance(value, str):
             return self.text(value)
         if isinstance(value, bytes):
@@ -120,19 +120,19 @@ class Blanker:
         return None if value in self._numbers else value
 
     def _in_bytes(self, data: bytes) -> bytes:
-        """Return what is shown of a picture or blob: two letters stand in every one by chance."""
+        """Return the redacted form of a blob, in which short secrets occur by chance."""
         for secret in self._long:
             if len(secret) >= _SHORTEST_PART:
                 data = data.replace(secret, REDACTED)
         return data
 
     def envelope(self, envelope: Envelope) -> Envelope:
-        """Return what is shown of a message."""
+        """Return the redacted form of a message."""
         shown = self.value(envelope.attributes)
         return envelope._replace(attributes=shown, body=self.value(envelope.body))
 
     def stream(self, key: tuple[str, str], data: bytes) -> bytes:
-        """Return what is shown now of the stream `key`, to which `data` was added."""
+        """Return the redacted data of the stream `key` that can be shown after `data`."""
         if not self._all:
             return data
         shown = self.whole(self._held.pop(key, b"") + data)
@@ -144,17 +144,17 @@ class Blanker:
 
     @property
     def is_holding(self) -> bool:
-        """Whether something was held back that may begin a secret."""
+        """Whether the possible beginning of a secret is delayed."""
         return bool(self._held)
 
     def rest(self) -> list[tuple[tuple[str, str], bytes]]:
-        """Return what was held back of each stream, on which nothing has come for a while."""
+        """Return the delayed data of each stream, after a pause."""
         held = list(self._held.items())
         self._held.clear()
         return [(key, REDACTED if len(data) >= _SHORTEST else data) for key, data in held]
 
     def _beginning(self, data: bytes) -> int:
-        """Return how many bytes at the end of `data` may begin a secret."""
+        """Return the number of bytes at the end of `data` that may begin a secret."""
         longest = 0
         for secret in self._all:
             for size in range(min(len(secret) - 1, len(data)), longest, -1):
@@ -165,7 +165,7 @@ class Blanker:
 
 
 def _base64(secret: bytes) -> list[bytes]:
-    """Return how a secret looks inside of base64 text, wherever in it the secret begins."""
+    """Return the forms of a secret inside base64 text, one for each alignment."""
     found = []
     for shift in range(3):
         code = base64.b64encode(bytes(shift) + secret).rstrip(b"=")
@@ -177,7 +177,7 @@ def _base64(secret: bytes) -> list[bytes]:
 
 
 def _without_cut(secret: bytes, shown: bytes) -> bytes:
-    """Return a text without a beginning of `secret` that it ends, or quotes, with."""
+    """Return a text without a cut beginning of `secret` at its end or before a quote."""
     at = shown.find(secret[:_SHORTEST_PART])
     while at >= 0 and len(secret) > _SHORTEST_PART:
         size = _SHORTEST_PART

@@ -1,6 +1,6 @@
-"""The tables that URC ships, gathered for whoever loads or connects a robot.
+"""The built-in tables of transports and framings.
 
-Imports no transport, no framing and no event loop: a row is imported when it is used.
+It imports no transport, no framing and no event loop; each is imported at its first use.
 """
 
 from urc.registry import Catalog

@@ -1,6 +1,6 @@
-"""Waits until a file changes, comes or goes, by looking again and again: nothing to install for it.
+"""Detection of changed, new and deleted files by polling, which needs no extra package.
 
-Floor 4. Editors replace a file rather than write into it, so what counts is the name, not the file.
+Layer 4. Editors often replace a file, so the path is polled, not the open file.
 """
 
 import os
@@ -15,30 +15,30 @@ _State = tuple[int, int, int] | None
 
 
 class Watched:
-    """Some files as they were when they were looked at."""
+    """The last known states of some files."""
 
     def __init__(self, files: Iterable[str]) -> None:
         self._states = {file: _state(file) for file in files}
 
     def add(self, files: Iterable[str]) -> None:
-        """Look at more files; those that are looked at already stay as they were."""
+        """Watch further files; known files keep their states."""
         for file in files:
             if file not in self._states:
                 self._states[file] = _state(file)
 
     def changed(self) -> list[str]:
-        """Return the files that are not as they were."""
+        """Return the changed files."""
         return [file for file, state in self._states.items() if _state(file) != state]
 
     def states(self) -> list[object]:
-        """Return what every file is like now; equal when none of them changed in between."""
+        """Return the current state of every file; equal results mean no change in between."""
         return [_state(file) for file in self._states]
 
 
 def wait_for_change(watched: Watched, sleep: Callable[[float], None] = time.sleep) -> list[str]:
-    """Return the files that changed, once any did and all are left alone for one look.
+    """Return the changed files, once one has changed and all are stable for one period.
 
-    A program that writes a file in several steps would otherwise be seen in the middle of it.
+    Otherwise, a program that writes a file in several steps would be caught half-way.
     """
     while not watched.changed():
         sleep(PERIOD_S)

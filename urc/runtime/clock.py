@@ -1,4 +1,4 @@
-"""Time, as an argument: the real one here, a fake one in `urc.testing`."""
+"""Time as an argument: the real clock here, a fake one in `urc.testing`."""
 
 import asyncio
 import time
@@ -10,14 +10,14 @@ __all__ = ["Alarm", "Clock", "LoopClock", "Repeating", "within"]
 
 
 class Alarm(Protocol):
-    """A call that is due later, and can be called off."""
+    """A call that is due later and can be cancelled."""
 
     def cancel(self) -> None:
-        """Call it off; harmless when it has already been made."""
+        """Cancel the call; harmless after it was made."""
 
 
 class Clock(Protocol):
-    """The only source of time for everything that runs a robot."""
+    """The only source of time for all code that runs a robot."""
 
     def now(self) -> float:
         """Return monotonic seconds."""
@@ -26,11 +26,11 @@ class Clock(Protocol):
         """Return after `seconds`."""
 
     def call_at(self, time_s: float, action: Callable[[], None]) -> Alarm:
-        """Make `action` run at `time_s` on this clock, or at once when that is past."""
+        """Call `action` at `time_s` on this clock, or at once if that is past."""
 
 
 class LoopClock:
-    """The running event loop's time."""
+    """The time of the running event loop."""
 
     now = staticmethod(time.monotonic)
     """Return monotonic seconds."""
@@ -40,13 +40,13 @@ class LoopClock:
         await asyncio.sleep(seconds)
 
     def call_at(self, time_s: float, action: Callable[[], None]) -> Alarm:
-        """Make `action` run at `time_s`, or at once when that is past."""
-        # Relative to our own reading: other loops' clocks need not start where this one does.
+        """Call `action` at `time_s`, or at once if that is past."""
+        # Relative to `now`, because an event loop's own clock may have another zero.
         return asyncio.get_running_loop().call_later(max(0.0, time_s - self.now()), action)
 
 
 class Repeating:
-    """An alarm whose action returns the seconds to the next call, or None for the last one."""
+    """A timer whose action returns the seconds to the next call, or None for the last one."""
 
     def __init__(self, clock: Clock, delay_s: float, action: Callable[[], float | None]) -> None:
         self._clock = clock
@@ -54,7 +54,7 @@ class Repeating:
         self._alarm: Alarm = clock.call_at(clock.now() + delay_s, self._ring)
 
     def cancel(self) -> None:
-        """Call it off for good."""
+        """Cancel all further calls."""
         self._alarm.cancel()
 
     def _ring(self) -> None:
@@ -65,7 +65,7 @@ class Repeating:
 
 @asynccontextmanager
 async def within(clock: Clock, seconds: float) -> AsyncIterator[None]:
-    """Raise `TimeoutError` out of the block when it takes longer than `seconds` on `clock`."""
+    """Raise `TimeoutError` if the block takes longer than `seconds` on `clock`."""
     loop = asyncio.get_running_loop()
     async with asyncio.timeout(None) as scope:
         alarm = clock.call_at(clock.now() + seconds, lambda: scope.reschedule(loop.time()))

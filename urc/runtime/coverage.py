@@ -1,6 +1,6 @@
-"""Which commands, polls and messages of a document its own tests exercise.
+"""The commands, polls and messages of a document that its tests use.
 
-Floor 4, pure. What no test exercises is no finding: a person decides what is worth a test.
+Layer 4, pure. An untested command is not a problem; the author decides which tests are needed.
 """
 
 from collections.abc import Iterable
@@ -13,20 +13,20 @@ __all__ = ["Coverage", "Exercised", "measure", "summary"]
 
 _KINDS: Final[tuple[Kind, ...]] = ("command", "poll", "message")
 _NAMED_MOST: Final = 3
-"""Names in the summary; more of them are counted."""
+"""Limit of names in the summary; beyond it, they are counted."""
 
 
 class Coverage(NamedTuple):
-    """What the tests of one document exercise."""
+    """Test coverage of one document."""
 
     file: str
     total: int
     untested: tuple[Exercised, ...]
-    """Commands, then polls, then messages, in the order of the document."""
+    """Untested commands, polls and messages, in this order and in the order of the document."""
 
 
 def measure(file: str, driver: Driver, exercised: Iterable[Exercised]) -> Coverage:
-    """Return what of a driver is exercised, and what is not."""
+    """Return the coverage of a driver by its tests."""
     declared: list[Exercised] = [
         *(("command", name) for name in driver.commands),
         *(("poll", poll.name) for poll in driver.polls),
@@ -37,7 +37,7 @@ def measure(file: str, driver: Driver, exercised: Iterable[Exercised]) -> Covera
 
 
 def summary(coverages: Iterable[Coverage]) -> str:
-    """Return what has no test in a few words, or ""."""
+    """Return a short text about the untested parts, or ""."""
     untested = [one for coverage in coverages for one in coverage.untested]
     if not untested:
         return ""

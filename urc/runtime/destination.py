@@ -1,7 +1,7 @@
-"""Where a robot's lines lead, as one short text: what is entered as a secret is for there alone.
+"""The destination of a robot's transports, as one short text; secrets are bound to it.
 
-A secret goes to whatever the options of the transports name. So each is kept with the destination
-for which it was entered, and is not used for another one.
+A secret goes to any host that the transports' options name. So each secret is stored together with
+the destination for which it was entered, and is never used for another one.
 """
 
 import json
@@ -27,23 +27,23 @@ _MANNERS: Final = frozenset(
         "answers",
     )
 )
-"""Options that say how to talk there. Any other one, as of a transport that does not ship with URC,
-counts as a place."""
+"""Options about the manner of the connection. All others count as a place, also those of a
+transport that does not ship with URC."""
 
 
 def destination_of(profile: Profile, package: str, values: Mapping[str, Value]) -> str:
-    """Return a digest of all places to which a robot's settings can go.
+    """Return a digest of all places that a robot's settings can reach.
 
-    Two are equal where the package, its transports and their places are the same.
+    Equal packages with equal transports and places have equal digests.
 
     Args:
-        profile: whose transports.
-        package: ``drivers/puppet``; "" for a document that was named at the start.
-        values: of the settings.
+        profile: profile with the transports.
+        package: ``drivers/puppet``; "" for a document given by path.
+        values: values of the settings.
     """
     empty = {name: one.empty for name, one in profile.settings.items() if not one.is_required}
     lines = [_line(spec, empty | dict(values)) for spec in profile.driver.transports.values()]
-    # Robots behind a gateway are named in what is sent, not in an option.
+    # Robots behind a gateway are named in sent data, not in an option.
     named = [
         [name, values.get(name)]
         for name, setting in profile.settings.items()
@@ -66,4 +66,4 @@ def _filled(option: object, values: Mapping[str, Value]) -> object:
     try:
         return filled(option, {"settings": values})
     except ExpressionError:
-        return None  # it needs what is not set yet: nothing goes there
+        return None  # it needs a missing setting, so no data goes there

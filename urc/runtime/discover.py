@@ -1,4 +1,4 @@
-"""What a rosbridge robot publishes, and how a document would read it."""
+"""The topics of a rosbridge robot, and their form in a document."""
 
 import asyncio
 import re
@@ -14,7 +14,7 @@ __all__ = ["RosTopic", "ros_topics", "snippet"]
 ANSWER_S = 5.0
 
 _FIELDS: Mapping[str, Mapping[str, tuple[str, str]]] = {
-    # Type → signal → where in the message, and its unit: common_interfaces, REP-103.
+    # Type → signal → place in the message, and unit: common_interfaces, REP-103.
     "sensor_msgs/BatteryState": {"voltage": ("voltage", "V"), "charge": ("percentage", "")},
     "nav_msgs/Odometry": {
         "x": ("pose.pose.position.x", "m"),
@@ -32,18 +32,18 @@ _PLAIN = re.compile(r"std_msgs/(?:msg/)?(?:Bool|String|Float\d+|U?Int\d+)")
 
 
 class RosTopic(NamedTuple):
-    """One topic that somebody publishes or listens to."""
+    """One topic with a publisher or a subscriber."""
 
     name: str
     type: str
-    """"" where rosapi does not know it."""
+    """Type of the messages; "" if rosapi does not know it."""
 
 
 async def ros_topics(transport: Transport, timeout_s: float) -> list[RosTopic]:
-    """Ask rosapi for all topics, on a rosbridge line that this opens and closes.
+    """Ask rosapi for all topics, on a rosbridge transport that this function opens and closes.
 
     Raises:
-        TransportError: there is no bridge, or no rosapi beside it.
+        TransportError: the bridge or rosapi does not respond.
     """
     try:
         await transport.open(timeout_s)
@@ -54,7 +54,7 @@ async def ros_topics(transport: Transport, timeout_s: float) -> list[RosTopic]:
                 if isinstance(said, Envelope) and said.verb == "response":
                     break
     except TimeoutError:
-        text = f"{transport.address}: rosapi has not answered within {ANSWER_S:g} s; is it running?"
+        text = f"{transport.address}: rosapi has not replied within {ANSWER_S:g} s; is it running?"
         raise TransportError(text) from None
     finally:
         await transport.close()
@@ -63,13 +63,13 @@ async def ros_topics(transport: Transport, timeout_s: float) -> list[RosTopic]:
     values = said.body if isinstance(said.body, Mapping) else NOTHING
     names, types = values.get("topics"), values.get("types")
     if not isinstance(names, list) or not isinstance(types, list):
-        raise TransportError(f"{transport.address}: rosapi's answer names no topics")
+        raise TransportError(f"{transport.address}: rosapi's reply has no topics")
     types += [""] * (len(names) - len(types))
     return sorted(RosTopic(str(name), str(kind)) for name, kind in zip(names, types, strict=False))
 
 
 def snippet(topics: Sequence[RosTopic], transport: str) -> str:
-    """Return signals and messages in YAML for those of `topics` whose fields are known."""
+    """Return signals and messages in YAML for the topics with known fields."""
     signals: list[str] = []
     messages: list[str] = []
     for topic in topics:
@@ -94,7 +94,7 @@ def snippet(topics: Sequence[RosTopic], transport: str) -> str:
 
 def _fields_of(topic: RosTopic) -> Mapping[str, tuple[str, str]]:
     if not _NAME.fullmatch(topic.name):
-        return NOTHING  # nothing that ROS would take, and nothing for a document
+        return NOTHING  # not a valid ROS name, so not for a document
     if _PLAIN.fullmatch(topic.type):
         return {"": ("data", "")}
     return _FIELDS.get(topic.type.replace("/msg/", "/"), NOTHING)

@@ -1,4 +1,4 @@
-"""The forms in which a secret may turn up in what a robot was sent: as it is, or encoded."""
+"""The possible forms of a secret in sent data: plain or encoded."""
 
 import base64
 import json
@@ -10,21 +10,21 @@ __all__ = ["HIDDEN", "Disguises", "forms"]
 
 HIDDEN = "•••"
 _SHORTEST = 4
-"""Encodings of shorter ones would be found in anything."""
+"""Shortest secret to search in encoded forms; shorter ones match too often."""
 _LONGEST = 4096
 
 
 class Disguises:
-    """What to look for: secrets as text, in JSON, in URLs, in hex and in base64.
+    """A search for secrets as plain text, in JSON, in URLs, in hex and in base64.
 
-    In base64 also as a part of something longer, such as ``user:password`` in a header: then the
-    whole of it is hidden, since its first and last letters depend on what is around.
+    In base64 the secret may be part of a longer text, such as ``user:password`` in a header. Then
+    the whole base64 text is hidden, because the first and last letters depend on their neighbours.
     """
 
     def __init__(self, secrets: Iterable[str] = ()) -> None:
         known = [one for one in secrets if one]
         plain = {form for one in known for form in forms(one)}
-        # Longest first: one secret may be part of another.
+        # The longest first, because one secret may be part of another.
         self._plain = tuple(sorted(plain, key=lambda form: (-len(form), form)))
         self._based = tuple(sorted({form for one in known for form in _based(one)}))
         self._bytes = tuple(
@@ -46,7 +46,7 @@ class Disguises:
 
 
 def forms(secret: str) -> list[str]:
-    """Return a secret as it may be written: as it is, in JSON, in a URL, in hex."""
+    """Return the written forms of a secret: plain, in JSON, in a URL, in hex."""
     found = [secret, json.dumps(secret, ensure_ascii=False)[1:-1], json.dumps(secret)[1:-1]]
     if _SHORTEST <= len(secret) <= _LONGEST:
         data = secret.encode("utf-8", "surrogatepass")
@@ -56,7 +56,7 @@ def forms(secret: str) -> list[str]:
 
 
 def _based(secret: str) -> list[str]:
-    """Return what of its base64 is the same whatever stands before and after it."""
+    """Return the parts of its base64 forms that do not depend on neighbouring bytes."""
     data = secret.encode("utf-8", "surrogatepass")
     found: list[str] = []
     for first in range(3):

@@ -1,9 +1,8 @@
-"""The one owner of a driver's engine: whoever has news for it comes here.
+"""The only caller of a driver's engine.
 
-All calls into the engine are made on the event loop, one after the other and never from inside one
-another: performing an event only sets state in a `Link`, the hub or a future, and the links' own
-tasks act on it later. A driver with several transports has one engine, one dispatcher, and a link
-for each transport.
+All calls into the engine run on the event loop, one after the other and never nested. Performing an
+event only sets state in a `Link`, the hub or a future; the links' own tasks act on it later. A
+driver with several transports has one engine, one dispatcher, and one link for each transport.
 """
 
 import asyncio
@@ -34,36 +33,36 @@ __all__ = ["MAX_WAITING", "Dispatcher", "EngineLike", "Port"]
 
 
 MAX_WAITING = 256
-"""Commands that may wait for their answer at a time; one more is refused."""
+"""Limit of pending commands; one more is refused."""
 
 Answer = Replied | Failed
 
 
 class Waiting:
-    """A future for each command that waits."""
+    """The futures of pending commands."""
 
     def __init__(self, clock: Clock, limit_s: Callable[[str], float]) -> None:
-        """Begin with none.
+        """Start without pending commands.
 
         Args:
-            clock: the time.
-            limit_s: command → seconds after which nobody waits for it any longer.
+            clock: source of time.
+            limit_s: command → longest wait, in seconds.
         """
         self._clock = clock
         self._limit_s = limit_s
         self._limits_s: dict[str, float] = {}
         self._all: dict[int, tuple[asyncio.Future[Answer], float, str]] = {}
-        """Number of the request → who waits, until when, and for which command."""
+        """Request number → future, deadline and command."""
         self._alarm: Alarm | None = None
         self._alarm_s = 0.0
 
     @property
     def is_full(self) -> bool:
-        """Whether no more may wait."""
+        """Whether the limit of pending commands is reached."""
         return len(self._all) >= MAX_WAITING
 
     def add(self, request: Request, answer: asyncio.Future[Answer], now: float) -> None:
-        """Let `answer` wait for the end of a request that is made `now`."""
+        """Add the future of a request that is made at `now`."""
         name = request.command
         limit_s = self._limits_s.get(name)
         if limit_s is None:
@@ -74,17 +73,17 @@ class Waiting:
             self._arm(due_s)
 
     def settle(self, answer: Answer) -> None:
-        """Give the answer to whoever waits for it, if anybody does."""
+        """Set the result of a pending command, if it still waits."""
         found = self._all.pop(answer.id, None)
         if found is not None and not found[0].done():
             found[0].set_result(answer)
 
     def forget(self, number: int) -> None:
-        """Nobody waits for the answer to this request any more."""
+        """Forget a command whose caller has gone."""
         self._all.pop(number, None)
 
     def close(self, reason: str) -> None:
-        """Fail all that wait, and leave no alarm behind."""
+        """Fail all pending commands and cancel the timer."""
         if self._alarm is not None:
             self._alarm.cancel()
             self._alarm = None
@@ -98,7 +97,7 @@ class Waiting:
         self._alarm = self._clock.call_at(due_s, self._ring)
 
     def _ring(self) -> None:
-        """Fail those that are overdue. The alarm may have been set for one that is over."""
+        """Fail the overdue commands, if any; the timer may be early."""
         self._alarm = None
         now = self._clock.now()
         for number, (_, due_s, name) in list(self._all.items()):
@@ -111,79 +110,79 @@ class Waiting:
 
 
 _SOONEST_S = 0.001
-"""A tick that leaves work overdue is not repeated sooner, so that no engine can hold the loop."""
+"""Shortest time to the next tick after one with overdue work; an engine cannot block the loop."""
 _AFTER_A_BUG_S = 1.0
 
 log = logging.getLogger(__name__)
 
 
 class EngineLike(Protocol):
-    """What is used of `urc.protocol.engine.Engine`."""
+    """The methods that the dispatcher uses of `urc.protocol.engine.Engine`."""
 
     @property
     def deadline(self) -> float | None:
-        """When `tick` wants to be called."""
+        """Time of the next `tick`, or None."""
 
     @property
     def calm_s(self) -> float:
-        """Neither `receive` nor `command` makes a deadline that is nearer than this."""
+        """Lower bound of new deadlines from `receive` and `command`, in seconds from now."""
 
     def start(self, transport: str, now: float) -> Sequence[Event]:
-        """The transport is open."""
+        """Handle an opened transport."""
 
     def receive(self, transport: str, data: Payload, now: float) -> Sequence[Event]:
-        """Bytes or an envelope arrived."""
+        """Handle received bytes or a received message."""
 
     def closed(self, transport: str, reason: str, now: float) -> Sequence[Event]:
-        """The transport is gone, or could not be opened."""
+        """Handle the loss of a transport, or a failed attempt to open it."""
 
     def command(self, request: Request, now: float) -> Sequence[Event]:
-        """Somebody wants this done."""
+        """Start a command."""
 
     def latch(self, reason: str, now: float) -> Sequence[Event]:
-        """End every sequence, and begin nothing that moves by itself; "" ends that."""
+        """End every sequence and refuse autonomous motion until called with ""."""
 
     def finish(self, now: float) -> list[Event]:
-        """Close every line in good order."""
+        """Start an orderly close of every connection."""
 
     def tick(self, now: float) -> Sequence[Event]:
-        """The deadline has come."""
+        """Handle the deadline."""
 
 
 class Port(Protocol):
-    """What the dispatcher asks of a `Link`. Nothing here may call the dispatcher back."""
+    """The dispatcher's interface to a `Link`. Its methods must not call the dispatcher."""
 
     @property
     def is_full(self) -> bool:
-        """Whether so much waits to be written that no new command should be taken."""
+        """Whether the output is too long for new commands."""
 
     def want_open(self) -> None:
-        """Connect; a request waits for it."""
+        """Connect, because a request waits."""
 
     def want_close(self, reason: str) -> None:
-        """Write what is queued and close; at once when there is a reason."""
+        """Write the queued output and close; close at once if a reason is given."""
 
     def send(self, sent: Send) -> None:
-        """Write bytes or an envelope; secret ones are not shown to whoever watches the traffic."""
+        """Write bytes or a message; secret ones are not shown as traffic."""
 
     def heard(self) -> None:
-        """A good frame arrived."""
+        """Handle a good frame."""
 
     def ready(self) -> None:
-        """The steps of the connection are done."""
+        """Handle the end of the connection's steps."""
 
     def count(self, fault: Fault) -> None:
-        """Something was not as declared."""
+        """Count a protocol violation."""
 
     def hang_up(self, reason: str) -> None:
-        """Give the connection up, and tell the engine from the link's own task."""
+        """Close the connection; the link's own task reports the end to the engine."""
 
     def publish(self) -> None:
-        """Show the state, if it has changed."""
+        """Publish the state if it has changed."""
 
 
 class Dispatcher:
-    """Passes news to the engine and performs what it answers."""
+    """A passer of input to the engine and of its events to links, hub and callers."""
 
     def __init__(
         self,
@@ -194,15 +193,15 @@ class Dispatcher:
         limit_s: Callable[[str], float],
         reins: Mapping[str, Reins] = NOTHING,
     ) -> None:
-        """Take an engine over.
+        """Take over an engine.
 
         Args:
-            engine: called by nobody else from now on.
-            hub: takes readings and notes.
-            clock: the time.
-            commands: of the driver.
-            limit_s: command → seconds after which its wait ends, whatever the engine says.
-            reins: sequence → where it stands.
+            engine: the engine, which no other code may call from now on.
+            hub: receives readings and log entries.
+            clock: source of time.
+            commands: the driver's commands.
+            limit_s: command → seconds after which its wait ends, regardless of the engine.
+            reins: sequence → its control.
         """
         self._engine = engine
         self._hub = hub
@@ -219,15 +218,15 @@ class Dispatcher:
         self._is_stopped = False
 
     def attach(self, transport: str, port: Port) -> None:
-        """Say which link serves `transport`."""
+        """Set the link of `transport`."""
         self._ports[transport] = port
 
     def start(self, transport: str) -> None:
-        """Tell the engine that a transport is open."""
+        """Report an opened transport to the engine."""
         self._run(lambda now: self._engine.start(transport, now))
 
     def receive(self, transport: str, data: Payload, now: float) -> None:
-        """Tell the engine what arrived; all readings in it reach the hub in one go."""
+        """Pass received data to the engine; all its readings reach the hub together."""
         if self._is_stopped:
             return
         try:
@@ -240,12 +239,12 @@ class Dispatcher:
         self._arm_after(now)
 
     def closed(self, transport: str, reason: str) -> None:
-        """Tell the engine that a transport is gone, or could not be opened."""
+        """Report a lost transport, or a failed attempt to open it, to the engine."""
         self._run(lambda now: self._engine.closed(transport, reason, now))
 
     def command(self, request: Request) -> asyncio.Future[Answer]:
-        """Start a command. The future gets exactly one answer, unless `forget` comes first."""
-        loop = self._loop = self._loop or asyncio.get_running_loop()  # which costs a system call
+        """Start a command. The future gets exactly one result, unless `forget` comes first."""
+        loop = self._loop = self._loop or asyncio.get_running_loop()  # cached: the call costs a system call
         answer: asyncio.Future[Answer] = asyncio.Future(loop=loop)
         command = self._commands.get(request.command)
         port = self._ports.get(command.transport) if command else None
@@ -265,26 +264,26 @@ class Dispatcher:
         return answer
 
     def pull(self, sequence: str, what: Pull) -> None:
-        """Let a sequence pause, go on, or end; nothing happens where there is none."""
+        """Pause, continue or end a sequence; do nothing if it does not run."""
         reins = self._reins.get(sequence)
         if reins is not None:
             reins.pull(what)
             self._run(self._engine.tick)
 
     def latch(self, reason: str) -> None:
-        """End every sequence, and begin nothing that moves by itself; "" lets it be begun again."""
+        """End every sequence and refuse autonomous motion; "" allows it again."""
         self._run(lambda now: self._engine.latch(reason, now))
 
     def forget(self, request_id: int) -> None:
-        """Nobody waits for this answer any more."""
+        """Forget a request whose caller has gone."""
         self._waiting.forget(request_id)
 
     def wind_up(self) -> None:
-        """Begin: let the engine say when it wants to be called."""
+        """Start the timer with the engine's first deadline."""
         self._arm()
 
     def finish(self) -> None:
-        """Let every open line say its good-bye; each ends with the engine closing it."""
+        """Start an orderly close of every open connection; the engine then closes each."""
         try:
             events = self._engine.finish(self._clock.now())
         except Exception as bug:  # supervisor, as in `command`
@@ -294,20 +293,20 @@ class Dispatcher:
         self._arm()
 
     def stop(self, reason: str) -> None:
-        """Call no engine from now on, and fail every command that still waits."""
+        """Stop calling the engine, and fail every pending command."""
         self._is_stopped = True
         if self._alarm is not None:
             self._alarm.cancel()
         self._waiting.close(reason)
 
     def _refusal(self, request: Request) -> Failed:
-        """Return why the engine is not even asked."""
+        """Return the reason to refuse a request without the engine, or None."""
         if self._is_stopped:
             return Failed(request.id, request.command, "disconnected", "the session is closed")
         if self._waiting.is_full:
             text = f"{MAX_WAITING} commands are waiting already; this one was dropped"
         else:
-            text = "the robot takes no more bytes at the moment; the command was dropped"
+            text = "the robot accepts no more bytes at the moment; the command was dropped"
         return Failed(request.id, request.command, "queue-full", text)
 
     def _run(self, step: Callable[[float], Sequence[Event]]) -> None:
@@ -344,7 +343,7 @@ class Dispatcher:
                 self._change(event)
         if samples:
             self._hub.put(samples)
-        # After the hub: whoever waits for a reply finds its readings there.
+        # After the hub: a caller that gets its reply must find the readings there.
         for answer in answers:
             self._waiting.settle(answer)
         if is_changed:
@@ -352,7 +351,7 @@ class Dispatcher:
                 port.publish()
 
     def _change(self, event: Event) -> None:
-        """Let a link take what changes its state."""
+        """Pass an event to the link whose state it changes."""
         match event:
             case Fault(transport):
                 self._ports[transport].count(event)
@@ -364,12 +363,12 @@ class Dispatcher:
                 self._ports[transport].want_close(reason)
 
     def _arm_after(self, now: float) -> None:
-        """Do what `_arm` does, unless there is no need to look: the alarm rings soon enough."""
+        """Call `_arm` unless the timer is already early enough."""
         if self._alarm_s is None or self._alarm_s > now + self._calm_s:
             self._arm()
 
     def _look(self) -> None:
-        """Show where the sequences stand."""
+        """Publish the progress of the sequences."""
         for name, reins in self._reins.items():
             if reins.count != self._seen[name]:
                 self._seen[name] = reins.count
@@ -384,7 +383,7 @@ class Dispatcher:
         due_s = self._engine.deadline
         if due_s is not None and soonest_s:
             due_s = max(due_s, self._clock.now() + soonest_s)
-        # An alarm that rings too early costs less than a new one for every message.
+        # A timer that fires too early costs less than a new timer for every message.
         if due_s is None or (self._alarm_s is not None and self._alarm_s <= due_s):
             return
         if self._alarm is not None:
@@ -398,7 +397,7 @@ class Dispatcher:
             return
         due_s = self._engine.deadline
         if due_s is None or due_s > self._clock.now():
-            self._arm()  # it was set for something that came in the meantime
+            self._arm()  # the deadline has moved in the meantime
             return
         try:
             events = self._engine.tick(self._clock.now())
@@ -409,9 +408,9 @@ class Dispatcher:
         self._arm(_SOONEST_S)
 
     def _survive(self, bug: Exception) -> None:
-        """Report a mistake of our own, begin all lines anew, and keep the timer alive."""
+        """Report a bug of URC, reopen all connections, and keep the timer running."""
         log.error("the engine failed", exc_info=bug)
-        text = f"URC made a mistake ({type(bug).__name__}): please report it with the log"
+        text = f"internal error ({type(bug).__name__}): please report it with the log"
         self._hub.note(Note(self._clock.now(), "error", "engine", text))
         for port in self._ports.values():
             port.hang_up(text)

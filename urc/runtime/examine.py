@@ -1,7 +1,7 @@
-"""Whether a package's document may be listed in a repository: its errors, its tests included.
+"""A check of a package's document for a repository: its errors, including failed tests.
 
-``python -m urc.runtime.examine DOCUMENT`` prints the faults as a JSON list. It gives itself little
-memory and time: a stranger's document cannot hold up the repository that looks at it.
+``python -m urc.runtime.examine DOCUMENT`` prints the errors as a JSON list. It limits its own
+memory and time, so that a third-party document cannot block the repository.
 """
 
 import json
@@ -31,7 +31,7 @@ def examine(document: Path) -> list[str]:
     """Return the errors of a package's document, one line each.
 
     Args:
-        document: ``TOP/drivers/puppet/driver.yaml``, beside the packages that it needs.
+        document: ``TOP/drivers/puppet/driver.yaml``, next to the packages that it needs.
     """
     top = document.parent.parent.parent
     checked = check(document, built_in_catalog(), TwoShelves(shipped("widgets"), top / "widgets"))
@@ -50,10 +50,10 @@ def examine(document: Path) -> list[str]:
 
 
 def findings(document: Path) -> list[Problem]:
-    """Return all that `urc validate` finds, warnings and tests included, worst first.
+    """Return the output of `urc validate`, including warnings and failed tests, worst first.
 
     Args:
-        document: ``TOP/drivers/puppet/driver.yaml``, beside the packages that it needs.
+        document: ``TOP/drivers/puppet/driver.yaml``, next to the packages that it needs.
     """
     top = document.resolve().parent.parent.parent
     checked = check(document, built_in_catalog(), TwoShelves(shipped("widgets"), top / "widgets"))
@@ -64,11 +64,11 @@ def findings(document: Path) -> list[Problem]:
 
 
 def examine_apart(document: Path, total_s: float = _TOTAL_S) -> list[str]:
-    """Return the same of a stranger's document: found by a process of its own, within bounds.
+    """Return the same for a third-party document, from a separate process with limits.
 
     Args:
         document: as for `examine`.
-        total_s: after which it is stopped.
+        total_s: limit of the process, in seconds.
     """
     command = [sys.executable, "-P", "-m", "urc.runtime.examine", str(document)]
     try:
@@ -76,11 +76,11 @@ def examine_apart(document: Path, total_s: float = _TOTAL_S) -> list[str]:
             command, stdin=subprocess.DEVNULL, capture_output=True, timeout=total_s, check=False
         )
     except subprocess.TimeoutExpired:
-        return [f"{document}: checking it took longer than {total_s:g} s"]
+        return [f"{document}: the check took longer than {total_s:g} s"]
     try:
         faults = [str(fault) for fault in json.loads(done.stdout)]
     except ValueError:
-        return [f"{document}: it cannot be checked within the memory and time that there are"]
+        return [f"{document}: the check exceeded its limits of memory and time"]
     return [fault[:_FAULT_LONGEST] for fault in faults[:_FAULTS_MOST]]
 
 

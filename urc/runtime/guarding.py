@@ -1,4 +1,4 @@
-"""The guard of a session: what it must know of the driver's lines and held commands."""
+"""The guard of a session, with the driver's transports and held commands."""
 
 import logging
 from collections.abc import Mapping
@@ -22,7 +22,7 @@ from urc.runtime.lines import Made, make_lines
 __all__ = ["take_reins"]
 
 _DEAR: Final = frozenset(("ssh", "serial", "mqtt", "rosbridge"))
-"""Kinds of line that are not reset lightly: opening them afresh takes long, or cannot be done."""
+"""Transports that open slowly or maybe not again, so they are not reset at once."""
 
 _SOONER: Final = 0.9
 
@@ -37,17 +37,17 @@ def take_reins(
     *,
     is_guarded: bool,
 ) -> GuardClient:
-    """Return the guard of a robot, with its lines.
+    """Return the guard client of a robot, with its transports.
 
     Args:
-        driver: as loaded.
+        driver: the loaded driver.
         settings: a value for every setting.
         table: the kinds of transport.
-        clock: the time of a guard in this process.
-        is_guarded: whether the guard is a process of its own.
+        clock: source of time for a guard in this process.
+        is_guarded: whether the guard is a separate process.
 
     Raises:
-        UrcError: a transport cannot be made with these settings.
+        UrcError: a transport cannot be built with these settings.
     """
     lines = [_line(made, driver) for made in make_lines(driver, settings, table).values()]
     held = {
@@ -56,7 +56,7 @@ def take_reins(
     if is_guarded and CAN_GUARD:
         return GuardClient(lines, held, PipeChannel)
     if is_guarded:
-        log.warning("there is no guard on this system: a server that hangs stops nothing")
+        log.warning("this system has no guard: if the server hangs, robots are not stopped")
     return GuardClient(lines, held, partial(LocalChannel, lines=lines, clock=clock))
 
 
@@ -67,22 +67,22 @@ def _held(command: Command, driver: Driver) -> HeldSpec:
 
 
 def _is_dear(spec: TransportSpec, driver: Driver) -> bool:
-    """Return whether a line that takes nothing is waited for, and not reset at once."""
+    """Return whether a stalled transport gets time, instead of a reset at once."""
     said = {
         one.hold.on_stall
         for one in driver.commands.values()
         if one.hold is not None and one.transport == spec.name
     }
-    if "abort" in said:  # the more careful of two that differ
+    if "abort" in said:  # the safer of two different values
         return False
     return "wait" in said or spec.type in _DEAR or bool(spec.via)
 
 
 def _silent_s(spec: TransportSpec) -> float | None:
-    """Return after which silence a line is reset while something moves; None: never.
+    """Return the silence after which a transport is reset during motion, or None for never.
 
-    A little before the engine gives up its motion: what it writes then would wait where the motion
-    waits. A line without a connection keeps nothing that a reset could throw away.
+    It is a little shorter than the engine's timeout, because the engine's output would queue up
+    behind the motion. A connectionless transport has no buffer that a reset could discard.
     """
     if spec.stale_after_s is None or spec.type in ("udp", "serial"):
         return None

@@ -1,4 +1,4 @@
-"""What the desk of a robot is made of: its held commands, and what it asks of others."""
+"""The held commands of a robot, and the interfaces that the motion controller needs."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -16,102 +16,102 @@ __all__ = ["Control", "Frames", "Movers", "control_of", "is_lossy", "period_of"]
 
 
 class Frames(Protocol):
-    """What is asked of the engine: `urc.protocol.motions.Motions`."""
+    """The controller's interface to the engine: `urc.protocol.motions.Motions`."""
 
     on_count: Callable[[str], None]
-    """To be set: told a line on which a number was used up that its stops must come after."""
+    """Callback: a counter of this transport was used up, so later stops need new ones."""
     on_ready: Callable[[str], None]
-    """To be set: told a line that was connected, once its start-up steps are done."""
+    """Callback: this transport is connected, and its steps are done."""
     on_refused: Callable[[str, str], None]
-    """To be set: told a held command that the robot refuses, and in which words."""
+    """Callback: the robot refuses a held command, with its message."""
 
     def is_lasting(self, command: str) -> bool:
-        """Return whether the stop of a held command is the same for ever."""
+        """Return whether the stop frame of a held command never changes."""
 
     def has_stops(self, command: str) -> bool:
-        """Return whether the stops that it was given last are enough for now."""
+        """Return whether the last rendered stop frames are enough for now."""
 
     def is_ready(self, command: str) -> bool:
-        """Return whether its line is connected, and its start-up steps are done."""
+        """Return whether its transport is connected, and the steps are done."""
 
     def stop_frame(self, command: str) -> Payload | Series:
-        """Return what stops the motion of a held command; raise `UrcError` when it cannot."""
+        """Return the stop frame of a held command; raise `UrcError` on failure."""
 
     def motion_frame(
         self, command: str, arguments: Mapping[str, Reading], now: float
     ) -> Payload | Counted:
-        """Return the frame of a held command; raise `UrcError` that says why not."""
+        """Return the frame of a held command; raise `UrcError` with the reason of a refusal."""
 
 
 class Movers(Protocol):
-    """Who owns the wire: the guard process, or this one."""
+    """The controller's interface to the writer of motion: the guard process, or this one."""
 
     def arm(self, command: str, terms: Terms) -> None:
-        """Take ticks of `command` from now on, under these terms."""
+        """Accept ticks of `command` from now on, under these terms."""
 
     def tick(self, command: str, data: Payload | Counted) -> None:
         """Renew the lease of `command`; `data` is its newest frame."""
 
     def renew(self, command: str, stop: Payload | Series) -> None:
-        """Let `stop` be what stops `command` from now on; it arms nothing."""
+        """Replace the stop frame of `command`; this arms nothing."""
 
     def is_stopping(self, command: str) -> bool:
-        """Return whether `command` may be moving, or its stop may still be repeated."""
+        """Return whether `command` may move, or its stop may still be repeated."""
 
     def is_open(self, command: str) -> bool:
-        """Return whether its line is connected, by the newest that is known."""
+        """Return whether its transport is connected, by the last report."""
 
     def release(self, command: str) -> None:
-        """Stop `command`, which was let go."""
+        """Stop `command` after its release."""
 
     def stop(self, stops: Mapping[str, Payload | Series]) -> None:
-        """Stop at once, whatever moves; these are the stop frames of all held commands."""
+        """Stop all motion at once, with these stop frames of all held commands."""
 
     async def stops(self) -> Sequence[tuple[str, Reason]]:
-        """Wait for the next stop frames that were written: command, and why it stopped.
+        """Wait for the next written stop frames; return command and reason of each.
 
-        In their order, at least one. Being cancelled loses none. A control that `stop` stopped is
-        told with ``stopped`` even when it did not move: it says that the robot's line took it.
+        They come in order, at least one. A cancellation loses none. A control that `stop` stopped
+        is reported as ``stopped`` even without motion, because its transport has accepted the stop.
         """
 
 
 @dataclass(slots=True)
 class Control:
-    """One held command, as its screen knows it."""
+    """One held command, from its page's point of view."""
 
     line: str
     hold: Hold
     period_s: float
-    """Between two of its frames, at least."""
+    """Shortest time between two of its frames, in seconds."""
     slew: Slew | None
     defaults: Mapping[str, Reading]
-    """Of the arguments that it limits."""
+    """Defaults of the arguments that slew limits."""
     is_greeted: bool
-    """The line has start-up steps: what is said before them may not count."""
+    """Whether its transport has steps; frames before their end may not count."""
     is_armed: bool = False
     is_lasting: bool = False
-    """What stops it is the same for as long as it is armed."""
+    """Whether its stop frame stays the same while it is armed."""
     course: Literal["rest", "moving", "ending"] = "rest"
-    """``ending``: it was let go, and nobody has said yet that its stop was written."""
+    """``ending``: released, and its stop is not reported as written yet."""
     stop: Payload | Series | None = None
-    """What stops it, as the movers know it."""
+    """Its stop frame, as the movers have it."""
     is_owed_again: bool = False
-    """Its stop went out on a line that was not ready: it is repeated when it is."""
+    """Whether its stop was sent before the transport was ready, and must be repeated."""
     needs_release: bool = False
     why: str = ""
-    """What closed it, where it needs that."""
+    """Reason for which it needs a release."""
     closed_epoch: int = -1
-    """Lease in which it stopped by itself: it goes on in a later one only."""
+    """Epoch of the lease in which it was stopped; it continues only in a later one."""
 
     def rest(self) -> None:
-        """Take note that it is to stand."""
+        """Set the control to rest."""
         if self.slew is not None:
             self.slew.begin()
 
     def close(self, why: str, epoch: int) -> None:
-        """Take no tick until it was let go, and the lease was taken anew after `epoch`.
+        """Accept no tick before a release and a new lease after `epoch`.
 
-        What closed it first is why: the rest follows from that.
+        The first reason stays, because later ones follow from it.
         """
         if not self.needs_release:
             self.why = why
@@ -122,7 +122,7 @@ class Control:
         self.closed_epoch = epoch
 
     def limited(self, arguments: Mapping[str, Reading], now: float) -> Mapping[str, Reading]:
-        """Return what may be asked of the robot now, of what its driver wants."""
+        """Return the arguments after the slew rate limit."""
         if self.slew is None:
             return arguments
         return self.slew.limit({**self.defaults, **arguments}, now)
@@ -131,7 +131,7 @@ class Control:
 def control_of(driver: Driver, command: Command) -> Control:
     """Return a held command of `driver`, at rest."""
     hold = command.hold
-    assert hold is not None  # noqa: S101 - no others are asked for
+    assert hold is not None  # noqa: S101 - callers pass only held commands
     slew, defaults = None, {}
     if hold.slew:
         arguments = command.arguments
@@ -143,7 +143,7 @@ def control_of(driver: Driver, command: Command) -> Control:
 
 
 def period_of(driver: Driver, command: Command) -> float:
-    """Return the shortest time between two frames of a held command: what may be sent at all."""
+    """Return the shortest allowed time between two frames of a held command, in seconds."""
     hold = command.hold
     repeat_s = STALLED_S if hold is None else hold.repeat_s
     rate_s = 1 / command.rate_per_s if command.rate_per_s else 0.0
@@ -153,9 +153,9 @@ def period_of(driver: Driver, command: Command) -> float:
 
 
 _LOSSY = frozenset(("udp", "serial", "mqtt", "rosbridge"))
-"""Kinds of line on which one stop may be lost on the way."""
+"""Transports on which one stop may be lost."""
 
 
 def is_lossy(driver: Driver, transport: str) -> bool:
-    """Return whether what is written to a line may be lost on the way without anybody noticing."""
+    """Return whether written data may be lost on this transport without notice."""
     return driver.transports[transport].type in _LOSSY

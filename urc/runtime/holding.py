@@ -1,7 +1,7 @@
-"""A held command that a program gives for a time, under the motion contract.
+"""A held command that a script sends for a limited time, under the rules of motion.
 
-The program is the hand: it samples nothing, but it is alive as long as it ticks. When it hangs, is
-killed or is cut off, the lease runs out, and the guard writes the stop.
+The script samples no input, but it renews the lease as long as it ticks. If it hangs, is killed or
+loses its connection, the lease runs out, and the guard writes the stop.
 """
 
 import asyncio
@@ -20,13 +20,13 @@ from urc.runtime.session import CommandFailed, Session
 __all__ = ["LONGEST_HOLD_S", "hold"]
 
 LONGEST_HOLD_S: Final = 60.0
-"""Nobody watches: what takes longer is driven on a dashboard."""
+"""Limit of a scripted hold, in seconds; longer motion needs an operator at a dashboard."""
 _TICK_S: Final = 0.05
 _LOOK_S: Final = 0.01
 _STOP_OUT_S: Final = 10.0
-"""How long the line may take to take the stop."""
+"""Time for the connection to accept the stop, in seconds."""
 _WORKED_OFF_S: Final = 0.5
-"""What a broker or bridge may need for a stop that it has: it may forget it with the line."""
+"""Time for a broker or bridge to pass the stop on, in seconds, before the connection closes."""
 _US: Final = Client("send", "a program")
 
 
@@ -37,21 +37,21 @@ async def hold(
     for_s: float,
     why_not: Callable[[], str],
 ) -> None:
-    """Give a held command for a time, release it, and return when its stop is out.
+    """Hold a command for a time, release it, and return once its stop is sent.
 
     Args:
-        session: opened with ``motion``.
-        name: of a command with ``hold``.
+        session: a session opened with ``motion``.
+        name: name of a command with ``hold``.
         arguments: name → value.
-        for_s: 0 to `LONGEST_HOLD_S`.
-        why_not: why it has to end before its time, or "".
+        for_s: duration, from 0 to `LONGEST_HOLD_S` seconds.
+        why_not: returns the reason to end early, or "".
 
     Raises:
-        CommandFailed: it was refused, or ended early; the robot was told to stop.
+        CommandFailed: it was refused, or ended early; the robot got a stop.
     """
     movers = session.movers
     if movers is None:
-        raise CommandFailed("unknown-command", f"{name} is no held command")
+        raise CommandFailed("unknown-command", f"{name} is not a held command")
     await _until_ready(session, movers, name)
     desk = MotionDesk(session.profile.driver)
     desk.join(_US)
@@ -77,7 +77,7 @@ def _now() -> float:
 
 
 async def _until_ready(session: Session, movers: Movers, name: str) -> None:
-    """Wait until the line is connected and its start-up steps are done, or cannot be."""
+    """Wait until the transport is connected and its steps are done or failed."""
     line = session.profile.driver.commands[name].transport
     until = _now() + queue_limit_s(session.profile.driver.transports[line], None)
     while not (movers.is_open(name) and session.frames.is_ready(name)):
@@ -95,7 +95,7 @@ async def _ticks(
     for_s: float,
     why_not: Callable[[], str],
 ) -> tuple[bool, str]:
-    """Tick until the time is over; return whether anything moved, and why it ended early."""
+    """Tick until the end of the time; return whether the robot moved, and why it ended early."""
     number, next_s = 0, _now()
     ends_s = next_s + for_s
     while (now := _now()) < ends_s:
@@ -110,15 +110,15 @@ async def _ticks(
 
 
 async def _stop_is_out(session: Session, desk: MotionDesk, movers: Movers, name: str) -> None:
-    """Wait until the line has taken the stop, and its repetitions where one may be lost.
+    """Wait until the transport has accepted the stop, and its repetitions on a lossy transport.
 
-    A line that was cut is opened again by its owner, and the stop is the first thing on it.
+    The guard reopens a lost connection, and sends the stop first.
     """
     driver = session.profile.driver
     until = _now() + _STOP_OUT_S
     while not (desk.rests(name) and movers.is_open(name)):
         if _now() >= until:
-            text = f"the robot has not heard the stop: its line took none for {_STOP_OUT_S:g} s"
+            text = f"the stop has not reached the robot: its line took none for {_STOP_OUT_S:g} s"
             raise CommandFailed("disconnected", text)
         await asyncio.sleep(_LOOK_S)
     if is_lossy(driver, driver.commands[name].transport):

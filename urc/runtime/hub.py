@@ -1,11 +1,11 @@
 """The latest value of every signal and the state of every link of one robot.
 
-Floor 4. State is newest-wins: a reader that was away sees the newest reading, never a queue of old
-ones. Notes (faults, state changes) are kept in a bounded list that says how many it dropped. The
-hub is used from one event loop; it has no task and no timer of its own.
+Layer 4. The newest value wins: a slow reader sees the newest reading, never a queue of old ones.
+Log entries (faults, state changes) are kept in a bounded list that counts the dropped ones. One
+event loop uses the hub; it has no task and no timer of its own.
 
-It is the one door between a robot and all who are shown something of it: pages, cards, recordings,
-the command line. So the values of secret settings are taken out here, on the way in.
+All readers get their values from the hub: pages, cards, recordings and the command line. So
+redaction removes the values of secret settings here, on the way in.
 """
 
 import asyncio
@@ -40,28 +40,28 @@ __all__ = [
 
 
 STREAM_KEPT: Final = 500
-"""Readings of each such signal."""
+"""Number of stored readings of each such signal."""
 
 
 class Streams:
-    """The latest readings of some signals, each with the hub's revision that brought it."""
+    """The last readings of some signals, each with its revision of the hub."""
 
     def __init__(self) -> None:
         self._kept: dict[str, deque[tuple[int, Sample]]] = {}
         self._counts: dict[str, int] = {}
-        """Readings that there ever were."""
+        """Signal → total number of readings."""
 
     def __bool__(self) -> bool:
         return bool(self._kept)
 
     def keep(self, names: Iterable[str]) -> None:
-        """Keep each reading of these signals from now on."""
+        """Store every reading of these signals from now on."""
         for name in names:
             self._kept.setdefault(name, deque(maxlen=STREAM_KEPT))
             self._counts.setdefault(name, 0)
 
     def put(self, samples: Iterable[Sample], revision: int) -> None:
-        """Take what came with a revision."""
+        """Store the samples of a revision."""
         for sample in samples:
             name = sample[0]
             kept = self._kept.get(name)
@@ -70,7 +70,7 @@ class Streams:
                 self._counts[name] += 1
 
     def filled(self, newest: Iterable[Sample], since: int) -> Sequence[Sample]:
-        """Return the newest readings, and those after a revision that they have hidden."""
+        """Return the newest readings, and older ones after the revision `since`."""
         found: list[Sample] = []
         for sample in newest:
             rows: list[Sample] = []
@@ -82,13 +82,13 @@ class Streams:
         return found
 
     def firsts(self, names: Sequence[str]) -> dict[str, int]:
-        """Return the number of the first reading of each signal, where the last is its newest."""
+        """Return the number of the first reading of each signal; the last is its newest."""
         counts = self._counts
         return {name: counts[name] - names.count(name) + 1 for name in counts if name in names}
 
 
 LinkState = Literal["idle", "connecting", "live", "silent", "lost"]
-"""idle: nobody asked yet. silent: connected, but something is overdue. lost: not connected."""
+"""idle: not requested yet. silent: connected, but overdue. lost: not connected."""
 
 NOTES_KEPT = 500
 TRAFFIC_KEPT = 1000
@@ -97,46 +97,46 @@ TAP_KEPT = 10_000
 
 @dataclass(frozen=True, slots=True)
 class LinkStatus:
-    """What is known of one transport."""
+    """State of one transport."""
 
     transport: str
     state: LinkState
     address: str
     since_s: float
-    """Monotonic time at which this state began."""
+    """Monotonic time at which this state began, in seconds."""
     detail: str = ""
-    """Why, in one line, when the state is not good."""
+    """One-line reason of a bad state."""
     attempts: int = 0
-    """Failed attempts since the last good frame."""
+    """Number of failed attempts since the last good frame."""
     faults: int = 0
-    """Frames and replies that were not as declared, since the session began."""
+    """Number of protocol violations since the session began."""
 
 
 @dataclass(frozen=True, slots=True)
 class Note:
-    """One line for the log: a fault or a change of state."""
+    """A log entry: a fault or a change of state."""
 
     time_s: float
     level: Literal["info", "warning", "error"]
     source: str
-    """Transport or command it is about."""
+    """Name of the transport or command."""
     text: str
 
 
 @dataclass(frozen=True, slots=True)
 class Traffic:
-    """Bytes that went over a line; only recorded while somebody watches."""
+    """Bytes of a connection; only recorded while a reader watches."""
 
     time_s: float
     transport: str
     direction: Literal["sent", "received"]
     data: bytes
     envelope: Envelope | None = None
-    """The message that `data` shows, on a line that carries messages."""
+    """Message with these bytes, on a transport with messages."""
 
 
 class Subscription:
-    """One reader's place: which revision it has seen, and a wake-up when there is more."""
+    """A reader's position: the last revision that it has seen, and a wake-up for newer ones."""
 
     def __init__(self, hub: "Hub") -> None:
         self._hub = hub
@@ -145,17 +145,17 @@ class Subscription:
         """Revision up to which this reader has taken everything."""
 
     async def changed(self) -> None:
-        """Return when the hub holds something newer than `seen`."""
+        """Return when the hub has a newer revision than `seen`."""
         while self._hub.revision <= self.seen:
             self._event.clear()
             await self._event.wait()
 
     def wake(self) -> None:
-        """Let `changed` look again."""
+        """Let `changed` check again."""
         self._event.set()
 
     def take(self) -> list[Sample]:
-        """Return the newest sample of each signal changed since `seen`, and move `seen` up."""
+        """Return the newest sample of each signal that changed since `seen`; update `seen`."""
         samples = [*self._hub.changed_since(self.seen)]
         self.seen = self._hub.revision
         return samples
@@ -163,20 +163,20 @@ class Subscription:
 
 @dataclass(frozen=True, slots=True)
 class Progress:
-    """Where a sequence stands."""
+    """Progress of a sequence."""
 
     command: str
     place: int
-    """Steps that were begun, without those inside of others."""
+    """Number of started steps, without nested ones."""
     of: int
     state: Literal["idle", "running", "paused"]
     reason: str = ""
-    """Why it ended without success; "" when it did not."""
+    """Reason of a failure, or ""."""
 
 
 @dataclass(frozen=True, slots=True)
 class Moved:
-    """A tick of a held command that was taken; only told while somebody keeps all that happens."""
+    """An accepted tick of a held command; only reported while a tap is open."""
 
     time_s: float
     command: str
@@ -185,28 +185,28 @@ class Moved:
 
 @dataclass(frozen=True, slots=True)
 class Told:
-    """An entry of the audit."""
+    """An entry of the audit log."""
 
     time_s: float
-    """Monotonic: the entry itself has the time of day, which somebody may set."""
+    """Monotonic time; the entry itself has the time of day, which may be adjusted."""
     entry: "Entry"
 
 
 Tapped: TypeAlias = Sample | Note | Traffic | LinkStatus | Moved | Told
-"""What a tap gives."""
+"""Item of a tap."""
 
 
 class Tap:
-    """All that happens, in order, for a reader that must not miss a thing; it counts losses."""
+    """A complete, ordered stream of events for one reader; it counts its losses."""
 
     def __init__(self) -> None:
         self.dropped = 0
-        """Lost because the reader was too slow, since the tap was opened."""
+        """Number of items lost because the reader was too slow, since the tap was opened."""
         self._kept: deque[Tapped] = deque()
         self._event = asyncio.Event()
 
     def put(self, items: Iterable[Tapped]) -> None:
-        """Take what happened; the oldest go when there is more than `TAP_KEPT`."""
+        """Add items; beyond `TAP_KEPT`, drop the oldest ones."""
         for item in items:
             if len(self._kept) == TAP_KEPT:
                 self._kept.popleft()
@@ -215,13 +215,13 @@ class Tap:
         self._event.set()
 
     async def filled(self) -> None:
-        """Return when there is something to take."""
+        """Return when items are available."""
         while not self._kept:
             self._event.clear()
             await self._event.wait()
 
     def take(self) -> list[Tapped]:
-        """Return all there is, and keep none of it."""
+        """Return all items and empty the tap."""
         taken = list(self._kept)
         self._kept.clear()
         return taken
@@ -236,36 +236,36 @@ class Hub:
         blanker: Blanker | None = None,
         streams: Iterable[str] = (),
     ) -> None:
-        """Begin with nothing known.
+        """Start without values.
 
         Args:
-            signals: of the driver.
-            blanker: takes secrets out of all that comes in; None: there are none.
-            streams: lines on which a piece of traffic may go on in the next one.
+            signals: the driver's signals.
+            blanker: removes secrets from all input; None if the robot has none.
+            streams: transports whose traffic may split a message over several pieces.
         """
         self.signals = signals
         self._blanker = blanker if blanker is not None and blanker.is_needed else None
         self._stream_lines = frozenset(streams)
         self.names = tuple(signals)
-        """Index → signal name; the order of the driver, fixed for the session."""
+        """Index → signal name, in the order of the driver, fixed for the session."""
         self.index = {name: place for place, name in enumerate(self.names)}
         self.revision = 0
         self.links: dict[str, LinkStatus] = {}
         self.links_count = 0
-        """How often one of them changed."""
+        """Number of changes of the links."""
         self.progress: dict[str, Progress] = {}
-        """Sequence → where it stands; those that were never run are missing."""
+        """Sequence → its progress; sequences that never ran are missing."""
         self.progress_count = 0
-        """How often that changed."""
+        """Number of changes of the progress."""
         self.notes: deque[Note] = deque(maxlen=NOTES_KEPT)
         self.notes_count = 0
-        """Notes ever made; the deque holds the last of them."""
+        """Total number of log entries; the deque holds the last ones."""
         self.traffic: deque[Traffic] = deque(maxlen=TRAFFIC_KEPT)
         self.traffic_count = 0
         self.traffic_watchers = 0
-        """Traffic is recorded while this is above 0."""
+        """Number of readers of traffic; traffic is recorded while it is above 0."""
         self.streams = Streams()
-        """Of which each reading counts; of none, unless somebody says so."""
+        """Signals of which every reading counts; none by default."""
         self._latest: dict[str, Sample] = {}
         self._changed: dict[str, int] = {}
         self._wakers: set[Callable[[], None]] = set()
@@ -273,7 +273,7 @@ class Hub:
         self._traffic_taps: set[Tap] = set()
 
     def put(self, samples: Iterable[Sample]) -> None:
-        """Take readings; a repeated value counts as a change, because its age is new."""
+        """Store readings; a repeated value also counts as a change, because its age is new."""
         taken = samples if type(samples) is tuple else tuple(samples)
         if self._blanker is not None:
             value = self._blanker.value
@@ -289,7 +289,7 @@ class Hub:
         self._wake()
 
     def set_link(self, status: LinkStatus) -> None:
-        """Take the state of one transport."""
+        """Store the state of one transport."""
         if self._blanker is not None:
             text = self._blanker.text
             status = replace(status, address=text(status.address), detail=text(status.detail))
@@ -303,7 +303,7 @@ class Hub:
         self._wake()
 
     def set_progress(self, progress: Progress) -> None:
-        """Take where a sequence stands."""
+        """Store the progress of a sequence."""
         if self._blanker is not None:
             progress = replace(progress, reason=self._blanker.text(progress.reason))
         if self.progress.get(progress.command) == progress:
@@ -315,18 +315,18 @@ class Hub:
 
     @property
     def is_tapped(self) -> bool:
-        """Whether somebody is given all that happens."""
+        """Whether a tap is open."""
         return bool(self._taps)
 
     def tell(self, done: Moved | Told) -> None:
-        """Take what somebody did with the robot: only taps hear of it."""
+        """Report an operator's action; only taps receive it."""
         if self._blanker is not None and isinstance(done, Moved):
             done = replace(done, arguments=self._blanker.value(done.arguments))
         for tap in self._taps:
             tap.put((done,))
 
     def note(self, note: Note) -> None:
-        """Take one line for the log."""
+        """Add a log entry."""
         if self._blanker is not None:
             note = replace(note, text=self._blanker.text(note.text))
         self.notes.append(note)
@@ -337,7 +337,7 @@ class Hub:
         self._wake()
 
     def saw(self, traffic: Traffic) -> None:
-        """Take bytes that went over a line; what may begin a secret waits for what follows it."""
+        """Add traffic; the possible beginning of a secret is delayed until more bytes arrive."""
         if self._blanker is not None:
             is_stream = traffic.envelope is None and traffic.transport in self._stream_lines
             if is_stream:
@@ -352,11 +352,11 @@ class Hub:
 
     @property
     def holds_back(self) -> bool:
-        """Whether some traffic waits for what follows it."""
+        """Whether some traffic is delayed."""
         return self._blanker is not None and self._blanker.is_holding
 
     def tell_rest(self, now_s: float) -> None:
-        """Show the traffic that waits: nothing has followed it."""
+        """Publish the delayed traffic, because no more bytes arrived."""
         if self._blanker is not None:
             for (transport, direction), data in self._blanker.rest():
                 went: Literal["sent", "received"] = "sent" if direction == "sent" else "received"
@@ -371,7 +371,7 @@ class Hub:
         self._wake()
 
     def latest(self, name: str) -> Sample | None:
-        """Return the newest reading of a signal, or None when there was none."""
+        """Return the newest reading of a signal, or None."""
         return self._latest.get(name)
 
     def changed_since(self, revision: int) -> Sequence[Sample]:
@@ -382,21 +382,21 @@ class Hub:
     def readings_since(self, revision: int, *, joined: int = 0) -> Sequence[Sample]:
         """Return the same, and every reading of the signals in `streams`, the newest last.
 
-        A reader gets no stream reading from before `joined`, the revision at which it began.
+        Stream readings from before `joined`, the revision at which the reader began, are left out.
         """
         newest = self.changed_since(revision)
         return self.streams.filled(newest, max(revision, joined)) if self.streams else newest
 
     @contextmanager
     def subscribe(self) -> Iterator[Subscription]:
-        """Give a reader its place for as long as the context lasts."""
+        """Subscribe a reader for the duration of the context."""
         subscription = Subscription(self)
         with self.heed(subscription.wake):
             yield subscription
 
     @contextmanager
     def heed(self, wake: Callable[[], None]) -> Iterator[None]:
-        """Call `wake` at each change for as long as the context lasts; it must return at once."""
+        """Call `wake` at each change during the context; it must return at once."""
         self._wakers.add(wake)
         try:
             yield
@@ -405,10 +405,10 @@ class Hub:
 
     @contextmanager
     def tap(self, *, with_traffic: bool = False) -> Iterator[Tap]:
-        """Give a reader every sample and note from now on, for as long as the context lasts.
+        """Open a tap on all samples and log entries for the duration of the context.
 
         Args:
-            with_traffic: the bytes on the lines as well, which are recorded from now on.
+            with_traffic: whether to include the bytes of the connections, recorded from now on.
         """
         tap = Tap()
         self._taps.add(tap)

@@ -1,6 +1,6 @@
-"""What the operator filled in for a robot, kept over a restart: one small file for each.
+"""The stored settings of each robot, one small file for each.
 
-The file may hold secrets, so nobody but its owner can read it.
+The file may contain secrets, so only its owner can read it.
 """
 
 from collections.abc import Iterable
@@ -18,7 +18,7 @@ from urc.problems import UrcError
 __all__ = ["DRIVEN", "Kept", "KeptFile", "in_use", "names_kept", "pin"]
 
 DRIVEN: Final = ("robot", "driver")
-"""Kinds of packages that settings are filled in for; of one name, the robot goes first."""
+"""Kinds of packages with settings; for equal names, the robot comes first."""
 
 _MOST_BYTES: Final = 1 << 20
 _Name = Annotated[str, msgspec.Meta(max_length=200)]
@@ -26,31 +26,31 @@ _Text = Annotated[str, msgspec.Meta(max_length=4096)]
 
 
 class Kept(msgspec.Struct, frozen=True):
-    """What was chosen for one robot."""
+    """The stored choices for one robot."""
 
     format: Annotated[int, msgspec.Meta(ge=1, le=1)] = 1
     version: _Name = ""
-    """Of the installed package; "": the newest."""
+    """Version of the installed package; "" for the newest."""
     interface: _Name = ""
-    """Shown first; "": the document's first."""
+    """Interface to show first; "" for the document's first."""
     settings: dict[_Name, _Text] = {}
-    """Setting → as typed; those that are missing take their defaults."""
+    """Setting → text of the operator; missing settings take their defaults."""
     destination: _Name = ""
-    """What the secrets among them were entered for, as `urc.runtime.destination` tells it; "": that
-    was not noted, so they are asked for again."""
+    """Destination for which the secrets were entered, from `urc.runtime.destination`. "" means
+    unknown; then they must be entered again."""
     package: _Name = ""
-    """For which they were filled in, as ``drivers/puppet``; "": for a document that was named."""
+    """Package of the settings, such as ``drivers/puppet``; "" for a document given by path."""
 
 
 class KeptFile:
-    """The file of one robot."""
+    """The settings file of one robot."""
 
     def __init__(self, folder: Path, name: str) -> None:
-        """Choose the file; nothing is read or written yet."""
+        """Choose the file, without reading or writing it."""
         self.file = folder / f"{quote(name, safe='')}.json"
 
     def load(self) -> Kept:
-        """Return what is kept; nothing yet is an empty `Kept`.
+        """Return the stored settings, or an empty `Kept`.
 
         Raises:
             UrcError: the file cannot be read, or is damaged.
@@ -67,10 +67,10 @@ class KeptFile:
             raise UrcError(f"{self.file}: this file is damaged: {error}") from None
 
     def save(self, kept: Kept) -> None:
-        """Write it: after this the file holds `kept`, even if the power goes; before, what it held.
+        """Write the settings atomically: after a power failure, the file is either old or new.
 
         Raises:
-            UrcError: it cannot be written; then nothing has changed.
+            UrcError: the file cannot be written; then it is unchanged.
         """
         data = msgspec.json.format(msgspec.json.encode(kept, order="sorted"), indent=1) + b"\n"
         try:
@@ -79,29 +79,29 @@ class KeptFile:
             raise UrcError(f"{self.file}: {error.strerror or error}") from None
 
     def is_of(self, package: str) -> bool:
-        """Return whether it is there, and was not filled in for something else than a package."""
+        """Return whether the file exists and may belong to this package."""
         try:
             kept = self.load()
         except UrcError:
-            return True  # damaged: what it held is of no use any more
+            return True  # damaged, so its content is lost anyway
         if kept == Kept():
             return False
-        # An earlier version noted no destination, and no package with it.
+        # An earlier version stored neither destination nor package.
         return kept.package == package or not (kept.package or kept.destination)
 
     def forget(self) -> None:
-        """Take the file away, if it is there."""
+        """Delete the file, if it exists."""
         with suppress(OSError):
             self.file.unlink(missing_ok=True)
 
 
 def names_kept(folder: Path, removed: Iterable[Lock], left: Iterable[Lock]) -> list[str]:
-    """Return the robots for which something is kept that goes with packages that are removed.
+    """Return the robots whose settings are deleted together with removed packages.
 
     Args:
-        folder: of the files.
-        removed: the packages.
-        left: what stays installed; a robot that still has a package keeps its settings.
+        folder: folder of the files.
+        removed: packages to remove.
+        left: packages that stay installed; a robot with such a package keeps its settings.
     """
     stay = {lock.key.name for lock in left if lock.key.kind in DRIVEN}
     roots = {lock.key.name: lock.root for lock in removed if lock.key.kind in DRIVEN}
@@ -113,15 +113,15 @@ def names_kept(folder: Path, removed: Iterable[Lock], left: Iterable[Lock]) -> l
 
 
 def in_use(folder: Path, name: str, installed: Iterable[Lock]) -> Lock | None:
-    """Return the installed package that is driven under a name, or None.
+    """Return the installed package that a robot's name refers to, or None.
 
-    That is the version that was chosen. Without a choice it is the newest, and of a robot and a
-    driver of one name the robot.
+    It is the chosen version, or else the newest. If a robot and a driver have the same name, it is
+    the robot.
 
     Args:
-        folder: of the files.
-        name: of the robot.
-        installed: all that is installed.
+        folder: folder of the files.
+        name: name of the robot.
+        installed: all installed packages.
     """
     locks = [lock for lock in installed if lock.key.kind in DRIVEN and lock.key.name == name]
     try:
@@ -139,11 +139,11 @@ def in_use(folder: Path, name: str, installed: Iterable[Lock]) -> Lock | None:
 
 
 def pin(folder: Path, lock: Lock) -> None:
-    """Let a robot go on with a version, whatever else is installed; raise `UrcError`.
+    """Make a robot keep its version when others are installed; raise `UrcError`.
 
     Args:
-        folder: of the files.
-        lock: what `in_use` returned.
+        folder: folder of the files.
+        lock: result of `in_use`.
     """
     file = KeptFile(folder, lock.key.name)
     kept = file.load()

@@ -1,7 +1,7 @@
-"""What of a lease survives a restart: latch, epoch, and whether the robot heard. One small file.
+"""The part of a lease that survives a restart, in one small file: latch, epoch, pending stop.
 
-Writing may take long, or fail on a full disk; stopping waits for neither. So the newest state is
-written by a thread of its own turn, and what could not be written is told, not raised.
+Writing may be slow, or fail on a full disk, and stopping must wait for neither. So a thread writes
+the newest state, and failures are reported without an exception.
 """
 
 import asyncio
@@ -26,36 +26,36 @@ log = logging.getLogger(__name__)
 
 
 class Latch(NamedTuple):
-    """What is kept."""
+    """The stored state."""
 
     state: LeaseState
     is_owed: bool = False
-    """Whether the robot has not heard of the last stop yet."""
+    """Whether the robot has not received the last stop yet."""
 
 
 _UNKNOWN = Latch(LeaseState(latched_by=_UNREADABLE), is_owed=True)
 
 
 class LatchFile:
-    """The file of one robot. `keep` from the event loop; `load` before it."""
+    """The file of one robot. Call `load` first, then `keep` from the event loop."""
 
     def __init__(self, folder: Path, robot: str) -> None:
-        """Choose the file; nothing is read or written yet."""
+        """Choose the file, without reading or writing it."""
         self._file = folder / f"{robot}.latch.json"
         self._newest: Latch | None = None
         self._writing: asyncio.Task[None] | None = None
         self._again: asyncio.TimerHandle | None = None
         self.fault = ""
-        """Why the newest state could not be kept; "" when it is, or will be."""
+        """Reason why the newest state cannot be stored, or ""."""
         self.on_fault: Callable[[str], None] = _untold
-        """Told every new `fault`, and "" when all is well again."""
+        """Called with every new `fault`, and with "" after a recovery."""
 
     def load(self) -> Latch:
-        """Return what was kept.
+        """Return the stored state.
 
-        A file that cannot be read, or holds anything else, means latched: nobody knows what was.
-        A robot of which it does not say that it has heard of a latched stop hears it once more.
-        Screens are numbered from one in each run: whoever stopped it is told as of another one.
+        An unreadable or invalid file means latched, because the true state is unknown. The robot
+        gets the stop once more, unless the file says that it has received it. Page numbers start
+        at one in each run, so the page that stopped the robot is named as one before a restart.
         """
         try:
             with self._file.open("rb") as file:
@@ -69,13 +69,13 @@ class LatchFile:
         except (OSError, ValueError, KeyError, TypeError) as error:
             log.warning("%s cannot be read (%s): the robot stays stopped", self._file, error)
             return _UNKNOWN
-        log.warning("%s is no record of a stop: the robot stays stopped", self._file)
+        log.warning("%s is not a record of a stop: the robot stays stopped", self._file)
         return _UNKNOWN
 
     def keep(self, kept: Latch) -> None:
-        """Write `kept` soon; only the newest counts. Returns at once.
+        """Write `kept` soon and return at once; only the newest state counts.
 
-        What could not be written is tried again every few seconds.
+        A failed write is retried every few seconds.
         """
         self._newest = kept
         if self._again is not None:
@@ -85,7 +85,7 @@ class LatchFile:
             self._writing = asyncio.get_running_loop().create_task(self._write())
 
     async def settle(self) -> None:
-        """Wait until the newest state is written, or could not be."""
+        """Wait until the newest state is written, or its writing has failed."""
         if self._writing is not None:
             await self._writing
 
@@ -107,11 +107,11 @@ class LatchFile:
             return
         self.fault = fault
         if fault:
-            log.warning("the stop latch cannot be kept over a restart: %s", fault)
+            log.warning("a restart would lose the latched STOP: %s", fault)
         self.on_fault(fault)
 
     def _replace(self, kept: Latch) -> None:
-        """Put a whole new file in the place of the old one: a crash leaves one of the two."""
+        """Replace the file atomically: after a crash, it is either old or new."""
         by = kept.state.latched_by[:_LONGEST_NAME]
         text = json.dumps({"epoch": kept.state.epoch, "latched_by": by, "owed": kept.is_owed})
         put_private(self._file, text.encode())
@@ -122,4 +122,4 @@ def _of_before(by: str) -> str:
 
 
 def _untold(fault: str) -> None:
-    """Nobody wants to know."""
+    """Ignore a fault."""

@@ -1,7 +1,7 @@
-"""Watches how late the event loop is: what holds it up holds up everything in this process.
+"""A watchdog of the event loop: a blocked loop delays everything in this process.
 
-Motion stops without it, in the guard, when its lease runs out. Here it is noticed, counted and
-told, and whoever drives begins anew after a long one.
+The guard stops motion without the loop, when its lease runs out. The watchdog notices and counts
+the delay and reports it; after a long one, operators must start a new gesture.
 """
 
 import logging
@@ -14,25 +14,25 @@ __all__ = ["EVERY_S", "LATE_S", "TOO_LATE_S", "LoopWatch"]
 
 EVERY_S: Final = 0.1
 LATE_S: Final = 0.1
-"""Later than this is counted and told."""
+"""Delay that is counted and reported, in seconds."""
 TOO_LATE_S: Final = 0.5
-"""Later than this, what moves is stopped, whatever its lease says."""
+"""Delay that stops motion regardless of its lease, in seconds."""
 QUIET_S: Final = 10.0
-"""Those that come closer together than this are told once."""
+"""Delays that are closer together, in seconds, are reported once."""
 
 log = logging.getLogger(__name__)
 
 
 class LoopWatch:
-    """Looks at the clock again and again while it is started."""
+    """A periodic check of the clock."""
 
     def __init__(self, clock: Clock, late: Callable[[float, bool], None]) -> None:
         """Prepare.
 
         Args:
-            clock: the time.
-            late: has each lateness that counts, in seconds, and whether it is the first of several
-                that came close together.
+            clock: source of time.
+            late: called with each counted delay, in seconds, and whether it is the first of
+                several close together.
         """
         self._clock = clock
         self._late = late
@@ -40,18 +40,18 @@ class LoopWatch:
         self._due_s = 0.0
         self._noticed_s = float("-inf")
         self.count = 0
-        """How often it was late, since it was made."""
+        """Number of delays so far."""
         self.worst_s = 0.0
-        """The longest of them."""
+        """Longest delay, in seconds."""
 
     def start(self) -> None:
-        """Begin to look."""
+        """Start the checks."""
         self.end()
         self._due_s = self._clock.now() + EVERY_S
         self._alarm = self._clock.call_at(self._due_s, self._look)
 
     def end(self) -> None:
-        """Look no more; may be called twice."""
+        """End the checks; may be called twice."""
         if self._alarm is not None:
             self._alarm.cancel()
             self._alarm = None
@@ -69,5 +69,5 @@ class LoopWatch:
         self.count += 1
         self.worst_s = max(self.worst_s, late_s)
         if is_first:
-            log.warning("the server was held up for %.0f ms", late_s * 1000)
+            log.warning("the server was blocked for %.0f ms", late_s * 1000)
         self._late(late_s, is_first)

@@ -1,4 +1,4 @@
-"""The transports of a driver, made in the order in which they carry each other."""
+"""The transports of a driver, with tunnels before the transports that they carry."""
 
 from collections.abc import Mapping
 from typing import NamedTuple, cast
@@ -14,32 +14,32 @@ __all__ = ["Made", "make_lines", "make_transports"]
 
 
 class Made(NamedTuple):
-    """A transport, and what it was made from."""
+    """A transport, with the values it was built from."""
 
     spec: TransportSpec
     factory: str
-    """``module:attribute``."""
+    """Factory, as ``module:attribute``."""
     setup: Setup
     transport: Transport
 
 
 def make_lines(driver: Driver, settings: Mapping[str, Value], table: Table) -> dict[str, Made]:
-    """Return name → transport, none of them open; those that carry others come before them.
+    """Return name → closed transport; tunnels come before the transports that they carry.
 
     Args:
-        driver: as loaded: no transport goes through itself.
+        driver: the loaded driver, without circular tunnels.
         settings: a value for every setting.
         table: the kinds of transport.
 
     Raises:
-        UrcError: a transport cannot be made with these settings.
+        UrcError: a transport cannot be built with these settings.
     """
     made: dict[str, Made] = {}
 
     def make(name: str) -> Transport:
         if name not in made:
             spec = driver.transports[name]
-            # The loader saw to it that only what carries others is named by `via`.
+            # The loader has checked that `via` names a tunnel.
             via = cast("Carrier", make(spec.via)) if spec.via else None
             topics = listened(driver, name, settings)
             setup = Setup(
@@ -60,5 +60,5 @@ def make_lines(driver: Driver, settings: Mapping[str, Value], table: Table) -> d
 def make_transports(
     driver: Driver, settings: Mapping[str, Value], table: Table
 ) -> dict[str, Transport]:
-    """Return name → transport, none of them open; see `make_lines`."""
+    """Return name → closed transport; see `make_lines`."""
     return {name: made.transport for name, made in make_lines(driver, settings, table).items()}

@@ -1,21 +1,20 @@
-"""A line to a robot that is kept alive: one transport, and its part of the driver's engine.
+"""The link to a robot: one transport, and its part of the driver's engine.
 
-Theory of operation. `run` is a loop of three waits: until the line is wanted (always, when it is
-persistent; when the engine says `Open`, when it is made for each request), until the back-off
-allows an attempt, and until the connection ends. While it is open a reader and a writer work side
-by side; whatever ends it (the robot, the engine, a rule below) goes through `_end`, and the two are
-taken down in one place.
+Theory of operation. `run` is a loop of three waits. It waits for a reason to connect: a persistent
+link always has one; else the engine sends `Open`, or each request opens the link. Then it waits for
+the backoff, and for the end of the connection. A reader and a writer run while the connection is
+open. Every end (by the robot, the engine or a rule below) goes through `_end`, and one place stops
+both tasks.
 
-A connection is good from the first good frame on, and only that resets the back-off: a robot that
-accepts and closes again is not hammered. Where there are steps of a connection (``on_connect``),
-nothing counts before they are done: a robot that greets, and then refuses the login, is not good.
-Lines shown to people follow `LinkState`; while attempts
-fail the state stays what it is and the count rises.
+A connection is good from its first good frame, and only that resets the backoff. So URC does not
+hammer a robot that accepts connections and closes them. With steps of a connection
+(``on_connect``), no frame counts before they are done: a robot may greet and then refuse the login.
+Pages show the `LinkState`; while attempts fail, the state stays and the count of attempts grows.
 
-The link needs the five members of a transport and nothing else, and does not care in which process
-it lives. One that is a `Prompt` as well saves the turns of the two tasks: what arrives while the
-reader waits goes straight to the engine, and what the engine sends straight to the kernel. Whatever
-must wait, is too much at once, or broke is left to the tasks.
+The link uses only the five members of a transport, so the transport may live in another process. A
+transport that is also a `Prompt` saves task switches. Bytes that arrive while the reader waits go
+straight to the engine, and the engine's bytes go straight to the kernel. The tasks handle bytes
+that must wait, large amounts and errors.
 """
 
 import asyncio
@@ -36,16 +35,16 @@ from urc.transports.base import NOTICE, Prompt, SupportsSettle, Transport, Trans
 __all__ = ["Link"]
 
 SLICE_BYTES = 4096
-"""Most bytes that are handed to the engine before others have their turn on the loop."""
+"""Limit of the bytes that the engine takes before other tasks of the loop run."""
 SLICE_S = 0.001
-"""What the engine may be busy with them; where it takes longer, fewer bytes are handed over."""
+"""Limit of the engine's time for them, in seconds; a slower engine gets fewer bytes."""
 _LEAST_SLICE_BYTES = 512
 _CHUNK_COST = 32
-"""What a chunk costs beside its bytes, in bytes: tiny chunks must not hold the loop either."""
+"""Fixed cost of a chunk, in bytes, because many tiny chunks would also block the loop."""
 SETTLE_S = 1.0
-"""A connection that stands this long without being closed has been accepted."""
+"""Age of a connection, in seconds, after which the robot has accepted it."""
 _GRACE_S = 1.0
-"""What a transport may take beyond the time it promised."""
+"""Tolerance for a transport that exceeds its own time limit, in seconds."""
 _LOOK_S = 0.01
 _NOTHING_YET = "connected; nothing received yet"
 _LOGGING_IN = "connected; the steps of the connection are not done yet"
@@ -54,7 +53,7 @@ log = logging.getLogger(__name__)
 
 
 class Link:
-    """Keeps one transport connected and moves bytes between it and the engine."""
+    """A transport that stays connected, with the traffic between it and the engine."""
 
     def __init__(
         self,
@@ -67,16 +66,16 @@ class Link:
         random: Callable[[], float],
         expects_frames: bool,
     ) -> None:
-        """Prepare the line; `run` does the work.
+        """Prepare the link; `run` does the work.
 
         Args:
-            spec: as the driver declares it.
-            transport: made for `spec`, not open.
-            dispatcher: owns the engine.
-            hub: takes states, notes and traffic.
-            clock: the time.
-            random: returns a number from 0 to below 1, for the jitter.
-            expects_frames: whether the robot talks here without a command: then the line is live
+            spec: the driver's declaration.
+            transport: the transport for `spec`, closed.
+            dispatcher: the owner of the engine.
+            hub: receives states, log entries and traffic.
+            clock: source of time.
+            random: returns a number in [0, 1) for the jitter.
+            expects_frames: whether the robot sends without a request. The link then becomes live
                 with the first frame, else with the connection.
         """
         self._spec = spec
@@ -89,19 +88,19 @@ class Link:
         self._expects_frames = expects_frames
         self._is_persistent = spec.connection == "persistent"
         self._is_stream = (spec.framing.sent or spec.framing).type != "datagram"
-        """Whether bytes may be joined and cut; else each piece is a datagram or an envelope."""
+        """Whether bytes may be joined and split; else each piece is a datagram or a message."""
         self._wanted = asyncio.Event()
         if self._is_persistent:
             self._wanted.set()
         self._retry_s = clock.now()
-        """Before this time no attempt is made."""
+        """Monotonic time of the next attempt."""
         self._ended: asyncio.Future[str] | None = None
-        """None while not connected; its result says why the connection ended."""
+        """Reason for the end of the connection; None while not connected."""
         self._forget_connection()
         self._is_overdue = False
-        """The robot took a request and has not said anything since."""
+        """Whether the robot is silent since the last request."""
         self.tried = asyncio.Event()
-        """Set once the first attempt has ended, well or not; at once when the engine decides."""
+        """Set after the first attempt, or at once if the engine decides when to connect."""
         if not self._is_persistent:
             self.tried.set()
         self._report = LinkReport(spec.name, transport.address, hub, clock)
@@ -110,35 +109,35 @@ class Link:
         )
 
     def _forget_connection(self) -> None:
-        """Set what is known of a connection to its values at the start."""
+        """Reset the state of the connection."""
         self._close_reason: str | None = None
-        """Set when the engine has closed the line: data that arrives later is dropped."""
+        """Reason of the engine for closing the connection; later data is dropped."""
         self._heard_s = self._clock.now()
         self._is_reader_waiting = False
         self._is_ready = not self._spec.on_connect
-        """The steps of the connection are done, or there are none."""
+        """Whether the steps of the connection are done, or missing."""
         self._has_heard = False
-        """A good frame came before they were."""
+        """Whether a good frame arrived before the steps were done."""
         self._has_stood = False
-        """It has stood for `SETTLE_S`."""
+        """Whether the connection is older than `SETTLE_S`."""
 
     @property
     def is_full(self) -> bool:
-        """Whether so much waits to be written that no new command should be taken."""
+        """Whether the output is too long for new commands."""
         return self._outgoing.is_full
 
     def want_open(self) -> None:
-        """Connect, as soon as the back-off allows it."""
+        """Connect as soon as the backoff allows it."""
         self._wanted.set()
 
     def want_close(self, reason: str) -> None:
-        """Write what is queued and close; at once when there is a reason."""
+        """Write the queued output and close; close at once if a reason is given."""
         if not self._is_persistent:
             self._wanted.clear()
         if self._ended is None:
             return
-        # Noted even when the connection has ended already: the engine has forgotten it by now,
-        # and must not be told of its end.
+        # Noted even after the end of the connection: the engine has already forgotten it and must
+        # not receive its end.
         self._close_reason = reason
         if reason:
             self._end(reason)
@@ -151,13 +150,13 @@ class Link:
         return self._ended is not None
 
     def send(self, sent: Send) -> None:
-        """Write what the engine sends; secret bytes are shown to nobody."""
+        """Write the bytes of the engine; secret bytes are not shown."""
         ended = self._ended
         if ended is not None and self._close_reason is None and not ended.done():
             self._outgoing.put(sent.data, is_secret=sent.is_secret, counted=sent.counted)
 
     def heard(self) -> None:
-        """A good frame arrived: whatever was wrong is over, unless the login is still to come."""
+        """Handle a good frame: clear all failures, unless the login is still running."""
         self._has_heard = True
         if not self._is_ready:
             return
@@ -169,7 +168,7 @@ class Link:
         self._report.publish()
 
     def ready(self) -> None:
-        """The steps of the connection are done: what came before counts from now on."""
+        """Handle the end of the connection's steps: earlier good frames count from now on."""
         self._is_ready = True
         if self._has_heard:
             self.heard()
@@ -179,25 +178,25 @@ class Link:
             self._greet()
 
     def count(self, fault: Fault) -> None:
-        """Count something that was not as declared, and tell of it now and then."""
+        """Count a protocol violation, and log it at a limited rate."""
         self._report.count(fault)
         if fault.code in ("reply-timeout", "silent"):
             self._is_overdue = True
             self._report.show("silent", fault.message)
 
     def hang_up(self, reason: str) -> None:
-        """Give the connection up; the engine is told from this link's own task."""
+        """Close the connection; the link's own task reports the end to the engine."""
         self._end(reason)
 
     def publish(self) -> None:
-        """Show the state, if it has changed."""
+        """Publish the state if it has changed."""
         self._report.publish()
 
     async def settle(self) -> str:
-        """Wait until all that was sent is written and, where that can be known, has arrived.
+        """Wait until all sent bytes are written and, if the transport can tell, have arrived.
 
         Returns:
-            What did not arrive, in one line, or "". Takes a few seconds at most.
+            A message about undelivered bytes, or "". Takes a few seconds at most.
         """
         until = self._clock.now() + STUCK_S
         while self.is_connected and not self._outgoing.is_written:
@@ -212,7 +211,7 @@ class Link:
         return ""
 
     async def run(self) -> None:
-        """Keep the line, until cancelled. Leaves nothing open behind."""
+        """Keep the link connected until cancelled; then close everything."""
         try:
             while True:
                 await self._wanted.wait()
@@ -226,7 +225,7 @@ class Link:
             await self._close()
 
     async def _connection(self) -> None:
-        """Make one attempt and, when it succeeds, serve the connection to its end."""
+        """Make one attempt and, if it succeeds, serve the connection until its end."""
         if self._report.state == "idle":
             self._report.show("connecting")
             self.publish()
@@ -237,11 +236,11 @@ class Link:
             self.tried.set()
         elif self._wanted.is_set():
             await self._serve()
-        else:  # the engine has thought better of it meanwhile
+        else:  # the engine no longer needs the connection
             await self._close()
 
     async def _open(self) -> str:
-        """Open the transport; return why it failed, or "" when it did not."""
+        """Open the transport; return the reason of a failure, or ""."""
         limit_s = self._spec.timeouts.connect_s
         try:
             async with within(self._clock, limit_s + _GRACE_S):
@@ -251,12 +250,12 @@ class Link:
         except TimeoutError:
             await self._close()
             return f"no answer from {self._transport.address} within {limit_s:g} s"
-        except Exception as bug:  # supervisor: a foreign transport may raise what it likes
+        except Exception as bug:  # supervisor: a third-party transport may raise anything
             return self._mistake(bug)
         return ""
 
     async def _serve(self) -> None:
-        """Serve the open connection until it ends, and draw the conclusions."""
+        """Serve the open connection until it ends, then set the state."""
         self._ended = asyncio.get_running_loop().create_future()
         self._forget_connection()
         transport, prompt = self._transport, None
@@ -283,9 +282,9 @@ class Link:
         self._conclude(reason)
 
     def _greet(self) -> None:
-        """Show what a connection without any frame means."""
+        """Publish the state of a connection without any frame."""
         if self._report.attempts or self._report.state == "silent":
-            return  # it has to prove itself first, see `_settled`
+            return  # the state changes after `SETTLE_S`, see `_settled`
         if not self._is_ready and self._is_persistent:
             self._report.show("connecting", _LOGGING_IN)
         elif self._is_persistent and not self._expects_frames:
@@ -294,7 +293,7 @@ class Link:
             self._report.show("connecting", _NOTHING_YET)
 
     def _conclude(self, reason: str) -> None:
-        """Take note of how a connection ended."""
+        """Set state and backoff after the end of a connection."""
         asked = self._close_reason
         is_flushed = self._outgoing.is_written
         self._outgoing.reset()
@@ -305,26 +304,26 @@ class Link:
             self._report.attempts = 0
             self._report.show("live")
         else:
-            # A robot that takes connections but says nothing is silent, however often it is called.
+            # A robot that accepts connections but sends nothing stays silent across reconnects.
             state: LinkState = "silent" if self._is_overdue else "lost"
             self._lose(state, asked or reason or "the line was closed")
             if not self._is_persistent:
-                # The engine's own pace (polls, time-outs) is slow enough for the robot.
+                # The engine's own pace (polls, timeouts) is slow enough for the robot.
                 self._retry_s = self._clock.now() + self._spec.backoff.initial_s
 
     def _lose(self, state: LinkState, reason: str) -> None:
-        """Count a failed attempt, and set the time of the next one."""
+        """Count a failed attempt and set the time of the next one."""
         self._is_overdue = state == "silent"
         self._report.fail(state, reason)
         backoff = self._spec.backoff
-        # The exponent is bounded: after a night of attempts 2 ** attempts is no float any more.
+        # The exponent is bounded: after a night of attempts, 2 ** attempts exceeds a float.
         doublings = min(self._report.attempts - 1, 30)
         wait_s = min(backoff.max_s, backoff.initial_s * 2**doublings)
         self._retry_s = self._clock.now() + wait_s * (1 - backoff.jitter * self._random())
 
     def _tell_closed(self, reason: str) -> None:
         if not self._is_persistent:
-            self._wanted.clear()  # before the engine is told: it may want the line again at once
+            self._wanted.clear()  # first, because the engine may ask for a connection again at once
         self._dispatcher.closed(self._spec.name, reason)
         self.publish()
 
@@ -372,12 +371,12 @@ class Link:
                     size = min(size * 2, SLICE_BYTES)
 
     def _take_now(self, data: bytes) -> bool:
-        """Take what has just arrived, unless it is much or something else comes first."""
+        """Handle received bytes at once, unless they are many or others come first."""
         if len(data) > _LEAST_SLICE_BYTES or not self._is_reader_waiting:
             return False
         ended = self._ended
         if ended is None or self._close_reason is not None or ended.done():
-            return True  # of a connection that is over for the engine
+            return True  # the engine has already closed this connection
         try:
             self._pass_on(data)
         except Exception as bug:  # supervisor, as in `_open`
@@ -412,14 +411,14 @@ class Link:
         return alarms
 
     def _settled(self) -> float | None:
-        """The connection stands: a robot that closes at once would have done so by now."""
+        """Note that the robot has accepted the connection; a refusal would have come by now."""
         self._has_stood = True
         self._stand()
         self.publish()
         return None
 
     def _stand(self) -> None:
-        """Show what a connection that stands means."""
+        """Publish the state of an accepted connection."""
         if self._report.state not in ("lost", "connecting"):
             return
         if not self._is_ready:
@@ -431,15 +430,15 @@ class Link:
             self._report.show("live")
 
     def _check_idle(self) -> float | None:
-        """Close a line that has been silent for too long, else say how long it still may be."""
+        """Close a connection after too long a silence, or return the remaining time."""
         limit_s = self._spec.timeouts.idle_s or 0.0
         left_s = self._heard_s + limit_s - self._clock.now()
         if left_s > 0:
             return left_s
-        self._end(f"nothing received for {limit_s:g} s; connecting anew")
+        self._end(f"nothing received for {limit_s:g} s; reconnecting")
         return None
 
     def _mistake(self, bug: Exception) -> str:
-        """Log what no transport should raise, and return the line for people."""
+        """Log an unexpected exception of a transport; return the message for the operator."""
         log.error("%s failed in an unexpected way", self._transport.address, exc_info=bug)
         return f"the transport failed in an unexpected way ({type(bug).__name__}: {bug})"

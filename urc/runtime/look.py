@@ -1,4 +1,9 @@
-"""What can be seen of a package before it is installed or updated, by its documents alone."""
+"""A preview of a package from its documents, before it is installed or updated.
+
+Files, keys, agents, commands on other machines and hosts normally come from settings. A package may
+name them itself, but the person who installs it must know. So they are listed apart from the
+permissions.
+"""
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
@@ -22,19 +27,19 @@ __all__ = ["Look", "look", "permissions", "risks_of"]
 
 
 def permissions(document: Path, folder: Path, widgets: Sequence[str]) -> list[str]:
-    """Return what a package may do, one line each.
+    """Return the permissions of a package, one line each.
 
     Args:
-        document: the package's own.
-        folder: with all that the package needs; nothing outside may be named.
-        widgets: names of the widgets that come along.
+        document: the document of the package.
+        folder: folder with all files of the package; references outside are an error.
+        widgets: names of the included widgets.
 
     Raises:
-        ProblemsError: the document is broken.
+        ProblemsError: the document has errors.
         UrcError: it refers to a file outside.
     """
     checked = check(document, built_in_catalog(), shelf_of(document))
-    _check_inside(checked, folder)  # first: a finding would show a line of the file outside
+    _check_inside(checked, folder)  # first, because a problem would show a line of an outside file
     errors = [problem for problem in checked.problems if problem.severity == "error"]
     if errors:
         raise ProblemsError(errors)
@@ -82,7 +87,7 @@ def _of_profile(profile: Profile) -> list[str]:
 
 
 def _of_transport(spec: TransportSpec, profile: Profile) -> str:
-    """Return the line of a connection: its type, and where each of its options comes from."""
+    """Return the line of a connection: its type, and the source of each option."""
     options = [
         joined(" ", (name, _told(value, profile))) for name, value in sorted(spec.options.items())
     ]
@@ -97,7 +102,7 @@ def _of_transport(spec: TransportSpec, profile: Profile) -> str:
 
 
 def _told(value: Any, profile: Profile) -> str:
-    """Return an option as it is written; of a setting also what it is without an answer."""
+    """Return an option as written, with the defaults of its settings."""
     if isinstance(value, Template):
         text = value.source
         used = [
@@ -128,7 +133,7 @@ _URL_HOST: Final = re.compile(r"[a-z+]+://(?:[^/@]*@)?(?P<host>\[[^\]]*\]|[^/:?#
 
 
 def risks_of(profile: Profile) -> list[str]:
-    """Return what a package names by itself, one line each; empty for most."""
+    """Return the fixed names of a package, one line each; most packages have none."""
     found = [
         line
         for spec in profile.driver.transports.values()
@@ -164,7 +169,7 @@ def _risks_of_transport(spec: TransportSpec, profile: Profile) -> Iterator[str]:
 
 
 def _own(value: Any, profile: Profile) -> str:
-    """Return what a package says by itself; "" where all of it is filled in by a person."""
+    """Return the fixed text of an option, or "" if it comes from settings."""
     if value is None or value is False:
         return ""
     if not isinstance(value, Template):
@@ -181,7 +186,7 @@ def _own(value: Any, profile: Profile) -> str:
 
 
 def _fixed_host(options: Mapping[str, object]) -> str:
-    """Return the host that no setting decides, or ""."""
+    """Return the host that does not depend on a setting, or ""."""
     host, url = options.get("host"), options.get("url")
     text = host.source if isinstance(host, Template) and not host.settings else host
     if isinstance(text, str):
@@ -200,27 +205,27 @@ _NOT_WIRE: Final = (
 
 
 class Look(NamedTuple):
-    """What is seen."""
+    """The preview of a package."""
 
     permissions: list[str]
-    """What it may do, one line each."""
+    """Permissions, one line each."""
     wire: Mapping[str, str]
-    """``commands.beep.send`` → what stands there: all that decides what goes to the robot, and what
-    is made of its answers."""
+    """``commands.beep.send`` → its value: all keys that decide the sent bytes and the decoding of
+    the replies."""
     risks: list[str]
-    """What of this machine it uses by itself; see `urc.runtime.risks`."""
+    """Local resources without a setting; see `risks_of`."""
 
 
 def look(document: Path, folder: Path, widgets: Sequence[str]) -> Look:
-    """Return what is seen of a package.
+    """Return the preview of a package.
 
     Args:
-        document: the package's own.
-        folder: with all that the package needs; nothing outside may be named.
-        widgets: names of the widgets that come along.
+        document: the document of the package.
+        folder: folder with all files of the package; references outside are an error.
+        widgets: names of the included widgets.
 
     Raises:
-        ProblemsError: the document is broken.
+        ProblemsError: the document has errors.
         UrcError: it refers to a file outside.
     """
     allowed = permissions(document, folder, widgets)
@@ -237,7 +242,7 @@ def look(document: Path, folder: Path, widgets: Sequence[str]) -> Look:
 
 
 def _flat(value: object, path: str) -> Iterator[tuple[str, str]]:
-    """Yield the path and text of every value that holds no others."""
+    """Yield the path and text of every leaf value."""
     if isinstance(value, dict) and value:
         for key, inner in value.items():
             yield from _flat(inner, f"{path}.{key}" if path else str(key))

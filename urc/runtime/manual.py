@@ -1,7 +1,7 @@
-"""A profile's manual page, as Markdown: what the robot is, says and can be told.
+"""The manual page of a profile, as Markdown: the robot, its signals and its commands.
 
-Floor 4, pure: the same profile gives the same page. It is made for who operates the robot; what a
-document says in its descriptions is passed on word by word.
+Layer 4, a pure function: the same profile gives the same page. The page is for operators and quotes
+the descriptions of the document.
 """
 
 import math
@@ -35,7 +35,7 @@ _LIMITS: Final = (
 
 
 def manual(profile: Profile) -> str:
-    """Return the page."""
+    """Return the manual page."""
     driver = profile.driver
     sections = (
         ("Settings", _settings(profile.settings)),
@@ -149,8 +149,8 @@ def _commands(driver: Driver) -> Iterator[str]:
             yield f"- held: sent every {shown_duration(command.hold.repeat_s)} while it is held"
         if command.moves:
             where = f" where {_code(command.moves_if.source)}" if command.moves_if else ""
-            until = "not while STOP is latched, nor while others drive"
-            yield f"- moves something by itself{where}: {until}"
+            until = "refused while STOP is latched or another operator drives"
+            yield f"- moves the robot by itself{where}: {until}"
         if command.stops:
             yield "- given once when STOP is pressed"
         yield ""
@@ -174,7 +174,7 @@ def _what_goes_out(command: Command, spec: TransportSpec | None) -> Iterator[str
 
 
 def _constant_bytes(command: Command, spec: TransportSpec | None) -> bytes | None:
-    """Return what always goes out, or None where that depends on something."""
+    """Return the bytes of a constant frame, or None for a frame that varies."""
     if command.send.names or spec is None:
         return None
     try:
@@ -183,7 +183,7 @@ def _constant_bytes(command: Command, spec: TransportSpec | None) -> bytes | Non
         )
         return traffic_of(encode({}))
     except UrcError:
-        return None  # a counter, for one: it is not the same every time
+        return None  # a counter, for example, changes the frame each time
 
 
 def _text_of(data: bytes) -> str:
@@ -226,7 +226,7 @@ def _need(argument: Argument) -> str:
 
 
 def _releases(driver: Driver) -> Iterator[str]:
-    """Yield what the server sends when a control is let go of, or the one who holds it is gone."""
+    """Yield the frames that the server sends after a release or the loss of the operator."""
     for command in driver.commands.values():
         if command.hold is not None and command.hold.step_s is not None:
             lasts = shown_duration(command.hold.step_s)
@@ -243,16 +243,16 @@ def _releases(driver: Driver) -> Iterator[str]:
 
 
 def _by_itself(watchdog_s: float | None) -> str:
-    """Return what the robot does when nothing more comes, not even the release."""
+    """Return the robot's own behaviour without further frames, not even the release."""
     if watchdog_s is None:
-        return "Whether the robot stops by itself when nothing more comes is not said."
+        return "The document does not say whether the robot stops by itself."
     if math.isinf(watchdog_s):
-        return "The robot does not stop by itself: what was sent last goes on."
-    return f"Without any further command the robot ends it by itself: {shown_duration(watchdog_s)}."
+        return "The robot does not stop by itself: the last command continues."
+    return f"Without further commands, the robot stops by itself: {shown_duration(watchdog_s)}."
 
 
 def _interfaces(profile: Profile) -> Iterator[str]:
-    """Yield what stands on each interface, also of the one that is made when there is none."""
+    """Yield the widgets of each interface, or of the generated one."""
     for place, interface in enumerate(profile.interfaces.values()):
         found = {
             slot: interface.widgets.get(slot) or profile.slots.get(slot) for slot in interface.shown
@@ -312,7 +312,7 @@ def _descriptions(named: Iterable[Signal | Argument | Setting]) -> Iterator[str]
 
 
 def _table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> Iterator[str]:
-    """Yield a table without the columns in which no row says anything."""
+    """Yield a table without its empty columns."""
     kept = [place for place in range(len(header)) if any(row[place] for row in rows)]
     yield f"| {' | '.join(header[place] for place in kept)} |"
     yield f"|{'---|' * len(kept)}"
@@ -321,12 +321,12 @@ def _table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> Iterator[str
 
 
 def _plain(text: str) -> str:
-    """Return text of a document that no reader of Markdown takes for markup."""
+    """Return the text of a document with escaped Markdown."""
     return printable(" ".join(text.split())).translate(_MARKUP)
 
 
 def _code(text: str) -> str:
-    """Return text as code, whatever is in it; a bar would end the cell of a table."""
+    """Return text as code, with escaped bars, which would end the cell of a table."""
     clean = printable(text).replace("|", "\\|")
     if "`" in clean:
         return f"`` {clean} ``"

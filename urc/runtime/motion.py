@@ -1,18 +1,18 @@
-"""Who drives one robot, and what its held commands do: the desk between screens and the movers.
+"""The motion controller of one robot: the lease, and the state of each held command.
 
-Theory of operation. Screens send ticks of sampled input and releases. The desk asks the lease who
-may drive, the freshness of that screen whether the tick is new, the engine whether the arguments
-are good, and hands the frame to the movers, which own the wire and its time limits. The first tick
-of a gesture arms the control: the stop frame is rendered then, so that stopping needs neither the
-engine nor the document any more.
+Theory of operation. Pages send ticks of sampled input, and releases. For each tick, the controller
+checks three things: the lease of the page, the age of the tick, and the arguments, by the engine.
+It then hands the frame to the movers, which own the connection and its time limits. The first tick
+of a gesture arms the control. It also renders the stop frame, so that a stop needs neither the
+engine nor the document.
 
-A control that stopped for any reason but a release is closed until its screen has released it: a
-stick that is still held when the link heals moves nothing.
+A control that stopped without a release stays closed until its page releases it. So a stick that is
+still held after the link reconnects moves nothing.
 
-A desk outlives the sessions of its robot: the latch holds while nobody is connected. `attach` gives
-it the engine and the movers of a session, `detach` takes them away.
+A controller outlives the sessions of its robot, because the latch also holds while the robot is
+disconnected. `attach` adds the engine and the movers of a session, `detach` removes them.
 
-Synchronous; time is passed in. Whoever owns the movers reports their stops by `stopped`.
+The module is synchronous, and callers pass the time. The movers report their stops by `stopped`.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -33,7 +33,7 @@ __all__ = ["Frames", "MotionDesk", "Movers", "Verb", "is_lossy"]
 Verb = str
 """``take``, ``ask``, ``yes``, ``no``, ``force``, ``leave`` or ``reset``."""
 Moved = Callable[[Client, int, str, Mapping[str, Reading], Payload, float], None]
-"""Takes who ticked, the epoch of the lease, command, arguments, frame, and when."""
+"""Arguments: operator, epoch of the lease, command, arguments, frame, and time."""
 MOST_SCREENS = 256
 _FIRST_TICKS = 2**31
 _NO_ROBOT = "the robot is not connected"
@@ -49,17 +49,17 @@ class _Screen:
 
 
 class MotionDesk:
-    """The controls of one robot."""
+    """The lease and the held commands of one robot."""
 
     def __init__(
         self, driver: Driver, *, kept: LeaseState | None = None, is_owed: bool = False
     ) -> None:
-        """Begin with nobody at the controls, and no robot connected.
+        """Start without an operator and without a connected robot.
 
         Args:
-            driver: its commands with ``hold`` are the controls.
-            kept: the lease as it was before a restart: a latched stop stays latched.
-            is_owed: whether the robot has not heard of the last stop, and is to hear of it first.
+            driver: the driver; its commands with ``hold`` are the controls.
+            kept: the lease from before a restart: a latched stop stays latched.
+            is_owed: whether the last stop has not reached the robot and must be sent first.
         """
         self.lease = Lease(kept)
         self._frames: Frames | None = None
@@ -75,56 +75,56 @@ class MotionDesk:
         self._screens: dict[str, _Screen] = {}
         self._unconfirmed = {*self._holds, *self._stops} if is_owed else set[str]()
         self.on_change: Callable[[LeaseState], None] = _ignore
-        """Told of every new state of the lease, and when a stop is confirmed."""
+        """Called after each change of the lease, and after the confirmation of a stop."""
         self.on_moved: Moved = _unseen
-        """Told of each tick, once its frame has gone to the movers; must neither wait nor raise."""
+        """Called for each tick whose frame went to the movers; must neither block nor raise."""
         self.on_refused: Callable[[str, str], None] = _unrefused
-        """Told the control that the robot refused to move, and in which words."""
+        """Called with the control and the message when the robot refuses to move."""
 
     @property
     def can_move(self) -> bool:
-        """Whether anything of the robot is held, moves by itself, or stops it."""
+        """Whether the robot has a held command, autonomous motion or a stop command."""
         return bool(self._holds) or self._moves or bool(self._stops)
 
     @property
     def has_own_stop(self) -> bool:
-        """Whether the robot hears anything when STOP is pressed; else URC alone holds back."""
+        """Whether STOP sends anything to the robot; else URC only blocks its own commands."""
         return bool(self._holds) or bool(self._stops)
 
     @property
     def owed(self) -> list[str]:
-        """Commands that are to be given for a stop, and were not yet."""
+        """Return the stop commands that are still to be sent."""
         return [name for name in self._stops if name in self._unconfirmed]
 
     def given(self, command: str) -> None:
-        """Take note that a command of a stop has reached the robot."""
+        """Note that a stop command has reached the robot."""
         if command in self._unconfirmed:
             self._unconfirmed.discard(command)
             if self.is_confirmed:
                 self.on_change(self.lease.state)
 
     def holds(self, command: str) -> bool:
-        """Return whether `command` is a held one."""
+        """Return whether `command` is a held command."""
         return command in self._holds
 
     def rests(self, command: str) -> bool:
-        """Return whether a held command does not move, and its last stop was reported."""
+        """Return whether a held command is at rest and its last stop was reported."""
         return self._controls[command].course == "rest"
 
     @property
     def is_confirmed(self) -> bool:
-        """Whether the robot's lines have taken the stop of everything that was to stop."""
+        """Whether all stop frames of the last stop were written."""
         return not self._unconfirmed
 
     @property
     def deadline(self) -> float | None:
-        """When `expire` has something to do."""
+        """Time of the next call of `expire`, or None."""
         return self.lease.deadline
 
     # -- the robot
 
     def attach(self, frames: Frames, movers: Movers | None) -> None:
-        """Take a session's engine, and movers where anything is held; an owed stop goes out."""
+        """Connect a session's engine and its movers, if any; send an outstanding stop."""
         self._frames, self._movers = frames, movers
         frames.on_count, frames.on_ready = self._renew, self._ready
         frames.on_refused = self._refused
@@ -132,34 +132,34 @@ class MotionDesk:
             movers.stop(self._stop_frames(self._holds))
 
     def detach(self) -> None:
-        """Take note that the session is over: its movers stop what moves, and nothing is armed."""
+        """End the session: its movers stop all motion, and no control stays armed."""
         self._frames = self._movers = None
         for control in self._controls.values():
             control.is_owed_again = False
             if control.is_armed:
                 self._close(control)
 
-    # -- screens
+    # -- pages
 
     def join(self, client: Client) -> None:
-        """Take note of a screen; raise `UrcError` when there are too many."""
+        """Add a page; raise `UrcError` at the limit of pages."""
         if len(self._screens) >= MOST_SCREENS:
-            raise UrcError(f"{MOST_SCREENS} screens show this robot already")
+            raise UrcError(f"{MOST_SCREENS} pages already show this robot")
         self._screens[client.id] = _Screen(client)
 
     def part(self, client: str) -> None:
-        """Take note that a screen is gone: what it held stops."""
+        """Remove a page and stop the commands that it held."""
         self._screens.pop(client, None)
         self._settle(self.lease.leave(client))
 
     def beat(self, client: str, now: float) -> int:
-        """Return the number of the tick that this screen is told now, to be echoed."""
+        """Return the current tick number for this page, which the page echoes."""
         return self._screens[client].freshness.issue(now)
 
     # -- the lease
 
     def drive(self, client: str, verb: Verb, now: float, for_s: float = REQUEST_S) -> str:
-        """Do what a screen wants with the lease; return why not, or ""."""
+        """Apply a page's request for the lease; return the reason of a refusal, or ""."""
         who, lease = self._screens[client].client, self.lease
         if verb == "take":
             outcome: Changed | Refused | None = lease.take(who, now)
@@ -181,16 +181,16 @@ class MotionDesk:
         return ""
 
     def stop(self, by: str) -> None:
-        """Stop the robot and latch; whoever says so, and whatever else goes on."""
+        """Stop the robot and latch, regardless of the lease."""
         self._unconfirmed = {*self._holds, *self._stops}
         if self._movers is not None:
             self._movers.stop(self._stop_frames(self._holds))
         self._settle(self.lease.stop(by), is_stopped=True)
 
     def halt(self) -> list[str]:
-        """Stop what moves, and let it be driven again only by a new gesture in a new lease.
+        """Stop all motion; a new motion needs a new gesture and a new lease.
 
-        What the movers have stopped by themselves meanwhile hears no second stop.
+        Controls that the movers have already stopped get no second stop.
 
         Returns:
             The commands that may have moved.
@@ -203,12 +203,12 @@ class MotionDesk:
         return halted
 
     def _moving(self) -> list[str]:
-        """Return what was ticked since its stop was written, as far as anybody has said."""
+        """Return the commands with ticks since their last reported stop."""
         controls = self._controls.items()
         return [name for name, one in controls if one.is_armed and one.course != "rest"]
 
     def expire(self, now: float) -> None:
-        """Do what time alone does."""
+        """Handle the timeouts of the lease."""
         self._settle(self.lease.expire(now))
 
     # -- motion
@@ -221,10 +221,10 @@ class MotionDesk:
         given: Input,
         now: float,
     ) -> str:
-        """Take a tick of sampled input; return why it was refused, or ""."""
+        """Handle a tick of sampled input; return the reason of a refusal, or ""."""
         control, screen = self._controls.get(command), self._screens.get(client)
         if control is None or screen is None:
-            return f"{command!r} is no held command of this robot"
+            return f"{command!r} is not a held command of this robot"
         epoch = self.lease.state.epoch
         refusal = self.lease.refusal(client, given.epoch) or screen.freshness.refusal(
             given, epoch, now, command
@@ -238,7 +238,7 @@ class MotionDesk:
             return _NO_ROBOT
         if control.slew is not None:
             arguments = control.limited(arguments, now)
-        self._is_making = True  # its stop is made after it
+        self._is_making = True  # its stop frame is rendered after it
         try:
             data = frames.motion_frame(command, arguments, now)
             if not control.is_armed:
@@ -255,19 +255,19 @@ class MotionDesk:
         control.course = "moving"
         movers.tick(command, data)
         if data == b"":
-            return ""  # it waits for an answer that the robot owes
+            return ""  # it waits for a reply that the robot owes
         shown = data.numbered.data if isinstance(data, Counted) else data
         self.on_moved(screen.client, epoch, command, arguments, shown, now)
         return ""
 
     def _abandon(self, command: str, control: Control, movers: Movers, why: str) -> None:
-        """End a motion of which no frame can be made."""
+        """End a motion for which no frame can be rendered."""
         if control.is_armed:
             movers.release(command)
         self._close(control, why)
 
     def release(self, client: str, command: str) -> None:
-        """Take note that a control was let go; only its holder's word counts."""
+        """Note the release of a control; only its holder may release it."""
         holder = self.lease.state.holder
         control = self._controls.get(command)
         if control is None or holder is None or holder.id != client:
@@ -281,10 +281,10 @@ class MotionDesk:
         control.rest()
         if control.is_armed and self._movers is not None:
             self._movers.release(command)
-            self._renew(control.line)  # the number of this stop is used up
+            self._renew(control.line)  # the counter of this stop frame is used up
 
     def _refused(self, command: str, why: str) -> None:
-        """End a motion that the robot refuses: it hears the stop, and its words say why."""
+        """Stop a motion that the robot refuses, and report its message."""
         control, movers = self._controls.get(command), self._movers
         if control is None or movers is None or control.course != "moving":
             return
@@ -292,11 +292,11 @@ class MotionDesk:
         self.on_refused(command, why)
 
     def stopped(self, command: str, reason: Reason) -> None:
-        """Take note of what the movers report: the stop of a control was written."""
+        """Handle a report of the movers: the stop of a control was written."""
         control = self._controls.get(command)
         if control is None:
             return
-        if control.course == "ending":  # else it moves again already
+        if control.course == "ending":  # else it already moves again
             control.course = "rest"
         if reason not in ("released", "stopped"):
             self._close(control, _CUT if reason == "revoked" else LET_GO)
@@ -306,10 +306,10 @@ class MotionDesk:
         if reason != "released":
             self.given(command)
 
-    # -- stops that are made anew
+    # -- renewed stops
 
     def _is_too_early(self, command: str, control: Control) -> bool:
-        """Return whether a stop that was written may not count: the robot was not ready for it."""
+        """Return whether a written stop may not count, because the robot was not ready for it."""
         frames, movers = self._frames, self._movers
         if frames is None or movers is None:
             return False
@@ -318,7 +318,7 @@ class MotionDesk:
         return not (movers.is_open(command) and frames.is_ready(command))
 
     def _ready(self, line: str) -> None:
-        """Repeat the stops that went out before the start-up steps of `line` were done."""
+        """Repeat stops that were sent before the steps of connection `line` were done."""
         owed = [
             name
             for name, control in self._controls.items()
@@ -330,7 +330,7 @@ class MotionDesk:
             self._movers.stop(self._stop_frames(owed))
 
     def _renew(self, line: str) -> None:
-        """Make the stops of `line` anew: they come after what has been sent."""
+        """Render the stops of `line` again, with counters after the last sent frame."""
         if not self._is_making:
             self._renew_stops(line)
 
@@ -346,7 +346,7 @@ class MotionDesk:
             try:
                 stop = frames.stop_frame(name)
             except UrcError:
-                continue  # the one it has is better than none
+                continue  # the old stop is better than none
             if stop != control.stop:
                 control.stop = stop
                 movers.renew(name, stop)
@@ -385,25 +385,25 @@ class MotionDesk:
     def _stop_frames(
         self, commands: Sequence[str] | Mapping[str, object]
     ) -> dict[str, Payload | Series]:
-        """Return the stop frames; one that cannot be made must not keep back the others."""
+        """Return the stop frames; a failure of one must not prevent the others."""
         made: dict[str, Payload | Series] = {}
         for name in commands:
             control = self._controls[name]
             try:
                 if self._frames is not None:
                     made[name] = self._frames.stop_frame(name)
-            except UrcError:  # told by `urc validate`
+            except UrcError:  # reported by `urc validate`
                 if control.is_armed and control.stop is not None:
-                    made[name] = control.stop  # the one it was armed with
+                    made[name] = control.stop  # rendered when it was armed
         return made
 
 
 def _unrefused(command: str, why: str) -> None:
-    """Nobody wants to know."""
+    """Ignore a refusal."""
 
 
 def _ignore(state: LeaseState) -> None:
-    """Nobody wants to know."""
+    """Ignore a change."""
 
 
 def _unseen(
@@ -414,4 +414,4 @@ def _unseen(
     data: Payload,
     now: float,
 ) -> None:
-    """Nobody looks."""
+    """Ignore a tick."""

@@ -1,7 +1,7 @@
-"""Hosts that lead to this machine itself, or to whatever is plugged into it.
+"""Detection of hosts that mean this machine itself, or a device plugged into it.
 
-A package that fixes such a host would speak to the programs of whoever installs it. It may reach
-this machine by a setting, which a person sees and fills in.
+A package with such a fixed host would talk to local programs of the person who installs it. It may
+use this machine only through a setting, which a person sees and fills in.
 """
 
 import ipaddress
@@ -19,20 +19,20 @@ __all__ = ["check_hosts", "is_near"]
 
 _LOCAL: Final = re.compile(r"(.*\.)?localhost(\.localdomain)?\.?|ip6-(localhost|loopback)", re.I)
 _BEGINS: Final = re.compile(r"127\.|169\.254\.|\[?(::1|fe[89ab][0-9a-f]:)|localhost", re.I)
-"""Of a host that settings only complete."""
+"""Beginning of a host that settings complete."""
 _URL: Final = re.compile(r"[a-z]+://(?P<host>\[[^\]]*\]|[^/:?#]*)", re.I)
 _OPTIONS: Final = ("host", "url")
 
 
 def is_near(host: str) -> bool:
-    """Return whether `host`, in whatever form, is this machine, or link-local."""
+    """Return whether `host`, in any notation, is this machine or link-local."""
     text = host.strip().removeprefix("[").removesuffix("]").partition("%")[0]
     if _LOCAL.fullmatch(text):
         return True
     try:
         address = unmapped(ipaddress.ip_address(text))
     except ValueError:
-        try:  # "127.1", "0x7f.1" and "2130706433" are addresses, too
+        try:  # "127.1", "0x7f.1" and "2130706433" are addresses too
             address = ipaddress.ip_address(socket.inet_aton(text))
         except (OSError, ValueError):
             return False
@@ -40,10 +40,10 @@ def is_near(host: str) -> bool:
 
 
 def check_hosts(profile: Profile) -> None:
-    """Raise `UrcError` when the document of a package fixes a host to this machine."""
+    """Raise `UrcError` if the document of a package has this machine as a fixed host."""
     for spec in profile.driver.transports.values():
         if spec.via or spec.options.get("mode") == "listen":
-            continue  # seen from another machine; or the robot comes here
+            continue  # resolved on another machine, or the robot connects to URC
         host = _fixed(spec.options)
         if host:
             raise UrcError(
@@ -53,7 +53,7 @@ def check_hosts(profile: Profile) -> None:
 
 
 def _fixed(options: Mapping[str, object]) -> str:
-    """Return the near host that no setting decides, or ""."""
+    """Return the local host that does not depend on a setting, or ""."""
     for name in _OPTIONS:
         value = options.get(name)
         text = value.source if isinstance(value, Template) else value

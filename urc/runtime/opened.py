@@ -1,7 +1,7 @@
-"""A robot's document as it is driven: with the widgets beside it, and the interfaces it came with.
+"""The document of a robot as users open it: with local widgets and installed interfaces.
 
-Floor 4. A driver's document names no interface; an installed driver is offered with those that were
-installed because it needs them.
+Layer 4. A driver's document names no interface; an installed driver gets the interfaces that were
+installed for it.
 """
 
 from os import PathLike
@@ -19,14 +19,14 @@ __all__ = ["open_document"]
 
 _DRIVER: Final = "driver.yaml"
 _MADE: Final = "default"
-"""The interface that is made where a document has none."""
+"""Name of the generated interface of a document without one."""
 
 
 def open_document(path: str | PathLike[str]) -> Profile:
-    """Return the profile in a robot's or driver's document.
+    """Return the profile of a robot's or driver's document.
 
     Raises:
-        ProblemsError: with every finding of the pass that stopped it.
+        ProblemsError: the document has errors, which the exception lists.
     """
     profile = load_profile(path, built_in_catalog(), shelf_of(path))
     home = ecosystem_of(Path(path))
@@ -40,5 +40,5 @@ def open_document(path: str | PathLike[str]) -> Profile:
             interfaces[name] = found.interface._replace(name=name)
             widgets |= found.widgets
     if len(interfaces) > 1 and _MADE in interfaces:
-        interfaces[_MADE] = interfaces.pop(_MADE)  # what somebody has drawn goes first
+        interfaces[_MADE] = interfaces.pop(_MADE)  # the generated one comes last
     return profile._replace(interfaces=interfaces, widgets=widgets)

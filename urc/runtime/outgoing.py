@@ -1,7 +1,7 @@
-"""What is to be written on one line: joined, bounded, and shown in the traffic once it is written.
+"""The output buffer of one transport: joined, bounded, and shown as traffic after the writing.
 
-Bytes wait for the writer's own task. On a transport that is a `Prompt` they go straight to the
-kernel, unless others wait before them. The task, which has time to wait, writes the rest.
+A `Prompt` transport passes bytes straight to the kernel if the buffer is empty. Other bytes wait
+for the writer's task, which can block.
 """
 
 import asyncio
@@ -19,34 +19,34 @@ from urc.transports.base import Prompt, Transport
 __all__ = ["MAX_QUEUED_BYTES", "STUCK_S", "Outgoing"]
 
 MAX_QUEUED_BYTES = 262_144
-"""Bytes that may wait to be written; with more the line is given up, and says so."""
+"""Limit of the buffer, in bytes; beyond it the connection is closed with a message."""
 STUCK_S = 5.0
-"""A robot that takes no byte for this long is gone."""
+"""Time without accepted bytes, in seconds, after which the connection is stalled."""
 
 
 class _Waiting(NamedTuple):
-    """Something to be written."""
+    """One item of the buffer."""
 
     data: Payload
     shown: Payload
-    """What the traffic shows of it."""
+    """Payload to show as traffic."""
     counted: Counted | None = None
-    """Its numbers count once it has left: it goes by itself."""
+    """Frame with counters, which are used up once it is sent; such a frame is never joined."""
 
 
 @runtime_checkable
 class _Shared(Protocol):
-    """A transport on which others send frames with counters, too."""
+    """A transport that also sends frames with counters of the guard."""
 
     def offer_counted(self, counted: Counted, left: Callable[[Payload], None]) -> bool:
-        """Pass it on without waiting; return whether it was taken. `left` is told what left."""
+        """Send it without waiting; return whether that worked. `left` gets the sent frame."""
 
     async def send_counted(self, counted: Counted, left: Callable[[Payload], None]) -> None:
-        """Pass it on, waiting until it has left."""
+        """Send it and wait until it is sent. `left` gets the sent frame."""
 
 
 class Outgoing:
-    """The way out of one line. What does not work ends the connection, through `give_up`."""
+    """A buffer for one transport. Any failure ends the connection, through `give_up`."""
 
     def __init__(
         self,
@@ -58,15 +58,15 @@ class Outgoing:
         *,
         is_stream: bool,
     ) -> None:
-        """Prepare it.
+        """Prepare the buffer.
 
         Args:
-            transport: takes what is written.
-            report: shows it.
-            hub: knows whether anybody watches.
-            clock: the time.
+            transport: receives the bytes.
+            report: publishes the traffic.
+            hub: knows whether traffic has readers.
+            clock: source of time.
             give_up: ends the connection for a reason.
-            is_stream: whether bytes may be joined; else each piece is a datagram or an envelope.
+            is_stream: whether bytes may be joined; else each piece is a datagram or a message.
         """
         self._transport = transport
         self._report = report
@@ -80,20 +80,20 @@ class Outgoing:
         self._bytes = 0
         self._has_some = asyncio.Event()
         self._is_idle = False
-        """Whether the writer waits for something to write."""
+        """Whether the writer waits for data."""
 
     @property
     def is_full(self) -> bool:
-        """Whether so much waits that no new command should be taken."""
+        """Whether the buffer is too long for new commands."""
         return self._bytes > MAX_QUEUED_BYTES // 2
 
     @property
     def is_written(self) -> bool:
-        """Whether everything has been handed over."""
+        """Whether all data was handed to the transport."""
         return not self._bytes
 
     def reset(self, prompt: Prompt | None = None) -> None:
-        """Begin anew, with nothing waiting; `prompt` is the transport, if it is one."""
+        """Empty the buffer; `prompt` is the transport if it supports immediate writes."""
         self._prompt = prompt
         self._waiting.clear()
         self._bytes = 0
@@ -103,9 +103,9 @@ class Outgoing:
     def put(
         self, data: Payload, *, is_secret: bool = False, counted: Counted | None = None
     ) -> None:
-        """Write `data` at once where that needs no waiting, else as soon as the line takes it.
+        """Write `data` at once if possible, else as soon as the transport accepts it.
 
-        Secrets are shown to nobody.
+        Secrets are not shown.
         """
         shared = counted if self._shared is not None else None
         item = _Waiting(data, REDACTED if is_secret else data, shared)
@@ -118,7 +118,7 @@ class Outgoing:
         size = size_of(data)
         if self._bytes + size > MAX_QUEUED_BYTES:
             dropped = self._bytes + size
-            self._give_up(f"the robot takes no more bytes; {dropped} waiting ones were dropped")
+            self._give_up(f"the robot accepts no more bytes; {dropped} queued ones were dropped")
             return
         self._waiting.append(item)
         self._bytes += size
@@ -133,18 +133,18 @@ class Outgoing:
         return True
 
     def _left(self, item: _Waiting, data: Payload) -> None:
-        """Show a frame as it left: with numbers that may be others than those it was made with."""
+        """Show a frame as it was sent: its counters may differ from the rendered ones."""
         self._report.saw("sent", data if item.shown is item.data else item.shown)
 
     def wake(self) -> None:
-        """Let the writer look again: the line is to be closed once all is written."""
+        """Wake the writer, because the connection closes once all data is written."""
         self._has_some.set()
 
     async def run(self, is_closing: Callable[[], bool]) -> None:
-        """Write what waits, until cancelled; give up, for no reason, when all is written and done.
+        """Write until cancelled; after the last write of a closing connection, give it up.
 
         Raises:
-            TransportError: it cannot be written.
+            TransportError: writing failed.
         """
         while True:
             self._is_idle = True
@@ -164,12 +164,12 @@ class Outgoing:
                 self._give_up("")
 
     def _wait_for_rest(self) -> None:
-        """Let the writer see to it that what the kernel has not taken goes, in time."""
+        """Let the writer check that the kernel accepts the rest in time."""
         self._waiting.append(_Waiting(b"", b""))
         self._has_some.set()
 
     def _next(self) -> _Waiting:
-        """Take what is sent at once: all of a stream up to a frame with counters, else one item."""
+        """Return the next write: a stream up to a frame with counters, else one item."""
         waiting = self._waiting
         if not self._is_stream or len(waiting) == 1 or waiting[0].counted is not None:
             return waiting.pop(0)
@@ -180,8 +180,8 @@ class Outgoing:
 
     @contextmanager
     def _watched(self) -> Iterator[None]:
-        """Give the robot `STUCK_S` to take what is being written."""
-        reason = f"the robot has taken no bytes for {STUCK_S:g} s"
+        """Give the robot `STUCK_S` to accept the bytes."""
+        reason = f"the robot has accepted no bytes for {STUCK_S:g} s"
         alarm = self._clock.call_at(self._clock.now() + STUCK_S, lambda: self._give_up(reason))
         try:
             yield

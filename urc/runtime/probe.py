@@ -1,7 +1,7 @@
-"""Tries the lines of a robot once, for real, and says of each what worked, or why not.
+"""A connection test of a robot: each transport is tried once.
 
-Floor 4. It opens a session as a page would, so logins, polls and time-outs are the driver's own;
-nothing is steered. A line that is opened for a request only, and that nothing asks by itself, is
+Layer 4. The test opens a session as a page does, so it uses the driver's logins, polls and
+timeouts. It sends no motion. A transport that only opens for a request, and that no poll uses, is
 opened and closed once.
 """
 
@@ -20,11 +20,11 @@ from urc.transports.base import TransportError
 __all__ = ["LONGEST_S", "Tried", "Verdict", "probe"]
 
 LONGEST_S: Final = 12.0
-"""A test takes no longer, whatever the driver declares; saying good-bye comes on top."""
+"""Limit of a test, in seconds, regardless of the driver; the orderly close comes on top."""
 _ANSWER_S: Final = 4.0
-"""How long a connected robot has to say something."""
+"""Time for a connected robot to send a frame, in seconds."""
 _FIRST_S: Final = 1.0
-"""A line that nothing was asked on by then is one that only commands use."""
+"""Time after which an idle transport is one that only commands use, in seconds."""
 _LOOK_S: Final = 0.05
 _CLOSE_S: Final = 2.0
 
@@ -32,18 +32,18 @@ Verdict = Literal["answers", "opens", "fails"]
 
 
 class Tried(NamedTuple):
-    """What became of one transport."""
+    """Result of one transport."""
 
     transport: str
     type: str
     address: str
-    """Where it leads, for people."""
+    """Address for people."""
     verdict: Verdict
-    """answers: it is live. opens: it can be connected, and said nothing. fails: neither."""
+    """answers: it is live. opens: it connects but the robot sends nothing. fails: neither."""
     text: str
-    """What was seen, in one line."""
+    """One-line description of the result."""
     advice: str
-    """What to do about it, in one line; "" where nothing is wrong."""
+    """One-line advice, or "" for a good result."""
 
 
 async def probe(
@@ -52,15 +52,15 @@ async def probe(
     *,
     longest_s: float = LONGEST_S,
 ) -> list[Tried]:
-    """Try every transport of a robot; each wait is bounded.
+    """Test every transport of a robot; each wait is bounded.
 
     Args:
-        opened: gives the session that is tried.
+        opened: returns the session to test.
         table: the kinds of transport.
-        longest_s: when to stop waiting, in seconds.
+        longest_s: limit of the test, in seconds.
 
     Raises:
-        UrcError: the session cannot be made with these settings.
+        UrcError: the session cannot be built with these settings.
     """
     async with opened() as session:
         specs = session.profile.driver.transports
@@ -97,24 +97,24 @@ def _is_connected(status: LinkStatus) -> bool:
 
 
 def _is_settled(status: LinkStatus | None, since_s: float, connected_s: float) -> bool:
-    """Return whether nothing more is to be learned of a line.
+    """Return whether the result of a transport is final.
 
     Args:
-        status: of the line.
-        since_s: how long the test has been going on, in seconds.
-        connected_s: how long the line has been connected.
+        status: state of the transport.
+        since_s: time since the start of the test, in seconds.
+        connected_s: time since the connection opened, in seconds.
     """
     if status is None:
         return False
     if status.state in ("live", "lost") or status.attempts:
         return True
-    if status.state == "idle":  # until something is asked, which polls do at once
+    if status.state == "idle":  # without a request; polls send one at once
         return since_s >= _FIRST_S
     return connected_s >= _ANSWER_S
 
 
 async def _opened_alone(session: Session, names: list[str], table: Table) -> dict[str, Tried]:
-    """Open and close lines that nothing has asked for."""
+    """Open and close the transports without a request."""
     driver = session.profile.driver
     tried: dict[str, Tried] = {}
     if not names:
@@ -129,7 +129,7 @@ async def _opened_alone(session: Session, names: list[str], table: Table) -> dic
         try:
             async with asyncio.timeout(spec.timeouts.connect_s + 1):
                 await transport.open(spec.timeouts.connect_s)
-            text = "can be opened; commands use it one by one"
+            text = "can be opened; commands open it as needed"
             tried[name] = Tried(name, spec.type, transport.address, "opens", text, "")
         except (TransportError, TimeoutError) as error:
             text = str(error) or f"not open within {spec.timeouts.connect_s:g} s"
@@ -149,7 +149,7 @@ def _told(spec: TransportSpec, status: LinkStatus | None) -> Tried:
     if _is_connected(status) and not status.attempts:
         text = status.detail or "connected, and an answer is overdue"
         advice = (
-            "something is there and does not speak as this driver expects: check the port, and"
+            "the replies do not fit this driver: check the port, and"
             " whether it is this robot; many robots serve one program at a time"
         )
         return Tried(spec.name, spec.type, status.address, "opens", text, advice)
@@ -163,25 +163,25 @@ def _failed(spec: TransportSpec, address: str, text: str) -> Tried:
 _ADVICE: Final = (
     (
         ("refused",),
-        "the machine is there, and nothing listens on that port: check the port, and that the"
+        "the machine responds, but nothing listens on that port: check the port, and that the"
         " robot's program runs",
     ),
     (
         ("name or service", "no address", "not known", "resolve", "look up", "no such host"),
-        "nobody knows that name: check its spelling, or write the address in numbers",
+        "the name cannot be resolved: check its spelling, or write the address in numbers",
     ),
     (
         ("unreachable", "no route"),
-        "no network leads there: is this machine on the robot's network?",
+        "the network is unreachable: is this machine on the robot's network?",
     ),
     (
         ("timed out", "within", "time-out", "timeout"),
-        "nobody answers there: check the address, that the robot is on, and the network",
+        "no reply from that address: check the address, that the robot is on, and the network",
     ),
     (("host key", "fingerprint"), "look at the robot's key, then trust it with urc trust"),
     (
         ("authenticat", "password", "permission denied", "login", "publickey", "401", "403"),
-        "the robot refuses who asks: check user, password and key file",
+        "the robot rejects the login: check user, password and key file",
     ),
     (
         ("no such file", "could not open port", "no such device"),
@@ -192,7 +192,7 @@ _ADVICE: Final = (
 
 
 def advice(text: str) -> str:
-    """Return what to do about a failure, by the words that it is told in."""
+    """Return advice about a failure, by the words of its message."""
     lower = text.lower()
     for words, what in _ADVICE:
         if any(word in lower for word in words):

@@ -1,6 +1,6 @@
-"""Why nothing set a signal, and what to write instead: the first thing that people stumble over.
+"""Hints why a test set no signal, and how to correct the test.
 
-Floor 4, pure. Looked for only when a test fails.
+Layer 4, pure. It runs only after a failed test.
 """
 
 from collections.abc import Iterator
@@ -26,20 +26,20 @@ _WAITED_FOR: Final = {
     "brackets": "for the bracket that ends it",
     "json": "for the end of the JSON",
 }
-"""Framing → what bytes that are no whole frame wait for."""
+"""Framing → the missing part of an incomplete frame."""
 
 
 class _Asked(NamedTuple):
-    """Something whose answer a frame could be."""
+    """A request whose reply a frame may be."""
 
     how: str
-    """What to write so that it is asked."""
+    """Line of the test that would send the request."""
     transport: str
     reply: Reply
 
 
 class Remedy:
-    """Finds out why a signal was not set in one test."""
+    """A finder of the reason why a test has not set a signal."""
 
     def __init__(self, trial: Trial, *, in_steps: bool) -> None:
         self._trial = trial
@@ -47,7 +47,7 @@ class Remedy:
         self._in_steps = in_steps
 
     def of(self, signal: str) -> str:
-        """Return the reason, to be put behind "nothing set it", or "" when there is none."""
+        """Return the reason, as a continuation of "nothing set it", or ""."""
         for transport in self._driver.transports:
             reason = self._of_line(transport, signal)
             if reason:
@@ -56,7 +56,7 @@ class Remedy:
             return ": nothing was fed"
         others = sorted(self._trial.fresh)
         if others:
-            return f": what came set {', '.join(others[:5])}"
+            return f": the fed data set {', '.join(others[:5])}"
         return ""
 
     def _of_line(self, transport: str, signal: str) -> str:
@@ -71,7 +71,7 @@ class Remedy:
         if asked:
             return asked
         if not line.is_open:
-            return f"{transport} is connected only for a request, and there was none"
+            return f"{transport} connects only for a request, and the test sent none"
         waiting = line.inbox.decoder.pending
         return self._waits(transport, fed[-waiting:]) if waiting else ""
 
@@ -87,7 +87,7 @@ class Remedy:
         return f"{text} waits {what}{passes}"
 
     def _answered_by(self, transport: str, fed: bytes, signal: str) -> str:
-        """Return which request a frame would be the answer to, when nobody made it."""
+        """Return the unsent request whose reply the frame may be."""
         spec = self._driver.transports[transport]
         for asked in self._could_ask():
             reads = [asked.reply.read, *(stage.read for stage in asked.reply.stages)]
@@ -98,11 +98,11 @@ class Remedy:
             for cut in decoder.feed(fed):
                 if isinstance(cut, bytes) and any(self._fits(cut, transport, one) for one in reads):
                     text = _shown(cut, spec.encoding)
-                    return f"{text} answers a request that nobody made (write {asked.how})"
+                    return f"{text} is a reply without its request (write {asked.how})"
         return ""
 
     def _asked_in_vain(self, transport: str, fed: bytes, signal: str) -> str:
-        """Return which form of a request that was made no frame has, when all have another."""
+        """Return the sent request whose form fits no frame, if all frames have another form."""
         spec = self._driver.transports[transport]
         for label, reply in self._were_asked(transport):
             reads = [reply.read, *(stage.read for stage in reply.stages)]
@@ -113,15 +113,15 @@ class Remedy:
             if cuts and not any(self._fits(cut, transport, one) for cut in cuts for one in reads):
                 form = next(one.form for one in reads if signal in one.fields)
                 text = _shown(cuts[-1], spec.encoding)
-                return f"{text} does not fit the {form!r} of {label}, which was asked"
+                return f"{text} does not fit the {form!r} of {label}, which was sent"
         return ""
 
     def _were_asked(self, transport: str) -> Iterator[tuple[str, Reply]]:
-        """Yield the requests of the test that want an answer of this line."""
+        """Yield the requests of the test that expect a reply on this transport."""
         for poll in self._trial.polls:
             is_ours = poll.transport == transport and ("poll", poll.name) in self._trial.used
             if is_ours and poll.reply is not None:
-                # One without a name is called by its place, as polls.0.
+                # A poll without a name is called by its position, such as polls.0.
                 yield poll.name if "." in poll.name else f"poll {poll.name}", poll.reply
         for command in self._driver.commands.values():
             name = command.name
@@ -138,7 +138,7 @@ class Remedy:
             return False
 
     def _could_ask(self) -> Iterator[_Asked]:
-        """Yield what the test did not ask and could have."""
+        """Yield the requests that the test could have sent."""
         used = self._trial.used
         for poll in self._trial.polls:
             if poll.reply is not None and ("poll", poll.name) not in used:
@@ -150,7 +150,7 @@ class Remedy:
 
 
 def _shown(data: bytes, encoding: str) -> str:
-    """Return bytes as text where they are, else in hex."""
+    """Return bytes as text if possible, else in hex."""
     cut = data[:_SHOWN]
     more = " …" if len(data) > _SHOWN else ""
     try:

@@ -1,4 +1,4 @@
-"""What people are told of one line: its state, its counts, and a log that cannot be flooded."""
+"""The published status of one transport: its state, its counts, and a rate-limited log."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -12,13 +12,13 @@ from urc.runtime.hub import Hub, LinkState, LinkStatus, Note, Traffic
 __all__ = ["REDACTED", "LinkReport", "NoteLimiter"]
 
 BURST = 4
-"""Notes of one kind that are told at once."""
+"""Number of log entries of one kind before the rate limit applies."""
 REFILL_S = 10.0
-"""After so many seconds one more of that kind is told."""
+"""Interval of further log entries of one kind, in seconds."""
 HELD_S = 0.3
-"""What may begin a secret is told when nothing has followed it for so long."""
+"""Delay of the possible beginning of a secret, in seconds."""
 KINDS = 64
-"""Kinds told apart; what a foreign engine adds beyond them is counted together."""
+"""Limit of kinds; further kinds of a third-party engine share one limit."""
 
 
 @dataclass(slots=True)
@@ -29,14 +29,14 @@ class _Kind:
 
 
 class NoteLimiter:
-    """A token bucket for each kind of note."""
+    """A token bucket for each kind of log entry."""
 
     def __init__(self, clock: Clock) -> None:
         self._clock = clock
         self._kinds: dict[str, _Kind] = {}
 
     def admit(self, kind: str) -> int | None:
-        """Return how many of this kind were kept back before, or None to keep this one back too."""
+        """Return the number of suppressed entries of this kind, or None to suppress this one."""
         now = self._clock.now()
         if kind not in self._kinds:
             kind = kind if len(self._kinds) < KINDS else ""
@@ -53,7 +53,7 @@ class NoteLimiter:
 
 
 class LinkReport:
-    """Keeps what is shown of one transport and puts it into the hub."""
+    """The published state of one transport, sent to the hub."""
 
     def __init__(self, transport: str, address: str, hub: Hub, clock: Clock) -> None:
         self._transport = transport
@@ -67,7 +67,7 @@ class LinkReport:
         self._telling: Alarm | None = None
         self.state: LinkState = "idle"
         self.attempts = 0
-        """Failed attempts since the last good frame."""
+        """Number of failed attempts since the last good frame."""
         self.faults = 0
         self.publish()
 
@@ -77,7 +77,7 @@ class LinkReport:
         return self.state == "live" and not self.attempts and not self._detail
 
     def show(self, state: LinkState, detail: str = "") -> None:
-        """Take a state; a change of it is noted, a change of its detail is only shown."""
+        """Set the state. A new state is logged; a new detail is only shown."""
         if state == self.state and detail == self._detail:
             return
         if state != self.state:
@@ -88,24 +88,24 @@ class LinkReport:
         self._is_changed = True
 
     def fail(self, state: LinkState, detail: str) -> None:
-        """Take a failed attempt."""
+        """Count a failed attempt."""
         self.attempts += 1
         self._is_changed = True
         self.show(state, detail)
 
     def count(self, fault: Fault) -> None:
-        """Count something that was not as declared, and tell of it now and then."""
+        """Count a protocol violation, and log it at a limited rate."""
         self.faults += 1
         self._is_changed = True
         if self.state == "connecting" and self._detail:
-            # Connected, and nothing good has come yet: why is what people want to know.
+            # Connected without a good frame: the violation is the detail that helps most.
             self._detail = f"connected; {fault.message}"
         if fault.code == "silent" and self.state != "silent":
-            return  # the change of state that follows says the same
+            return  # the following change of state says the same
         self.note("warning", f"fault {fault.code}", f"{fault.code}: {fault.message}")
 
     def note(self, level: Literal["info", "warning", "error"], kind: str, text: str) -> None:
-        """Put a line into the log, unless there have been too many of its kind."""
+        """Log an entry, within the rate limit of its kind."""
         untold = self._limiter.admit(kind)
         if untold is None:
             return
@@ -113,7 +113,7 @@ class LinkReport:
         self._hub.note(Note(self._clock.now(), level, self._transport, text + more))
 
     def saw(self, direction: Literal["sent", "received"], data: Payload) -> None:
-        """Record traffic while somebody watches."""
+        """Record traffic while it has readers."""
         if self._hub.traffic_watchers:
             envelope = data if isinstance(data, Envelope) else None
             shown, now = traffic_of(data), self._clock.now()
@@ -128,7 +128,7 @@ class LinkReport:
         self._hub.tell_rest(self._clock.now())
 
     def publish(self) -> None:
-        """Put the state into the hub, if anything about it has changed."""
+        """Send the state to the hub if it has changed."""
         if not self._is_changed:
             return
         self._is_changed = False
@@ -147,7 +147,7 @@ class LinkReport:
     def _note_state(self, state: LinkState, detail: str) -> None:
         level: Literal["info", "warning"] = "warning" if state in ("silent", "lost") else "info"
         if state == "connecting":
-            text = f"connecting to {self._address}"  # told once; who reads on knows where
+            text = f"connecting to {self._address}"  # the only entry with the address
         else:
             text = f"{state}: {detail}" if detail else state
         self.note(level, f"state {state}", text)

@@ -32,7 +32,7 @@ def load(path: str | PathLike[str]) -> Profile:
     """Return the profile in a file.
 
     Raises:
-        ProblemsError: the document cannot be used; `problems` has every finding.
+        ProblemsError: the document has errors; `problems` lists them.
     """
     from urc.config.load import load_profile
 
@@ -43,15 +43,15 @@ def load(path: str | PathLike[str]) -> Profile:
 async def connect(
     profile: Profile | str | PathLike[str], **settings: Value
 ) -> AsyncIterator["ConnectedRobot"]:
-    """Connect a robot for the length of the block; lost lines are connected again by themselves.
+    """Connect a robot for the duration of the block; lost connections are reopened.
 
     Args:
-        profile: as from `load`, or the path of its file.
-        settings: by name, ``-`` written as ``_``; those left out take their defaults.
+        profile: a result of `load`, or the path of a file.
+        settings: values by name, with ``_`` for ``-``; missing settings take their defaults.
 
     Raises:
-        UrcError: the profile cannot be used, or a setting is wrong or missing. A robot that cannot
-            be reached is no error here: `command` says so, and `state` shows it.
+        UrcError: the profile has errors, or a setting is wrong or missing. An unreachable robot
+            is not an error here; `command` reports it, and `state` shows it.
     """
     opened = profile if isinstance(profile, Profile) else load(profile)
     given = {_setting_name(opened, name): _as_text(value) for name, value in settings.items()}
@@ -65,10 +65,10 @@ async def connect(
 
 
 class ConnectedRobot:
-    """What a script needs of a connected robot; the whole `session` is there as well."""
+    """A connected robot, for scripts; `session` gives access to everything else."""
 
     def __init__(self, session: Session) -> None:
-        """Made by `connect`."""
+        """Store the session; scripts call `connect` instead."""
         self.session = session
 
     async def command(self, name: str, /, **arguments: Reading) -> dict[str, Reading]:
@@ -81,7 +81,7 @@ class ConnectedRobot:
         return dict(replied.values)
 
     def latest(self, name: str) -> Sample | None:
-        """Return the newest reading of a signal, or None when there was none yet.
+        """Return the newest reading of a signal, or None.
 
         Raises:
             UrcError: the driver has no such signal.
@@ -97,13 +97,13 @@ class ConnectedRobot:
         """
         if transport not in self.session.hub.links:
             known = ", ".join(self.session.hub.links)
-            raise UrcError(f"there is no transport {transport!r}; there are: {known}")
+            raise UrcError(f"unknown transport {transport!r}; expected one of: {known}")
         return self.session.hub.links[transport].state
 
     async def watch(self, *names: str) -> AsyncIterator[Sample]:
-        """Yield readings as they change, of the signals named or of all, until you stop asking.
+        """Yield new readings of the named signals, or of all, until the caller stops.
 
-        The newest counts: a script that is slow skips readings, and is never behind.
+        Only the newest reading counts: a slow script skips readings and never falls behind.
 
         Raises:
             UrcError: the driver has no such signal.
@@ -120,7 +120,7 @@ class ConnectedRobot:
     def _check(self, name: str) -> None:
         if name not in self.session.hub.signals:
             known = ", ".join(self.session.hub.signals) or "none"
-            raise UrcError(f"there is no signal {name!r}; there are: {known}")
+            raise UrcError(f"unknown signal {name!r}; expected one of: {known}")
 
 
 def _setting_name(profile: Profile, name: str) -> str:

@@ -1,9 +1,10 @@
-"""Runs the tests that a document carries, on the same engine that drives the robot.
+"""The tests of a document, run on the engine that also drives the robot.
 
-Floor 4, no I/O and no asyncio: `urc validate` runs these without a robot, a network or a secret.
+Layer 4, without I/O and asyncio: `urc validate` needs no robot, no network and no secret.
 
-A test says what happens in one instant, or step by step on a clock of its own. In an instant the
-driver does nothing by itself; step by step it is whole, but for the polls that no test names.
+A test runs in one instant, or step by step on a simulated clock. In one instant, the driver does
+nothing by itself. Step by step, the whole driver runs, except for polls that the test does not
+name.
 """
 
 from collections.abc import Mapping
@@ -22,31 +23,31 @@ __all__ = ["Outcome", "exercise", "run_tests", "sample_settings"]
 
 _SAMPLE: Final[Mapping[str, Value]] = {"host": "127.0.0.1", "port": 1, "integer": 0, "number": 0.0}
 _ROUNDS: Final = 16
-"""How many deadlines a test lets pass while it waits for the failure that it declares."""
+"""Number of deadlines that a test passes while it waits for its declared failure."""
 
 
 class Outcome(NamedTuple):
-    """What came of a document's own tests."""
+    """Result of a document's tests."""
 
     problems: list[Problem]
-    """A finding for each one that failed."""
+    """One problem for each failed test."""
     exercised: frozenset[Exercised]
-    """The commands, polls and messages that were used, whether the test passed or not."""
+    """Commands, polls and messages that passed or failed tests have used."""
 
 
 class _Complaint(NamedTuple):
     text: str
     step: int | None = None
-    """Its place among the steps, from 0; None: the test has none."""
+    """Index of the step, from 0; None for a test without steps."""
 
 
 def run_tests(profile: Profile) -> list[Problem]:
-    """Run every test of `profile`; return a finding for each one that fails."""
+    """Run every test of `profile`; return a problem for each failure."""
     return exercise(profile).problems
 
 
 def exercise(profile: Profile) -> Outcome:
-    """Run every test of `profile`; return what failed, and what was used."""
+    """Run every test of `profile`; return the failures, and the used parts of the driver."""
     settings = sample_settings(profile.settings)
     problems = []
     used: set[Exercised] = set()
@@ -58,9 +59,9 @@ def exercise(profile: Profile) -> Outcome:
 
 
 def sample_settings(settings: Mapping[str, Setting]) -> dict[str, Value]:
-    """Return a value for every setting: its default, or something of its type.
+    """Return a value for every setting: its default, or a sample of its type.
 
-    What may stay empty does.
+    Optional settings stay empty.
     """
     values: dict[str, Value] = {}
     for name, setting in settings.items():
@@ -97,7 +98,7 @@ def _problem(profile: Profile, test: DocumentTest, complaint: _Complaint) -> Pro
 def _run(
     driver: Driver, settings: Mapping[str, Value], test: DocumentTest, used: set[Exercised]
 ) -> _Complaint:
-    """Return what is wrong, with no text when the test passes; add what it exercises to `used`."""
+    """Return the failure, or empty text for a pass; add the used parts to `used`."""
     used |= _asked(driver, test)
     try:
         trial = Trial(_narrowed(driver, test), settings, driver.polls)
@@ -114,7 +115,7 @@ def _run(
 
 
 def _asked(driver: Driver, test: DocumentTest) -> set[Exercised]:
-    """Return what a test in one instant asks, whether it gets there or not."""
+    """Return the requests of a test in one instant, even if it fails before them."""
     asked: set[Exercised] = set()
     if isinstance(test.reply_to, int):
         poll = driver.polls[test.reply_to]
@@ -128,10 +129,10 @@ def _asked(driver: Driver, test: DocumentTest) -> set[Exercised]:
 
 
 def _narrowed(driver: Driver, test: DocumentTest) -> Driver:
-    """Return the driver with only the polls that the test is about.
+    """Return the driver with only the polls of the test.
 
-    In one instant they are due at once. A test that asks nothing is about what the robot says, and
-    about the steps of its connections.
+    In one instant, polls are due at once. A test without a request is about unsolicited frames and
+    the steps of the connections.
     """
     if test.steps:
         polls = tuple(poll for poll in driver.polls if poll.name in test.polls)
@@ -150,13 +151,13 @@ def _narrowed(driver: Driver, test: DocumentTest) -> Driver:
 
 
 def _in_an_instant(trial: Trial, test: DocumentTest) -> list[str]:
-    """Connect, ask, and feed the answer; return what is wrong."""
+    """Connect, send, and feed the reply; return the complaints."""
     command = test.run or (test.reply_to if isinstance(test.reply_to, str) else None)
     checks = bool(test.expect or test.sent or test.fails is not None)
     asked = trial.driver.commands.get(command or "")
     is_fed_only = bool(test.feed) and command is None and test.reply_to is None
     if not checks and not is_fed_only and (not test.feed or asked is None or asked.reply is None):
-        return ["it checks nothing; say what it should 'expect', what is 'sent' or how it 'fails'"]
+        return ["the test checks nothing; add 'expect', 'sent' or 'fails'"]
     trial.begin()
     if command is not None:
         trial.run(command, test.arguments)
@@ -171,14 +172,16 @@ def _in_an_instant(trial: Trial, test: DocumentTest) -> list[str]:
     complaints += check_values(trial, test.expect, Remedy(trial, in_steps=False))
     complaints += check_bytes(trial, trial.driver, test.sent)
     if not checks and is_fed_only and not complaints and not trial.fresh and not trial.used:
-        complaints.append("nothing declared reads what is fed; is the end of the frame missing?")
+        complaints.append(
+            "no message or reply matches the fed data; is the end of the frame missing?"
+        )
     if not checks and command is not None and not complaints:
-        complaints += check_reply(trial.ended, {}, command)  # all that it says: it is done
+        complaints += check_reply(trial.ended, {}, command)  # the command only has to be done
     return complaints
 
 
 def _check_failure(trial: Trial, expected: str) -> list[str]:
-    """Let time pass until the failure that the test declares, and complain if it never comes."""
+    """Pass time until the declared failure; complain if it never comes."""
     for _ in range(_ROUNDS):
         if any(expected in failure for failure in trial.failures):
             return []
@@ -192,7 +195,7 @@ def _check_failure(trial: Trial, expected: str) -> list[str]:
 
 
 def _in_steps(trial: Trial, test: DocumentTest) -> _Complaint:
-    """Do every step up to the first one that does not hold."""
+    """Run the steps up to the first failure."""
     place = 0
     try:
         trial.begin()
@@ -218,7 +221,7 @@ def _is_action(step: DialogueStep) -> bool:
 
 
 def _unexpected(trial: Trial) -> str:
-    return f"{'; '.join(first(trial.failures))} (where that is meant, say so by 'fails')"
+    return f"{'; '.join(first(trial.failures))} (if this is intended, add 'fails')"
 
 
 def _act(trial: Trial, step: DialogueStep) -> None:
@@ -233,13 +236,13 @@ def _act(trial: Trial, step: DialogueStep) -> None:
     for name, fed in step.feed.items():
         for piece in pieces_of(fed):
             if not trial.engine.lines[name].is_open:
-                raise UrcError(f"{name} is not connected: what is fed to it goes nowhere")
+                raise UrcError(f"{name} is not connected: it cannot receive the fed data")
             trial.feed(name, piece)
     trial.wait(step.wait_s or 0.0)
 
 
 def _check(trial: Trial, step: DialogueStep) -> list[str]:
-    """Return what does not hold after a step."""
+    """Return the complaints after a step."""
     complaints: list[str] = []
     if step.fails:
         complaints += _check_told(trial, step)
@@ -256,12 +259,12 @@ def _check(trial: Trial, step: DialogueStep) -> list[str]:
         if step.closed in trial.closed:
             trial.closed.discard(step.closed)
         else:
-            complaints.append(f"{step.closed} should be closed from this side, but is not")
+            complaints.append(f"{step.closed} should have been closed by URC, but is open")
     return complaints
 
 
 def _check_told(trial: Trial, step: DialogueStep) -> list[str]:
-    """Complain if the failure of a step was not told; forget what was told along with it."""
+    """Complain about a missing declared failure, and forget other reports of the step."""
     failures = list(trial.failures)
     if step.of:
         ended = [one for one in trial.ended if one.command == step.of]
@@ -275,12 +278,12 @@ def _check_told(trial: Trial, step: DialogueStep) -> list[str]:
 
 
 def _isolated(driver: Driver, *, keeps_conditions: bool) -> Driver:
-    """Return the driver with lines that are usable at once and send nothing by themselves.
+    """Return the driver with connections that are ready at once and send nothing by themselves.
 
     Args:
-        driver: as loaded.
-        keeps_conditions: whether commands still require and verify anything. A test of bytes has no
-            robot that could report the signals.
+        driver: the loaded driver.
+        keeps_conditions: whether commands keep requires and verify. A test of bytes has no robot to
+            report the signals.
     """
     transports = {
         name: spec._replace(on_connect=(), on_close=(), keepalive=None, stale_after_s=None)

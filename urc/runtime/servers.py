@@ -1,6 +1,6 @@
-"""Which dashboards run on this machine, for programs of the same user: their addresses and keys.
+"""The running dashboards of this user on this machine: their addresses and start keys.
 
-Floor 4. Each server keeps one small file of its owner alone, for as long as it runs::
+Layer 4. While it runs, each server keeps one small file that only its owner can read::
 
     servers/1a2b3c4d.json    {"address": "http://127.0.0.1:8080/", "key": "…", "pid": 4711}
 
@@ -23,34 +23,34 @@ _MOST_BYTES = 4096
 
 
 class Server(NamedTuple):
-    """A dashboard that runs, or did when its machine lost its power."""
+    """A dashboard that runs, or ran before the machine lost its power."""
 
     address: str
-    """As ``http://127.0.0.1:8080/``."""
+    """Address, such as ``http://127.0.0.1:8080/``."""
     key: str
-    """The start key."""
+    """Start key."""
     pid: int
-    """Its process."""
+    """Process id."""
 
 
 def headers(server: Server) -> dict[str, str]:
-    """Return what a program sends with each request to `server`."""
+    """Return the headers of a program's requests to `server`."""
     return {"authorization": f"Bearer {server.key}"}
 
 
 @contextmanager
 def announced(data: Path, name: str, server: Server) -> Iterator[None]:
-    """Let others of this user find `server` for as long as the context lasts.
+    """Announce `server` to other programs of this user for the duration of the context.
 
     Args:
-        data: the folder of URC's data that it uses.
-        name: tells it from other servers.
-        server: it.
+        data: URC's data folder.
+        name: unique name of the server.
+        server: the server.
 
     Raises:
         OSError: the file cannot be written.
     """
-    servers(data)  # removes what servers that were killed left behind
+    servers(data)  # also removes the files of killed servers
     file = data / _FOLDER / f"{name}.json"
     put_private(file, json.dumps(server._asdict()).encode())
     try:
@@ -61,10 +61,10 @@ def announced(data: Path, name: str, server: Server) -> Iterator[None]:
 
 
 def servers(data: Path) -> dict[Path, Server]:
-    """Return the servers that use the folder `data`, the newest first, by their files.
+    """Return the servers of the data folder by their files, the newest first.
 
-    The file of one that was killed is removed. Where the system cannot say whether a process runs,
-    the server is among them; then nothing listens at its address.
+    The file of a killed server is removed. If the system cannot tell whether the process runs, the
+    server stays in the list, although its address may not respond.
     """
     found: dict[Path, Server] = {}
     for file in _files(data):
@@ -95,9 +95,9 @@ def _read(file: Path) -> Server | None:
 
 
 def _may_run(pid: int) -> bool:
-    """Return whether there is such a process, or whether that cannot be asked."""
+    """Return whether such a process exists, or may exist."""
     if os.name != "posix":
-        return True  # there, signal 0 is Ctrl-C
+        return True  # on Windows, signal 0 is Ctrl-C
     try:
         os.kill(pid, 0)
     except ProcessLookupError:

@@ -1,4 +1,4 @@
-"""An opened profile: the engine, its links, and the hub, from `async with` to the end of it."""
+"""A session: an open profile with its engine, links and hub."""
 
 import asyncio
 import secrets
@@ -40,21 +40,21 @@ __all__ = ["CommandFailed", "Motion", "Session", "Turnstile", "resolve_settings"
 
 
 class Turnstile:
-    """Closed until an event has happened, and until all who waited for it are through."""
+    """A FIFO queue in front of an event."""
 
     def __init__(self, event: asyncio.Event) -> None:
-        """Prepare; the event is never cleared."""
+        """Store the event, which must never be cleared."""
         self._event = event
-        self._turn = asyncio.Lock()  # the first who wants it has it first
+        self._turn = asyncio.Lock()  # FIFO
         self._waiting = 0
 
     @property
     def is_open(self) -> bool:
-        """Whether somebody who comes now overtakes nobody."""
+        """Whether a new caller would overtake no other."""
         return self._event.is_set() and not self._waiting
 
     async def wait(self) -> None:
-        """Return when it is one's turn; who gives up holds up nobody."""
+        """Wait for the event and for all earlier callers; a cancelled caller leaves the queue."""
         self._waiting += 1
         try:
             async with self._turn:
@@ -64,17 +64,17 @@ class Turnstile:
 
 
 Motion = Literal["none", "here", "guarded"]
-"""Who writes motion: nobody; this process; a guard, which stops the robot when this one cannot."""
+"""Writer of motion: none, this process, or the guard, which stops the robot if URC fails."""
 
 _LOOK_S = 0.02
 new = tuple.__new__
-"""Makes a named tuple without the detour through its class: this is done for every command."""
+"""Creates a named tuple without the cost of its class, because every command does it."""
 _GRACE_S = 2.0
-"""What a command may take beyond all its declared waits together."""
+"""Tolerance beyond the sum of a command's declared waits, in seconds."""
 
 
 class CommandFailed(UrcError):
-    """A command that was not done.
+    """A command that failed.
 
     `code` is one of ``timed-out``, ``refused``, ``disconnected``, ``bad-argument``, ``queue-full``,
     ``unknown-command``; `message` is for people.
@@ -87,10 +87,10 @@ class CommandFailed(UrcError):
 
 
 class Session:
-    """One robot, connected for as long as the context lasts. Opened once.
+    """One robot, connected for the duration of the context. It opens once.
 
     ``async with Session(profile, settings, catalog.transports) as session:`` starts the links and
-    returns at once; what they achieve is in `hub`.
+    returns at once; `hub` has their results.
     """
 
     def __init__(
@@ -103,18 +103,18 @@ class Session:
         random: Callable[[], float] = random_share,
         motion: Motion = "none",
     ) -> None:
-        """Prepare everything; nothing is opened yet.
+        """Prepare the session without opening anything.
 
         Args:
-            profile: as loaded.
+            profile: the loaded profile.
             settings: a value for every setting of the profile, as from `resolve_settings`.
             transports: the table of transports.
-            clock: the time; the running loop's when left out.
-            random: a number from 0 to below 1, for the jitter of the back-off.
-            motion: who writes held commands, if anybody is to hold them.
+            clock: source of time; by default the running loop.
+            random: returns a number in [0, 1) for the jitter of the backoff.
+            motion: writer of held commands.
 
         Raises:
-            UrcError: a setting has no value, or a transport cannot be made with those given.
+            UrcError: a setting has no value, or a transport cannot be built with these settings.
         """
         missing = [name for name in profile.settings if settings.get(name) is None]
         if missing:
@@ -131,9 +131,9 @@ class Session:
         fresh = Fresh(time.time, secrets.token_bytes)
         engine = Engine(driver, self.settings, fresh=fresh, is_compiled=True)
         self.frames: Frames = engine.motions
-        """Makes the frames of held commands."""
+        """Renders the frames of held commands."""
         self.movers = self._made_movers(engine, transports, motion)
-        """Who writes them; None where nothing is held."""
+        """Writer of the frames; None without motion."""
         self._dispatcher = Dispatcher(
             engine,
             self.hub,
@@ -150,7 +150,7 @@ class Session:
         )
         self._stops = 0
         self._untried = {name: Turnstile(link.tried) for name, link in self._links.items()}
-        """Lines whose first attempt may not have ended yet: commands wait for it, in order."""
+        """Links before the end of their first attempt: commands wait for it, in order."""
         self._numbers = count(1)
         self._group = asyncio.TaskGroup()
         self._tasks: list[asyncio.Task[None]] = []
@@ -161,7 +161,7 @@ class Session:
         driver = self.profile.driver
         if motion == "none" or all(one.hold is None for one in driver.commands.values()):
             return None
-        from urc.runtime.guarding import take_reins  # 20 ms: only for what can be driven
+        from urc.runtime.guarding import take_reins  # takes 20 ms, so only with motion
 
         movers = take_reins(
             driver, self.settings, transports, self._clock, is_guarded=motion == "guarded"
@@ -206,7 +206,7 @@ class Session:
     ) -> None:
         try:
             if self.movers is not None:
-                # Before the good-byes of the lines: these may wait.
+                # Before the steps of on_close, which may take time.
                 self.movers.stop_all(self.frames.stop_frame)
             await self._say_goodbye()
             await self._end(kind, error, trace)
@@ -224,15 +224,15 @@ class Session:
         self.hub.tell_rest(self._clock.now())
         for task in self._tasks:
             task.cancel()
-        # An error of the block is the caller's own and passes as it is, not inside a group. Only
-        # a cancellation is shown to the group, which may itself have asked for it.
+        # An error of the block belongs to the caller and passes unchanged, outside of a group. Only
+        # a cancellation goes to the task group, which may itself have asked for it.
         if isinstance(error, asyncio.CancelledError):
             await self._group.__aexit__(kind, error, trace)
         else:
             await self._group.__aexit__(None, None, None)
 
     async def _say_goodbye(self) -> None:
-        """Run what drivers declare under `on_close`, for as long as that is allowed to take."""
+        """Run the `on_close` steps of the drivers, within their time limit."""
         polite = [
             link
             for name, link in self._links.items()
@@ -255,17 +255,16 @@ class Session:
     ) -> Replied:
         """Run a command and return its reply; the wait is always bounded.
 
-        A command that comes while a persistent line is connected for the first time waits for it.
+        A command waits for the first attempt of a persistent link.
 
         Args:
-            name: as in the driver.
-            arguments: name → value; those left out take their defaults.
-            confirmed_by: people who said yes to it, where two must.
-            on_sent: told what goes out for it, each time; not what is secret, nor what a sequence
-                sends.
+            name: name of the command in the driver.
+            arguments: name → value; missing arguments take their defaults.
+            confirmed_by: people who confirmed it, for the two-person rule.
+            on_sent: called with each sent payload, except secrets and payloads of a sequence.
 
         Raises:
-            CommandFailed: it was refused here or by the robot, timed out, or the robot is gone.
+            CommandFailed: the command was refused, timed out, or lost its connection.
         """
         given = arguments or NOTHING
         if self._untried:
@@ -284,36 +283,36 @@ class Session:
         return outcome
 
     async def settle(self) -> str:
-        """Wait until what was sent has arrived, before the session is closed.
+        """Wait until all sent data has arrived, before the session closes.
 
         Returns:
-            What did not arrive, in one line, or "". Takes a few seconds at most.
+            A message about undelivered bytes, or "". Takes a few seconds at most.
         """
         found = await asyncio.gather(*(link.settle() for link in self._links.values()))
         return "; ".join(filter(None, found))
 
     def pull(self, sequence: str, what: Pull) -> None:
-        """Let a sequence pause, do one more step, go on, or end.
+        """Pause a sequence, run one more step, continue, or end it.
 
-        Told ``step`` before it is run, it begins paused. Where none of that name is at work,
-        nothing else happens.
+        ``step`` before the start of a sequence starts it paused. Without a running sequence of this
+        name, nothing else happens.
         """
         self._dispatcher.pull(sequence, what)
 
     def latch(self, reason: str) -> None:
-        """End every sequence of the driver, and begin nothing that moves by itself.
+        """End every sequence of the driver and refuse autonomous motion.
 
         Args:
-            reason: why, for people; "": it may be begun again.
+            reason: reason for people; "" allows autonomous motion again.
         """
         self._stops += reason != ""
         self._dispatcher.latch(reason)
 
     async def _first_attempt(self, name: str, given: Mapping[str, Reading]) -> None:
-        """Wait until the lines of a command have been tried, well or not, for as long as may take.
+        """Wait until the links of a command have ended their first attempt, within a limit.
 
         Raises:
-            CommandFailed: it moves something, and STOP was pressed meanwhile.
+            CommandFailed: the command moves the robot, and STOP was pressed during the wait.
         """
         driver, stops = self.profile.driver, self._stops
         command = driver.commands.get(name)
@@ -328,9 +327,9 @@ class Session:
     async def _until_tried(self, line: str) -> None:
         turnstile = self._untried.get(line)
         if turnstile is None:
-            return  # another command has found out meanwhile
+            return  # another command has waited already
         timeouts = self.profile.driver.transports[line].timeouts
-        with suppress(TimeoutError):  # then the engine says that it is not connected
+        with suppress(TimeoutError):  # the engine then reports the missing connection
             async with within(self._clock, timeouts.connect_s + _GRACE_S):
                 await turnstile.wait()
         if turnstile.is_open:
@@ -338,13 +337,13 @@ class Session:
 
 
 def _limit_s(driver: Driver, name: str) -> float:
-    """Return how long the declaration lets a command take, and a little more."""
+    """Return the declared limit of a command plus a tolerance, in seconds."""
     known = driver.commands.get(name)
     paused_s = PAUSE_S if known is not None and known.steps else 0.0
     return longest_s(driver, name) + paused_s + _GRACE_S
 
 
 def _expects_frames(driver: Driver, transport: str) -> bool:
-    """Return whether the robot is to say something on this line without a command."""
+    """Return whether the robot sends frames on this transport without a request."""
     polls = any(poll.transport == transport and poll.reply for poll in driver.polls)
     return polls or any(message.transport == transport for message in driver.messages.values())

@@ -1,6 +1,6 @@
-"""What the operator fills in, from text to typed values.
+"""Conversion of the operator's settings from text to typed values.
 
-Used by every verb that opens a robot; knows no network and no event loop.
+Each command that opens a robot uses it. It needs no network and no event loop.
 """
 
 import math
@@ -28,7 +28,7 @@ _TRUE, _FALSE = ("true", "yes", "on", "1"), ("false", "no", "off", "0")
 _ONE_SETTING = re.compile(r"\{\{\s*settings\.[a-z]\w*\s*\}\}")
 _LEFT_OUT: Final = object()
 _LONGEST = 4096
-"""Characters of one setting."""
+"""Limit of a setting, in characters."""
 _NO_ENVIRONMENT: Mapping[str, str] = MappingProxyType({})
 
 
@@ -44,16 +44,16 @@ def resolve_settings(
     *,
     allows_any_port: bool = False,
 ) -> tuple[dict[str, Value], tuple[str, ...]]:
-    """Return the value of every setting that has one, and the names of those that have none.
+    """Return the value of each setting, and the names of settings without one.
 
     Args:
-        profile: whose settings.
-        given: name → text, from ``--set``; wins over everything.
-        environ: the environment; ``URC_SET_NAME`` wins over the default.
-        allows_any_port: port 0 may be given, for a server that lets the system choose.
+        profile: profile with the settings.
+        given: name → text, from ``--set``; overrides all other sources.
+        environ: the environment; ``URC_SET_NAME`` overrides the default.
+        allows_any_port: whether port 0 is allowed, for a server whose port the system chooses.
 
     Raises:
-        UrcError: a name that is no setting, or a text that is no value of its type.
+        UrcError: an unknown name, or an invalid text.
     """
     for name in given:
         if name not in profile.settings:
@@ -81,15 +81,15 @@ def resolve_settings(
 
 
 def parse_setting(setting: Setting, text: str, *, allows_any_port: bool = False) -> Value:
-    """Return the value that `text` means for `setting`.
+    """Return the value of `text` for `setting`.
 
     Args:
-        setting: whose type and range count.
-        text: as typed.
-        allows_any_port: port 0 may be given, for a server that lets the system choose.
+        setting: setting with type and range.
+        text: the operator's text.
+        allows_any_port: whether port 0 is allowed, for a server whose port the system chooses.
 
     Raises:
-        UrcError: one line: what was found and what was expected. A secret is not repeated.
+        UrcError: one line with the found and the expected value. Secrets are not repeated.
     """
     if len(text) > _LONGEST:
         raise UrcError(f"is {len(text)} characters long; {_LONGEST} are allowed")
@@ -117,12 +117,12 @@ def parse_setting(setting: Setting, text: str, *, allows_any_port: bool = False)
 
 
 def options_of(spec: TransportSpec, settings: Mapping[str, Value]) -> dict[str, object]:
-    """Return the options of a transport, its templates evaluated with ``settings``.
+    """Return the options of a transport, with templates evaluated over ``settings``.
 
-    What is nothing but a setting that is empty is left out, as if it did not stand there.
+    An option that is only an empty setting is left out.
 
     Raises:
-        UrcError: a template needs a setting that has no value, or fails on the one it has.
+        UrcError: a template needs a missing setting, or fails.
     """
     options: dict[str, object] = {}
     for name, option in spec.options.items():
@@ -145,7 +145,7 @@ def _filled(option: object, settings: Mapping[str, Value]) -> object:
 
 
 def _text(text: str, found: str) -> str:
-    # The environment and the command line may hold bytes that are no text; no robot takes them.
+    # The environment and the command line may contain undecodable bytes; no robot accepts them.
     if any("\ud800" <= character <= "\udfff" for character in text):
         raise UrcError(f"{found} is not text in UTF-8")
     return text
@@ -157,7 +157,7 @@ def _path(text: str, found: str) -> str:
     try:
         return str(Path(text).expanduser())
     except RuntimeError as error:  # ~ without a home, or of a user who is not there
-        raise UrcError(f"{found} is not a path: whose home is meant is not known") from error
+        raise UrcError(f"{found} is not a path: its home folder is unknown") from error
 
 
 def _host(text: str, found: str) -> str:

@@ -1,4 +1,4 @@
-"""Which widgets a document may use: those of URC, and those that came with it."""
+"""The widgets that a document can use: those of URC, and those that came with the document."""
 
 from os import PathLike
 from pathlib import Path
@@ -17,8 +17,8 @@ __all__ = ["TwoShelves", "hidden_beside", "hidden_widget", "shelf_of"]
 def shelf_of(document: str | PathLike[str]) -> Shelf:
     """Return the widgets for a document.
 
-    An installed package sees its own ecosystem, no other; one that is still being written sees the
-    packages that stand beside it; any other document sees the folder ``widgets`` beside it.
+    An installed package uses the widgets of its own ecosystem. A package in development uses the
+    packages next to it. Any other document uses the folder ``widgets`` next to it.
     """
     home = ecosystem_of(Path(document)) or _workshop_of(Path(document))
     ours = shipped("widgets")
@@ -29,46 +29,46 @@ def shelf_of(document: str | PathLike[str]) -> Shelf:
 
 
 def hidden_beside(document: str | PathLike[str]) -> list[Path]:
-    """Return the folders of widgets that came with a document and are never used."""
+    """Return the folders of a document's widgets that are never used."""
     shelf = shelf_of(document)
     return shelf.hidden() if isinstance(shelf, TwoShelves) else []
 
 
 def hidden_widget(manifest: str, name: str) -> Problem:
-    """Return the warning about a widget that has a name of ours."""
+    """Return the warning about a widget with the name of a built-in one."""
     return Problem(
         "shipped-name",
-        f"this widget is never used: one called {name!r} ships with URC, and goes before it",
+        f"this widget is never used: the built-in widget {name!r} takes precedence",
         manifest,
-        hint="give it, and its folder, another name",
+        hint="rename the widget and its folder",
         severity="warning",
     )
 
 
 def _workshop_of(document: Path) -> Path | None:
-    """Return the folder of packages that a package's own document stands in, or None."""
+    """Return the folder of packages that contains a package's own document, or None."""
     home = document.resolve().parent
     is_package = home.parent.name in FOLDERS and (home / MANIFEST).is_file()
     return home.parent.parent if is_package else None
 
 
 class TwoShelves(Shelf):
-    """What ships with URC, and beside it what was installed: that never replaces the other."""
+    """The built-in widgets, and the installed ones, which never replace a built-in one."""
 
     def __init__(self, folder: Path, brought: Path) -> None:
         super().__init__(folder)
         self._brought = Shelf(brought)
         self._brought.problems = self.problems
         self._hidden: set[str] = set()
-        """Names of ours that were asked for, and are brought as well."""
+        """Requested names that are both built-in and installed."""
 
     @property
     def files(self) -> tuple[str, ...]:
-        """Every manifest that was asked for."""
+        """Every requested manifest."""
         return (*super().files, *self._brought.files)
 
     def names(self) -> list[str]:
-        """Return the names of all widgets there are."""
+        """Return the names of all widgets."""
         return sorted({*super().names(), *self._brought.names()})
 
     def get(self, name: str) -> Widget | None:
@@ -82,19 +82,19 @@ class TwoShelves(Shelf):
         return super().get(name)
 
     def hidden(self) -> list[Path]:
-        """Return the folders that were brought and are never used: ours go before them."""
+        """Return the folders of installed widgets that a built-in one hides."""
         return [self._brought.place(name) for name in self._brought.names() if self._hides(name)]
 
     def _hides(self, name: str) -> bool:
-        """Return whether one of ours goes before another one of that name."""
+        """Return whether a built-in widget hides an installed one of this name."""
         if not (super().has(name) and self._brought.has(name)):
             return False
         return super().place(name).resolve() != self._brought.place(name).resolve()
 
     def has(self, name: str) -> bool:
-        """Return whether there is a widget of that name."""
+        """Return whether a widget of this name exists."""
         return super().has(name) or self._brought.has(name)
 
     def place(self, name: str) -> Path:
-        """Return the folder of the widget of that name."""
+        """Return the folder of the widget with this name."""
         return super().place(name) if super().has(name) else self._brought.place(name)

@@ -1,9 +1,9 @@
-"""What one robot's controls leave in the audit: two lines for each motion, not one for each tick.
+"""The audit entries of one robot: two for each motion, not one for each tick.
 
-Floor 4, synchronous; time is passed in; nothing here waits or raises, for motion passes by.
-A motion is told when it begins and when it ends, with its first and its last values; a refusal that
-comes again and again is told once a second, with its count. So the audit answers
-"why did it move?" and does not grow with every stick.
+Layer 4, synchronous; callers pass the time. Motion calls these functions, so they never wait or
+raise. Each motion has an entry for its start and one for its end, with its first and last values. A
+repeated refusal gets one entry per second, with its count. So the audit log shows the cause of each
+motion, and its size does not grow with every tick.
 """
 
 import json
@@ -24,11 +24,11 @@ __all__ = ["Trail"]
 
 _NOBODY: Final = Client("", "", "viewer")
 _AGAIN_S: Final = 1.0
-"""How often the same refusal is told."""
+"""Shortest time between entries for the same refusal, in seconds."""
 _MOST_KEPT: Final = 64
-"""Refusals that are counted at once."""
+"""Limit of different refusals with a count."""
 _MOST_TOLD: Final = 16
-"""Refusals that are told in a second, whatever they say: a hostile page must not fill the file."""
+"""Limit of refusal entries per second, so that a hostile page cannot fill the file."""
 _MOST_SECRETS: Final = 256
 _LONGEST_NAME: Final = 100
 _LONGEST_TEXT: Final = 1000
@@ -40,15 +40,15 @@ _P = ParamSpec("_P")
 def _harmless(
     take: "Callable[Concatenate[Trail, _P], None]",
 ) -> "Callable[Concatenate[Trail, _P], None]":
-    """Let no mistake in here reach what it only looks at; it is told once."""
+    """Catch every exception, so that a bug here cannot stop motion; log only the first one."""
 
     @wraps(take)
     def taken(self: "Trail", /, *args: _P.args, **named: _P.kwargs) -> None:
         try:
             take(self, *args, **named)
-        except Exception:  # a supervisor: motion and STOP go on
+        except Exception:  # supervisor: motion and STOP must go on
             if not self.is_faulty:
-                log.exception("the audit misses what happens to %s", self.robot)
+                log.exception("the audit log lacks an event of %s", self.robot)
             self.is_faulty = True
 
     return taken
@@ -71,7 +71,7 @@ class _Refusal:
 
 
 class Trail:
-    """The audit of one robot."""
+    """A writer of the audit entries of one robot."""
 
     def __init__(
         self,
@@ -81,17 +81,17 @@ class Trail:
         utc: Callable[[], float],
         secrets: Iterable[str] = (),
     ) -> None:
-        """Begin.
+        """Start without motion.
 
         Args:
-            robot: its name.
-            note: takes the entries; must not wait.
-            utc: the time of day, in seconds since 1970.
-            secrets: texts that no entry may hold, such as the values of secret settings.
+            robot: name of the robot.
+            note: receives the entries; must not block.
+            utc: source of UTC time, in seconds since 1970.
+            secrets: texts to redact, such as the values of secret settings.
         """
         self.robot = robot
         self.is_faulty = False
-        """Whether anything could not be noted because of a mistake in URC."""
+        """Whether a bug in URC has prevented an entry."""
         self._note = note
         self._hub: Hub | None = None
         self._now: Callable[[], float] = _never
@@ -104,14 +104,14 @@ class Trail:
         self._lease = LeaseState()
         self._told_s = float("-inf")
         self._told = 0
-        """Refusals that were told in the second that began then."""
+        """Number of refusal entries in the current second."""
 
     def attend(self, hub: Hub | None, now: Callable[[], float]) -> None:
-        """Tell the taps of a session's hub as well, by its clock; None: of no session."""
+        """Also report to the taps of a session's hub, with its clock; None ends that."""
         self._hub, self._now = hub, now
 
     def hide(self, secrets: Iterable[str]) -> None:
-        """Keep these out as well, from now on."""
+        """Redact these texts too, from now on."""
         known = dict.fromkeys((*(one for one in secrets if one), *self._secrets))
         self._secrets = tuple(known)[:_MOST_SECRETS]
         self._disguises = Disguises(self._secrets)
@@ -126,7 +126,7 @@ class Trail:
         data: Payload,
         now: float,
     ) -> None:
-        """Take note of a tick that was taken, and the frame that it became."""
+        """Note an accepted tick and its frame."""
         if self._hub is not None and self._hub.is_tapped:
             self._hub.tell(Moved(now, command, arguments))
         motion = self._motions.get(command)
@@ -147,7 +147,7 @@ class Trail:
 
     @_harmless
     def stopped(self, command: str, reason: str, now: float) -> None:
-        """Take note that a control stopped, and why."""
+        """Note the stop of a control, and its reason."""
         motion = self._motions.pop(command, None)
         if motion is None:
             return
@@ -165,7 +165,7 @@ class Trail:
 
     @_harmless
     def refused(self, client: Client, about: str, message: str, now: float) -> None:
-        """Take note that a tick of the control, or a wish, `about` was refused."""
+        """Note the refusal of a tick or request; `about` is the control or the request."""
         about, message = about[:_LONGEST_NAME], message[:_LONGEST_TEXT]
         key = (client.id, about, message)
         known = self._refusals.get(key)
@@ -181,7 +181,7 @@ class Trail:
 
     @_harmless
     def leased(self, state: LeaseState, now: float) -> None:
-        """Take note of a new state of the lease: who has the controls, and whether STOP latched."""
+        """Note a change of the lease: the holder, or the latch of STOP."""
         before, self._lease = self._lease, state
         if state.latched_by and not before.latched_by:
             self._put("STOP", _NOBODY, epoch=state.epoch, outcome=f"by {state.latched_by}")
@@ -204,7 +204,7 @@ class Trail:
         data: Payload = b"",
         answer: Mapping[str, Reading] = NOTHING,
     ) -> None:
-        """Take note of a command that is not held, and what it came to: ``done`` or why not."""
+        """Note a command without hold, and its outcome: ``done`` or the reason of the failure."""
         if answer:
             outcome = f"{outcome}: {_json(answer)}"
         self._put(
@@ -264,7 +264,7 @@ class Trail:
         return shown(shown_bytes) if shown_bytes else ""
 
     def _hidden(self, text: str) -> str:
-        """Return a text without the secrets, however they are encoded."""
+        """Return a text without the secrets in any of their encodings."""
         return self._disguises.hide(text)
 
 

@@ -1,6 +1,6 @@
-"""An engine under test: a clock of its own, a transport that always connects, and a memory.
+"""An engine under test, with a simulated clock and a transport that always connects.
 
-Floor 4, no I/O and no asyncio. Everything that the engine does is kept until a test asks for it.
+Layer 4, without I/O and asyncio. It collects all output of the engine for the test.
 """
 
 import json
@@ -36,17 +36,17 @@ __all__ = ["Exercised", "Kind", "Trial", "encoded"]
 
 Kind = Literal["command", "poll", "message"]
 Exercised = tuple[Kind, str]
-"""What a test can exercise: what it is, and its name."""
+"""Kind and name of an item that a test can use."""
 _TWO_PEOPLE: Final = ("who wrote the test", "who runs it")
-"""A test is about the wire: whatever must be confirmed is."""
+"""Confirmations for every command, because a test is about the wire."""
 _BRINGS_OBJECTS: Final = frozenset(("rosbridge",))
-"""Types of transports whose messages are data; the others bring bytes."""
+"""Transport types whose messages are objects; the others carry bytes."""
 _MOST_TICKS: Final = 20_000
-"""Deadlines that may pass while a test waits."""
+"""Limit of deadlines during one wait of a test."""
 
 
 class _Watched(Engine):
-    """An engine that remembers which commands it ran, and which messages frames were."""
+    """An engine that notes its commands, and the messages of decoded frames."""
 
     def __init__(self, driver: Driver, settings: Mapping[str, Value], fresh: Fresh) -> None:
         super().__init__(driver, settings, fresh=fresh)
@@ -72,21 +72,21 @@ class _Watched(Engine):
 
 
 class Trial:
-    """One test at work.
+    """One running test.
 
     Raises:
-        UrcError: from every method, for what cannot be done; the message is for people.
+        UrcError: from every method, for an impossible action; the message is for people.
     """
 
     def __init__(
         self, driver: Driver, settings: Mapping[str, Value], polls: Sequence[Poll] = ()
     ) -> None:
-        """Prepare.
+        """Prepare the test.
 
         Args:
-            driver: with the polls that the test is about.
+            driver: driver with only the polls of the test.
             settings: value of every setting.
-            polls: all polls there are.
+            polls: all polls of the document.
         """
         self.driver = driver
         self.settings = settings
@@ -95,52 +95,52 @@ class Trial:
             driver, settings, Fresh(lambda: FIXED_UNIX_S + self.now, fixed_bytes)
         )
         self.now = 0.0
-        """Seconds on the test's own clock."""
+        """Simulated time, in seconds."""
         self.samples: dict[str, Sample] = {}
         self.fresh: set[str] = set()
-        """Signals that were set since `forget`."""
+        """Signals that were set since the last `forget`."""
         self.fed: dict[str, bytes] = {}
-        """Transport → all that the robot said on it since it was connected."""
+        """Transport → all bytes from the robot since the connection opened."""
         self.sent: dict[str, list[Payload]] = {}
-        """Transport → what was sent and not yet looked at."""
+        """Transport → sent payloads that no check has read."""
         self.failures: list[str] = []
         self.ended: list[Replied | Failed] = []
-        """Commands that are over, as long as nobody asked about them."""
+        """Finished commands that no check has read."""
         self.closed: set[str] = set()
-        """Transports that were closed from this side, as long as nobody asked."""
+        """Transports that the engine has closed, until a check reads them."""
         self._requests = 0
         self.engine.motions.on_refused = self._refused
         self._numbers: dict[str, list[object]] = {}
-        """Transport → numbers of the requests that no response answers so far."""
+        """Transport → numbers of the requests without a response."""
 
     @property
     def used(self) -> set[Exercised]:
-        """The commands, polls and messages that were used."""
+        """Commands, polls and messages that the test has used."""
         return self.engine.used
 
     def begin(self) -> None:
-        """Connect every line that stays open."""
+        """Connect every persistent transport."""
         self.perform(self.engine.tick(self.now))
         for name, spec in self.driver.transports.items():
             if spec.connection == "persistent":
                 self.connect(name)
 
     def connect(self, transport: str) -> None:
-        """Let a line be connected."""
+        """Connect a transport."""
         self.fed.pop(transport, None)
         self._numbers.pop(transport, None)
         self.perform(self.engine.start(transport, self.now))
 
     def close(self, transport: str) -> None:
-        """Let the robot end a connection."""
+        """Close a connection from the robot's side."""
         self.perform(self.engine.closed(transport, "", self.now))
 
     def leave(self) -> None:
-        """Let the operator go."""
+        """Start the orderly close of all connections."""
         self.perform(self.engine.finish(self.now))
 
     def run(self, command: str, arguments: Mapping[str, Reading]) -> None:
-        """Run a command; one that is held is given once, as the first frame of a gesture is."""
+        """Run a command; a held command sends the first frame of a gesture."""
         self._requests += 1
         known = self.driver.commands.get(command)
         if known is not None and known.hold is not None:
@@ -150,7 +150,7 @@ class Trial:
         self.perform(self.engine.command(request, self.now))
 
     def _give(self, command: Command, arguments: Mapping[str, Reading]) -> None:
-        """Send a frame of motion: it passes the queue, waits for no answer, and may be refused."""
+        """Send a motion frame, which bypasses the queue, waits for no reply, and may be refused."""
         name, number = command.name, self._requests
         self.used.add(("command", name))
         try:
@@ -161,13 +161,13 @@ class Trial:
             return
         data = made.numbered.data if isinstance(made, Counted) else made
         if data == b"":
-            text = "it waits for an answer that the robot owes"
+            text = "it waits for an outstanding reply"
             self._failed(Failed(number, name, "not-allowed", text))
             return
         self.perform([Send(command.transport, data), Replied(number, name, {})])
 
     def _refused(self, command: str, why: str) -> None:
-        """Take note that the robot refuses motion."""
+        """Note that the robot refuses motion."""
         self._failed(Failed(self._requests, command, "refused", why))
 
     def _failed(self, failed: Failed) -> None:
@@ -175,7 +175,7 @@ class Trial:
         self.ended.append(failed)
 
     def feed(self, transport: str, piece: Fed) -> None:
-        """Let the robot say something."""
+        """Feed data as if the robot sent it."""
         data: Payload
         if isinstance(piece, Envelope):
             data = self._envelope(transport, piece)
@@ -186,7 +186,7 @@ class Trial:
         self.perform(self.engine.receive(transport, data, self.now))
 
     def _envelope(self, transport: str, piece: Envelope) -> Envelope:
-        """Return what the transport would bring: an answer has the number of its request."""
+        """Return the message as the transport delivers it: a response gets its request's number."""
         body = piece.body
         if body is not None and self.driver.transports[transport].type not in _BRINGS_OBJECTS:
             body = body if isinstance(body, bytes) else json.dumps(body).encode()
@@ -194,13 +194,13 @@ class Trial:
         if piece.verb in ("response", "feedback"):
             numbers = self._numbers.get(transport, [])
             if not numbers:
-                raise UrcError(f"{transport}: nothing waits for this {piece.verb}")
+                raise UrcError(f"{transport}: no request waits for this {piece.verb}")
             number = numbers.pop(0) if piece.verb == "response" else numbers[0]
             attributes = {"ok": True, **attributes, "id": number}
         return Envelope(piece.verb, attributes, body)
 
     def fall_silent(self) -> None:
-        """Let as much time pass as ends a frame that silence ends."""
+        """Pass the time that ends a frame by silence."""
         for name in self.fed:
             due = self.engine.lines[name].inbox.decoder.deadline
             if due is not None:
@@ -208,16 +208,16 @@ class Trial:
                 self.perform(self.engine.tick(self.now))
 
     def wait(self, seconds: float) -> None:
-        """Let time pass, and everything happen that is due in it."""
+        """Pass simulated time, with all deadlines in it."""
         end = self.now + seconds
         for _ in range(_MOST_TICKS):
             if not self.pass_to_deadline(end):
                 self.now = end
                 return
-        raise UrcError(f"more than {_MOST_TICKS} things are due within {seconds:g} s")
+        raise UrcError(f"more than {_MOST_TICKS} deadlines are due within {seconds:g} s")
 
     def pass_to_deadline(self, end: float = float("inf")) -> bool:
-        """Let time pass to the next thing that is due until `end`; return whether there is one."""
+        """Pass time to the next deadline before `end`; return whether one exists."""
         due = self.engine.deadline
         if due is None or due > end:
             return False
@@ -226,7 +226,7 @@ class Trial:
         return True
 
     def perform(self, events: list[Event]) -> None:
-        """Do what a link would do."""
+        """Perform events as a link does."""
         for poll in self.driver.polls:
             if self.engine.lines[poll.transport].has(poll.name) or poll.reply is None:
                 self.used.add(("poll", poll.name))
@@ -237,7 +237,7 @@ class Trial:
                 case Send(transport, data):
                     self.sent.setdefault(transport, []).append(data)
                     if isinstance(data, Envelope) and data.verb in NUMBERED:
-                        number = data.attributes.get("id")  # motion by requests has none
+                        number = data.attributes.get("id")  # motion requests have no number
                         self._numbers.setdefault(transport, []).append(number)
                 case Samples(_, samples):
                     self.samples.update((sample.signal, sample) for sample in samples)
@@ -254,12 +254,12 @@ class Trial:
                         self.failures.append(f"closed: {reason}")
 
     def forget(self) -> None:
-        """Begin to keep anew which signals are set."""
+        """Start a new collection of set signals."""
         self.fresh.clear()
 
 
 def encoded(text: str | bytes, driver: Driver, transport: str) -> bytes:
-    """Return text in the encoding of its line; raise `UrcError` when it cannot be written."""
+    """Return text in the encoding of its transport; raise `UrcError` for invalid characters."""
     if isinstance(text, bytes):
         return text
     spec = driver.transports[transport]
@@ -267,4 +267,4 @@ def encoded(text: str | bytes, driver: Driver, transport: str) -> bytes:
         return text.encode(spec.encoding)
     except UnicodeEncodeError as error:
         wrong = text[error.start : error.end]
-        raise UrcError(f"{spec.name}: {wrong!r} cannot be written in {spec.encoding}") from error
+        raise UrcError(f"{spec.name}: {wrong!r} cannot be encoded in {spec.encoding}") from error

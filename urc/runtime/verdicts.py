@@ -1,6 +1,6 @@
-"""Held side by side: what a test of a document says, and what came of it.
+"""Comparison of the expected and the actual results of a document's test.
 
-Floor 4, pure. Every complaint is a piece of one line, with both sides in it.
+Layer 4, pure. Each complaint is part of one line and contains both values.
 """
 
 import math
@@ -21,22 +21,22 @@ from urc.runtime.trial import Trial, encoded
 __all__ = ["check_bytes", "check_reply", "check_values", "first", "is_same"]
 
 _SINGLE: Final = 1e-7
-"""Numbers of four bytes are exact to this share of themselves."""
+"""Relative precision of four-byte floats."""
 _SHOWN: Final = 3
-"""Failures told of one test."""
+"""Limit of reported failures of one test."""
 _SHOWN_BYTES: Final = 48
 _BEFORE_BYTES: Final = 16
-"""Of a long frame: bytes shown, and how many of them before the first difference."""
+"""Shown bytes of a long frame, and how many of them come before the first difference."""
 
 
 def first(failures: list[str]) -> list[str]:
-    """Return the first failures, and how many there are beyond."""
+    """Return the first failures, and the number of further ones."""
     more = len(failures) - _SHOWN
     return [*failures[:_SHOWN], f"and {more} more"] if more > 0 else list(failures)
 
 
 def check_values(trial: Trial, expect: Mapping[str, Expected], remedy: Remedy) -> Iterator[str]:
-    """Yield a complaint for each signal that is not as expected."""
+    """Yield a complaint for each signal with an unexpected state."""
     for name, wanted in expect.items():
         state = wanted if isinstance(wanted, State) else State(has_value=True, value=wanted)
         sample = trial.samples.get(name)
@@ -69,7 +69,7 @@ def _wanted(state: State) -> str:
 def check_bytes(
     trial: Trial, driver: Driver, sent: Mapping[str, Fed | tuple[Fed, ...]]
 ) -> Iterator[str]:
-    """Yield a complaint for each transport on which other things were sent; forget what was."""
+    """Yield a complaint for each transport with unexpected sent data, and forget the data."""
     for name, text in sent.items():
         found = trial.sent.pop(name, [])
         pieces = pieces_of(text)
@@ -94,7 +94,7 @@ def check_reply(
     wanted: Mapping[str, object],
     of: str,
 ) -> Iterator[str]:
-    """Yield what is wrong with the first command that ended; forget it."""
+    """Yield the complaints about the first finished command, and forget it."""
     place = next((place for place, one in enumerate(ended) if of in ("", one.command)), None)
     if place is None:
         yield f"{of or 'the command'} should be done, but is not: no answer, or no command was run"
@@ -113,7 +113,7 @@ def check_reply(
 
 
 def _check_messages(transport: str, wanted: list[Envelope], found: list[Payload]) -> Iterator[str]:
-    """Yield a complaint about the first message that is another one."""
+    """Yield a complaint about the first unexpected message."""
     for place in range(max(len(wanted), len(found))):
         one = wanted[place] if place < len(wanted) else None
         other = found[place] if place < len(found) else None
@@ -125,7 +125,7 @@ def _check_messages(transport: str, wanted: list[Envelope], found: list[Payload]
 
 
 def _is_message(found: Envelope, wanted: Envelope) -> bool:
-    """Return whether what was sent has all that is written of it, and the same body."""
+    """Return whether a sent message has all expected attributes and the expected body."""
     given = wanted.attributes
     return (
         found.verb == wanted.verb
@@ -135,7 +135,7 @@ def _is_message(found: Envelope, wanted: Envelope) -> bool:
 
 
 def _is_alike(found: object, wanted: object) -> bool:
-    """Compare data, numbers as everywhere in tests."""
+    """Compare data, with the number rules of tests."""
     if isinstance(found, Mapping) and isinstance(wanted, Mapping):
         return found.keys() == wanted.keys() and all(
             _is_alike(found[name], wanted[name]) for name in wanted
@@ -154,7 +154,7 @@ def _on_wire(sent: Iterable[Payload]) -> bytes:
 
 
 def _framed(text: str | bytes, driver: Driver, transport: str) -> bytes:
-    """Return every byte on the wire: bytes are that already, text is a frame's payload."""
+    """Return every byte on the wire. Bytes are complete already; text is a frame's payload."""
     if isinstance(text, bytes):
         return text
     payload = encoded(text, driver, transport)
@@ -165,7 +165,7 @@ def _framed(text: str | bytes, driver: Driver, transport: str) -> bytes:
 
 
 def is_same(found: object, expected: object) -> bool:
-    """Compare as a person would: 42 is 42.0, but true is not 1, and a third is not exact."""
+    """Compare by value: 42 equals 42.0, true does not equal 1, and fractions have a tolerance."""
     if isinstance(found, tuple) and isinstance(expected, tuple):
         return len(found) == len(expected) and all(map(is_same, found, expected))
     if isinstance(found, bool) != isinstance(expected, bool):
@@ -176,7 +176,7 @@ def is_same(found: object, expected: object) -> bool:
 
 
 def _difference(transport: str, wanted: bytes, found: bytes) -> str:
-    """Return both sides in hex and text around the first byte at which they differ."""
+    """Return both sides in hex and text around the first different byte."""
     at = next((i for i, (a, b) in enumerate(zip(wanted, found, strict=False)) if a != b), None)
     offset = min(len(wanted), len(found)) if at is None else at
     start = max(0, offset - _BEFORE_BYTES) if max(len(wanted), len(found)) > _SHOWN_BYTES else 0
@@ -185,7 +185,7 @@ def _difference(transport: str, wanted: bytes, found: bytes) -> str:
 
 
 def _bytes_shown(data: bytes, start: int) -> str:
-    """Return what stands from `start`, with dots where something is left out."""
+    """Return the bytes from `start`, with dots for omitted ones."""
     if not data:
         return "nothing"
     part = data[start : start + _SHOWN_BYTES]

@@ -117,7 +117,7 @@ def test_a_folder_that_cannot_be_written_is_told_once_and_holds_nobody_up(
         assert log._wakes.wait_for(lambda: log._lost > 0, 5)
     log.close()
     assert [one.getMessage().partition(":")[0] for one in caplog.records] == [
-        "the audit cannot be kept"
+        "the audit log cannot be written"
     ]
     assert log.fault
 
@@ -132,7 +132,7 @@ def test_a_file_that_is_no_database_is_put_aside(
         assert log.settle()
         assert [one.at for one in read(file)] == [1001.0]
     assert file.with_suffix(".broken").read_bytes().startswith(b"this is no database")
-    assert "it is now audit.broken" in caplog.text
+    assert "renamed to audit.broken" in caplog.text
 
 
 def test_reading_nothing_is_no_error(file: Path) -> None:
@@ -203,7 +203,8 @@ def test_a_file_that_somebody_locks_holds_nobody_up_and_is_told_once(
     assert [(each.what, each.times) for each in read(file)][1:] == [("moved", 1), ("lost", 2)]
     told = [one.getMessage() for one in caplog.records]
     assert [text for text in told if "locked" in text] == [
-        "the audit cannot be kept: database is locked; robots are driven and stopped as ever"
+        "the audit log cannot be written: database is locked; "
+        "robots can still be driven and stopped"
     ]
 
 

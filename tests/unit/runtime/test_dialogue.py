@@ -224,11 +224,11 @@ def steps(*lines: str, ready: bool = True) -> str:
         (
             steps('feed: { wire: "LOAD 3\\n" }, expect: { load: 3 }'),
             "3:9 1: no-match: nothing declared matches 'LOAD 3'; load: expected 3, but nothing set"
-            " it: 'LOAD 3' answers a request that nobody made (write polls: [load])",
+            " it: 'LOAD 3' is a reply without its request (write polls: [load])",
         ),
         (
             steps('feed: { wire: "HOOK U\\n" }, expect: { load: { alarm: high } }'),
-            "3:9 1: load: expected the alarm high, but nothing set it: what came set hook",
+            "3:9 1: load: expected the alarm high, but nothing set it: the fed data set hook",
         ),
         (
             steps("wait: 1s, expect: { load: 3 }"),
@@ -241,17 +241,16 @@ def steps(*lines: str, ready: bool = True) -> str:
         ),
         (
             steps('feed: { once: "A 3\\n" }', "expect: { load: 3 }"),
-            "3:9 1: once is not connected: what is fed to it goes nowhere",
+            "3:9 1: once is not connected: it cannot receive the fed data",
         ),
         (
             steps('feed: { wire: "what?\\n" }', "wait: 1s, expect: { hook: { age: never } }"),
-            "3:9 1: no-match: nothing declared matches 'what?' (where that is meant, say so by"
-            " 'fails')",
+            "3:9 1: no-match: nothing declared matches 'what?' (if this is intended, add 'fails')",
         ),
         (
             steps("run: ask, sent: { once: ASK }", "wait: 9s"),
             "4:9 2: reply-timeout: no answer to ask within 2 s; timed-out: no answer to ask within"
-            " 2 s; closed: no answer to ask within 2 s (where that is meant, say so by 'fails')",
+            " 2 s; closed: no answer to ask within 2 s (if this is intended, add 'fails')",
         ),
         (
             steps("run: ask, fails: refused"),
@@ -280,7 +279,7 @@ def steps(*lines: str, ready: bool = True) -> str:
         ),
         (
             steps("wait: 1s, closed: wire"),
-            "3:9 1: wire should be closed from this side, but is not",
+            "3:9 1: wire should have been closed by URC, but is open",
         ),
     ],
 )  # fmt: skip
@@ -356,7 +355,7 @@ ODOM = "feed: { ros: { message: { topic: %s, json: { pose: { x: 2 } } } } }, exp
         ),
         (
             steps("feed: { ros: { response: { json: {} } } }", "wait: 1s, sent: { ros: [] }"),
-            "3:9 1: ros: nothing waits for this response",
+            "3:9 1: ros: no request waits for this response",
         ),
         (steps(ODOM % "/other"), None),
     ],
@@ -379,4 +378,4 @@ def test_time_without_end_is_told_and_not_waited_for(
     """A poll of every second for a day is more than a test may ask."""
     monkeypatch.setattr("urc.runtime.trial._MOST_TICKS", 2000)
     test = "ready: true\npolls: [beat]\nsteps:\n  - { wait: 24h, fails: x }"
-    assert outcome(tmp_path, test)[0] == ["4:9 1: more than 2000 things are due within 86400 s"]
+    assert outcome(tmp_path, test)[0] == ["4:9 1: more than 2000 deadlines are due within 86400 s"]

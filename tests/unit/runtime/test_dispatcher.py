@@ -86,7 +86,7 @@ async def test_mistake_in_the_engine_is_told_and_the_line_begun_anew() -> None:
     dispatcher = Dispatcher(engine, hub, clock, {}, limit_s)
     dispatcher.attach("wire", port)
     dispatcher.start("wire")
-    expected = "URC made a mistake (ZeroDivisionError): please report it with the log"
+    expected = "internal error (ZeroDivisionError): please report it with the log"
     assert [(note.level, note.text) for note in hub.notes] == [("error", expected)]
     assert port.reasons == [expected]
     dispatcher.wind_up()

@@ -37,7 +37,7 @@ async def test_a_loop_that_was_held_up_is_told_and_logged_once(
             await it.clock.hold_up(held_s)
         assert [(round(late, 2), first) for late, first in it.told] == [(0.3, True), (0.75, False)]
         assert [record.getMessage() for record in caplog.records] == [
-            "the server was held up for 300 ms"
+            "the server was blocked for 300 ms"
         ]
         await it.clock.advance(20)
         await it.clock.hold_up(1.0)

@@ -252,7 +252,7 @@ async def test_robot_that_takes_no_bytes_is_given_up() -> None:
         assert {answer.code for answer in refused} == {"queue-full"}
         assert 0 < (len(answers) - len(refused)) * len(word) <= MAX_QUEUED_BYTES
         await clock.advance(5.01)
-        assert state_of(session) == ("lost", "the robot has taken no bytes for 5 s")
+        assert state_of(session) == ("lost", "the robot has accepted no bytes for 5 s")
         line.stall_sends(False)
         await clock.advance(5)
         assert line.opens == 2
@@ -344,7 +344,7 @@ async def test_idle_line_is_opened_anew() -> None:
         await clock.advance(3.5)
         assert line.opens == 1
         await clock.advance(0.6)
-        assert state_of(session) == ("lost", "nothing received for 4 s; connecting anew")
+        assert state_of(session) == ("lost", "nothing received for 4 s; reconnecting")
         await clock.advance(1)
         assert line.opens == 2
 

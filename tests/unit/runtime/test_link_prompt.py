@@ -94,4 +94,4 @@ async def test_bytes_that_the_kernel_never_takes_end_the_line() -> None:
         await clock.advance(1.0)
         assert line.offered == [ASK]
         await clock.advance(STUCK_S + 0.1)
-        assert [note.text for note in session.hub.notes if "taken no bytes" in note.text]
+        assert [note.text for note in session.hub.notes if "accepted no bytes" in note.text]

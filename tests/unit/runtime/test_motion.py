@@ -38,7 +38,7 @@ def test_who_has_not_the_controls_moves_nothing() -> None:
     assert it.tick("bob", speed=1) == "ann has the controls"
     assert it.drive("bob", "take") == "ann has the controls"
     assert it.drive("vic", "take") == "viewers cannot drive"
-    assert it.tick("ann", "beep") == "'beep' is no held command of this robot"
+    assert it.tick("ann", "beep") == "'beep' is not a held command of this robot"
     assert it.heard() == []
 
 
@@ -371,7 +371,7 @@ def test_too_many_screens_are_turned_away() -> None:
     it = Scene()
     for number in range(MOST_SCREENS - 4):
         it.desk.join(Client(str(number)))
-    with pytest.raises(UrcError, match="256 screens"):
+    with pytest.raises(UrcError, match="256 pages"):
         it.desk.join(Client("one-too-many"))
 
 

@@ -39,9 +39,9 @@ async def test_robot_in_a_script_gives_readings_and_replies() -> None:
         await settle()
         assert (await anext(watching)).value == "three"
         await watching.aclose()
-        with pytest.raises(UrcError, match="there is no signal 'nix'; there are: battery, note"):
+        with pytest.raises(UrcError, match="unknown signal 'nix'; expected one of: battery, note"):
             robot.latest("nix")
-        with pytest.raises(UrcError, match="there is no transport 'nix'; there are: wire"):
+        with pytest.raises(UrcError, match="unknown transport 'nix'; expected one of: wire"):
             robot.state("nix")
 
 

@@ -136,11 +136,11 @@ def test_a_test_that_only_feeds_holds_when_all_is_read() -> None:
         (trial(feed={"wire": "nota hi\n"}), "no-match: nothing declared matches 'nota hi'"),
         (
             trial(feed={"wire": "note hi"}),
-            "nothing declared reads what is fed; is the end of the frame missing?",
+            "no message or reply matches the fed data; is the end of the frame missing?",
         ),
         (
             trial(feed={"wire": "42\n"}, reply_to=0),
-            "it checks nothing; say what it should 'expect', what is 'sent' or how it 'fails'",
+            "the test checks nothing; add 'expect', 'sent' or 'fails'",
         ),
         (
             trial(feed={"wire": "ok"}, run="stop"),
@@ -149,7 +149,7 @@ def test_a_test_that_only_feeds_holds_when_all_is_read() -> None:
         (trial(feed={"wire": "no\n"}, run="stop"), "no-match: nothing declared matches 'no'"),
         (
             trial(feed={"wire": "ok\n"}, run="say", arguments={"word": "x"}),
-            "it checks nothing; say what it should 'expect', what is 'sent' or how it 'fails'",
+            "the test checks nothing; add 'expect', 'sent' or 'fails'",
         ),
         (
             trial(feed={"wire": "43\n"}, reply_to=0, expect={"battery": 42}),
@@ -161,7 +161,7 @@ def test_a_test_that_only_feeds_holds_when_all_is_read() -> None:
         ),
         (
             trial(feed={"wire": "42\n"}, reply_to=0, expect={"note": "x"}),
-            "note: expected 'x', but nothing set it: what came set battery",
+            "note: expected 'x', but nothing set it: the fed data set battery",
         ),
         (
             trial(feed={"wire": "4"}, reply_to=0, expect={"battery": 4}),
@@ -172,14 +172,14 @@ def test_a_test_that_only_feeds_holds_when_all_is_read() -> None:
             trial(feed={"wire": "full\n"}, reply_to=0, expect={"battery": 100}),
             "no-match: nothing declared matches 'full';"
             " battery: expected 100, but nothing set it:"
-            " 'full' does not fit the 'regex' of polls.0, which was asked",
+            " 'full' does not fit the 'regex' of polls.0, which was sent",
         ),
         (
             trial(feed={"wire": "a\n" * 5}, reply_to=0, expect={"battery": 1}),
             "no-match: nothing declared matches 'a'; no-match: nothing declared matches 'a';"
             " no-match: nothing declared matches 'a'; and 2 more;"
             " battery: expected 1, but nothing set it:"
-            " 'a' does not fit the 'regex' of polls.0, which was asked",
+            " 'a' does not fit the 'regex' of polls.0, which was sent",
         ),
         (
             trial(feed={"wire": "ok\n"}, run="stop", fails="refused"),
@@ -247,8 +247,8 @@ def test_difference_in_a_long_frame_is_shown_around_its_place() -> None:
 @pytest.mark.parametrize(
     ("test", "message"),
     [
-        (trial(feed={"wire": "é\n"}, expect={"note": ""}), "wire: 'é' cannot be written in ascii"),
-        (trial(run="ask", sent={"wire": "é"}), "wire: 'é' cannot be written in ascii"),
+        (trial(feed={"wire": "é\n"}, expect={"note": ""}), "wire: 'é' cannot be encoded in ascii"),
+        (trial(run="ask", sent={"wire": "é"}), "wire: 'é' cannot be encoded in ascii"),
     ],
 )  # fmt: skip
 def test_text_that_the_line_cannot_carry_is_told(test: DocumentTest, message: str) -> None:

@@ -49,7 +49,7 @@ BAD = [
     (
         Setting("s", "path"),
         "~no-such-user/x",
-        "'~no-such-user/x' is not a path: whose home is meant is not known",
+        "'~no-such-user/x' is not a path: its home folder is unknown",
     ),
     (Setting("s", "integer", is_secret=True), "x", "that is not a whole number"),
 ]

@@ -114,7 +114,7 @@ def test_a_mistake_in_here_reaches_nobody_and_is_told_once(
     trail.leased(LeaseState(1, ANN), 3.0)
     assert trail.is_faulty
     assert [one.getMessage() for one in caplog.records] == [
-        "the audit misses what happens to rover"
+        "the audit log lacks an event of rover"
     ]
 
 

@@ -17,7 +17,7 @@ async def test_a_server_that_was_held_up_stops_what_moves() -> None:
         it.tick(ann)
         await it.clock.advance(0.05)
         await it.clock.hold_up(0.2)
-        assert [note.text for note in it.hub.notes] == ["the server was held up for 150 ms"]
+        assert [note.text for note in it.hub.notes] == ["the server was blocked for 150 ms"]
         it.tick(ann)
         assert it.movers.texts[-1] == "drive speed=0.5"
         await it.clock.hold_up(0.7)

@@ -1,1 +1,1 @@
-"""Recordings: what happens with a robot, kept in a file, and played back."""
+"""Recordings: the events of a robot in a file, and their playback."""

@@ -1,7 +1,7 @@
-"""What the messages of a recording tell, as what happened.
+"""Decoding of a recording's messages into events.
 
-Floor 4, pure. A file may be damaged, or made by anybody: what is not as `shapes` makes it tells
-nothing.
+Layer 4, pure. A file may be damaged or come from any program, so a message that `shapes` would not
+write is ignored.
 """
 
 import base64
@@ -20,7 +20,7 @@ _MOST: Final = 2**31 - 1
 
 
 def is_state(topic: str) -> bool:
-    """Return whether the last message of a topic holds until the next: a signal, or a line."""
+    """Return whether the last message of a topic is a state: a signal or a transport."""
     return topic.startswith((SIGNALS, LINK))
 
 
@@ -32,18 +32,18 @@ def topic_of(signal: str) -> str:
 def event_of(
     topic: str, data: bytes, time_s: float, signals: Mapping[str, Signal]
 ) -> Sample | LinkStatus | Note | Traffic | None:
-    """Return what a message tells, as if it happened now; None when it tells nothing known.
+    """Return the event of a message, as if it happened now; None for an unknown message.
 
     Args:
-        topic: of the message.
+        topic: topic of the message.
         data: its JSON.
-        time_s: monotonic seconds at which it happens.
-        signals: of the profile that shows it, which may have changed since.
+        time_s: time of the event, in monotonic seconds.
+        signals: signals of the displayed profile, which may have changed since the recording.
     """
     try:
         told = msgspec.json.decode(data)
         return _event(topic, told, time_s, signals) if isinstance(told, dict) else None
-    except Exception:  # whatever is wrong with it: it is not one of ours, or damaged
+    except Exception:  # the message is damaged, or from another program
         return None
 
 

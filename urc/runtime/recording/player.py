@@ -1,9 +1,8 @@
-"""Plays a recording: its readings come to a hub as if the robot told them now.
+"""Playback of a recording: its readings go to a hub as if the robot sent them now.
 
-Floor 4. `Player` knows where it stands and whether it runs, also while nobody looks on; `session`
-is what a dashboard opens in place of a robot. What was decoded is played, not the bytes: an answer
-is only understood beside the question it belongs to, and the questions of a new session would come
-at other times than those that were recorded.
+Layer 4. `Player` keeps its position and state even without viewers. A dashboard opens its `session`
+in place of a robot. It plays decoded values, not bytes. A reply can only be decoded together with
+its request, and a new session would send its requests at other times.
 """
 
 import asyncio
@@ -34,15 +33,15 @@ __all__ = ["FASTEST", "Player", "REFUSAL"]
 FASTEST: Final = 100.0
 REFUSAL: Final = "this is a recording: nothing reaches a robot"
 _REST_S: Final = 0.25
-"""Between the end of one that is looped and its beginning."""
+"""Pause between the end and the next start of a looped recording, in seconds."""
 _AHEAD: Final = 256
-"""Messages that are read at once."""
+"""Number of messages to read at once."""
 
 log = logging.getLogger(__name__)
 
 
 class Player:
-    """Where a recording stands. Used from one event loop."""
+    """The position and state of a playback. It runs on one event loop."""
 
     def __init__(
         self,
@@ -55,16 +54,16 @@ class Player:
         is_looped: bool = False,
         clock: Clock | None = None,
     ) -> None:
-        """Stand at the beginning, ready to run.
+        """Prepare the playback, paused at its start.
 
         Args:
-            recording: what is played.
-            profile: as which it is shown.
-            settings: any that the profile can be opened with; nothing is connected.
-            speed: how many seconds of it pass in one.
-            start_s: where it begins.
-            is_looped: whether it begins anew at its end.
-            clock: the time.
+            recording: the recording to play.
+            profile: profile whose pages show the recording.
+            settings: valid settings of the profile; nothing connects with them.
+            speed: recorded seconds per second.
+            start_s: start position, in seconds.
+            is_looped: whether the playback restarts at its end.
+            clock: source of time.
         """
         self.recording = recording
         self.profile = profile
@@ -73,55 +72,55 @@ class Player:
         self._clock: Clock = clock or LoopClock()
         self._speed = min(speed, FASTEST)
         self._base_s = self._within(start_s)
-        """Where it stood at `_since_s`."""
+        """Position at the time `_since_s`, in seconds."""
         self._since_s: float | None = None
-        """When it began to run from there; None: it stands."""
+        """Monotonic time of the last start; None while paused."""
         self._wishes_to_run = True
         self._is_open = False
         self._number = 0
-        """Another one after every change of where it stands, or how it runs."""
+        """Number of changes of position or state so far."""
         self._changed = asyncio.Event()
 
     @property
     def began_s(self) -> float:
-        """When it was recorded, in seconds since 1970."""
+        """UTC time of the recording's start, in seconds since 1970."""
         return self.recording.start_ns / 1e9
 
     @property
     def length_s(self) -> float:
-        """How long it lasts."""
+        """Length of the recording, in seconds."""
         return self.recording.length_s
 
     @property
     def position_s(self) -> float:
-        """Where it stands, from 0 to `length_s`."""
+        """Position, from 0 to `length_s`."""
         if self._since_s is None:
             return self._base_s
         return self._within(self._base_s + (self._clock.now() - self._since_s) * self._speed)
 
     @property
     def is_playing(self) -> bool:
-        """Whether it runs, or will as soon as somebody looks on."""
+        """Whether the playback runs, or will run with the first viewer."""
         return self._wishes_to_run
 
     @property
     def speed(self) -> float:
-        """How many seconds of it pass in one."""
+        """Recorded seconds per second."""
         return self._speed
 
     def play(self) -> None:
-        """Run; from the beginning, where it stands at its end."""
+        """Start; at the end, start from the beginning."""
         at_end = self.position_s >= self.length_s
         self._wishes_to_run = True
         self._stand(0.0 if at_end else self.position_s, is_moved=at_end)
 
     def pause(self) -> None:
-        """Stand where it is."""
+        """Pause at the current position."""
         self._wishes_to_run = False
         self._stand(self.position_s)
 
     def seek(self, position_s: float) -> None:
-        """Go on from somewhere else; what is beyond an end means that end."""
+        """Move to a position, limited to the recording."""
         self._stand(self._within(position_s), is_moved=True)
 
     def _within(self, position_s: float) -> float:
@@ -136,7 +135,7 @@ class Player:
 
     @asynccontextmanager
     async def session(self) -> AsyncIterator["Played"]:
-        """Be what a dashboard opens; it goes on where the last one left it."""
+        """Open a session for a dashboard, which continues at the last position."""
         played = Played(self.profile, self.settings)
         playing = asyncio.create_task(self._play(played.hub))
         self._is_open = True
@@ -152,14 +151,14 @@ class Player:
     # -- the task
 
     async def _play(self, hub: Hub) -> None:
-        """Play for as long as somebody looks on; what goes wrong is said, and it stands."""
+        """Play while a viewer is present; on an error, report it and pause."""
         while True:
             try:
                 await self._play_on(hub)
-            except Exception as fault:  # a supervisor: a file may go, or be anything
+            except Exception as fault:  # supervisor: files can vanish or have any content
                 if not isinstance(fault, UrcError):
                     log.exception("%s cannot be played", self.recording.file)
-                text = str(fault) if isinstance(fault, UrcError) else f"it broke: {fault!r}"
+                text = str(fault) if isinstance(fault, UrcError) else f"unexpected error: {fault!r}"
                 hub.note(Note(self._clock.now(), "error", "recording", text))
                 self.pause()
                 number = self._number
@@ -180,13 +179,13 @@ class Player:
             try:
                 await self._follow(hub, stream, number)
             finally:
-                with suppress(ValueError):  # somebody left while it was read: it is closed then
+                with suppress(ValueError):  # its thread still runs it; it closes later
                     await asyncio.to_thread(stream.close)
             if number == self._number:
                 await self._at_end(number)
 
     async def _follow(self, hub: Hub, stream: Generator[Message, None, None], number: int) -> None:
-        """Give what the stream has, each in its time, until its end or until it has moved."""
+        """Send each message of the stream at its time, until the end or a change of position."""
         waiting: deque[Message] = deque()
         while True:
             if not waiting:
@@ -202,14 +201,14 @@ class Player:
                 await self._until(waiting[0].time_ns, number)
 
     def _due_ns(self) -> float:
-        """Return until when messages are due: at its end, all of them, whatever time they say."""
+        """Return the time of the last due message; at the end of the recording, infinity."""
         position_s = self.position_s
         if position_s >= self.length_s:
             return math.inf
         return self.recording.start_ns + round(position_s * 1e9)
 
     async def _until(self, time_ns: int, number: int) -> None:
-        """Wait until a message is due, or something has changed."""
+        """Wait until a message is due or the state changes."""
         self._changed.clear()
         if number != self._number:
             return
@@ -234,14 +233,14 @@ class Player:
             await self._changed.wait()
 
     def _forget(self, hub: Hub, known: Set[str]) -> None:
-        """Let nothing stand that had not been told yet where it stands now."""
+        """Clear the values that come only later than the current position."""
         now_s = self._clock.now()
         later = [name for name in hub.signals if topic_of(name) not in known and hub.latest(name)]
         if later:
             hub.put(tuple(Sample(name, None, now_s) for name in later))
 
     def _give(self, hub: Hub, messages: Iterable[Message]) -> None:
-        """Tell the hub, as if it happened so long ago as it did from where the recording stands."""
+        """Send messages to the hub, with times relative to the current position."""
         now_s = self._clock.now()
         position_ns = self.recording.start_ns + round(self.position_s * 1e9)
         samples: list[Sample] = []
@@ -251,7 +250,7 @@ class Player:
             if isinstance(event, Sample):
                 samples.append(event)
                 continue
-            if samples:  # the order is kept
+            if samples:  # keep the order
                 hub.put(tuple(samples))
                 samples = []
             match event:
@@ -266,10 +265,10 @@ class Player:
 
 
 class Played:
-    """What a dashboard has of a recording in place of a session; nothing can be commanded."""
+    """A playback in place of a session; it accepts no command."""
 
     def __init__(self, profile: Profile, settings: Mapping[str, Value]) -> None:
-        """Begin with nothing known."""
+        """Start without values."""
         self.hub = Hub(profile.driver.signals)
         self.frames: Frames = Engine(profile.driver, settings).motions
         self.movers: Movers | None = None
@@ -282,11 +281,11 @@ class Played:
         confirmed_by: tuple[str, ...] = (),
         on_sent: Callable[[Payload], None] | None = None,
     ) -> Replied:
-        """Refuse it."""
+        """Refuse the command."""
         raise CommandFailed("not-allowed", REFUSAL)
 
     def pull(self, sequence: str, what: Pull) -> None:
-        """Nothing is at work."""
+        """Do nothing, because no sequence runs."""
 
     def latch(self, reason: str) -> None:
-        """Nothing moves."""
+        """Do nothing, because nothing moves."""

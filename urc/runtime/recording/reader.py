@@ -1,7 +1,7 @@
-"""Reads recordings, also those of a process that was killed before their end was written.
+"""A reader of recordings, which also reads the file of a killed process.
 
-Floor 4. Only what a player needs: the document, from when to when, and the messages in the order in
-which they happened, from any moment on. A file is read piece by piece, however long it is.
+Layer 4. It provides the parts that a player needs: the document, the time range, and the messages
+in order from any time on. It reads files of any length piece by piece.
 """
 
 import json
@@ -22,46 +22,46 @@ from urc.runtime.recording.shapes import LOG, PROFILE
 __all__ = ["Message", "Recording", "open_recording"]
 
 _RECORD_BYTES: Final = 64 * 1024 * 1024
-"""Of one piece of a file, also of what is packed in it; a longer one is a damaged file."""
+"""Limit of a record, also after decompression, in bytes; a longer one means a damaged file."""
 
 
 class Message(NamedTuple):
     """One message of a recording."""
 
     time_ns: int
-    """Since 1970."""
+    """Nanoseconds since 1970."""
     topic: str
     data: bytes
 
 
 class Recording(NamedTuple):
-    """A file, and what was found in it."""
+    """The content of a recording."""
 
     file: Path
     document: str
-    """The profile of the robot as it was; "" where none is kept."""
+    """The profile of the robot at that time, or ""."""
     start_ns: int
-    """Time of the first message, since 1970."""
+    """Time of the first message, in nanoseconds since 1970."""
     end_ns: int
     topics: Mapping[Any, str] = NOTHING
-    """Channel → topic, as the end of the file tells them once more."""
+    """Channel → topic, from the summary at the end of the file."""
     unread_bytes: int = 0
-    """Bytes at its end that cannot be read; -1: all can, and yet it has no proper end."""
+    """Number of unreadable bytes at the end; -1 for a readable file without a proper end."""
 
     @property
     def length_s(self) -> float:
-        """How long it lasts."""
+        """Length in seconds."""
         return (self.end_ns - self.start_ns) / 1e9
 
     def messages(self, from_ns: int) -> Generator[Message, None, None]:
-        """Yield all from a moment on, in order; ends early where the file is damaged.
+        """Yield the messages from a time on, in order; end early at damage in the file.
 
-        A piece in the middle that cannot be read is a line of the log.
+        An unreadable piece in the middle becomes a log message.
         """
         yield from _messages(self, from_ns, math.inf)
 
     def before(self, until_ns: int) -> list[Message]:
-        """Return what held just before a moment: the last of each signal and of each line."""
+        """Return the state before a time: the last message of each signal and transport."""
         last: dict[str, Message] = {}
         for message in _messages(self, 0, until_ns):
             if is_state(message.topic):
@@ -70,14 +70,14 @@ class Recording(NamedTuple):
 
 
 def open_recording(file: Path, *, has_profile: bool = False) -> Recording:
-    """Return what is in a file.
+    """Return the content of a recording.
 
     Args:
-        file: a recording.
-        has_profile: whether it is played with another profile than that in it.
+        file: path of the recording.
+        has_profile: whether another profile than the recorded one is used.
 
     Raises:
-        UrcError: it cannot be read, is no recording of URC, or holds nothing.
+        UrcError: the file is unreadable, not a recording of URC, or empty.
     """
     check_installed()
     from mcap.records import Attachment, Channel, Chunk, Footer
@@ -99,10 +99,10 @@ def open_recording(file: Path, *, has_profile: bool = False) -> Recording:
             size = stream.tell()
         left = 0 if is_whole else stream.seek(0, os.SEEK_END) - size
     if not document and not has_profile:
-        raise UrcError(f"{file} is no recording of URC: it holds no {PROFILE}")
+        raise UrcError(f"{file} is not a recording of URC: it contains no {PROFILE}")
     if not times:
-        why = f"{left} bytes of it cannot be read" if left > 0 else "it has just been begun"
-        raise UrcError(f"{file} holds nothing that can be played: {why}")
+        why = f"{left} bytes of it cannot be read" if left > 0 else "it has only just begun"
+        raise UrcError(f"{file} contains nothing to play: {why}")
     unread = 0 if is_whole else left or -1
     return Recording(file, document, min(times), max(times), topics, unread)
 
@@ -119,10 +119,10 @@ def _messages(recording: Recording, from_ns: int, before_ns: float) -> Iterator[
                 if record.message_start_time >= before_ns:
                     return
                 if topics and record.message_end_time < from_ns:
-                    continue  # the first one names the topics
+                    continue  # the first chunk declares the topics
                 try:
                     records = [*_unpacked(record)]
-                except Exception as fault:  # whatever a damaged piece makes the library raise
+                except Exception as fault:  # the library raises many types for damaged data
                     yield _unreadable(record.message_start_time, fault)
                     continue
             for one in records:
@@ -133,14 +133,14 @@ def _messages(recording: Recording, from_ns: int, before_ns: float) -> Iterator[
 
 
 def _unpacked(chunk: Any) -> Iterable[object]:
-    """Return what is in a chunk; raise something where it is damaged, or far too much."""
+    """Return the records of a chunk; raise for a damaged or too large one."""
     from mcap.stream_reader import breakup_chunk
 
     data = chunk.data
     if chunk.compression == "zstd":
         from zstandard import ZstdDecompressor
 
-        # One call of the library believes the size that the data tell, and makes room for it.
+        # The library's one-shot call allocates whatever size the data claims.
         with ZstdDecompressor().stream_reader(data) as reader:
             data = reader.read(_RECORD_BYTES + 1)
     elif chunk.compression == "lz4":
@@ -161,17 +161,17 @@ def _unreadable(time_ns: int, fault: Exception) -> Message:
 def _opened(file: Path) -> IO[bytes]:
     try:
         if not S_ISREG(file.stat().st_mode):
-            raise UrcError(f"{file} is no file")
+            raise UrcError(f"{file} is not a file")
         return open(file, "rb")
     except OSError as error:
         raise UrcError(f"{file} cannot be read: {error.strerror or error}") from None
 
 
 def _records(file: Path, stream: IO[bytes]) -> Iterator[object]:
-    """Yield the records of a file, as far as it can be read.
+    """Yield the readable records of a file.
 
     Raises:
-        UrcError: it does not begin like a file of this kind.
+        UrcError: the file does not start like an MCAP file.
     """
     from mcap.exceptions import InvalidMagic
     from mcap.stream_reader import StreamReader
@@ -184,9 +184,9 @@ def _records(file: Path, stream: IO[bytes]) -> Iterator[object]:
             yield record
     except InvalidMagic:
         if not has_begun:
-            raise UrcError(f"{file} is no MCAP file") from None
+            raise UrcError(f"{file} is not an MCAP file") from None
     except OSError as error:
         raise UrcError(f"{file} cannot be read: {error.strerror or error}") from None
-    except Exception:  # the library raises what it likes where a file is cut off or damaged
+    except Exception:  # the library raises many types for cut or damaged files
         if not has_begun:
-            raise UrcError(f"{file} is no MCAP file") from None
+            raise UrcError(f"{file} is not an MCAP file") from None

@@ -1,11 +1,10 @@
-"""Keeps all that happens with a robot in an MCAP file.
+"""The recorder of one session, which writes an MCAP file.
 
-Floor 4. Theory of operation. `Recorder.put` takes what happened and returns: it never waits for a
-disk, because motion passes by on the same loop. A thread of its own does everything that may wait:
-it reads the document, makes the file, and writes. Once a second what was written is made whole, so
-that a process that is killed loses that second, and the end of the file. When the queue is full,
-what comes is lost, and the file says how much; when the disk is, nothing is written any more, and
-`fault` says why.
+Layer 4. Theory of operation. `Recorder.put` queues events and returns. It never waits for a disk,
+because motion uses the same event loop. A separate thread does all slow work: it reads the
+document, creates the file, and writes. Once a second it flushes, so a killed process loses that
+second and the end of the file. When the queue is full, new events are lost, and the file has their
+count. When the disk is full, the recording ends, and `fault` has the reason.
 """
 
 import asyncio
@@ -35,19 +34,19 @@ __all__ = ["Recorder", "check_installed", "named", "recorded"]
 _SUFFIX: Final = ".mcap"
 _MISSING: Final = "recordings need the package mcap: pip install 'urc[record]'"
 MOST_WAITING: Final = 50_000
-"""Pieces that wait to be written."""
+"""Limit of the queue, in events."""
 MOST_WAITING_BYTES: Final = 64 * 1024 * 1024
 _PIECE_BYTES: Final = 200
-"""What a small piece takes, about."""
+"""Approximate size of a small event, in bytes."""
 _TRIES: Final = 1000
-"""Names that are tried for a file."""
+"""Number of names to try for a file."""
 _GATHER_S: Final = 0.05
-"""How long what happens is gathered on the loop: waking for each piece would cost more than it."""
+"""Time to gather events on the loop, in seconds; a wake-up for each event would cost more."""
 _CHUNK_BYTES: Final = 256 * 1024
-"""The library's own is four times that, and ending one would hold the interpreter up too long."""
+"""Size of an MCAP chunk, in bytes; the library's default of 1 MiB blocks the interpreter longer."""
 _SLICE: Final = 100
 _PAUSE_S: Final = 0.001
-"""After so many pieces the thread lets others run: they wait for the interpreter meanwhile."""
+"""Pause of the thread after so many events, in seconds, so that other threads can run."""
 _WHOLE_S: Final = 1.0
 _CLOSE_S: Final = 10.0
 _SECOND_NS: Final = 1_000_000_000
@@ -56,13 +55,13 @@ log = logging.getLogger(__name__)
 
 
 def check_installed() -> None:
-    """Raise `UrcError` where there is no package for recordings."""
+    """Raise `UrcError` if the package for recordings is missing."""
     if find_spec("mcap") is None:
         raise UrcError(_MISSING)
 
 
 class Recorder:
-    """The one writer of a file."""
+    """A writer of one recording."""
 
     def __init__(
         self,
@@ -72,26 +71,26 @@ class Recorder:
         is_folder: bool = False,
         document: str | None = None,
     ) -> None:
-        """Start the thread; the file is made by it.
+        """Start the writer thread, which creates the file.
 
         Args:
-            place: the file, which must not be there yet, or a folder.
-            profile: of the robot.
-            is_folder: whether `place` is one: the file in it has a name of `named`.
-            document: the profile as one document; read from its file when left out.
+            place: path of a new file, or of a folder.
+            profile: profile of the robot.
+            is_folder: whether `place` is a folder; `named` then gives the file its name.
+            document: the profile as one document; read from its file by default.
         """
         self.file = place
-        """Where it is written, as soon as `is_begun`."""
+        """Path of the file, valid once `is_begun`."""
         self.fault = ""
-        """Why nothing is written, or not any more; "" while all is well."""
+        """Reason why writing has stopped, or ""."""
         self.is_begun = False
-        """Whether the file is there."""
+        """Whether the file exists."""
         self.counts: Counter[str] = Counter()
-        """Topic → messages, as far as they are written."""
+        """Topic → number of written messages."""
         self._is_folder = is_folder
         self._profile = profile
         self._document = document
-        # One difference for the whole file: a clock that is set meanwhile moves nothing in it.
+        # One offset for the whole file: a change of the system clock must not shift its times.
         offset_ns = time.time_ns() - time.monotonic_ns()
         self._shapes = Shapes(profile.driver, lambda time_s: offset_ns + round(time_s * _SECOND_NS))
         self._writer: Any = None  # half of its methods have no types
@@ -102,12 +101,12 @@ class Recorder:
         self._wakes = threading.Condition()
         self._is_closing = False
         self._is_faulty = False
-        """Whether anything could not be kept because of a mistake in URC."""
+        """Whether a bug in URC has prevented an event from being written."""
         self._thread = threading.Thread(target=self._run, name="urc-recorder", daemon=True)
         self._thread.start()
 
     def put(self, events: Iterable[Tapped], lost: int = 0) -> None:
-        """Take what happened, and how much was lost on the way here; returns at once."""
+        """Queue events, with the number of lost events before them; return at once."""
         with self._wakes:
             self._lost += lost
             for event in events:
@@ -121,13 +120,13 @@ class Recorder:
             self._wakes.notify()
 
     def close(self) -> None:
-        """Write what waits and the end of the file, for ten seconds at most."""
+        """Write the queue and the end of the file, for ten seconds at most."""
         with self._wakes:
             self._is_closing = True
             self._wakes.notify()
         self._thread.join(_CLOSE_S)
         if self._thread.is_alive():
-            self._fail(f"{self.file}: the disk has not taken the end of it in {_CLOSE_S:g} s")
+            self._fail(f"{self.file}: the end of the file was not written within {_CLOSE_S:g} s")
 
     # -- the thread
 
@@ -143,12 +142,12 @@ class Recorder:
             self._fail(str(error))
         except OSError as error:
             self._fail(f"{self.file} cannot be written: {error.strerror or error}")
-        except Exception as error:  # a supervisor: a recording that ends must end nothing else
-            log.exception("a recording broke")
-            self._fail(f"{self.file}: the recording broke: {error!r}")
+        except Exception as error:  # supervisor: the session must go on without the recording
+            log.exception("a recording failed")
+            self._fail(f"{self.file}: the recording failed: {error!r}")
         finally:
             if stream is not None:
-                with suppress(OSError):  # of a disk that is full: it says so a second time
+                with suppress(OSError):  # a full disk raises a second time
                     stream.close()
                 if not self.is_begun:
                     with suppress(OSError):
@@ -163,8 +162,8 @@ class Recorder:
                 with suppress(FileExistsError):
                     return open(self.file, "xb")
         except OSError as error:
-            raise UrcError(f"{self.file} cannot be made: {error.strerror or error}") from None
-        raise UrcError(f"{self.file} is there already; no recording is written over another")
+            raise UrcError(f"{self.file} cannot be created: {error.strerror or error}") from None
+        raise UrcError(f"{self.file} already exists; recordings are never overwritten")
 
     def _begin(self, stream: IO[bytes]) -> None:
         from mcap.writer import Writer  # an extra
@@ -172,7 +171,7 @@ class Recorder:
         profile, document = self._profile, self._document
         if document is None:
             document = resolve(profile.file, shelf_of(profile.file), profile).text
-            # Its comments say where each key comes from: whose home that is, is nobody's business.
+            # Comments of the document show where each key comes from; the home folder is private.
             document = document.replace(f"# {Path(profile.file).parent}{os.sep}", "# ")
         writer: Any = Writer(stream, chunk_size=_CHUNK_BYTES)
         self._writer = writer
@@ -182,7 +181,7 @@ class Recorder:
             data, now_ns = document.encode(), time.time_ns()
             writer.add_attachment(now_ns, now_ns, PROFILE, "application/yaml", data)
         else:
-            text = f"{profile.file} does not load any more: replay it with --profile"
+            text = f"{profile.file} can no longer be loaded: replay this with --profile"
             self.put([Note(time.monotonic(), "warning", "recording", text)])
         for channel in channels(profile.driver):
             schema = json.dumps(channel.schema).encode()
@@ -192,7 +191,7 @@ class Recorder:
         self.is_begun = True
 
     def _follow(self) -> None:
-        """Write what comes until it is over."""
+        """Write queued events until the end."""
         whole_s = time.monotonic()
         while (batch := self._next()) is not None:
             for number, event in enumerate(batch, 1):
@@ -202,11 +201,11 @@ class Recorder:
             if not batch or time.monotonic() - whole_s >= _WHOLE_S:
                 self._writer.flush()
                 whole_s = time.monotonic()
-                if not self.file.exists():  # the system would go on writing what nobody can find
+                if not self.file.exists():  # the system would write to a deleted file
                     raise UrcError(f"{self.file} was removed, or moved away")
 
     def _next(self) -> list[Tapped] | None:
-        """Return what waits; nothing when nothing came for a second, None when it is over."""
+        """Return queued events; [] after a second without any, None at the end."""
         with self._wakes:
             self._wakes.wait_for(lambda: self._waiting or self._is_closing, _WHOLE_S)
             batch = list(self._waiting)
@@ -214,7 +213,7 @@ class Recorder:
             self._waiting_bytes = 0
             lost, self._lost = self._lost, 0
             if lost:
-                text = f"{lost} pieces are missing here: they came faster than they are written"
+                text = f"{lost} events are missing here: they arrived too fast to be written"
                 batch.append(Note(time.monotonic(), "warning", "recording", text))
             if not batch and self._is_closing:
                 return None
@@ -225,10 +224,10 @@ class Recorder:
             self._write(self._shapes.messages(event))
         except OSError:
             raise
-        except Exception:  # a supervisor: what nobody thought of costs itself only
+        except Exception:  # supervisor: an unexpected event loses only itself
             if not self._is_faulty:
-                log.exception("%s misses something of kind %s", self.file, type(event).__name__)
-                text = "something is missing here that could not be written; URC's own log says why"
+                log.exception("%s lacks an event of kind %s", self.file, type(event).__name__)
+                text = "an event is missing here because it could not be written; see URC's log"
                 self.put([Note(time.monotonic(), "warning", "recording", text)])
             self._is_faulty = True
 
@@ -245,7 +244,7 @@ class Recorder:
 
 
 def _size(event: Tapped) -> int:
-    """Return about how many bytes something takes while it waits."""
+    """Return the approximate size of a queued event, in bytes."""
     held: object = None
     if isinstance(event, Traffic):
         held = event.data
@@ -273,15 +272,15 @@ async def recorded(
     *,
     is_folder: bool = False,
 ) -> AsyncIterator[Recorder]:
-    """Keep all that a hub is told for as long as the context lasts; nothing of it is waited for.
+    """Record all events of a hub during the context, without slowing it down.
 
-    The log of the hub says where it is kept, or why it is not.
+    The hub's log names the file, or the reason of a failure.
 
     Args:
-        hub: of the session, best before it is opened; no secret leaves it.
-        place: the file, or a folder, as of `Recorder`.
-        profile: of the robot, from a file.
-        is_folder: whether `place` is one.
+        hub: hub of the session, ideally before the session opens; it passes no secrets on.
+        place: the file, or a folder, as for `Recorder`.
+        profile: profile of the robot, from a file.
+        is_folder: whether `place` is a folder.
     """
     recorder = Recorder(place, profile, is_folder=is_folder)
     with hub.tap(with_traffic=True) as tap:
@@ -298,7 +297,7 @@ async def recorded(
 async def _feed(tap: Tap, hub: Hub, recorder: Recorder) -> None:
     dropped, said = 0, ""
     while True:
-        with suppress(TimeoutError):  # what became of the file is told also where nothing happens
+        with suppress(TimeoutError):  # the state of the file is also reported without events
             async with asyncio.timeout(_WHOLE_S):
                 await tap.filled()
         recorder.put(tap.take(), tap.dropped - dropped)
@@ -314,4 +313,4 @@ async def _feed(tap: Tap, hub: Hub, recorder: Recorder) -> None:
 def _state(recorder: Recorder) -> str:
     if recorder.fault:
         return f"nothing is recorded{' any more' * recorder.is_begun}: {recorder.fault}"
-    return f"all that happens is recorded in {recorder.file.name}" if recorder.is_begun else ""
+    return f"all events are recorded in {recorder.file.name}" if recorder.is_begun else ""

@@ -1,8 +1,8 @@
-"""What a recording holds: topics, and what happens as JSON messages.
+"""The content of a recording: topics, and events as JSON messages.
 
-Floor 4, pure. A recording is an MCAP file (https://mcap.dev/spec) of JSON messages whose shapes are
-told by JSON Schemas in it, so that any program for such files shows it. Images and the log have the
-shapes that those programs know by name (``foxglove.CompressedImage``, ``foxglove.Log``; see
+Layer 4, pure. A recording is an MCAP file (https://mcap.dev/spec) of JSON messages. It contains
+their JSON Schemas, so any MCAP program can show it. Images and the log use message types that such
+programs know by name (``foxglove.CompressedImage``, ``foxglove.Log``; see
 https://docs.foxglove.dev/docs/visualization/message-schemas/introduction).
 """
 
@@ -35,14 +35,14 @@ __all__ = [
 ]
 
 PROFILE: Final = "profile.yaml"
-"""Attachment: the robot's document, with all that it is made of."""
+"""Name of the attachment with the robot's whole document."""
 LOG: Final = "/log"
 DRIVING: Final = "/driving"
 SIGNALS, LINK, WIRE, COMMANDS = "/signals/", "/link/", "/wire/", "/commands/"
 _SECOND_NS: Final = 1_000_000_000
 _LAST_S: Final = 1e9
 _LAST_NS: Final = 2**63 - 1
-"""Latest time that every program reads."""
+"""Latest time that every MCAP program can read, in nanoseconds."""
 LEVELS: Final = {"info": 2, "warning": 3, "error": 4}
 _TEXT: Final = {"type": "string"}
 _WHOLE: Final = {"type": "integer"}
@@ -89,7 +89,7 @@ _encode: Final = msgspec.json.Encoder(enc_hook=lambda value: _plain(value)).enco
 
 
 class Channel(NamedTuple):
-    """One topic of a recording, and the shape of its messages."""
+    """One topic of a recording, with its message type."""
 
     topic: str
     shape: str
@@ -98,7 +98,7 @@ class Channel(NamedTuple):
 
 
 def channels(driver: Driver) -> tuple[Channel, ...]:
-    """Return the topics of a robot's recordings: signals, motion, lines, log, and who drove."""
+    """Return the topics of a robot's recordings: signals, motion, traffic, log and audit."""
     found = [_signal_channel(signal) for signal in driver.signals.values()]
     for command in driver.commands.values():
         if command.hold is not None:
@@ -133,13 +133,13 @@ def _signal_channel(signal: Signal) -> Channel:
 
 
 class Shapes:
-    """Makes the messages of one recording: stateful, since its times never go back."""
+    """An encoder for one recording; it has state, because its times never decrease."""
 
     def __init__(self, driver: Driver, utc_ns: Callable[[float], int]) -> None:
-        """Begin.
+        """Start a recording.
 
         Args:
-            driver: of the robot.
+            driver: driver of the robot.
             utc_ns: monotonic seconds → nanoseconds since 1970.
         """
         self._signals = driver.signals
@@ -148,7 +148,7 @@ class Shapes:
         self._told_ns = 0
 
     def messages(self, event: Tapped) -> list[tuple[str, int, bytes]]:
-        """Return topic, time and JSON of what happened."""
+        """Return topic, time and JSON of each message for an event."""
         match event:
             case Sample():
                 return [self._sample(event)]
@@ -198,7 +198,7 @@ class Shapes:
         return COMMANDS + command, time_ns, _json(arguments)
 
     def _ended(self, entry: Entry, time_ns: int) -> list[tuple[str, int, bytes]]:
-        """Return what a motion that has ended tells the robot: else it seems to last for ever."""
+        """Return the message for the end of a motion, which else would seem to continue."""
         command = self._commands.get(entry.command)
         if entry.what != "stopped" or command is None or command.hold is None:
             return []
@@ -209,9 +209,9 @@ class Shapes:
         return WIRE + traffic.transport, self._now(traffic.time_s), _json(told)
 
     def _now(self, time_s: float) -> int:
-        """Return a time that is not before what was told last: the file is played in its order.
+        """Return the time, or the last used time if that is later: playback uses the file's order.
 
-        A reading has the time of its first byte, its bytes that of their arrival.
+        A reading has the time of its first byte; traffic has the time of its arrival.
         """
         time_ns = self._utc_ns(min(max(time_s, 0.0), _LAST_S)) if time_s == time_s else 0
         self._told_ns = min(max(self._told_ns, time_ns), _LAST_NS)
@@ -249,12 +249,12 @@ def _json(told: Mapping[str, object]) -> bytes:
     try:
         return _encode(told)
     except (UnicodeEncodeError, OverflowError):
-        # A lone surrogate in a robot's text, or a number of more than 64 bits.
+        # A lone surrogate in a robot's text, or an integer of more than 64 bits.
         return json.dumps(_mended(told), allow_nan=False).encode()
 
 
 def _mended(value: Any) -> Any:
-    """Return what any JSON can say."""
+    """Return the value with all parts that JSON cannot express replaced."""
     if isinstance(value, str):
         return value.encode("utf-8", "replace").decode()
     if isinstance(value, float):

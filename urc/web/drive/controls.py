@@ -351,7 +351,7 @@ class Controls:
                     seat.moved_s.pop(command, None)
                     seat.notice(command, wire.encode_stopped(command, "expired"))
         if is_first:
-            self._tell("warning", f"the server was held up for {late_s * 1000:.0f} ms")
+            self._tell("warning", f"the server was blocked for {late_s * 1000:.0f} ms")
 
     def _tell(self, level: Literal["info", "warning", "error"], text: str) -> None:
         if self._hub is not None:

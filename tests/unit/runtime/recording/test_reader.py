@@ -141,9 +141,9 @@ def test_a_bomb_is_not_unpacked(
 @pytest.mark.parametrize(
     ("data", "said"),
     [
-        (b"", "is no MCAP file"),
-        (b"urc: 1\n", "is no MCAP file"),
-        (b"\x89MCAP0\r\n", "is no MCAP file"),
+        (b"", "is not an MCAP file"),
+        (b"urc: 1\n", "is not an MCAP file"),
+        (b"\x89MCAP0\r\n", "is not an MCAP file"),
     ],
 )
 def test_what_is_no_recording_is_told_in_one_line(tmp_path: Path, data: bytes, said: str) -> None:
@@ -163,7 +163,7 @@ def test_a_recording_of_another_program_is_told_in_one_line(tmp_path: Path) -> N
     writer.finish()
     with pytest.raises(UrcError) as refused:
         open_recording(other)
-    assert str(refused.value) == f"{other} is no recording of URC: it holds no profile.yaml"
+    assert str(refused.value) == f"{other} is not a recording of URC: it contains no profile.yaml"
 
 
 def test_a_file_that_is_not_there_is_told_in_one_line(tmp_path: Path) -> None:
@@ -188,7 +188,7 @@ def test_what_is_no_plain_file_is_told_in_one_line(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe")
     with pytest.raises(UrcError) as refused:
         open_recording(tmp_path / "pipe")
-    assert str(refused.value) == f"{tmp_path / 'pipe'} is no file"
+    assert str(refused.value) == f"{tmp_path / 'pipe'} is not a file"
 
 
 def test_nothing_recorded_is_told_in_one_line(tmp_path: Path) -> None:
@@ -196,4 +196,4 @@ def test_nothing_recorded_is_told_in_one_line(tmp_path: Path) -> None:
     Recorder(empty, line_profile(), document="urc: 1\n").close()
     with pytest.raises(UrcError) as refused:
         open_recording(empty)
-    assert str(refused.value) == f"{empty} holds nothing that can be played: it has just been begun"
+    assert str(refused.value) == f"{empty} contains nothing to play: it has only just begun"

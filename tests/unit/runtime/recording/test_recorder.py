@@ -88,7 +88,7 @@ def test_what_is_more_than_it_can_keep_is_counted(
     kept.close()
     texts = [message.data for message in open_recording(file).messages(0)]
     assert len(texts) == 3
-    assert b"7 pieces are missing here" in texts[-1]
+    assert b"7 events are missing here" in texts[-1]
 
 
 def test_what_is_too_much_in_bytes_is_counted_too(
@@ -107,7 +107,7 @@ def test_another_recording_is_never_written_over(file: Path) -> None:
     recorder(file).close()
     kept = recorder(file)
     kept.close()
-    assert kept.fault == f"{file} is there already; no recording is written over another"
+    assert kept.fault == f"{file} already exists; recordings are never overwritten"
     assert not kept.is_begun
 
 
@@ -143,7 +143,7 @@ def test_the_document_is_in_it_without_the_folders_of_who_recorded(file: Path) -
 
 @pytest.mark.parametrize(
     ("place", "said"),
-    [("file/bot.mcap", "cannot be made: File exists"), (f"{'x' * 300}.mcap", "too long")],
+    [("file/bot.mcap", "cannot be created: File exists"), (f"{'x' * 300}.mcap", "too long")],
 )
 def test_a_place_that_takes_no_file_is_told(tmp_path: Path, place: str, said: str) -> None:
     (tmp_path / "file").touch()
@@ -158,10 +158,10 @@ def test_a_document_that_is_gone_is_told_in_the_recording(file: Path) -> None:
     kept.put(readings(1))
     kept.close()
     assert kept.fault == ""
-    with pytest.raises(UrcError, match=r"it holds no profile\.yaml"):
+    with pytest.raises(UrcError, match=r"it contains no profile\.yaml"):
         open_recording(file)
     found = list(open_recording(file, has_profile=True).messages(0))
-    assert b"does not load any more: replay it with --profile" in b"".join(m.data for m in found)
+    assert b"can no longer be loaded: replay this with --profile" in b"".join(m.data for m in found)
 
 
 class FullDisk(io.BytesIO):
@@ -221,7 +221,7 @@ def test_a_disk_that_hangs_is_waited_for_a_while_only(
     kept = recorder(file)
     kept.put(readings(1))
     kept.close()
-    assert kept.fault == f"{file}: the disk has not taken the end of it in 0.05 s"
+    assert kept.fault == f"{file}: the end of the file was not written within 0.05 s"
     goes_on.set()
     kept._thread.join()
 
@@ -234,7 +234,7 @@ def test_one_thing_that_cannot_be_written_costs_itself_only(file: Path) -> None:
     kept.close()
     assert kept.fault == ""
     texts = b"".join(message.data for message in open_recording(file).messages(0))
-    assert b"something is missing here" in texts
+    assert b"an event is missing here" in texts
 
 
 def test_without_the_package_it_says_how_to_get_it(
