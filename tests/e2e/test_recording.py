@@ -197,7 +197,7 @@ async def test_a_robot_that_cannot_be_recorded_is_driven_all_the_same(
     await expect(page.locator("[data-badge-text]")).to_have_text("Live")
     said = page.locator("[data-log]")
     await expect(said).to_contain_text("recording: nothing is recorded: ")
-    await expect(said).to_contain_text("cannot be made: Not a directory")
+    await expect(said).to_contain_text("cannot be created: Not a directory")
     await page.close()
     assert await asyncio.to_thread(dashboard.interrupt) == 0
     assert any("puppet: " in line and "Not a directory" in line for line in dashboard.errors)

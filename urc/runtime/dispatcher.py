@@ -244,7 +244,9 @@ class Dispatcher:
 
     def command(self, request: Request) -> asyncio.Future[Answer]:
         """Start a command. The future gets exactly one result, unless `forget` comes first."""
-        loop = self._loop = self._loop or asyncio.get_running_loop()  # cached: the call costs a system call
+        loop = self._loop = (
+            self._loop or asyncio.get_running_loop()
+        )  # cached: the call costs a system call
         answer: asyncio.Future[Answer] = asyncio.Future(loop=loop)
         command = self._commands.get(request.command)
         port = self._ports.get(command.transport) if command else None

@@ -113,9 +113,7 @@ def test_a_mistake_in_here_reaches_nobody_and_is_told_once(
     trail.stopped("go", "released", 2.0)
     trail.leased(LeaseState(1, ANN), 3.0)
     assert trail.is_faulty
-    assert [one.getMessage() for one in caplog.records] == [
-        "the audit log lacks an event of rover"
-    ]
+    assert [one.getMessage() for one in caplog.records] == ["the audit log lacks an event of rover"]
 
 
 def test_secrets_that_come_later_are_hidden_too_and_the_longest_first() -> None:
