@@ -1,1 +1,1 @@
-"""From text to a checked, linked, compiled model."""
+"""The way from YAML to a checked, linked and compiled model."""

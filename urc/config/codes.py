@@ -1,7 +1,6 @@
 """The meaning of each code of a problem: ``codes.md``, for `urc explain` and for SARIF.
 
-Reads one text file and imports nothing. Each page has the same four parts; an example stands
-indented, as code.
+Every page has the same four parts, and an example is an indented code block.
 """
 
 from pathlib import Path
@@ -14,17 +13,17 @@ _PARTS = ("What", "Why", "Example", "Use instead")
 
 
 class Page(NamedTuple):
-    """All there is to say about one code."""
+    """The explanation of one code."""
 
     code: str
     what: str
     """The problem, in one sentence."""
     why: str
-    """Why it is a fault."""
+    """The effect of the problem."""
     example: str
-    """A document, or a part of one, that has it; or words, when no text can."""
+    """A document, or a part of one, with the problem; words where no text can show it."""
     instead: str
-    """The same without it."""
+    """The same example without the problem, or instructions."""
 
     def __str__(self) -> str:
         parts = zip(_PARTS, (self.what, self.why, self.example, self.instead), strict=True)
@@ -39,7 +38,7 @@ def pages() -> dict[str, Page]:
 
 
 def summaries() -> dict[str, str]:
-    """Return what each code means, in one sentence."""
+    """Return the meaning of each code, in one sentence."""
     return {page.code: page.what for page in pages().values()}
 
 
@@ -53,7 +52,7 @@ def _page(text: str) -> Page:
 
 
 def _unfenced(text: str) -> str:
-    """Return the code of a fenced block, or the words as they are, on one line."""
+    """Return the code of a fenced block, or a text as one line."""
     _, fence, code = text.partition("```yaml\n")
     return code.partition("```")[0] if fence else " ".join(text.split())
 

@@ -1,7 +1,7 @@
-"""The look of a profile that declares none: a widget for each slot, and their grid.
+"""The default interface: a widget for each signal and command, and their grid.
 
-Pure: the same driver and the same widgets give the same look. When a widget is missing, or does not
-take its signal, a plainer one is chosen. Commands with several arguments get no widget: the
+Pure: the same driver and the same widgets give the same interface. When a widget is missing or does
+not fit its signal, a simpler widget is chosen. Commands with several arguments get no widget: the
 developer page has a form for each.
 """
 
@@ -21,7 +21,7 @@ from urc.model.widget import Widget
 __all__ = ["automatic_slots", "default_interface"]
 
 MOST_PLAIN: Final = 24
-"""Signals with a cell of their own, when a table can take the others."""
+"""Maximum signals with a cell of their own; a table shows more signals."""
 MOST_COMMANDS: Final = 16
 
 _BATTERY: Final = re.compile(r"batter|charge|\bsoc\b", re.IGNORECASE)
@@ -44,10 +44,10 @@ _GROUPS: Final[tuple[tuple[str, Mapping[str, tuple[str, ...]], frozenset[str]], 
     ("compass", {"heading": ("heading", "bearing", "course")}, frozenset(("heading",))),
     ("compass", {"yaw": ("yaw",)}, frozenset(("yaw",))),
 )
-"""Widget, its inputs by the last words of signals' names, and the inputs that it needs at least."""
+"""Widget, its inputs by the last words of signals' names, and its required inputs."""
 
 _COLUMNS: Final = {"wide": 4, "phone": 2, "low": 7}
-"""Most columns of a default grid."""
+"""Maximum columns of a default grid, by screen."""
 _LOW_ROWS: Final = 2
 """Visible rows on a phone in landscape."""
 _BIG: Final = frozenset(
@@ -56,7 +56,7 @@ _BIG: Final = frozenset(
         *("path-pad", "plot", "scan", "scene3d", "table", "terminal", "vector-pad"),
     )
 )
-"""Widgets that get two rows and two columns."""
+"""Widgets with two rows and two columns."""
 _STEERED: Final = 2
 """Rank of controls that steer."""
 
@@ -82,7 +82,7 @@ def automatic_slots(driver: Driver, shelf: Shelf) -> dict[str, WidgetUse]:
 
 
 def _put(slots: dict[str, WidgetUse], use: WidgetUse) -> None:
-    """Add the widget of a slot, under a free name that a grid can draw."""
+    """Add the widget of a slot, under a free and valid slot name."""
     name = re.sub(r"[^a-z0-9_-]", "-", use.slot.lower()).lstrip("-_0123456789")[:60] or "slot"
     names = (name, *(f"{name}-{number}" for number in range(2, len(slots) + 3)))
     free = next(one for one in names if one not in slots)
@@ -93,7 +93,7 @@ def _put(slots: dict[str, WidgetUse], use: WidgetUse) -> None:
 
 
 def _grouped(left: dict[str, Signal], shelf: Shelf) -> Iterator[WidgetUse]:
-    """Yield the widgets that take several signals, and take those out of `left`."""
+    """Yield the widgets that take several signals, and remove those signals from `left`."""
     for widget_name, inputs, needed in _GROUPS:
         widget = shelf.get(widget_name)
         if widget is None or not needed <= widget.inputs.keys():
@@ -115,7 +115,7 @@ def _grouped(left: dict[str, Signal], shelf: Shelf) -> Iterator[WidgetUse]:
 def _stems(
     signals: Mapping[str, Signal], inputs: Mapping[str, tuple[str, ...]]
 ) -> dict[str, dict[str, Signal]]:
-    """Return what precedes the last word of a name → input → signal: ``gps_lat``, ``gps_lon``."""
+    """Return the part before the last word of a name → input → signal: ``gps_lat``, ``gps_lon``."""
     stems: dict[str, dict[str, Signal]] = {}
     for signal in signals.values():
         stem, _, last = signal.name.rpartition("_")
@@ -126,7 +126,7 @@ def _stems(
 
 
 def _shown(signal: Signal, shelf: Shelf) -> WidgetUse | None:
-    """Return the first widget that shows a signal, from the most telling to the plainest."""
+    """Return the first widget that fits a signal, from the most specific to the simplest."""
     for name in _candidates(signal):
         use = _one_input(shelf.get(name), signal)
         if use is not None:
@@ -149,7 +149,7 @@ def _candidates(signal: Signal) -> tuple[str, ...]:
 
 
 def _one_input(widget: Widget | None, signal: Signal) -> WidgetUse | None:
-    """Return the widget with the signal at its first input that takes it, if that is enough."""
+    """Return the widget with the signal at its first input that fits, if no other is required."""
     if widget is None:
         return None
     fitting = [
@@ -178,7 +178,7 @@ def _table(signals: list[Signal], shelf: Shelf) -> WidgetUse | None:
 
 
 def _given(command: Command, driver: Driver, shelf: Shelf) -> WidgetUse | None:
-    """Return what gives a command; None when it takes more values than any widget has."""
+    """Return the control of a command; None when no widget has enough values."""
     if command.hold is not None:
         held = _held(command, shelf)
         return held if held is not None and _is_complete(held, command) else None
@@ -224,7 +224,7 @@ def _held(command: Command, shelf: Shelf) -> WidgetUse | None:
 
 
 def _is_complete(use: WidgetUse, command: Command) -> bool:
-    """Return whether the command gets all that it needs: else it would never move."""
+    """Return whether the control gives every required argument; without them no motion starts."""
     given = {name for one in use.given.values() for name in one.names}
     needed = {
         name for name, one in command.arguments.items() if one.is_required and one.default is None
@@ -250,7 +250,7 @@ def _output(widget: Widget | None, command: Command, names: Mapping[str, str]) -
 
 
 def _with_state(use: WidgetUse, argument: Argument, driver: Driver, shelf: Shelf) -> WidgetUse:
-    """Show what the robot says of it, where a signal has the name of the argument or command."""
+    """Show the robot's value, if a signal has the name of the argument or command."""
     widget = shelf.get(use.widget)
     port = widget.inputs.get("state") if widget is not None else None
     command = next(iter(use.outputs.values()))
@@ -275,9 +275,9 @@ def _use(widget: Widget, slot: str, inputs: Mapping[str, str], title: str) -> Wi
 def default_interface(slots: Mapping[str, WidgetUse], title: str) -> Interface:
     """Return an interface named ``default`` that shows every slot.
 
-    Views are on top, the large before the small. Controls that steer are at the bottom right, near
-    the thumb; other controls take the free places. On a phone in landscape, controls that steer
-    come first, at the right and at the left; the page scrolls to the rest.
+    Views are on top, the large ones before the small ones. Controls that steer are at the bottom
+    right, near the thumb; other controls take the free places. On a phone in landscape, controls
+    that steer come first, at the right and at the left, and the page scrolls to the rest.
     """
     return Interface(
         name="default",
@@ -295,7 +295,7 @@ def _grid(slots: Mapping[str, WidgetUse], screen: str) -> Grid:
     taken: set[tuple[int, int]] = set()
     placed: dict[str, Slot] = {}
     ranks = {name: _rank(use) for name, use in slots.items()}
-    # In a narrow grid, controls that steer come last: at the bottom, with nothing below.
+    # In a narrow grid, controls that steer come last, at the bottom.
     steered = -1 if is_low else _STEERED if columns > 2 else 4
     order = {name: steered if rank == _STEERED else rank for name, rank in ranks.items()}
     for number, name in enumerate(sorted(slots, key=lambda name: order[name])):
@@ -311,7 +311,7 @@ def _grid(slots: Mapping[str, WidgetUse], screen: str) -> Grid:
 
 
 def _rank(use: WidgetUse) -> int:
-    """Return the place in the order: large views, small views, controls that steer, others."""
+    """Return the rank of a widget: large views, small views, controls that steer, others."""
     if use.widget in _BIG:
         return _STEERED if use.outputs and not use.inputs else 0
     return 3 if use.outputs else 1
@@ -320,7 +320,7 @@ def _rank(use: WidgetUse) -> int:
 def _free(
     taken: set[tuple[int, int]], columns: int, size: int, first: int, *, is_from_right: bool
 ) -> tuple[int, int]:
-    """Return the first place at or below the row `first` where a square has room."""
+    """Return the first free square at or below the row `first`."""
     places = range(columns - size + 1)
     row = first
     while True:

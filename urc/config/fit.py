@@ -1,4 +1,4 @@
-"""An interface that a user adds to a robot: does it fit, and which widgets does it need?"""
+"""The fit of an interface that a user adds to a robot, and the widgets that it needs."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -30,7 +30,7 @@ class Fitted(NamedTuple):
 
 
 class _Known(Shelf):
-    """The widgets of a profile, then those of a shelf; a name means one widget."""
+    """The widgets of a profile and of a folder, in this order of precedence."""
 
     def __init__(self, widgets: Mapping[str, Widget], behind: Shelf) -> None:
         super().__init__(Path())
@@ -47,23 +47,23 @@ class _Known(Shelf):
         return self._mine.get(name) or self._behind.get(name)
 
     def has(self, name: str) -> bool:
-        """Return whether there is a widget of that name."""
+        """Return whether a widget has this name."""
         return name in self._mine or self._behind.has(name)
 
 
 def fit_interface(path: str, profile: Profile, shelf: Shelf) -> Fitted:
-    """Return an interface with what a robot's driver puts into its slots.
+    """Return an interface with the slots of a robot's driver.
 
     Args:
         path: the interface's document.
         profile: of the robot.
-        shelf: more widgets that the document may use, after the robot's own.
+        shelf: more widgets for the document, after the robot's own.
     """
     gathered = gather(path)
     sources = gathered.sources
     if sources is None or sources.kind != "interface":
         faults = [one.message for one in gathered.problems if one.severity == "error"]
-        return Fitted(None, fault=next(iter(faults), "it is no interface"))
+        return Fitted(None, fault=next(iter(faults), "it is not an interface"))
     findings = Findings()
     interface = parse_interface(sources.root, sources.root.text("name"), findings)
     known = _Known(profile.widgets, shelf)

@@ -1,6 +1,6 @@
 """Problems for other programs: SARIF 2.1.0, and annotations of GitHub's workflow runs.
 
-Reporters over `Problem`, in addition to the text and JSON of `urc.problems`; pure.
+Pure reporters over `Problem`, in addition to the text and JSON of `urc.problems`.
 """
 
 import os
@@ -17,14 +17,14 @@ _SCHEMA: Final = (
     "https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/schemas/sarif-schema-2.1.0.json"
 )
 _DATA: Final = {"%": "%25", "\r": "%0D", "\n": "%0A"}
-"""Escapes in the message of a workflow command …"""
+"""Escapes in the message of a workflow command."""
 _PROPERTY: Final = str.maketrans(_DATA | {":": "%3A", ",": "%2C"})
-"""… and in its properties, which colons and commas part."""
+"""Escapes in its properties, which colons and commas separate."""
 _MESSAGE: Final = str.maketrans(_DATA)
 
 
 def to_github(problem: Problem) -> str:
-    """Return the problem as a workflow command, one line."""
+    """Return the problem as a workflow command of one line."""
     properties = {
         "file": _slashed(problem.file),
         "line": str(problem.line),
@@ -106,6 +106,6 @@ def _slashed(file: str) -> str:
 
 
 def _uri(file: str) -> str:
-    """Return a URI reference: relative to the run's folder as it was written, or absolute."""
+    """Return a URI reference: relative to the folder of the run as given, or absolute."""
     path = PurePath(file)
     return path.as_uri() if path.is_absolute() else quote(_slashed(file))

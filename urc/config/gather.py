@@ -1,7 +1,8 @@
 """The passes over documents: compose, expand, shape, for a robot and the documents that it names.
 
-compose merges a document with its base and its includes. expand fills in `params` and writes out
-each `each`. shape compares the result with the schema. Each is a function of one document.
+Compose merges a document with its base and its includes. Expand fills in `params` and `each`. Shape
+compares the result with the schema. Each is a function of one document.
+
 A robot comes first, because it names its driver and its interfaces.
 """
 
@@ -25,15 +26,15 @@ class Gathered(NamedTuple):
     """The result of the passes over documents."""
 
     sources: Sources | None
-    """None after an error, and for a document that is only a part of others."""
+    """None after an error, and for a partial document."""
     problems: list[Problem]
     kind: str
     files: tuple[str, ...]
-    """Each file that was looked for, existing or not."""
+    """Every requested file, existing or not."""
 
 
 def gather(path: str) -> Gathered:
-    """Return the parts of a document and of those that it names, or the errors."""
+    """Return the parts of a document and of its references, or the errors."""
     library = Library()
     try:
         document = library.read(path)
@@ -65,11 +66,8 @@ def _prepared(
 ) -> Document | None:
     """Return a document after the passes compose, expand and shape, or None.
 
-    Args:
-        document: as read from its file.
-        library: reads its sources, and collects the problems.
-        given: the robot's mapping with `params` and `overrides` for the driver.
-        use: the robot's reference to the driver.
+    `given` is the robot's mapping with `params` and `overrides`. `use` is its reference to the
+    driver.
     """
     findings = library.findings
     whole, sources = compose(document, library)
@@ -91,7 +89,7 @@ def _prepared(
 
 
 def _place(problem: Problem) -> tuple[str, str, int, int]:
-    """Return the identity of a problem: two passes may report one text."""
+    """Return the identity of a problem, because two passes may report the same one."""
     return problem.code, problem.file, problem.line, problem.column
 
 
@@ -105,9 +103,9 @@ def _gather_robot(sources: Sources, library: Library) -> None:
         findings.error(
             root,
             "missing-key",
-            "'driver' or 'transports' is missing from a robot",
+            "a robot needs 'driver' or 'transports'",
             key=True,
-            hint="name a driver's document, or declare the lines to the robot",
+            hint="name the document of a driver, or declare the transports of the robot",
         )
     sources.add(root)
     for name, inner in root.named("interfaces").items():
@@ -126,19 +124,19 @@ def _check_placement(root: Part, findings: Findings) -> None:
             findings.error(
                 root,
                 "misplaced-key",
-                f"'{key}' belongs to the driver",
+                f"'{key}' is a key of the driver",
                 at=key,
                 key=True,
-                hint="move it to where 'driver:' points, or write the whole driver here",
+                hint="move it to the driver's document, or write the whole driver here",
             )
 
 
 def _driver(part: Part, sources: Sources, library: Library) -> Part:
-    """Return the driver at `part`: written there, or named."""
+    """Return the driver at `part`: declared there, or named."""
     reference, given = part, None
     if isinstance(part.data, dict):
         if "use" not in part.data:
-            return part  # it stands right here
+            return part  # declared here
         reference, given = part.must("use"), part
     followed = _follow(reference, "driver", library, given)
     if followed is None:
@@ -159,7 +157,7 @@ def _follow(reference: Part, kind: str, library: Library, given: Part | None = N
         library.findings.error(
             reference,
             "partial-document",
-            f"{prepared.file} is only a part of {'an' if kind == 'interface' else 'a'} {kind}",
+            f"{prepared.file} is a partial {kind}",
             hint="name a document that includes or extends it",
         )
         return None

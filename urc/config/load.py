@@ -37,14 +37,14 @@ class Checked(NamedTuple):
     """The result for one document."""
 
     profile: Profile | None
-    """The profile of a robot or driver without errors; a driver has the default look."""
+    """The profile of a robot or driver without errors; a driver has the default interface."""
     problems: tuple[Problem, ...]
     kind: str
     """``robot``, ``driver``, ``interface``, ``widget``, or "" when a first pass stopped."""
     files: tuple[str, ...] = ()
-    """Every document that was looked for, existing or not; this one is the first."""
+    """Every requested document, existing or not; this document is the first."""
     pages: tuple[str, ...] = ()
-    """URLs of web pages that its widgets show, as written."""
+    """URLs of web pages in its widgets, as written."""
     widget: Widget | None = None
     """The widget of a manifest without errors."""
     is_cut_short: bool = False
@@ -64,13 +64,13 @@ def load_profile(
         return checked.profile
     if not has_errors(checked.problems):
         if checked.kind in ("robot", "driver"):
-            text = f"this is only a part of a {checked.kind}: others include or extend it"
+            text = f"this is a partial {checked.kind}, which others include or extend"
             raise ProblemsError([Problem("partial-document", text, fspath(path))])
         raise ProblemsError(
             [
                 Problem(
                     "wrong-kind",
-                    f"a robot's document is expected, this one is of kind '{checked.kind}'",
+                    f"expected a document of kind 'robot', found kind '{checked.kind}'",
                     fspath(path),
                 ),
             ]
@@ -83,7 +83,7 @@ def check(path: str | PathLike[str], catalog: Catalog, shelf: Shelf | None = Non
     """Return every problem of a document of any kind, and of its references.
 
     Args:
-        path: the document; problems name it as written here.
+        path: the document; problems name it in this form.
         catalog: the transports and framings.
         shelf: the widgets; by default those that ship with URC. With one shelf for several calls,
             each manifest is read once.
@@ -125,7 +125,7 @@ def _pages(uses: Iterable[WidgetUse]) -> tuple[str, ...]:
 
 
 def _told_once(problems: Iterable[Problem]) -> list[Problem]:
-    """Return the problems, one for each text that `each` repeats."""
+    """Return the problems without the copies that `each` causes."""
     paths: dict[tuple[str, str, int, int], str] = {}
     return [
         problem

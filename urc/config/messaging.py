@@ -1,6 +1,6 @@
 """Transports that carry messages instead of bytes, and the forms that each allows.
 
-Transports of packages are not listed here, and are refused nothing.
+Transports of packages are not listed here and have no such limits.
 """
 
 from typing import Final, NamedTuple
@@ -9,12 +9,12 @@ __all__ = ["BYTE_LINES", "CARRIERS", "MESSAGING", "Messaging"]
 
 
 class Messaging(NamedTuple):
-    """The forms of one kind of transport."""
+    """The allowed forms of one transport type."""
 
     verbs: tuple[str, ...]
     """Forms of sent messages."""
     listen: tuple[str, ...]
-    """More keys under ``subscribe``, next to ``topic``."""
+    """Additional keys under ``subscribe``, next to ``topic``."""
 
 
 MESSAGING: Final = {
@@ -26,4 +26,4 @@ MESSAGING: Final = {
 }
 BYTE_LINES: Final = frozenset(("tcp", "udp", "serial", "ssh", "telnet", "websocket"))
 CARRIERS: Final = frozenset(("ssh",))
-"""Transports that can carry other transports."""
+"""Transport types that can be tunnels."""

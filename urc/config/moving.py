@@ -1,4 +1,4 @@
-"""Commands that move something by themselves: their key, their sequences, and their limits."""
+"""Commands with autonomous motion: their key, their sequences, and their limits."""
 
 from collections.abc import Mapping
 
@@ -13,7 +13,7 @@ __all__ = ["link_moves", "parse_moves", "refuse_moving", "runs_what_moves", "wit
 
 
 def parse_moves(part: Part, findings: Findings) -> tuple[bool, Template | None]:
-    """Return whether a command moves something, and for which arguments; None: for all."""
+    """Return whether a command starts autonomous motion, and the condition for it, if any."""
     said = part.get("moves")
     if said is None or isinstance(said.data, bool):
         return bool(said and said.data), None
@@ -21,7 +21,7 @@ def parse_moves(part: Part, findings: Findings) -> tuple[bool, Template | None]:
 
 
 def link_moves(findings: Findings, part: Part, command: Command) -> None:
-    """Report what the condition under ``moves`` cannot know: everything but the arguments."""
+    """Report names in the condition under ``moves`` that are no arguments."""
     condition = command.moves_if
     if condition is None:
         return
@@ -29,14 +29,14 @@ def link_moves(findings: Findings, part: Part, command: Command) -> None:
         findings.error(
             part.must("moves"),
             "unknown-name",
-            f"{name!r} is no argument of {command.name!r}",
+            f"{name!r} is not an argument of {command.name!r}",
             offset=condition.source.find(name),
             hint=did_you_mean(name, command.arguments, "arguments"),
         )
 
 
 def runs_what_moves(command: Command, arguments: Mapping[str, Template | Reading]) -> bool:
-    """Return whether a command with these arguments moves something, as far as a document tells."""
+    """Return whether a command with these arguments may start autonomous motion."""
     is_told = not any(isinstance(value, Template) for value in arguments.values())
     return command.moves_with(arguments) if is_told else command.moves
 
@@ -68,11 +68,11 @@ def refuse_moving(
     command: Command,
     arguments: Mapping[str, Template | Reading],
 ) -> None:
-    """Report a command that moves something by itself, where no person gives it."""
+    """Report autonomous motion of a command at a place where it runs automatically."""
     if runs_what_moves(command, arguments):
         findings.error(
             part,
             "wrong-command",
-            f"{command.name!r} moves something by itself, and here nobody asks for it",
-            hint="run a command that does not move, and let people give this one",
+            f"{command.name!r} starts autonomous motion, and would run automatically here",
+            hint="run a command without motion, and leave this one to people",
         )

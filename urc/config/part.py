@@ -1,7 +1,7 @@
-"""A place in a document of the right shape, and the problems there.
+"""A node of a document that fits its schema, and the problems of the nodes.
 
 The parsers read documents only through `Part`. So each value has a place for a problem, and a test
-can see which keys are read. All functions here assume that the shape pass found no fault.
+can see the keys in use. All functions here assume that the shape pass found no error.
 """
 
 import math
@@ -27,13 +27,13 @@ def duration_s(text: str) -> float:
     found = _DURATION.fullmatch(text)
     if found is None:
         raise ValueError(f"{text!r} is not a duration")
-    # Scaled as a whole: 250 * 0.001 is not 0.25 exactly, 250 / 1000 is.
+    # A division is exact: 250 / 1000 is 0.25, and 250 * 0.001 is not.
     number, unit = float(found[1]), found[2]
     return number / 1000 if unit == "ms" else number * _UNITS_S[unit]
 
 
 class Part(NamedTuple):
-    """One value of a document, and its place."""
+    """A value of a document, and its place."""
 
     document: Document
     path: Path
@@ -41,7 +41,7 @@ class Part(NamedTuple):
 
     @property
     def name(self) -> str:
-        """The key or index that leads to it."""
+        """The last key or index of the path."""
         return str(self.path[-1]) if self.path else ""
 
     def get(self, key: str) -> "Part | None":
@@ -55,7 +55,7 @@ class Part(NamedTuple):
         return Part(self.document, (*self.path, key), self.data[key])
 
     def named(self, key: str) -> dict[str, "Part"]:
-        """Return the entries of the mapping under `key`; none when it is left out."""
+        """Return the entries of the mapping under `key`; none when the key is missing."""
         inner = self.get(key)
         return inner.entries() if inner else {}
 
@@ -66,7 +66,7 @@ class Part(NamedTuple):
         }
 
     def listed(self, key: str) -> list["Part"]:
-        """Return the items of the list under `key`; none when it is left out."""
+        """Return the items of the list under `key`; none when the key is missing."""
         inner = self.get(key)
         return inner.items() if inner else []
 
@@ -82,22 +82,22 @@ class Part(NamedTuple):
         return default if inner is None else str(inner.data)
 
     def flag(self, key: str, *, default: bool) -> bool:
-        """Return the truth under `key`."""
+        """Return the boolean under `key`."""
         inner = self.get(key)
         return default if inner is None else bool(inner.data)
 
     def number(self, key: str) -> float | None:
-        """Return the number under `key`, or None when it is left out."""
+        """Return the number under `key`, or None when the key is missing."""
         inner = self.get(key)
         return None if inner is None else inner.data
 
     def integer(self, key: str) -> int | None:
-        """Return the whole number under `key`; 3.0 is one too, as in JSON Schema."""
+        """Return the whole number under `key`; as in JSON Schema, 3.0 is a whole number."""
         inner = self.get(key)
         return None if inner is None else int(inner.data)
 
     def scalar(self, key: str) -> Value:
-        """Return the plain value under `key`, or None when it is left out."""
+        """Return the plain value under `key`, or None when the key is missing."""
         inner = self.get(key)
         value: Value = None if inner is None else inner.data
         return value
@@ -113,7 +113,7 @@ class Findings:
         return iter(self.problems)
 
     def error(self, part: Part, code: str, message: str, **place: Any) -> None:
-        """Add an error; `place` is what `Document.problem` takes, and ``at``: a key inside."""
+        """Add an error; `place` has arguments of `Document.problem`, and ``at``: a key inside."""
         self._add(part, code, message, "error", **place)
 
     def warn(self, part: Part, code: str, message: str, **place: Any) -> None:
@@ -135,7 +135,7 @@ class Findings:
         least: float = 0.001,
         most: float = _LONGEST_S,
     ) -> float:
-        """Return the duration under `key` in seconds, within `least` and `most`."""
+        """Return the duration under `key` in seconds, from `least` to `most`."""
         inner = part.get(key)
         if inner is None:
             return default
@@ -150,7 +150,7 @@ class Findings:
         return seconds
 
     def pattern(self, part: Part, *, is_over_bytes: bool = False) -> Pattern | None:
-        """Compile the pattern at `part`, or report why it cannot be."""
+        """Compile the pattern at `part`, or report its mistake."""
         try:
             return compile_pattern(part.data, is_over_bytes=is_over_bytes)
         except PatternError as error:
@@ -158,7 +158,7 @@ class Findings:
             return None
 
     def template(self, part: Part) -> Template | None:
-        """Compile the template at `part`, or report why it cannot be."""
+        """Compile the template at `part`, or report its mistake."""
         try:
             return compile_template(part.data)
         except ExpressionError as error:
@@ -166,18 +166,18 @@ class Findings:
             return None
 
     def expression(self, part: Part, *, allows_bytes: bool = False) -> Template | None:
-        """Compile the expression at `part`, or report why it cannot be."""
+        """Compile the expression at `part`, or report its mistake."""
         try:
             return compile_expression(part.data, allows_bytes=allows_bytes)
         except ExpressionError as error:
             braces = "{{" in part.data
-            hint = "an expression is written without braces" if braces else ""
+            hint = "write the expression without braces" if braces else ""
             self.error(part, "bad-expression", str(error), offset=error.offset, hint=hint)
             return None
 
 
 def shown_duration(seconds: float) -> str:
-    """Return seconds as a document writes them."""
+    """Return seconds in the notation of a document, such as ``250ms``."""
     if seconds and seconds < 1:
         return f"{seconds * 1000:g}ms"
     for unit in ("h", "m"):

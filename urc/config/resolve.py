@@ -1,6 +1,6 @@
-"""A profile as one document, with the place of every key.
+"""A profile as one document, with the origin of every key.
 
-The result is itself a document: it loads, and means the same.
+The result is itself a valid document with the same meaning.
 """
 
 import json
@@ -27,7 +27,7 @@ _BUILDING: Final = ("extends", "include", "partial", "params", "driver", "interf
 _BESIDE: Final = ("settings", "widgets", "tests", "simulator")
 _PLAIN: Final = re.compile(r"[A-Za-z_](?:[\w./ -]*[\w./-])?|\d+(?:ms|s|m|h)", re.ASCII)
 _WORDS: Final = frozenset(("null", "true", "false", "yes", "no", "on", "off", "y", "n"))
-"""Words that some YAML reader does not read as text."""
+"""Words that some YAML readers do not read as text."""
 _UNSAFE: Final = re.compile("[\x7f-\x9f\u2028\u2029\ud800-\udfff\ufeff\ufffe\uffff]")
 _BLOCK: Final = re.compile(r"(?:[!-~](?:[ -~]*[!-~])?\n){2,}")
 _INLINE_MOST: Final = 60
@@ -37,7 +37,7 @@ class Resolved(NamedTuple):
     """The result of `resolve`."""
 
     text: str
-    """The whole document; "" when there are errors."""
+    """The whole document; "" after errors."""
     problems: tuple[Problem, ...]
 
 
@@ -47,19 +47,19 @@ def resolve(path: str, shelf: Shelf, profile: Profile | None = None) -> Resolved
     Args:
         path: a robot, driver, interface or widget.
         shelf: the widgets.
-        profile: the loaded profile. With it, the text has a default look where none is declared.
+        profile: the loaded profile. It gives the text a default interface if none is declared.
     """
     sources, problems, _, _ = gather(path)
     if sources is None:
         if not has_errors(problems):
-            text = "this is only a part of a document: resolve one that includes or extends it"
+            text = "this is a partial document: resolve a document that includes or extends it"
             problems.append(Problem("partial-document", text, path))
         return Resolved("", tuple(problems))
-    lines = [f"# {path}, put together by 'urc resolve'."]
+    lines = [f"# {path}, merged by 'urc resolve'."]
     made = _default_look(sources, profile)
     if made:
         told = " and ".join(f"'{key}'" for key in made)
-        lines.append(f"# It says nothing of its look, so {told} below: URC made them.")
+        lines.append(f"# URC made {told}: the document declares no interface.")
     for key, node in (*_sections(sources, shelf), *made.items()):
         lines += _entry(key, node, 0)
     return Resolved("\n".join(lines) + "\n", tuple(problems))
@@ -116,7 +116,7 @@ def _tree(part: Part) -> Tree:
 
 
 def _for_widget(tree: Tree, name: str, shelf: Shelf) -> Tree:
-    """Return the keys that another widget takes over: bindings of the same names, no options."""
+    """Return the keys that another widget keeps: bindings of the same names, no options."""
     widget = shelf.get(name)
     ports = {**widget.inputs, **widget.outputs} if widget is not None else {}
     value = {key: item for key, item in dict(tree.value).items() if key != "options"}  # type: ignore[call-overload]
@@ -130,7 +130,7 @@ def _for_widget(tree: Tree, name: str, shelf: Shelf) -> Tree:
 
 
 def written(key: str, value: object) -> str:
-    """Return ``key: value`` as a document writes it, without places."""
+    """Return ``key: value`` in the notation of a document, without places."""
     return "\n".join(_entry(key, value, 0)) + "\n"
 
 
@@ -140,7 +140,7 @@ def _entry(key: str, node: object, depth: int) -> Iterator[str]:
 
 
 def _value(head: str, node: object, depth: int, place: str) -> Iterator[str]:
-    """Yield the lines of a value behind `head`, which says where it belongs."""
+    """Yield the lines of a value after `head`, its indented key."""
     value = node.data if isinstance(node, Part) else node
     if isinstance(value, Mapping):
         entries = node.entries() if isinstance(node, Part) else value
@@ -182,7 +182,7 @@ def _data(node: object) -> object:
 
 
 def _place(node: object) -> str:
-    """Return where the key of a value stands, as a comment."""
+    """Return the place of a value's key, as a comment."""
     if not isinstance(node, Part):
         return ""
     mark = node.document.at(node.path)
@@ -201,7 +201,7 @@ def _scalar(value: object) -> str:
 
 
 def _text(text: str) -> str:
-    """Return text unquoted where no reader of YAML could take it for anything else."""
+    """Return text without quotes where every YAML reader takes it for text, else with quotes."""
     if _PLAIN.fullmatch(text) and text.lower() not in _WORDS:
         return text
     if "\\" in text and text.isascii() and text.isprintable() and "'" not in text:

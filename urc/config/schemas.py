@@ -1,9 +1,10 @@
-"""The schemas that ship with URC, and a fast verdict: does a value certainly fit?
+"""The schemas that ship with URC, and a fast check: does a value certainly fit?
 
 Both goals of `urc validate` fail when each good document pays for `jsonschema` (decision 4).
-This module turns the keywords of the schemas into closures. All other cases, unknown keywords
-included, are left to `jsonschema`; a contract test compares the two. A closure is made when data
-first reaches its part of a schema, so a small document compiles little.
+
+This module turns the keywords of the schemas into closures. It leaves all other cases, including
+unknown keywords, to `jsonschema`; a contract test compares the two. A part of a schema is compiled
+at its first use, so a small document compiles little.
 """
 
 import json
@@ -21,7 +22,7 @@ KINDS: Final = ("robot", "driver", "interface", "widget")
 """Kinds of documents; each has a schema."""
 
 
-@cache  # the schemas ship with URC and do not change while it runs
+@cache  # the shipped schemas never change at runtime
 def read_schema(name: str) -> Mapping[str, Any]:
     """Return a shipped schema by its file name."""
     schema: Mapping[str, Any] = json.loads((shipped("schemas") / name).read_text("utf-8"))
@@ -29,7 +30,7 @@ def read_schema(name: str) -> Mapping[str, Any]:
 
 
 def kind_of(document: Document) -> str:
-    """Return the document's kind, or "" when it names none that there is."""
+    """Return the document's kind, or "" for a missing or unknown kind."""
     data = document.data
     kind = data.get("kind") if isinstance(data, dict) else None
     return kind if isinstance(kind, str) and kind in KINDS else ""
@@ -37,7 +38,7 @@ def kind_of(document: Document) -> str:
 
 @cache
 def shipped_check() -> "QuickCheck":
-    """Return the verdicts over the shipped schemas."""
+    """Return the fast check of the shipped schemas."""
     return QuickCheck(read_schema)
 
 
@@ -60,11 +61,11 @@ _ANNOTATIONS: Final = frozenset(
 
 
 class _UncertainError(Exception):
-    """Raised at a keyword that this module does not know."""
+    """An error for a keyword that this module does not know."""
 
 
 class QuickCheck:
-    """Verdicts over a set of schemas that refer to each other by file name."""
+    """Fast checks of a set of schemas that refer to each other by file name."""
 
     def __init__(self, read: Callable[[str], Mapping[str, Any]]) -> None:
         """`read` returns the schema in a file."""
@@ -93,7 +94,7 @@ class QuickCheck:
             return False
 
     def reference(self, file: str, reference: str) -> _Check:
-        """Return the check of ``other.json#/pointer``, seen from `file`."""
+        """Return the check of ``other.json#/pointer``, relative to `file`."""
         other, _, pointer = reference.partition("#")
         place = (other or file, pointer)
         check = self._references.get(place)
@@ -126,7 +127,7 @@ def _compile(quick: QuickCheck, schema: Any, file: str) -> _Check:
 
 
 def _lazy(quick: QuickCheck, schema: Any, file: str) -> _Check:
-    """Return a check that is compiled when it is first used."""
+    """Return a check that is compiled at its first use."""
     compiled: list[_Check] = []
 
     def check(data: Any) -> bool:
@@ -160,7 +161,7 @@ def _type(quick: QuickCheck, value: Any, schema: Any, file: str) -> _Check:
 
 
 def _same(left: Any, right: Any) -> bool:
-    """Return equality as JSON has it: 1 is 1.0, but true is not 1."""
+    """Return whether two values are equal in JSON: 1 equals 1.0, but true does not equal 1."""
     if isinstance(left, bool) or isinstance(right, bool):
         return left is right
     if isinstance(left, (dict, list)) or isinstance(right, (dict, list)):

@@ -1,6 +1,6 @@
 """The parts of a profile, and the document of each.
 
-A robot may keep its driver and its interfaces in documents of their own.
+A robot may have its driver and its interfaces in separate documents.
 """
 
 from typing import Final
@@ -12,7 +12,7 @@ from urc.source import Document
 __all__ = ["RESERVED", "Sources"]
 
 _EMULATED: Final = ("signals", "state", "world")
-"""Keys of a simulator with its first values and its world."""
+"""Keys of a simulator with its initial values and its world."""
 RESERVED: Final = (*_EMULATED, "rules")
 """Keys of a simulator that cannot be names of transports."""
 
@@ -27,11 +27,11 @@ class Sources:
         """The mapping with transports, signals, messages, commands and polls."""
         self.settings: dict[str, Part] = {}
         self.slots: dict[str, list[Part]] = {}
-        """Slot → its widgets; a later one changes an earlier one."""
+        """Slot → its widgets; a later widget changes an earlier one."""
         self.interfaces: dict[str, Part] = {}
         self.tests: list[Part] = []
         self.simulator: dict[str, Part] = {}
-        """First values and world of the emulated robot."""
+        """Initial values and world of the emulated robot."""
         self.rules: dict[str, Part] = {}
         """Rules of the emulated robot by transport."""
 

@@ -1,4 +1,4 @@
-"""Which known word a person may have meant."""
+"""Suggestions of known words for a misspelt word."""
 
 from collections.abc import Iterable
 from typing import Final
@@ -7,11 +7,11 @@ __all__ = ["did_you_mean", "listed"]
 
 _MOST: Final = 16
 _SPARE: Final = 8
-"""So few more names are listed, too."""
+"""Excess up to which the list is not cut."""
 
 
 def did_you_mean(word: str, known: Iterable[str], noun: str = "") -> str:
-    """Return a hint: the nearest known word, else all of them.
+    """Return a hint: the nearest known word, else all known words.
 
     Args:
         word: the unknown word.
@@ -30,7 +30,7 @@ def did_you_mean(word: str, known: Iterable[str], noun: str = "") -> str:
 
 
 def listed(names: Iterable[str], most: int | None = _MOST) -> str:
-    """Return names with commas, cut after `most` of them where many are left out."""
+    """Return names with commas, cut after `most` when the list is much longer."""
     every = list(names)
     if most is None or len(every) <= most + _SPARE:
         return ", ".join(every)

@@ -1,4 +1,4 @@
-"""Typed values in documents: does a default, an expected reading or a choice fit its type?"""
+"""Checks of typed values in documents: defaults, expected values, choices and ranges."""
 
 from typing import Any, Final
 
@@ -29,7 +29,7 @@ _TYPE_WORDS: Final = {
 
 
 def shown(value: object) -> str:
-    """Return a value as a document writes it, for messages."""
+    """Return a value in the notation of a document, for messages."""
     if value is None:
         return "nothing"
     if isinstance(value, (list, tuple)):
@@ -40,7 +40,7 @@ def shown(value: object) -> str:
 
 
 def fraction_of(text: str) -> float:
-    """Return what ``1/65536`` means; the text fits the schema's pattern."""
+    """Return the value of a fraction such as ``1/65536``; the text fits the schema's pattern."""
     above, _, below = text.partition("/")
     return int(above) / int(below)
 
@@ -54,7 +54,7 @@ def fit(value: Value, kind: str) -> Value:
     """Return `value` as a value of type `kind`: 3.0 is a whole number.
 
     Raises:
-        ValueError: it is of another type.
+        ValueError: it has another type.
     """
     if kind == "string" and isinstance(value, str):
         return value
@@ -69,10 +69,10 @@ def fit(value: Value, kind: str) -> Value:
 
 
 def fit_argument(value: Any, kind: str, of: str, size: int | None) -> tuple[Value, ...]:
-    """Return the values given for an argument: the elements of an array, or one value.
+    """Return the values for an argument: the elements of an array, or one value.
 
     Raises:
-        ValueError: it is of another type or size.
+        ValueError: it has another type or size.
     """
     if kind != "array":
         return (fit(value, kind),)
@@ -84,25 +84,25 @@ def fit_argument(value: Any, kind: str, of: str, size: int | None) -> tuple[Valu
 
 
 def element_of(part: Part, kind: str, findings: Findings) -> str:
-    """Return the type of what an argument of type `kind` is made of: of an array, ``of``."""
+    """Return the type of the elements of an argument; of an array, its ``of``."""
     if kind == "array":
         return part.text("of", "number")
     for key in ("of", "size"):
         if key in part.data:
-            text = f"'{key}' means nothing for {kind}"
+            text = f"'{key}' has no effect for {kind}"
             hint = "write type: array"
             findings.error(part, "misplaced-key", text, at=key, key=True, hint=hint)
     return kind
 
 
 def fit_hint(value: Value, kind: str) -> str:
-    """Return what to do about a value that does not fit type `kind`, when quotes are the cause."""
+    """Return a hint for a value that does not fit type `kind`, when quotes are the cause."""
     if kind in ("integer", "number") and isinstance(value, str):
         try:
             float(value)
         except ValueError:
             return ""
-        return f"take the quotes away: {value}"
+        return f"remove the quotes: {value}"
     if kind == "string" and value is not None:
         return f'quote it: "{shown(value)}"'
     if kind == "boolean" and isinstance(value, str):
@@ -119,13 +119,13 @@ def check_range(part: Part, kind: str, findings: Findings) -> tuple[float | None
                 findings.error(
                     part,
                     "misplaced-key",
-                    f"'{key}' means nothing for {kind}",
+                    f"'{key}' has no effect for {kind}",
                     at=key,
                     key=True,
-                    hint="only integer and number have a range",
+                    hint="a range needs the type integer or number",
                 )
     elif low is not None and high is not None and low >= high:
-        hint = "exchange them" if low > high else "leave one out, or make the range wider"
+        hint = "swap them" if low > high else "remove one, or make the range wider"
         text = f"min {low:g} is not below max {high:g}"
         findings.error(part, "wrong-order", text, at="min", hint=hint)
     return low, high
@@ -146,7 +146,7 @@ def check_within(
 def known_argument(
     name: str, part: Part, command: Command, findings: Findings, *, key: bool = True
 ) -> Argument | None:
-    """Return the argument of that name, or report its absence at `part` or its key."""
+    """Return the argument with this name, or report its absence at `part` or its key."""
     argument = command.arguments.get(name)
     if argument is None:
         findings.error(

@@ -267,7 +267,7 @@ def test_resolve_writes_the_made_look_and_it_loads_as_the_same(tmp_path: Path) -
     profile = loaded(file, tmp_path).profile
     assert profile is not None
     text = resolve(str(file), shelf(tmp_path / "shelf"), profile).text
-    assert "'widgets' and 'interfaces' below: URC made them" in text
+    assert "URC made 'widgets' and 'interfaces'" in text
     file.write_text(text, "utf-8")
     again = loaded(file, tmp_path).profile
     assert again is not None

@@ -75,10 +75,10 @@ def test_a_grid_of_another_document_gives_way_to_tabs(folder: Folder) -> None:
         (
             "x: { tabs: { one: { title: O } } }",
             "missing-key",
-            "'grid' is missing from a tab",
+            "a tab lacks 'grid'",
         ),
-        ("x: { tabs: { one: { grid: a } }, background: a }", "misplaced-key", "is in the grid too"),
-        ("debug: { grid: a b }", "bad-name", "every robot has by itself"),
+        ("x: { tabs: { one: { grid: a } }, background: a }", "misplaced-key", "is also in the grid"),
+        ("debug: { grid: a b }", "bad-name", "the name of the built-in interface of every robot"),
     ],
 )
 def test_wrong_tabs_are_told_where_they_stand(

@@ -74,12 +74,12 @@ def test_a_file_beside_the_document_has_an_address_and_nothing_else_has(tmp_path
 @pytest.mark.parametrize(
     ("options", "fault"),
     [
-        ("{ urdf: ../arm.urdf }", "is no path within this folder"),
-        ("{ urdf: /etc/passwd.urdf }", "is no path within this folder"),
-        ("{ urdf: a/../../arm.urdf }", "is no path within this folder"),
-        ("{ urdf: 'file:arm.urdf' }", "is no path within this folder"),
-        ("{ urdf: robot.yaml }", "is of a type that no page is given"),
-        ("{ urdf: link.urdf }", "leads out of this folder"),
+        ("{ urdf: ../arm.urdf }", "is not a path inside this folder"),
+        ("{ urdf: /etc/passwd.urdf }", "is not a path inside this folder"),
+        ("{ urdf: a/../../arm.urdf }", "is not a path inside this folder"),
+        ("{ urdf: 'file:arm.urdf' }", "is not a path inside this folder"),
+        ("{ urdf: robot.yaml }", "has a type that is not served"),
+        ("{ urdf: link.urdf }", "is outside of this folder"),
         ("{ meshes: [gone.stl] }", "there is no file 'gone.stl'"),
     ],
 )

@@ -1,1 +1,1 @@
-"""Documents put together and written out: what extends, includes, params and each ask for."""
+"""Composition of documents: `extends`, `include`, `params` and `each`."""

@@ -1,4 +1,4 @@
-"""`each`: one declaration for many like things, written out before the shape pass.
+"""`each`: one declaration for many similar items, expanded before the shape pass.
 
     signals:
       "joint_{i}": { each: { i: [1, 2, 3] }, unit: rad }
@@ -34,17 +34,17 @@ class _Copy(NamedTuple):
 
 
 class Expander:
-    """Writes out the items of one document."""
+    """An expander for the `each` of all items of one document."""
 
     def __init__(self, document: Document, findings: Findings, budget: Budget) -> None:
         self.document = document
         self.findings = findings
         self.budget = budget
         self.path: Path = ()
-        """The item in work."""
+        """Path of the current item."""
 
     def collection(self, tree: Tree, path: Path) -> Tree:
-        """Return a mapping or list with every `each` of its items written out."""
+        """Return a mapping or list with every `each` of its items expanded."""
         if isinstance(tree.value, dict):
             return self._mapping(tree, path)
         return self._list(tree, path)
@@ -103,10 +103,10 @@ class Expander:
             self.findings.error(
                 Part(self.document, path, None),
                 "duplicate-key",
-                f"'each' makes {name!r} twice",
+                f"'each' creates {name!r} twice",
                 at="each",
                 key=True,
-                hint="use every variable in the name, and give no value twice",
+                hint="use every variable in the name, and give each value only once",
             )
         made.setdefault(name, copy.tree)
 
@@ -116,7 +116,7 @@ class Expander:
         """Yield the item once for every combination of values."""
         self.path = path
         template = _without(inner, "each")
-        each = inner.value["each"]  # type: ignore[index]  # a mapping: it has variables
+        each = inner.value["each"]  # type: ignore[index]  # a mapping with variables
         nodes = count_nodes(template.value) + 1
         self.budget.spend((prod(map(len, variables.values())) - 1) * nodes - count_nodes(each))
         for values in product(*variables.values()):
@@ -128,7 +128,7 @@ class Expander:
     def _variables(
         self, inner: Tree, path: Path, name: str | None
     ) -> Mapping[str, list[object]] | None:
-        """Return the variables of an item, or None when it has no `each` that can be used.
+        """Return the variables of an item, or None when it has no valid `each`.
 
         An `each` of a wrong shape stays in the document; the shape pass reports it.
         """
@@ -143,9 +143,9 @@ class Expander:
             self.findings.error(
                 part,
                 "unlike-values",
-                f"the values of {unlike[0]!r} are not alike",
+                f"the values of {unlike[0]!r} are of different kinds",
                 at=unlike[0],
-                hint="all of them plain, or all of them mappings with the same keys",
+                hint="give only plain values, or only mappings with the same keys",
             )
             return None
         self._check_variables(part)
@@ -168,14 +168,14 @@ class Expander:
                 self.findings.error(
                     part,
                     "bad-name",
-                    f"a variable of 'each' cannot be called {variable!r}",
+                    f"a variable of 'each' cannot have the name {variable!r}",
                     at=variable,
                     key=True,
                 )
 
 
 class _First:
-    """Reports faults in the texts of an item, while the first copy is made."""
+    """A reporter of problems in the texts of an item, for its first copy."""
 
     def __init__(self, expander: Expander, path: Path) -> None:
         self._expander = expander
@@ -189,19 +189,19 @@ class _First:
         self._expander.findings.error(
             Part(self._expander.document, path, None),
             "unknown-variable",
-            f"{name!r} has no {word!r}" if word else f"{name!r} is several values; name one",
+            f"{name!r} has no {word!r}" if word else f"{name!r} has several values; name one",
             offset=offset,
             length=len(name) + len(word) + bool(word),
             hint=did_you_mean(word, first, "it has") if is_mapping else plain,
         )
 
     def unquoted(self, path: Path, text: str) -> None:
-        """Report a name in braces that YAML takes for a mapping."""
+        """Report a name in braces that YAML reads as a mapping."""
         report_unquoted(Part(self._expander.document, path, None), text, self._expander.findings)
 
 
 class _Rest:
-    """Reports nothing: the first copy did."""
+    """A reporter that ignores all problems, for the copies after the first."""
 
     def unknown(self, path: Path, name: str, word: str, offset: int) -> None:
         """Say nothing."""
@@ -211,7 +211,7 @@ class _Rest:
 
 
 def _are_alike(values: list[object]) -> bool:
-    """Return whether all are plain, or all are mappings of the same plain words."""
+    """Return whether all values are plain, or all are mappings with the same keys."""
     if isinstance(values[0], dict):
         words = values[0].keys()
         return all(isinstance(one, dict) and one.keys() == words for one in values)
@@ -233,7 +233,7 @@ def _without(tree: Tree, key: str) -> Tree:
 
 
 def _changed(items: list[_Copy], name: str, given: Tree, changed: Tree | None) -> list[_Copy]:
-    """Return the items with the one that was made of that name changed, or taken away."""
+    """Return the items with the generated item of this name changed, or removed."""
     result = []
     for copy in items:
         if copy.name == name:
@@ -245,7 +245,7 @@ def _changed(items: list[_Copy], name: str, given: Tree, changed: Tree | None) -
 
 
 def is_removal(item: object) -> bool:
-    """Return whether an item only takes another one away."""
+    """Return whether an item only removes another item."""
     return isinstance(item, dict) and item.get("remove") is True
 
 
@@ -263,7 +263,7 @@ _BY_NAME: Final = ("simulator", "rules")
 
 
 def expand(document: Document, findings: Findings) -> Document:
-    """Return the document with every `each` written out."""
+    """Return the document with every `each` expanded."""
     everywhere = list(_places(document.data))
     _check_names(document, everywhere, findings)
     places = [path for path in everywhere if _has_each(_at(document.data, path))]
@@ -277,7 +277,7 @@ def expand(document: Document, findings: Findings) -> Document:
             findings.error(
                 Part(document, expander.path, None),
                 "too-many-nodes",
-                f"more than {_NODES_MOST} keys and values once every 'each' is written out",
+                f"more than {_NODES_MOST} keys and values after expansion of every 'each'",
                 at="each",
             )
         else:
@@ -286,7 +286,7 @@ def expand(document: Document, findings: Findings) -> Document:
 
 
 def _without_removals(document: Document, places: list[Path], findings: Findings) -> Document:
-    """Report removals of missing items, and drop them; the merge has applied the others."""
+    """Report and drop removals of missing items; the merge has applied the other removals."""
     tree = Tree(document.data, document.mark, document)
     for path in places:
         items = _at(document.data, path)
@@ -299,10 +299,10 @@ def _without_removals(document: Document, places: list[Path], findings: Findings
             findings.error(
                 Part(document, (*path, place), None),
                 "nothing-to-remove",
-                f"there is no {item_name(item_at(document.data, (*path, place)))!r} to take away",
+                f"there is no {item_name(item_at(document.data, (*path, place)))!r} to remove",
                 at="remove",
                 key=True,
-                hint="only what this document extends or includes can be taken away",
+                hint="an item to remove must come from 'extends' or 'include'",
             )
         if idle:
             tree = _replaced(tree, path, _without_idle)
@@ -324,7 +324,7 @@ def _document(document: Document, tree: Tree) -> Document:
 
 
 def _check_names(document: Document, places: list[Path], findings: Findings) -> None:
-    """Report names with braces that nothing fills in; the schemas let braces pass."""
+    """Report names with braces that remain; the schemas allow braces."""
     for path in places:
         named = _at(document.data, path)
         for name, item in named.items() if isinstance(named, dict) else ():
@@ -332,9 +332,9 @@ def _check_names(document: Document, places: list[Path], findings: Findings) -> 
                 findings.error(
                     Part(document, (*path, name), item),
                     "bad-name",
-                    f"{name!r} cannot be a name here",
+                    f"{name!r} is not a valid name here",
                     key=True,
-                    hint="a name in braces is a variable of 'each', and there is none here",
+                    hint="a name in braces needs an 'each' with this variable",
                 )
 
 

@@ -1,8 +1,8 @@
-"""Names in single braces → what they stand for: ``{i}`` of an `each`, ``{params.id}`` of a driver.
+"""Names in single braces → their values: ``{i}`` of an `each`, ``{params.id}`` of a driver.
 
 They are filled in while a document is loaded, in keys and texts alike. Templates have double braces
-and are not changed. A text that is one name and nothing else becomes the
-value itself, so ``"{i}"`` may be a number.
+and are not changed. A text with nothing but one name becomes the value itself, so ``"{i}"`` may be
+a number.
 """
 
 import re
@@ -20,17 +20,17 @@ Names = Mapping[str, object]
 
 
 class Listener(Protocol):
-    """Receives the names that cannot be filled in."""
+    """A receiver for the names that cannot be filled in."""
 
     def unknown(self, path: Path, name: str, word: str, offset: int) -> None:
-        """Take note that `name` is known, and the word behind its dot is not."""
+        """Report an unknown word after the dot of a known `name`."""
 
     def unquoted(self, path: Path, text: str) -> None:
-        """Take note of ``max: {i}``: without quotes that is a mapping to YAML."""
+        """Report ``max: {i}``, which YAML reads as a mapping without quotes."""
 
 
 _NAME: Final = re.compile(
-    # Double braces are a template's; but {{n}:number} is a field whose name is filled in.
+    # Double braces belong to a template, but {{n}:number} is a field with a filled name.
     r"(?:(?<!\{)|(?<=\{)(?=\{[a-z0-9_.]+\}:[a-z]))"
     r"\{([a-z][a-z0-9_]*)(?:\.([a-z0-9_]+))?\}(?!\})"
 )
@@ -38,18 +38,18 @@ _CHARACTERS_MOST: Final = 4 << 20
 
 
 class TooMuch(Exception):
-    """The document would exceed the bounds of a document."""
+    """An expansion that exceeds the limits of a document."""
 
 
 class Budget:
-    """The nodes and characters that may still be written."""
+    """The remaining nodes and characters of an expansion."""
 
     def __init__(self, nodes: int) -> None:
         self._nodes = nodes
         self._characters = _CHARACTERS_MOST
 
     def spend(self, nodes: int, characters: int = 0) -> None:
-        """Count new nodes and characters; raise `TooMuch` beyond the bound."""
+        """Count new nodes and characters; raise `TooMuch` beyond the limit."""
         self._nodes -= nodes
         self._characters -= characters
         if self._nodes < 0 or self._characters < 0:
@@ -94,9 +94,9 @@ class _Filler:
             if name not in made:
                 made[name] = inner
             elif name not in value:
-                made[key] = inner  # two became one: as it stands, this one is no name
+                made[key] = inner  # Two keys became one, so this key stays as written.
             else:
-                # What is declared by its full name goes before what was filled in.
+                # A key with its full name takes precedence over a filled key.
                 below, above = (made[name], inner) if name == key else (inner, made[name])
                 if above.value is None:
                     del made[name]
@@ -122,7 +122,7 @@ class _Filler:
         return Tree([item.value for item in items], tree.mark.copy(marks), tree.home)
 
     def text(self, text: str, path: Path) -> tuple[object, Written | None]:
-        """Return the text with its names filled in, and the edits that did it."""
+        """Return the text with its names filled in, and the edits for the places of problems."""
         if "{" not in text:
             return text, None
         edits: list[tuple[int, int, int]] = []
@@ -175,11 +175,11 @@ def fill_key(key: str, names: Names, budget: Budget) -> str:
 
 
 def report_unquoted(part: Part, text: str, findings: Findings) -> None:
-    """Report a name in braces that YAML takes for a mapping."""
+    """Report a name in braces that YAML reads as a mapping."""
     findings.error(
         part,
         "unquoted-name",
-        "a value that starts with '{' is a mapping to YAML",
+        "YAML reads a value that starts with '{' as a mapping",
         hint=f'quote it: "{text}"',
     )
 

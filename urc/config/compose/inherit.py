@@ -1,10 +1,10 @@
-"""`extends` and `include`: a document merged with those that it builds on.
+"""`extends` and `include`: a document merged with the documents that it builds on.
 
-    extends: base.yaml                  # all of the base, changed by what stands here
-    extends: generic-ros1               # the same, of a document that ships with URC
-    include: [parts/battery.yaml]       # parts of documents, put under what stands here
+    extends: base.yaml                  # the whole base, changed by this document
+    extends: generic-ros1               # the same, with a document that ships with URC
+    include: [parts/battery.yaml]       # parts of documents, below the keys of this document
 
-A document's own keys go before those of its includes, and these before those of its base.
+The keys of a document override those of its includes, and these override those of its base.
 """
 
 import os
@@ -20,7 +20,7 @@ from urc.source import Document, Path
 __all__ = ["Composed", "compose", "override"]
 
 _DEEPEST: Final = 16
-"""Documents that build on each other."""
+"""Maximum chain of documents that build on each other."""
 _NODES_MOST: Final = 10_000
 _OWN: Final = ("urc", "kind", "name", "extends", "include", "partial")
 _HEADER: Final = (*_OWN, "title", "summary", "licence", "author")
@@ -38,16 +38,16 @@ class Composed(NamedTuple):
     """A document with all that it extends and includes."""
 
     document: Document | None
-    """None: a document that it needs is missing, or cannot be used."""
+    """None if a required document is missing or invalid."""
     sources: tuple[Document, ...]
-    """The documents that were merged, each as it stands in its file; none when it stands alone."""
+    """The merged documents as read; none if the document builds on no other."""
 
 
 def compose(document: Document, library: Library) -> Composed:
-    """Return a document merged with those that it extends and includes.
+    """Return a document merged with the documents that it extends and includes.
 
-    The library reads them, and collects the problems of references and clashes. Nothing else is
-    checked here: the shape pass looks at the sources and at the result.
+    The library reads them, and collects the problems of references and clashes. The shape pass
+    checks everything else, in the sources and in the result.
     """
     composer = _Composer(library)
     whole = composer.compose(document, ())
@@ -58,7 +58,7 @@ def override(document: Document, overrides: Part) -> Document:
     """Return a driver with the changes under a robot's `overrides`."""
     mark = overrides.document.at(overrides.path)
     if mark is None:
-        return document  # a part that is there has a mark
+        return document  # every part has a mark
     over = Tree(overrides.data, mark, overrides.document.source_of(overrides.path))
     merged = merge(Tree(document.data, document.mark, document), over)
     mark = document.mark.copy(dict(merged.mark.children))
@@ -68,19 +68,19 @@ def override(document: Document, overrides: Part) -> Document:
 
 
 class _Composer:
-    """Merges one document with its sources."""
+    """A merger of one document with its sources."""
 
     def __init__(self, library: Library) -> None:
         self.sources: dict[str, Document] = {}
-        """File → document that is merged."""
+        """File → merged document."""
         self._library = library
         self._findings = library.findings
         self._whole: dict[str, Document | None] = {}
 
     def compose(self, document: Document, chain: tuple[str, ...]) -> Document | None:
-        """Return the document merged with its sources; itself when it names none.
+        """Return the document merged with its sources; a document without sources stays as it is.
 
-        `chain` has the files that led to it.
+        `chain` has the files from the first document to this one.
         """
         data = document.data
         if not isinstance(data, dict) or not kind_of(document):
@@ -109,7 +109,7 @@ class _Composer:
             return None
         if count_nodes(whole.value) > _NODES_MOST:
             self._findings.error(
-                root, "too-many-nodes", f"more than {_NODES_MOST} keys and values put together"
+                root, "too-many-nodes", f"more than {_NODES_MOST} keys and values after the merge"
             )
             return None
         mark = whole.mark.copy()
@@ -121,7 +121,7 @@ class _Composer:
     def _sources(
         self, root: Part, chain: tuple[str, ...]
     ) -> tuple[list[Tree | None], list[Tree | None]]:
-        """Return the base, if any, and the includes; None where one cannot be used."""
+        """Return the base, if any, and the includes; None for invalid ones."""
         kind = kind_of(root.document)
         base = root.get("extends")
         return (
@@ -135,7 +135,7 @@ class _Composer:
     def _source(
         self, reference: Part, kinds: tuple[str, ...], chain: tuple[str, ...], without: Path
     ) -> Tree | None:
-        """Return the composed document that `reference` names, but for the keys in `without`."""
+        """Return the composed document that `reference` names, without the keys in `without`."""
         target = self._library.follow(reference, kinds)
         if target is None:
             return None
@@ -162,7 +162,7 @@ class _Composer:
         return _without(Tree(found.data, found.mark, found), without)
 
     def _merged_includes(self, parts: list[Tree], settled: object) -> list[Tree]:
-        """Return the includes as one layer, or none; two that disagree clash."""
+        """Return the includes as one layer, or none; report two includes that disagree."""
         if not parts:
             return []
         clashes = _Clashes(settled)
@@ -170,20 +170,20 @@ class _Composer:
         for path, first, second in clashes.found:
             home = second.home
             place = f"{first.home.file}:{first.mark.span.line}"
-            # A document of one value, so that the finding points at the value itself.
+            # A document of one value, so that the problem points at the value itself.
             value = Document(home.file, home.text, home.lines, second.value, second.mark)
             found = value.problem(
                 (),
                 "include-clash",
-                f"{place} says something else about it",
-                hint="say it in the document that includes both",
+                f"{place} has another value for it",
+                hint="set it in the document that includes both",
             )
             self._findings.problems.append(found._replace(path=".".join(map(str, path))))
         return [merged]
 
 
 class _Clashes:
-    """Values on which two includes disagree, unless the including document settles them."""
+    """Values on which two includes disagree, unless the including document sets them."""
 
     def __init__(self, settled: object) -> None:
         self._settled = settled

@@ -1,6 +1,6 @@
-"""The documents of one check: reads them, and follows the references between them.
+"""The documents of one check, read through their references.
 
-A path is relative to the document that names it; a name is that of a document that ships with URC.
+A path is relative to the document that names it; a name means a document that ships with URC.
 """
 
 import os
@@ -22,21 +22,21 @@ _FILE_CODES: Final = (
 )  # fmt: skip
 _NAME: Final = re.compile("[a-z][a-z0-9-]*")
 _SHIPPED: Final = {"robot": ".", "driver": "drivers", "interface": "interfaces"}
-"""Kind of a document → folder of the shipped ones, below `robots`."""
+"""Kind of a document → folder of the shipped documents, below `robots`."""
 _ARTICLES: Final = {"interface": "an interface"}
 
 
 class Library:
-    """Reads documents, each once, and remembers the files."""
+    """A reader of documents that reads each file once and records its path."""
 
     def __init__(self) -> None:
         self.files: dict[str, None] = {}
-        """Each file that was looked for, existing or not."""
+        """Each requested file, existing or not."""
         self.findings = Findings()
         self._documents: dict[str, Document | None] = {}
 
     def read(self, path: str) -> Document:
-        """Return one document as it stands in its file.
+        """Return one document as written in its file.
 
         Raises:
             ProblemsError: it cannot be read.
@@ -62,7 +62,7 @@ class Library:
         if real not in self._documents:
             if len(self._documents) >= _FILES_MOST:
                 self.findings.error(
-                    reference, "too-many-files", f"more than {_FILES_MOST} documents are needed"
+                    reference, "too-many-files", f"more than {_FILES_MOST} documents are required"
                 )
                 return None
             self._documents[real] = self._open(reference, target)
@@ -74,7 +74,7 @@ class Library:
         self.findings.error(
             reference,
             "wrong-kind",
-            f"{target} is {_ARTICLES.get(found, f'a {found}')}, {wanted} is expected here",
+            f"{target} is {_ARTICLES.get(found, f'a {found}')}, expected {wanted} here",
         )
         return None
 
@@ -82,7 +82,7 @@ class Library:
         known = [name for kind in kinds for name in _names(kind)]
         hint = did_you_mean(reference.data, known, f"{kinds[0]}s that ship")
         if not hint.startswith("did"):
-            hint = f"the path of a document ends in .yaml; {hint}"
+            hint = f"the path of a document ends with .yaml; {hint}"
         self.findings.error(
             reference,
             "no-such-file",

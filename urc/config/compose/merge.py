@@ -1,8 +1,8 @@
-"""Two trees of data with their marks → one: the upper tree changes the lower one.
+"""The merge of two trees of data with their marks: the upper tree changes the lower tree.
 
-Mappings are merged key by key, lists of named items name by name; other values are replaced. Rules
-of a simulator change by name; rules without a name stay. A ``null`` removes a key, ``remove: true``
-an item of a list. Every mark of the result keeps its document, and so every problem its place.
+Mappings are merged by key, and lists of named items by name; other values are replaced. Rules of a
+simulator change by name, and rules without a name stay. A ``null`` removes a key, ``remove: true``
+an item of a list. Every mark of the result keeps its document, so every problem keeps its place.
 """
 
 from collections.abc import Callable
@@ -15,7 +15,7 @@ __all__ = ["Tree", "children", "count_nodes", "item_name", "mark_inside", "merge
 
 _NAMES: Final = ("name", "id")
 _EXCLUSIVE: Final = (frozenset(("grid", "grids", "tabs")),)
-"""Keys of which a mapping has at most one; forms of frames exclude each other, too."""
+"""Groups of keys that exclude each other, in addition to forms of frames."""
 _OF_USED_DRIVER: Final = frozenset(("use", "params", "overrides"))
 """Keys of a robot's ``driver`` that names a document."""
 
@@ -26,7 +26,7 @@ class Tree(NamedTuple):
     value: object
     mark: Mark
     home: Document
-    """The document of the text, unless a mark inside has another one."""
+    """The document of the text, unless a mark inside has another document."""
 
 
 _Clash = Callable[[Path, Tree, Tree], None]
@@ -63,7 +63,7 @@ def children(tree: Tree) -> dict[str | int, Tree]:
 
 
 def item_name(value: object) -> str | None:
-    """Return the name by which an item of a list is known, or None."""
+    """Return the name of an item of a list, or None."""
     if isinstance(value, dict):
         for key in _NAMES:
             name = value.get(key)
@@ -73,7 +73,7 @@ def item_name(value: object) -> str | None:
 
 
 def count_nodes(value: object) -> int:
-    """Return how many keys, values, mappings and lists there are."""
+    """Return the number of keys, values, mappings and lists."""
     if isinstance(value, dict):
         return 1 + len(value) + sum(map(count_nodes, value.values()))
     if isinstance(value, list):
@@ -82,19 +82,16 @@ def count_nodes(value: object) -> int:
 
 
 def merge(base: Tree, over: Tree, path: Path = (), clash: _Clash | None = None) -> Tree:
-    """Return `base` with all that `over` says.
+    """Return `base` with the changes of `over`.
 
-    Args:
-        base: the lower tree; it is not modified.
-        over: the upper tree.
-        path: place of both in their documents.
-        clash: receives each value that another one replaces.
+    The base is not modified. `path` is the place of both trees. `clash` receives each replaced
+    value, and its replacement.
     """
     if path == ("driver",) and isinstance(over.value, dict):
         base = _driver_in_full(base, over.value)
     if isinstance(base.value, dict) and isinstance(over.value, dict):
         if path[-1:] == ("framing",) and _has_other_type(base.value, over.value):
-            return over  # the keys of another framing mean nothing to this one
+            return over  # another framing type has other keys
         return _mappings(base, over, path, clash)
     if isinstance(base.value, list) and isinstance(over.value, list):
         old, new = _by_name(base), _by_name(over)
@@ -134,7 +131,7 @@ def _mappings(base: Tree, over: Tree, path: Path, clash: _Clash | None) -> Tree:
 
 
 def _exclusive(path: Path) -> tuple[frozenset[str], ...]:
-    """Return groups of keys of which the mapping at `path` has at most one."""
+    """Return groups of keys that exclude each other in the mapping at `path`."""
     if path[-1:] == ("send",):
         return (frozenset(WRITE_FORMS),)
     if path[-1:] == ("reply",) or path[-2:-1] == ("messages",):
@@ -147,7 +144,7 @@ def _has_other_type(base: dict[str, object], over: dict[str, object]) -> bool:
 
 
 def _by_name(tree: Tree) -> dict[str, Tree] | None:
-    """Return the items of a list by their names, or None when they have none of their own."""
+    """Return the items of a list by their names, or None when an item has no name of its own."""
     found: dict[str, Tree] = {}
     for inner in children(tree).values():
         name = item_name(inner.value)
@@ -173,7 +170,7 @@ def _lists(
 
 
 def _rules(base: Tree, new: dict[str, Tree], over: Tree, path: Path, clash: _Clash | None) -> Tree:
-    """Return rules, some changed by name; new ones come first."""
+    """Return rules, some changed by name; new rules come first."""
     left, items = dict(new), []
     for inner in children(base).values():
         name = item_name(inner.value)

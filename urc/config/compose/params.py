@@ -1,6 +1,6 @@
 """`params`: values of a driver that each robot chooses, ``{params.id}`` in keys and texts.
 
-They are filled in while the documents are loaded. Settings, in contrast, are the operator's.
+They are filled in while the documents are loaded. Settings, in contrast, belong to the operator.
 """
 
 from collections.abc import Mapping
@@ -28,12 +28,8 @@ def fill_params(
 ) -> Document:
     """Return a driver's document with its params filled in.
 
-    Args:
-        document: the merged driver.
-        given: the robot's values, if any.
-        use: the robot's reference to the driver. None for a driver alone: then a param without a
-            default gets a sample of its type.
-        findings: collects the problems.
+    `given` has the values of the robot, and `use` is its reference to the driver. A driver
+    alone has neither: then a param without a default gets a sample of its type.
     """
     data = document.data
     if not isinstance(data, dict):
@@ -44,7 +40,7 @@ def fill_params(
                 _report_unknown(inner, (), findings)
         return document
     if not fits("driver.schema.json#/$defs/params", data["params"]):
-        return document  # the shape pass tells
+        return document  # the shape pass reports it
     part = Part(document, (), data).must("params")
     values = _values(part, given, use, findings)
     filler = _Filler(document, values, findings)
@@ -56,7 +52,7 @@ def fill_params(
                 "unused-param",
                 f"nothing uses the param {name!r}",
                 key=True,
-                hint=f"write {{params.{name}}} where it belongs",
+                hint=f"write {{params.{name}}} at the place for it",
             )
     return result
 
@@ -112,7 +108,7 @@ def _checked(
     findings: Findings,
 ) -> Value:
     if any(type(part.data) is type(one) and part.data == one for one in choices):
-        return part.data  # type: ignore[no-any-return] # choices may be of several types
+        return part.data  # type: ignore[no-any-return]  # choices may have several types
     try:
         value = fit(part.data, kind)
     except ValueError as error:
@@ -143,7 +139,7 @@ def _sample(kind: str, bounds: tuple[float | None, float | None], choices: list[
 
 
 class _Filler:
-    """Fills the params into one document, and remembers which were used."""
+    """A filler for the params of one document, which records their use."""
 
     def __init__(self, document: Document, values: Mapping[str, Value], findings: Findings) -> None:
         self.used: set[str] = set()
@@ -154,7 +150,7 @@ class _Filler:
     def document(self) -> Document:
         """Return the document with everything filled in."""
         document, data = self._document, self._document.data
-        assert isinstance(data, dict)  # noqa: S101 - the caller looked
+        assert isinstance(data, dict)  # noqa: S101 - checked by the caller
         budget = Budget(_NODES_MOST - count_nodes(data) + len(data))
         value: dict[str, object] = {}
         marks: dict[str | int, Mark] = {}
@@ -168,7 +164,7 @@ class _Filler:
                     self._findings.error(
                         Part(document, (key,), item),
                         "too-large",
-                        "this becomes too long once the params are filled in",
+                        "this is too long after the params are filled in",
                         key=True,
                     )
             value[key], marks[key] = tree.value, tree.mark
@@ -178,7 +174,7 @@ class _Filler:
         )
 
     def unquoted(self, path: Path, text: str) -> None:
-        """Report a name in braces that YAML takes for a mapping."""
+        """Report a name in braces that YAML reads as a mapping."""
         report_unquoted(Part(self._document, path, None), text, self._findings)
 
     def unknown(self, path: Path, name: str, word: str, offset: int) -> None:
@@ -187,14 +183,14 @@ class _Filler:
         self._findings.error(
             Part(self._document, path, None),
             "unknown-param",
-            f"there is no param {word!r}" if word else "'params' is all of them; name one",
+            f"there is no param {word!r}" if word else "'params' has all params; name one of them",
             hint=did_you_mean(word, self._values, "params"),
             **place,
         )
 
 
 class _Watched(Mapping[str, Value]):
-    """Values that remember which names were used."""
+    """Values that record the names in use."""
 
     def __init__(self, values: Mapping[str, Value], used: set[str]) -> None:
         self._values = values

@@ -1,1 +1,1 @@
-"""Names in a model → what they refer to."""
+"""Links from names in a model to their declarations."""

@@ -1,4 +1,4 @@
-"""Names on the wire's side: transports, signals, settings and arguments, wherever they are used."""
+"""Names of transports, signals, settings and arguments in a driver, wherever they are used."""
 
 import re
 from collections.abc import Iterable, Mapping
@@ -42,12 +42,7 @@ def check_option(
 ) -> None:
     """Report a setting of the wrong type.
 
-    Args:
-        part: the option.
-        kind: type of the transport, a definition of the driver's schema where it is URC's own.
-        template: the option as a template.
-        settings: of the profile.
-        findings: collects the problems.
+    For a built-in transport, `kind` names a definition of the driver's schema.
     """
     found = _ONE_SETTING.fullmatch(template.source)
     setting = settings.get(found[1]) if found else None
@@ -65,13 +60,13 @@ def check_option(
     findings.error(
         part,
         "wrong-type",
-        f"'{part.name}' is {wanted}, and the setting {found[1]!r} is of type {setting.type}",
+        f"'{part.name}' is {wanted}, and the setting {found[1]!r} has the type {setting.type}",
         hint=f"give the setting 'type: {hint}'",
     )
 
 
 class Uses:
-    """The names in use; rules report the others."""
+    """The names in use; rules report the unused names."""
 
     def __init__(self) -> None:
         self.settings: set[str] = set()
@@ -88,7 +83,7 @@ class _Linker:
         self.uses = Uses()
 
     def transport(self, part: Part, key: str, name: str) -> None:
-        """Check the transport that `part` names under `key`, or leaves out."""
+        """Check the transport that `part` names under `key`, or omits."""
         if name in self.driver.transports:
             self.uses.transports.add(name)
             return
@@ -111,7 +106,7 @@ class _Linker:
             )
 
     def fields(self, part: Part, read: ReadSpec) -> None:
-        """Check that each field of a reply or message is a signal, or the document's own."""
+        """Check that each field of a reply or message is a signal, or local to the document."""
         found = read_form(part)
         if found is None:
             return
@@ -175,7 +170,7 @@ class _Linker:
             self.template(place, template, known)
 
     def template(self, part: Part, template: Template, known: Iterable[str] = ()) -> None:
-        """Check the names that a template uses."""
+        """Check the names in a template."""
         allowed = {*known, "settings"}
         for used in sorted(template.names - allowed):
             name, hint = self._meant(used, allowed - {COUNTERS, NONCE})
@@ -185,7 +180,7 @@ class _Linker:
                 rf"(?<![\w.]){name}(?!\w)",
                 name,
                 "unknown-name",
-                f"{name!r} means nothing here",
+                f"{name!r} is unknown here",
                 hint,
             )
         signals = self.driver.signals
@@ -215,20 +210,20 @@ class _Linker:
                 r"settings",
                 "settings",
                 "unknown-setting",
-                "'settings' is all of them; name one",
+                "'settings' has all settings; name one of them",
                 did_you_mean("", self.settings, "settings"),
             )
 
     def _meant(self, name: str, allowed: Iterable[str]) -> tuple[str, str]:
-        """Return an unknown name as it is written, and what to do about it."""
+        """Return an unknown name as written, and a hint for it."""
         if name == NONCE:
-            return "nonce", "fresh bytes belong into what is sent: 'send'"
+            return "nonce", "a nonce is only available in 'send'"
         if name == COUNTERS:
-            return "seq", "a counter counts what is sent: it belongs into 'send'"
+            return "seq", "a counter is only available in 'send'"
         if name in self.settings:
             return name, f"write settings.{name}"
         if name == "params":
-            return name, "params are filled in earlier: write {params.NAME}, in single braces"
+            return name, "params are filled in earlier: write {params.NAME} in single braces"
         return name, did_you_mean(name, allowed, "names")
 
     def _unknown(
@@ -256,9 +251,7 @@ def link_driver(
     for name, inner in part.named("transports").items():
         link_refusals(linker, inner, driver.transports[name].faults)
         if name not in answered:
-            refuse(
-                inner, ("errors",), "refuses nothing: nothing on this line has a reply", findings
-            )
+            refuse(inner, ("errors",), "has no effect: this transport has no replies", findings)
         for place, template in option_templates(inner, driver.transports[name]):
             linker.template(place, template)
             check_option(place, driver.transports[name].type, template, settings, findings)
@@ -289,7 +282,7 @@ def link_driver(
 
 
 def _check_poll_names(part: Part, driver: Driver, findings: Findings) -> None:
-    """Report names that two polls, or a poll and a command, share: a test could not tell them."""
+    """Report a name of two polls, or of a poll and a command, which a test could not tell apart."""
     seen: set[str] = set(driver.commands)
     for inner, poll in zip(part.listed("polls"), driver.polls, strict=True):
         if poll.name in seen:
@@ -297,7 +290,7 @@ def _check_poll_names(part: Part, driver: Driver, findings: Findings) -> None:
             findings.error(
                 inner,
                 "duplicate-name",
-                f"{other} is called {poll.name!r} too",
+                f"{other} has the name {poll.name!r}, too",
                 at="name",
                 hint="give each its own name",
             )
@@ -312,7 +305,7 @@ def _check_arguments_used(part: Part, send: WriteSpec, findings: Findings) -> No
                 "unused-argument",
                 f"nothing sends the argument {name!r}",
                 key=True,
-                hint=f"write {{{{ {name} }}}} in 'send', or take the argument away",
+                hint=f"write {{{{ {name} }}}} in 'send', or remove the argument",
             )
 
 
@@ -323,7 +316,7 @@ def link_simulator(
     settings: Mapping[str, Setting],
     findings: Findings,
 ) -> tuple[Mapping[str, Reading], WorldSpec | None]:
-    """Check every name in the emulated robot; return the values it begins with, and its world."""
+    """Check every name in the emulated robot; return its initial values and its world."""
     if not sources.simulator and not sources.rules:
         return NOTHING, None
     from urc.config.link.rules import link_rules, link_values

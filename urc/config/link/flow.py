@@ -1,4 +1,4 @@
-"""Names in conditions, correlations and what is run: do all of them exist, with good arguments?"""
+"""Checks of names and arguments in conditions, correlations and commands that are run."""
 
 from collections.abc import Iterable, Mapping
 from typing import Protocol
@@ -33,16 +33,16 @@ class Linker(Protocol):
     findings: Findings
 
     def transport(self, part: Part, key: str, name: str) -> None:
-        """Check the transport that `part` names under `key`, or leaves out."""
+        """Check the transport that `part` names under `key`, or omits."""
 
     def fields(self, part: Part, read: ReadSpec) -> None:
-        """Check that each field is a signal, or the document's own."""
+        """Check that each field is a signal, or local to the document."""
 
     def field(self, part: Part, name: str, place: Mapping[str, int | bool]) -> None:
         """Check one name of a signal that is set at `part`."""
 
     def template(self, part: Part, template: Template, known: Iterable[str] = ()) -> None:
-        """Check the names that a template uses."""
+        """Check the names in a template."""
 
     def templates(self, part: Part, spec: WriteSpec, known: Iterable[str] = ()) -> None:
         """Check the names in every template under ``send:``."""
@@ -66,9 +66,9 @@ def link_command(linker: Linker, part: Part, command: Command) -> None:
             linker.findings.error(
                 part.must("hold"),
                 "wrong-command",
-                "what is held is one person's doing: nobody can confirm it with every newest value",
+                "a second person cannot confirm every new value of a held command",
                 key=True,
-                hint="let two people confirm a command that enables the motion",
+                hint="require two people for a command that enables the motion",
             )
 
 
@@ -81,7 +81,7 @@ def _link_slew(findings: Findings, slew: Mapping[str, Part], command: Command) -
         kind = argument.of if argument.type == "array" else argument.type
         if kind not in ("integer", "number") or argument.choices:
             what = "has choices" if argument.choices else f"is {kind}"
-            text = f"argument {name!r} {what}, and nothing lies between two of its values"
+            text = f"argument {name!r} {what}, and has no values in between"
             hint = "limit arguments that are numbers without choices"
             findings.error(inner, "wrong-type", text, key=True, hint=hint)
 
@@ -94,13 +94,13 @@ def link_requirements(linker: Linker, part: Part, command: Command) -> None:
 
 
 def refuse_two_person(linker: Linker, part: Part, command: Command) -> None:
-    """Report a command that needs two people, where no person gives it."""
+    """Report a command that needs two people at a place where it runs automatically."""
     if _needs_two(command):
         linker.findings.error(
             part,
             "wrong-command",
-            f"{command.name!r} must be confirmed by two people, and here nobody asks for it",
-            hint="run a command that needs no second person",
+            f"{command.name!r} needs two people, and it would run automatically here",
+            hint="run a command without two_person",
         )
 
 
@@ -111,7 +111,7 @@ def _needs_two(command: Command) -> bool:
 
 
 def link_poll(linker: Linker, part: Part, poll: Poll) -> None:
-    """Check what a poll asks, and when."""
+    """Check the command, transport and period of a poll."""
     if poll.when is not None:
         linker.template(part.must("when"), poll.when, linker.driver.signals)
     if not poll.run:
@@ -128,8 +128,8 @@ def link_poll(linker: Linker, part: Part, poll: Poll) -> None:
         linker.findings.error(
             part.must("run"),
             "wrong-command",
-            f"{poll.run!r} is {what}: a poll asks, it does not act",
-            hint="run a command that only asks",
+            f"{poll.run!r} is {what}, and a poll must only read",
+            hint="run a command that only reads",
         )
         return
     link_arguments(linker.findings, part, command, part.named("args"), "run")
@@ -139,7 +139,7 @@ def link_poll(linker: Linker, part: Part, poll: Poll) -> None:
 def link_reply(
     linker: Linker, part: Part, reply: Reply, arguments: Iterable[str], send: WriteSpec
 ) -> None:
-    """Check every answer, its refusals, and the correlation."""
+    """Check every stage, the error replies and the correlation."""
     stages = part.listed("stages")
     reads = [reply.read, *(one.read for one in reply.stages)]
     errors = [reply.faults, *(one.faults for one in reply.stages)]
@@ -165,12 +165,12 @@ def link_reply(
             "the request has no counter",
             offset=reply.match.source.find("seq"),
             length=3,
-            hint="write {{ seq('number', 0, 255) }} where the request carries it",
+            hint="write {{ seq('number', 0, 255) }} at the place of the counter in the request",
         )
 
 
 def link_asides(linker: Linker, part: Part, asides: Asides) -> None:
-    """Check what a robot says before it answers, in any form."""
+    """Check the provisional replies, in any form."""
     for key, read in (("resend", asides.resend), ("extend", asides.extend)):
         inner = part.get(key)
         if inner is not None and read is not None and isinstance(inner.data, dict):
@@ -178,7 +178,7 @@ def link_asides(linker: Linker, part: Part, asides: Asides) -> None:
 
 
 def link_refusals(linker: Linker, part: Part, faults: tuple[ErrorReply, ...]) -> None:
-    """Check the refusals of any form under ``errors:``."""
+    """Check the error replies of any form under ``errors:``."""
     for inner, fault in zip(_refusal_parts(part), faults, strict=True):
         linker.fields(inner, fault.read)
         if fault.text is not None:
@@ -186,18 +186,18 @@ def link_refusals(linker: Linker, part: Part, faults: tuple[ErrorReply, ...]) ->
 
 
 def said_on(driver: Driver, transport: str) -> Iterable[str]:
-    """Return what all that is said on a line knows: its counters, and what its login learnt."""
+    """Return the names for all templates of a transport: counters, clocks, values of its login."""
     learnt = driver.learnt(transport) if transport in driver.transports else frozenset()
     return (COUNTERS, NONCE, NOW, *learnt)
 
 
 def link_keepalives(linker: Linker, part: Part) -> None:
-    """Check what keeps the lines alive."""
+    """Check the keepalive commands of the transports."""
     for name, inner in part.named("transports").items():
         keepalive = linker.driver.transports[name].keepalive
         if keepalive is None:
             continue
-        linker.transport(inner, "type", name)  # it is used by this
+        linker.transport(inner, "type", name)  # a keepalive uses it
         place = inner.must("keepalive")
         for one in place.listed("after"):
             _link_counting(linker, one, name)
@@ -212,15 +212,15 @@ def link_keepalives(linker: Linker, part: Part) -> None:
 
 
 def _link_counting(linker: Linker, part: Part, transport: str) -> None:
-    """Check a command that counts as a word on a line."""
+    """Check a command that counts as traffic for a keepalive."""
     command = find_command(linker, part, str(part.data))
     if command is not None and (command.steps or command.transport != transport):
         what = "is a sequence" if command.steps else f"goes to {command.transport!r}"
         linker.findings.error(
             part,
             "wrong-command",
-            f"{command.name!r} {what}, and keeps nothing alive on {transport!r}",
-            hint="name commands that are sent on this line",
+            f"{command.name!r} {what}, so it cannot keep {transport!r} alive",
+            hint="name commands of this transport",
         )
 
 
@@ -240,19 +240,14 @@ def find_command(linker: Linker, part: Part, name: str) -> Command | None:
 def link_arguments(
     findings: Findings, part: Part, command: Command, given: Mapping[str, Part], at: str
 ) -> None:
-    """Check plain values given to `command`.
+    """Check plain values for the arguments of `command`.
 
-    Args:
-        findings: collects the problems.
-        part: where they stand.
-        command: whose arguments they are.
-        given: by name.
-        at: key that a missing one is reported at, or the last key of `part` itself.
+    A missing argument is reported at the key `at` of `part`.
     """
     for name, inner in given.items():
         argument = known_argument(name, inner, command, findings)
         if argument is not None and not (isinstance(inner.data, str) and "{{" in inner.data):
-            check_value(inner, argument, findings)  # a step's template is known when it runs
+            check_value(inner, argument, findings)  # a template has its value only at runtime
     missing = [
         name
         for name, one in command.arguments.items()
@@ -264,13 +259,13 @@ def link_arguments(
             part,
             "missing-argument",
             f"command {command.name!r} needs {missing[0]!r}",
-            hint=f"give it here, or a default to the argument {missing[0]!r}",
+            hint=f"give it here, or give a default to the argument {missing[0]!r}",
             **where,
         )
 
 
 def check_value(part: Part, argument: Argument, findings: Findings) -> None:
-    """Check a plain value at `part` that is given for an argument."""
+    """Check a plain value at `part` for an argument."""
     value = part.data
     try:
         elements = fit_argument(value, argument.type, argument.of, argument.size)

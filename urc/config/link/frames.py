@@ -1,6 +1,6 @@
-"""Constant frames that their own framing cannot carry: told when a document is checked, not later.
+"""Constant frames that their own framing cannot carry, reported before a connection opens.
 
-Frames with expressions in them are checked when they are made.
+Frames with expressions are checked when they are built.
 """
 
 from collections.abc import Iterable
@@ -17,7 +17,7 @@ __all__ = ["check_frames"]
 
 
 def check_frames(part: Part, driver: Driver, findings: Findings) -> None:
-    """Report constant texts under ``send:`` that would be two frames, or none."""
+    """Report constant texts under ``send:`` that would become two frames, or none."""
     for name, inner in part.named("commands").items():
         command = driver.commands.get(name)
         if command is not None:
@@ -51,9 +51,9 @@ def _check_one(part: Part, send: WriteSpec, spec: TransportSpec, findings: Findi
             findings.error(
                 inner,
                 "contains-delimiter",
-                f"{_what(send)} {_shown(mark)} in it, which the framing puts around each frame:"
-                " it would be two frames",
-                hint="take it away: the framing adds what marks a frame",
+                f"{_what(send)} {_shown(mark)} inside, which the framing adds to each frame:"
+                " the robot would receive two frames",
+                hint="remove it: the framing adds the marks of a frame",
             )
             return
     wanted = None if layout.size is None else layout.size - layout.head - layout.tail
@@ -61,12 +61,12 @@ def _check_one(part: Part, send: WriteSpec, spec: TransportSpec, findings: Findi
         findings.error(
             inner,
             "wrong-size",
-            f"{_what(send)} {len(data)} bytes, and a frame of this line holds exactly {wanted}",
+            f"{_what(send)} {len(data)} bytes, and a frame of this transport has exactly {wanted}",
         )
 
 
 def _text(templates: Iterable[tuple[Part, Template]], encoding: str) -> bytes | None:
-    """Return the bytes of a constant text, or None; other code reports the faults."""
+    """Return the bytes of a constant text, or None; other code reports its mistakes."""
     found = [template for _, template in templates]
     if len(found) != 1 or not found[0].is_constant:
         return None
@@ -77,7 +77,7 @@ def _text(templates: Iterable[tuple[Part, Template]], encoding: str) -> bytes | 
 
 
 def _bytes(send: WriteSpec) -> bytes | None:
-    """Return the bytes that ``hex`` and ``bytes`` write out; None where something varies."""
+    """Return the bytes of constant ``hex`` and ``bytes``; None for variable ones."""
     pieces = cast("tuple[object, ...]", send.options.get("pieces", (None,)))
     fixed = [one for one in pieces if isinstance(one, bytes)]
     return b"".join(fixed) if len(fixed) == len(pieces) else None
@@ -88,13 +88,13 @@ def _what(send: WriteSpec) -> str:
 
 
 def _check_end(part: Part, findings: Findings) -> None:
-    """Warn of a text that ends in a backslash and a letter, as if it were a line end."""
+    """Warn of a text that ends with a backslash and a letter, as if it were a line end."""
     if isinstance(part.data, str) and part.data.endswith(("\\n", "\\r")):
         findings.warn(
             part,
             "literal-backslash",
-            f"this ends in the 2 characters {part.data[-2:]}, not in a control character",
-            hint='take them away: the framing adds the end; "\\r" in double quotes is a CR',
+            f"this ends with the 2 characters {part.data[-2:]}, not with a control character",
+            hint='remove them: the framing adds the end; "\\r" in double quotes is a CR',
         )
 
 

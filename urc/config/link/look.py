@@ -1,4 +1,4 @@
-"""Names on the side of the look: which widget fills a slot, and what it is bound to."""
+"""Names of an interface: the widget of each slot, and its bindings."""
 
 from collections.abc import Mapping
 from typing import NamedTuple, TypeVar
@@ -25,7 +25,7 @@ _T = TypeVar("_T")
 def link_slots(
     sources: Sources, driver: Driver, shelf: Shelf, findings: Findings
 ) -> dict[str, WidgetUse]:
-    """Return what fills each slot unless an interface says otherwise."""
+    """Return the widget of each slot, before the changes of an interface."""
     slots: dict[str, WidgetUse] = {}
     for slot, parts in sources.slots.items():
         use: WidgetUse | None = None
@@ -44,15 +44,9 @@ def link_interface(
     shelf: Shelf,
     findings: Findings,
 ) -> Interface:
-    """Return the interface with what it changes in the slots.
+    """Return the interface with its own changes to the slots.
 
-    Args:
-        part: the interface in its document.
-        interface: as parsed.
-        slots: the slots of the driver.
-        driver: None when the interface is checked by itself, without any driver.
-        shelf: the widgets.
-        findings: collects the problems.
+    `slots` has the slots of the driver. Without a driver, the interface is checked alone.
     """
     shown = set(interface.shown)
     uses = {}
@@ -90,7 +84,7 @@ def _check_background(
 def _use(
     part: Part, base: WidgetUse | None, driver: Driver | None, shelf: Shelf, findings: Findings
 ) -> WidgetUse | None:
-    """Return what `part` makes of a slot that `base` fills so far; None when it was reported."""
+    """Return the slot `base` with the changes at `part`; None when they were reported."""
     name = part.text("use", base.widget if base else "")
     if not name:
         if driver is not None:
@@ -112,7 +106,7 @@ def _use(
                 at="use",
                 hint=shelf.hint(name),
             )
-        return None  # a broken manifest is told where it stands
+        return None  # a broken manifest is reported in its own file
     bound = _bindings(part, widget, base, driver, findings)
     options, files, pages = _options(part, widget, base, findings)
     use = WidgetUse(
@@ -133,7 +127,7 @@ def _use(
 
 
 class _Bound(NamedTuple):
-    """The bindings so far; the fields are those of `WidgetUse`."""
+    """The bindings so far, with the fields of `WidgetUse`."""
 
     inputs: dict[str, str]
     lists: dict[str, tuple[str, ...]]
@@ -168,8 +162,8 @@ def _bindings(
             findings.error(
                 inner,
                 "wrong-type",
-                f"{key!r} is an output: the name of a command is expected",
-                hint="only inputs that take many signals have a list",
+                f"{key!r} is an output, so it needs the name of a command",
+                hint="only an input of many signals takes a list",
             )
         else:
             port = widget.outputs[key]
@@ -188,7 +182,7 @@ def _bind_input(
         findings.error(
             part,
             "wrong-type",
-            f"{port.name!r} is an input: the name of a signal is expected",
+            f"{port.name!r} is an input, so it needs the name of a signal",
             hint="only outputs take a command with its arguments",
         )
     elif isinstance(part.data, list) and not port.is_many:
@@ -212,7 +206,7 @@ def _bind_input(
 def _check_required(
     part: Part, widget: Widget, bound: Mapping[str, object], driver: Driver, findings: Findings
 ) -> None:
-    tried = part.named("bind")  # what is wrong with those has been told
+    tried = part.named("bind")  # their problems are already reported
     for port in (*widget.inputs.values(), *widget.outputs.values()):
         if port.is_required and port.name not in bound and port.name not in tried:
             findings.error(
@@ -233,15 +227,15 @@ def _kept(bound: Mapping[str, _T], ports: Mapping[str, Port]) -> dict[str, _T]:
 
 def _binding_hint(port: Port, driver: Driver) -> str:
     fitting = [signal.name for signal in driver.signals.values() if not misfit(port, signal)]
-    return f"signals that fit: {listed(fitting)}" if fitting else "no signal of the driver fits"
+    return f"possible signals: {listed(fitting)}" if fitting else "no signal of the driver fits"
 
 
 def _output_hint(port: Port, driver: Driver) -> str:
     fitting = [one.name for one in driver.commands.values() if takes(one, port)]
     if fitting:
-        return f"commands that fit: {listed(fitting)}"
+        return f"possible commands: {listed(fitting)}"
     held = "a command with 'hold'" if port.is_held else "a command without 'hold'"
-    return f"no command of the driver fits: this is an output, and needs {held}"
+    return f"no command of the driver fits this output, which needs {held}"
 
 
 def _check_signal(
@@ -270,26 +264,26 @@ def misfit(port: Port, signal: Signal) -> str:
     """Return why a signal cannot be bound to an input, or "" when it can."""
     types = (*port.types, "integer") if "number" in port.types else port.types
     if signal.type not in types:
-        return f"type {' or '.join(port.types)} is wanted, the signal is {signal.type}"
+        return f"type {' or '.join(port.types)} is expected, the signal is {signal.type}"
     if signal.type == "array":
         of = (*port.of, "integer") if "number" in port.of else port.of
         if of and signal.of not in of:
-            return f"an array of {' or '.join(port.of)} is wanted, the signal is of {signal.of}"
+            return f"an array of {' or '.join(port.of)} is expected, the signal is of {signal.of}"
         if None not in (port.size, signal.size) and port.size != signal.size:
-            return f"an array of {port.size} elements is wanted, the signal has {signal.size}"
+            return f"an array of {port.size} elements is expected, the signal has {signal.size}"
     if port.unit and conversion(signal.unit, port.unit) is None:
         has = f"in {signal.unit!r}" if signal.unit else "without a unit"
-        return f"unit {port.unit!r} is wanted, the signal is {has}"
+        return f"unit {port.unit!r} is expected, the signal is {has}"
     measured = quantity_of(signal.unit)
     if port.quantity and measured not in ("", port.quantity):
-        return f"unit of {port.quantity} is wanted, the signal is in {signal.unit!r}"
+        return f"unit of {port.quantity} is expected, the signal is in {signal.unit!r}"
     return ""
 
 
 def _options(
     part: Part, widget: Widget, base: WidgetUse | None, findings: Findings
 ) -> tuple[dict[str, object], dict[str, str], dict[str, tuple[str, ...]]]:
-    """Return the options, the manifest's defaults filled in, and the files and pages they name."""
+    """Return the options with the manifest's defaults, and the files and pages in them."""
     options: dict[str, object] = {
         name: schema["default"]
         for name, schema in widget.options.items()

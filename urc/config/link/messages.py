@@ -1,4 +1,4 @@
-"""What is said and heard on transports that carry messages: does it fit the kind of transport?"""
+"""Messages of message transports: do they fit the transport type?"""
 
 from collections.abc import Iterator, Mapping
 
@@ -15,7 +15,7 @@ _ANSWERED = ("call", "goal", "request")
 
 
 def check_messages(part: Part, driver: Driver, findings: Findings) -> None:
-    """Report what a transport cannot carry, and messages that come from nowhere."""
+    """Report messages that a transport cannot carry, and messages without a source."""
     for name, inner in part.named("messages").items():
         spec = driver.transports.get(driver.messages[name].transport)
         _check_read(inner, spec, findings, wants_topic=True)
@@ -31,7 +31,7 @@ def check_messages(part: Part, driver: Driver, findings: Findings) -> None:
         if keepalive is not None:
             _check_send(keepalive.get("send"), spec, findings)
         for key in ("on_connect", "on_close"):
-            is_asked = False  # the step before makes a request, whose answer may be expected
+            is_asked = False  # the step before makes a request with a reply
             for step in inner.listed(key):
                 _check_step(step, spec, findings, wants_topic=not is_asked)
                 send = step.get("send")
@@ -41,16 +41,16 @@ def check_messages(part: Part, driver: Driver, findings: Findings) -> None:
 
 
 def _check_answer(part: Part | None, spec: TransportSpec | None, findings: Findings) -> None:
-    """Report an answer whose form gets an answer itself."""
+    """Report a reply whose form expects a reply itself."""
     verb = _check_send(part, spec, findings)
     if part is not None and verb in _ANSWERED:
         findings.error(
             part,
             "wrong-form",
-            f"a message cannot be answered by a {verb!r}, which is answered itself",
+            f"a reply cannot be a {verb!r}, which expects a reply itself",
             at=verb,
             key=True,
-            hint="write 'publish', or text and bytes where the line carries those",
+            hint="write 'publish', or text or bytes if the transport carries them",
         )
 
 
@@ -89,14 +89,14 @@ def _check_send(part: Part | None, spec: TransportSpec | None, findings: Finding
         findings.error(
             part,
             "wrong-form",
-            f"{spec.type} carries messages, and {form or 'text'} says not where they go",
-            hint=f"on {spec.type} use: {verbs}; the text goes inside, as text: …",
+            f"{spec.type} carries messages, and {form or 'text'} has no address",
+            hint=f"on {spec.type} use: {verbs}; put the text inside, as text: …",
         )
     elif kind is None and form in _VERBS and spec.type not in MESSAGING:
         findings.error(
             part,
             "wrong-form",
-            f"{spec.type} carries bytes and knows no {form!r}",
+            f"{spec.type} carries bytes and has no {form!r}",
             at=form,
             key=True,
             hint="write text, or one of the forms hex, bytes, struct and json",
@@ -107,13 +107,13 @@ def _check_send(part: Part | None, spec: TransportSpec | None, findings: Finding
 
 
 def _check_ros(part: Part, findings: Findings) -> None:
-    """Report what a bridge to ROS cannot pass on: it speaks JSON, and wants to know the type."""
+    """Report messages that a ROS bridge cannot pass on: it carries JSON, and needs the type."""
     for key in ("text", "hex", "bytes", "struct"):
         if key in part.data:
             findings.error(
                 part,
                 "wrong-form",
-                f"rosbridge carries JSON and knows no {key!r}",
+                f"rosbridge carries JSON and has no {key!r}",
                 at=key,
                 key=True,
                 hint="write the message's fields: json: { data: … }",
@@ -122,9 +122,9 @@ def _check_ros(part: Part, findings: Findings) -> None:
         findings.error(
             part,
             "missing-key",
-            "'type' is missing: nobody may have advertised the topic yet",
+            "'type' is missing, and the topic may not be advertised yet",
             key=True,
-            hint="type: geometry_msgs/Twist, as 'rostopic info' shows it",
+            hint="'rostopic info' shows the type, such as type: geometry_msgs/Twist",
         )
 
 
@@ -144,7 +144,7 @@ def _check_read(
                 f"{spec.type} has no topics to subscribe to",
                 at="subscribe",
                 key=True,
-                hint="take 'subscribe' away: everything on this line is offered to the form",
+                hint="remove 'subscribe': the form reads everything on this transport",
             )
         return
     if subscribe is None:
@@ -152,7 +152,7 @@ def _check_read(
             findings.error(
                 part,
                 "missing-key",
-                f"'subscribe' is missing: nothing says which topic of {spec.type} it comes from",
+                f"'subscribe' is missing: a message on {spec.type} needs a topic",
                 key=True,
                 hint="subscribe: { topic: NAME }",
             )
@@ -163,14 +163,14 @@ def _check_read(
             findings.error(
                 inner,
                 "misplaced-key",
-                f"{name!r} means nothing on {spec.type}",
+                f"{name!r} has no effect on {spec.type}",
                 key=True,
-                hint=f"here 'subscribe' takes: {known}",
+                hint=f"'subscribe' takes: {known}",
             )
 
 
 def _answers(part: Part) -> list[Part]:
-    """Return a frame that is read, its stages, and the refusals of each."""
+    """Return a received frame, its stages, and the error replies of each."""
     stages = part.listed("stages") if "stages" in part.data else []
     given = [one for one in (part, *stages) if "errors" in one.data]
     refusals = [inner for one in given for inner in one.listed("errors")]
@@ -178,15 +178,15 @@ def _answers(part: Part) -> list[Part]:
 
 
 def _check_head(part: Part, spec: TransportSpec, findings: Findings) -> None:
-    """Report headers where no answer has any."""
+    """Report headers on a transport whose replies have none."""
     if "head" in part.data and spec.type != "http" and spec.type in (*MESSAGING, *BYTE_LINES):
         findings.error(
             part,
             "misplaced-key",
-            f"what comes over {spec.type} has no headers and no status",
+            f"replies over {spec.type} have no headers and no status",
             at="head",
             key=True,
-            hint="take 'head' away: it is for the answers of http",
+            hint="remove 'head': it is for replies over http",
         )
 
 
@@ -205,11 +205,11 @@ def check_via(
             text = f"there is no transport {spec.via!r}"
             findings.error(part, "unknown-transport", text, at="via", hint=hint)
         elif carrier.type not in CARRIERS:
-            text = f"{spec.via!r} is a {carrier.type} transport, which carries no others"
-            hint = f"these do: {', '.join(sorted(CARRIERS))}"
+            text = f"{spec.via!r} has the type {carrier.type}, which cannot be a tunnel"
+            hint = f"possible types: {', '.join(sorted(CARRIERS))}"
             findings.error(part, "wrong-form", text, at="via", hint=hint)
         elif _is_circular(name, transports):
-            text = f"{name!r} would go through itself"
+            text = f"{name!r} is a tunnel through itself"
             findings.error(part, "wrong-form", text, at="via", hint="break the circle")
         else:
             carriers.add(spec.via)

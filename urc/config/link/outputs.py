@@ -1,4 +1,4 @@
-"""Outputs of a widget → commands of the driver: which one, and where its values go."""
+"""Outputs of a widget → commands of the driver, with the arguments for their values."""
 
 from collections.abc import Mapping, Sequence
 from typing import Final
@@ -21,20 +21,16 @@ _GIVERS: Final = {
     "boolean": "switch",
     "string": "text",
 }
-"""Type of an argument → the shipped widgets that give one."""
+"""Type of an argument → the shipped widgets that give a value of it."""
 
 
 def link_output(
     part: Part, port: Port, widget: Widget, driver: Driver | None, findings: Findings
 ) -> tuple[str, Given]:
-    """Return the command that an output is bound to, and what it gives to its arguments.
+    """Return the command that an output is bound to, and the arguments for its values.
 
-    Args:
-        part: the output's value in ``bind``: a name, or a mapping.
-        port: the output.
-        widget: whose output it is.
-        driver: None when the interface is checked by itself, without any driver.
-        findings: collects the problems.
+    `part` is the value in ``bind``: a name, or a mapping. Without a driver, the interface is
+    checked alone.
     """
     is_short = isinstance(part.data, str)
     name = part.data if is_short else part.text("command")
@@ -65,7 +61,7 @@ def _given(part: Part, port: Port, widget: Widget, findings: Findings) -> Given:
             findings.error(
                 inner,
                 "unknown-argument",
-                f"output {port.name!r} of widget {widget.name!r} gives no {source!r}",
+                f"output {port.name!r} of widget {widget.name!r} gives no value {source!r}",
                 key=True,
                 hint=f"it gives: {listed(port.arguments)}" if port.arguments else "",
             )
@@ -73,7 +69,7 @@ def _given(part: Part, port: Port, widget: Widget, findings: Findings) -> Given:
             findings.error(
                 inner,
                 "given-twice",
-                f"{source!r} goes to {inner.data!r}, where {names[inner.data]!r} goes already",
+                f"{source!r} goes to {inner.data!r}, which already takes {names[inner.data]!r}",
                 hint="each argument takes one value",
             )
         names[inner.data] = source
@@ -83,7 +79,7 @@ def _given(part: Part, port: Port, widget: Widget, findings: Findings) -> Given:
             findings.error(
                 inner,
                 "given-twice",
-                f"{name!r} is set here, and {names[name]!r} of {port.name!r} goes there too",
+                f"{name!r} is set here, and {names[name]!r} of {port.name!r} sets it too",
                 key=True,
                 hint="each argument takes one value",
             )
@@ -93,28 +89,28 @@ def _given(part: Part, port: Port, widget: Widget, findings: Findings) -> Given:
 def _check_hold(
     part: Part, port: Port, widget: Widget, command: Command, findings: Findings
 ) -> bool:
-    """Return whether an output that holds has a held command."""
+    """Return whether a hold-to-run output has a held command."""
     if port.is_held and command.hold is None:
         findings.error(
             part,
             "not-held",
-            f"{port.name!r} of widget {widget.name!r} is held, and command"
-            f" {command.name!r} does not say what stops it",
+            f"{port.name!r} of widget {widget.name!r} is a hold-to-run control, and command"
+            f" {command.name!r} has no 'hold'",
             hint="give the command 'hold: { repeat: 50ms, release: … }'",
         )
     elif command.hold is not None and not port.is_held:
         findings.warn(
             part,
             "not-held",
-            f"command {command.name!r} is held, and {port.name!r} of widget"
-            f" {widget.name!r} cannot hold it",
-            hint="use a widget that holds: joystick, hold-button",
+            f"command {command.name!r} is a held command, and {port.name!r} of widget"
+            f" {widget.name!r} is no hold-to-run control",
+            hint="use a hold-to-run widget: joystick, hold-button",
         )
     return port.is_held is (command.hold is not None)
 
 
 def _check_targets(part: Part, command: Command, findings: Findings) -> bool:
-    """Check the arguments that are named and their constants; return whether there are all."""
+    """Check the named arguments and their constants; return whether all of them exist."""
     is_known = True
     for inner in part.named("args").values():
         is_known &= known_argument(inner.data, inner, command, findings, key=False) is not None
@@ -130,9 +126,9 @@ def _check_targets(part: Part, command: Command, findings: Findings) -> bool:
 def _check_values(
     part: Part, port: Port, widget: Widget, command: Command, given: Given, findings: Findings
 ) -> None:
-    """Report what the command needs and does not get, and what it gets and cannot take."""
+    """Report required arguments without a value, and values that do not fit their argument."""
     if port.types and not port.arguments:
-        return  # it gives a value, and nobody says by which name
+        return  # it gives a value without a name
     taken = targets(command, port, given)
     missing = [
         name
@@ -143,7 +139,7 @@ def _check_values(
         findings.error(
             part,
             "missing-argument",
-            f"{port.name!r} of widget {widget.name!r} does not give what command {command.name!r}"
+            f"{port.name!r} of widget {widget.name!r} does not give all that {command.name!r}"
             f" needs: {listed(missing)}",
             hint=_remedy(command, port, taken, missing),
         )
@@ -162,7 +158,7 @@ def _check_values(
 
 
 def takes(command: Command, port: Port) -> bool:
-    """Return whether a command may be bound to an output, if the binding says where values go."""
+    """Return whether a command may be bound to an output, possibly with `args`."""
     if port.is_held is not (command.hold is not None):
         return False
     if not port.arguments:
@@ -182,15 +178,15 @@ def _remedy(command: Command, port: Port, taken: Mapping[str, str], missing: Seq
 
 
 def _giver(argument: Argument) -> str:
-    """Return which widgets give what an argument takes."""
+    """Return a hint with the widgets that give a value for an argument."""
     widgets = "select" if argument.choices else _GIVERS.get(argument.type, "")
-    return f"use a widget that gives what {argument.name} takes: {widgets}" if widgets else ""
+    return f"use a widget with a value for {argument.name}: {widgets}" if widgets else ""
 
 
 def _check_nothing(
     part: Part, port: Port, widget: Widget, command: Command, given: Given, findings: Findings
 ) -> None:
-    """Report an output none of whose values goes anywhere."""
+    """Report an output whose values all have no effect."""
     what = f"{port.name!r} of widget {widget.name!r} gives {listed(port.arguments)}"
     free = [name for name in command.arguments if name not in given.fixed]
     if free:
@@ -199,7 +195,7 @@ def _check_nothing(
     else:
         where = f"and command {command.name!r} takes no value from it"
         plain = "hold-button" if port.is_held else "button"
-        hint = f"use a widget that needs to give none: {plain}"
+        hint = f"use a widget without values: {plain}"
     if not port.is_held or _stands_still(command, given):
         findings.error(part, "nothing-given", f"{what}, {where}", hint=hint)
     elif len(port.arguments) > 1:
@@ -207,7 +203,7 @@ def _check_nothing(
 
 
 def _stands_still(command: Command, given: Given) -> bool:
-    """Return whether a held command says while it is held what it says when it is let go."""
+    """Return whether a held command sends the same values while held as on release."""
     release = command.hold.release if command.hold is not None else {}
     return bool(command.arguments) and all(
         given.fixed.get(name, one.default) == release.get(name, one.default)
@@ -222,7 +218,7 @@ def _is_of_type(port: Port, argument: Argument) -> bool:
 
 
 def _misfit(port: Port, argument: Argument) -> str:
-    """Return why an argument cannot take what an output gives, or "" when it can."""
+    """Return why an argument cannot take the value of an output, or "" when it can."""
     if not _is_of_type(port, argument):
         given = "number" if port.is_held else " or ".join(port.types)
         return f"it is {given}, and the argument is {argument.type}"
@@ -232,6 +228,6 @@ def _misfit(port: Port, argument: Argument) -> str:
 
 
 def _place(part: Part, source: str) -> Part:
-    """Return where a binding says where a value goes, or the binding itself."""
+    """Return the place of a value in the `args` of a binding, or the binding itself."""
     args = part.get("args") if isinstance(part.data, dict) else None
     return (args.get(source) if args is not None else None) or part

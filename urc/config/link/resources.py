@@ -1,10 +1,10 @@
-"""Files and web pages that the options of a widget name.
+"""Files and web pages in the options of a widget.
 
-A dashboard serves exactly the files that a document names. A file must lie in the folder of the
+A dashboard serves exactly the files that a document names. A file must be in the folder of the
 document, so that no package can publish other files of the disk.
 
-The host of a web page is written into the policy of the document that shows the page. Its URL must
-therefore be one that all browsers read alike.
+The host of a web page becomes part of the security policy of the page that shows it. Its URL must
+therefore be unambiguous for all browsers.
 """
 
 import ipaddress
@@ -23,7 +23,7 @@ FILE_TYPES: Final = (
     *(".urdf", ".stl", ".dae", ".glb", ".obj", ".mtl", ".md", ".txt", ".json", ".csv"),
     *(".png", ".jpg", ".jpeg", ".webp", ".gif", ".svg", ".wav", ".mp3", ".ogg"),
 )
-"""File types that widgets can use; none of them runs."""
+"""File types for widgets; none of them is executable."""
 
 MOST_BYTES: Final = 64 << 20
 """Of one file."""
@@ -43,22 +43,20 @@ _LAST_PORT: Final = 65535
 def link_files(options: Part, widget: Widget, findings: Findings) -> dict[str, str]:
     """Return file names in the options → paths.
 
-    Args:
-        options: of one slot; their shape is right.
-        widget: its manifest marks the options that name files.
-        findings: collects the problems.
+    The options of the slot fit their schema. The widget's manifest marks the options that name
+    files.
     """
     found = {}
     for _, part in named_texts(options, widget.options, "file"):
         fault = _file_fault(part.data)
         place = FilePath(part.document.file).absolute().parent / part.data
         if fault:
-            hint = "name a file in the folder of this document, or below it"
+            hint = "name a file in the folder of this document or below"
             findings.error(part, "file-not-served", f"{part.data!r} {fault}", hint=hint)
         elif not place.is_file():
             findings.error(part, "no-such-file", f"there is no file {part.data!r}")
         elif not _is_below(place, FilePath(part.document.file).absolute().parent):
-            findings.error(part, "file-not-served", f"{part.data!r} leads out of this folder")
+            findings.error(part, "file-not-served", f"{part.data!r} is outside of this folder")
         elif place.stat().st_size > MOST_BYTES:
             text = f"{part.data!r} is larger than {MOST_BYTES >> 20} MiB"
             findings.error(part, "file-not-served", text)
@@ -85,9 +83,9 @@ def named_texts(
 def _file_fault(name: str) -> str:
     path = PurePosixPath(name)
     if path.is_absolute() or ".." in path.parts or "\\" in name or ":" in name or "\0" in name:
-        return "is no path within this folder"
+        return "is not a path inside this folder"
     if path.suffix.lower() not in FILE_TYPES:
-        return f"is of a type that no page is given; types are {', '.join(FILE_TYPES)}"
+        return f"has a type that is not served; types are {', '.join(FILE_TYPES)}"
     return ""
 
 
@@ -98,10 +96,8 @@ def _is_below(place: FilePath, folder: FilePath) -> bool:
 def link_pages(options: Part, widget: Widget, findings: Findings) -> dict[str, tuple[str, ...]]:
     """Return options that may name pages → their URLs.
 
-    Args:
-        options: of one slot; their shape is right.
-        widget: its manifest marks the options that name pages.
-        findings: collects the problems. An empty text is right: it names no page.
+    The options of the slot fit their schema. The widget's manifest marks the options that name
+    pages. An empty text is valid: it names no page.
     """
     found: dict[str, tuple[str, ...]] = {}
     for name, part in named_texts(options, widget.options, "page"):
@@ -117,21 +113,21 @@ def link_pages(options: Part, widget: Widget, findings: Findings) -> dict[str, t
 def _page_fault(url: str) -> str:
     parts = _URL.fullmatch(url)
     if parts is None or parts["scheme"].lower() not in ("http", "https"):
-        return "is no http or https URL"
+        return "is not an http or https URL"
     if len(url) > LONGEST_URL:
         return f"is longer than {LONGEST_URL} characters"
     authority = parts["authority"] or ""
     if "@" in authority:
-        return "holds a name or password, which everybody who sees the page could read"
+        return "has a user name or password, which every viewer of the page could read"
     if authority.startswith("["):
-        return "names an IPv6 address, which the policy of a page cannot; give the host a name"
+        return "has an IPv6 address, which a page's policy cannot hold; use a host name"
     host = _HOST.fullmatch(authority)
     if host is None or not _is_host(host["host"]):
-        return "names no host that all browsers read alike"
+        return "has an ambiguous or missing host"
     if host["port"] is not None and not 0 < int(host["port"]) <= _LAST_PORT:
-        return f"names a port that is not 1 to {_LAST_PORT}"
+        return f"has a port outside of 1 to {_LAST_PORT}"
     if not _REST.fullmatch(parts["rest"]):
-        return "holds a character that a URL writes as %XX"
+        return "has a character that a URL needs as %XX"
     return ""
 
 
@@ -139,7 +135,7 @@ def _is_host(host: str) -> bool:
     labels = host.removesuffix(".").split(".")
     if not all(labels):
         return False
-    # Browsers read `127.1` and `0x7f000001` as addresses, too. Only the usual notation is allowed.
+    # Browsers also read `127.1` and `0x7f000001` as addresses. Only the usual notation is allowed.
     if _NUMBER.fullmatch(labels[-1]):
         try:
             ipaddress.IPv4Address(host)

@@ -1,4 +1,4 @@
-"""Names in the rules of the emulated robot, and its first values."""
+"""Names in the rules of the emulated robot, and its initial values."""
 
 from collections.abc import Iterable, Mapping
 
@@ -19,20 +19,17 @@ __all__ = ["link_rules", "link_values", "settable"]
 def link_values(
     parts: Mapping[str, Part], driver: Driver, findings: Findings
 ) -> dict[str, Reading]:
-    """Return the values with which the robot begins, of the signals' types.
+    """Return the initial values of the emulated robot, in the types of the signals.
 
-    Args:
-        parts: of the simulator: `signals` and `state`.
-        driver: as linked.
-        findings: collects the problems.
+    `parts` has the `signals` and `state` of the simulator.
     """
     values: dict[str, Reading] = {}
     if "state" in parts:
         for name, inner in parts["state"].entries().items():
             if name in driver.signals or name in ("now", "settings", "world"):
                 what = "a signal" if name in driver.signals else "something else"
-                text = f"{name!r} is {what} already"
-                hint = "give its first value under 'signals'" if what == "a signal" else ""
+                text = f"{name!r} is already {what}"
+                hint = "give its initial value under 'signals'" if what == "a signal" else ""
                 findings.error(inner, "duplicate-name", text, key=True, hint=hint)
             values[name] = tuple(inner.data) if isinstance(inner.data, list) else inner.data
     if "signals" in parts:
@@ -44,7 +41,7 @@ def link_values(
 
 
 def settable(name: str, part: Part, driver: Driver, findings: Findings) -> Signal | None:
-    """Return the signal that is given a value at `part`; report it if it has none of its own."""
+    """Return the signal for a value at `part`; report a signal that cannot be set."""
     signal = driver.signals.get(name)
     if signal is None:
         text = f"{name!r} is not a signal"
@@ -63,12 +60,12 @@ def _value(part: Part, signal: Signal, findings: Findings) -> Reading:
     if data is None:
         return None
     if signal.type in ("object", "image", "blob"):
-        text = f"signal {signal.name!r}: an {signal.type} cannot be written here"
+        text = f"signal {signal.name!r}: a value of type {signal.type} cannot be given here"
         findings.error(part, "wrong-type", text)
         return None
     if (signal.type == "array") != isinstance(data, list):
         wanted = f"a list of {signal.of}s" if signal.type == "array" else "no list"
-        text = f"signal {signal.name!r} is of type {signal.type}: {wanted} is expected"
+        text = f"signal {signal.name!r} is of type {signal.type}: expected {wanted}"
         findings.error(part, "wrong-type", text)
         return None
     if isinstance(data, list):
@@ -81,7 +78,7 @@ def _single(part: Part, signal: Signal, kind: str, findings: Findings) -> Value:
     if signal.states:
         words = [word for _, word in signal.states]
         if value not in words:
-            text = f"signal {signal.name!r}: {shown(value)} is none of its states"
+            text = f"signal {signal.name!r}: {shown(value)} is not one of its states"
             near = did_you_mean(str(value), words, "states")
             hint = fit_hint(value, "string") if shown(value) in words else near
             findings.error(part, "unknown-word", text, hint=hint)
@@ -105,12 +102,7 @@ def link_rules(
 ) -> None:
     """Check the rules of one transport.
 
-    Args:
-        linker: of the driver.
-        part: the list of rules.
-        rules: the parsed rules.
-        state: names of the robot's own state.
-        world: of the robot.
+    `state` has the names of the robot's own state, and `world` its world.
     """
     always = {"now", *state, *linker.driver.signals} | ({"world"} if world is not None else set())
     told = frozenset[str]() if world is None else frozenset(world.senses)
@@ -126,7 +118,7 @@ def link_rules(
 
 
 def _given(linker: Linker, part: Part, rule: SimulatorRule) -> set[str]:
-    """Return the names that the frame of a rule brings; check who is meant."""
+    """Return the names from the frame of a rule; check the request that it names."""
     match = rule.match
     if isinstance(match, ReadSpec):
         fields = set(match.fields)
@@ -156,10 +148,10 @@ def _of_command(linker: Linker, part: Part, rule: SimulatorRule) -> set[str]:
         return set()
     if command.steps:
         text = f"{rule.request!r} is a sequence, which sends several frames"
-        hint = "write a rule for what each of its steps sends, with 'match'"
+        hint = "write a rule with 'match' for each of its steps"
         linker.findings.error(inner, "wrong-command", text, hint=hint)
     elif command.send.form == "frames":
-        text = f"{rule.request!r} sends several frames, and a rule takes one"
+        text = f"{rule.request!r} sends several frames, and a rule matches one"
         hint = "write a rule with match: for each of its frames"
         linker.findings.error(inner, "wrong-command", text, hint=hint)
     elif command.transport != rule.transport:
@@ -172,7 +164,7 @@ def _check_poll(linker: Linker, part: Part, rule: SimulatorRule) -> None:
     polls = {poll.name: poll for poll in linker.driver.polls}
     poll = polls.get(rule.request)
     if poll is None:
-        text = f"no poll is called {rule.request!r}"
+        text = f"there is no poll {rule.request!r}"
         hint = did_you_mean(rule.request, polls, "polls")
         linker.findings.error(inner, "unknown-request", text, hint=hint)
     elif poll.run:
@@ -185,7 +177,7 @@ def _check_poll(linker: Linker, part: Part, rule: SimulatorRule) -> None:
 
 def _elsewhere(linker: Linker, part: Part, rule: SimulatorRule, transport: str) -> None:
     if transport not in linker.driver.transports:
-        return  # it has been told of where the request stands
+        return  # reported at the request
     text = f"{rule.request!r} goes to {transport!r}, and this rule is for {rule.transport!r}"
     linker.findings.error(part, "wrong-transport", text)
 
@@ -217,16 +209,16 @@ def _link_reaction(
 
 
 def _check_told(linker: Linker, part: Part, told: frozenset[str]) -> None:
-    """Report values for signals that the world tells."""
+    """Report values for signals that the world sets."""
     for name, inner in part.named("set").items():
         if name in told:
-            text = f"signal {name!r} is told by the world"
-            hint = "take it away here, or from world.signals"
+            text = f"the world sets the signal {name!r}"
+            hint = "remove it here, or from world.signals"
             linker.findings.error(inner, "two-sources", text, key=True, hint=hint)
 
 
 def _check_word(linker: Linker, part: Part, value: Template) -> None:
-    """Check a plain text that a signal is set to: it may be a word, or an expression in want."""
+    """Check a plain text for a signal: a word, or a value that should be an expression."""
     signal = linker.driver.signals[part.name]
     if signal.formula is None and (signal.states or signal.type != "string"):
         text = value.evaluate({})
@@ -235,11 +227,11 @@ def _check_word(linker: Linker, part: Part, value: Template) -> None:
 
 
 def _check_answers(linker: Linker, places: tuple[Part, ...], rule: SimulatorRule) -> None:
-    """Report declared answers to nothing, and answers of a request that has none."""
+    """Report `auto` replies of periodic rules, and replies to a request that has none."""
     if rule.every_s is None:
         return
     for place in places:
         if place.text("answer") == "auto":
-            text = "nothing was asked that could be answered"
-            hint = "write message: NAME to say a message of the driver"
+            text = "a periodic rule has no request to reply to"
+            hint = "write message: NAME to send a message of the driver"
             linker.findings.error(place, "misplaced-key", text, at="answer", hint=hint)

@@ -1,4 +1,4 @@
-"""Signals that are computed from others: their names, and that none rests on itself."""
+"""Computed signals: their names, and no cycles between them."""
 
 from collections.abc import Callable, Iterable, Mapping
 
@@ -15,7 +15,7 @@ _Check = Callable[[Part, Template, Iterable[str]], None]
 
 
 def link_signals(part: Part, driver: Driver, check: _Check, findings: Findings) -> None:
-    """Check every computed signal of the driver at `part`; `check` looks at a template's names."""
+    """Check every computed signal of the driver at `part`; `check` checks a template's names."""
     set_by_frames = _set_by_frames(driver)
     for name, inner in part.named("signals").items():
         formula = driver.signals[name].formula
@@ -27,7 +27,7 @@ def link_signals(part: Part, driver: Driver, check: _Check, findings: Findings) 
             findings.error(
                 place,
                 "constant-value",
-                "no signal is in this expression, so it would never be computed",
+                "this expression has no signal, so it would never be computed",
                 hint=did_you_mean("", driver.signals, "signals"),
             )
         if name in set_by_frames:
@@ -36,20 +36,20 @@ def link_signals(part: Part, driver: Driver, check: _Check, findings: Findings) 
                 "two-sources",
                 f"{name!r} is computed here, and set by {set_by_frames[name]}",
                 key=True,
-                hint="give one of them another name",
+                hint="rename one of the two",
             )
         cycle = cycle_from(name, lambda one: _needed(one, driver.signals))
         if cycle:
             findings.error(
                 place,
                 "circular-value",
-                f"{name!r} rests on itself: {' → '.join(cycle)}",
-                hint="a signal is computed from signals that do not need it",
+                f"{name!r} depends on itself: {' → '.join(cycle)}",
+                hint="compute a signal only from signals that do not depend on it",
             )
 
 
 def _set_by_frames(driver: Driver) -> dict[str, str]:
-    """Return which frame sets a signal, for each that one does."""
+    """Return signal → the frame that sets it, as text."""
     found: dict[str, str] = {}
     for message in driver.messages.values():
         found |= dict.fromkeys(message.read.fields, f"message {message.name!r}")

@@ -1,4 +1,4 @@
-"""Names in sequences: in frames, replies and runs; and no sequence may run itself."""
+"""Names in the frames, replies and runs of sequences, and cycles of sequences."""
 
 from collections.abc import Iterator
 
@@ -21,7 +21,7 @@ __all__ = ["link_sequences", "steps_of"]
 
 
 def steps_of(part: Part) -> Part:
-    """Return the list of steps of the sequence at `part`, however it is written."""
+    """Return the list of steps of the sequence at `part`, in either notation."""
     return part.must("steps") if isinstance(part.data, dict) else part
 
 
@@ -33,7 +33,7 @@ def link_sequences(linker: Linker, part: Part) -> None:
             linker.findings.error(
                 inner,
                 "duplicate-name",
-                f"a command is called {name!r} too",
+                f"a command has the name {name!r}, too",
                 key=True,
                 hint="give each its own name",
             )
@@ -49,25 +49,25 @@ def link_sequences(linker: Linker, part: Part) -> None:
                 "circular-run",
                 f"{name!r} runs itself: {' → '.join(cycle)}",
                 key=True,
-                hint="write repeat: [ … ] with 'times' for what is done again and again",
+                hint="write repeat: [ … ] with 'times' for a loop",
             )
     for name, inner in part.named("transports").items():
         spec = linker.driver.transports[name]
         for key, steps in (("on_connect", spec.on_connect), ("on_close", spec.on_close)):
             if steps:
-                linker.transport(inner, "type", name)  # it is used by them
+                linker.transport(inner, "type", name)  # these steps use it
                 is_late = key != "on_connect"
                 _Walk(linker, is_named=False, is_late=is_late).steps(inner.must(key), steps)
 
 
 class _Walk:
-    """One sequence: what its later steps know."""
+    """The check of one sequence, with the names known to its later steps."""
 
     def __init__(self, linker: Linker, *, is_named: bool, is_late: bool = True) -> None:
         self._linker = linker
         self._is_named = is_named
         self._is_late = is_late
-        """It comes after the login of its lines, and so knows what that has learnt."""
+        """Whether the steps run after the login, and know the values from it."""
         self._known: set[str] = set(linker.driver.signals)
 
     def steps(self, part: Part, steps: tuple[sequence.Step, ...]) -> None:
@@ -133,11 +133,11 @@ class _Walk:
                     self._linker.findings.error(
                         part,
                         "too-many-steps",
-                        f"{loops!r} repeats, too, and it is run in here: nobody can say how long"
+                        f"{loops!r} is a loop inside this loop, so the number of steps has no limit"
                         " that takes",
                         at="repeat",
                         key=True,
-                        hint="repeat in one of them only",
+                        hint="use a loop in only one of the two",
                     )
 
     def _run(self, part: Part, step: sequence.RunStep) -> None:
@@ -155,7 +155,7 @@ class _Walk:
             self._known |= command.reply.names
 
     def _learnt(self, transport: str) -> frozenset[str]:
-        """Return names that a line knows after its login, apart from those of the steps."""
+        """Return names that a transport knows after its login, without the names of the steps."""
         driver = self._linker.driver
         return (
             driver.learnt(transport)
@@ -177,19 +177,19 @@ class _Walk:
             self._linker.transport(part, key, name)
 
     def _must_last(self, part: Part, transport: str) -> None:
-        """Report steps that wait for a frame on a line that cannot receive it."""
+        """Report steps that wait for a frame on a transport that cannot receive it."""
         spec = self._linker.driver.transports.get(transport)
         if self._is_named and spec is not None and spec.connection == "per_request":
             self._linker.findings.error(
                 part,
                 "no-connection",
-                f"{transport!r} has a connection for each request, and none between two steps",
-                hint="run a command that has a reply, or make the connection persistent",
+                f"{transport!r} opens a connection for each request, and none between two steps",
+                hint="run a command with a reply, or make the connection persistent",
             )
 
 
 def _loops(start: str, driver: Driver) -> str:
-    """Return the first sequence that `start` runs, or is, and that repeats something; else ""."""
+    """Return the first sequence with a loop: `start` or one that it runs; "" without a loop."""
     waiting, seen = [start], {start}
     while waiting:
         name = waiting.pop(0)

@@ -1,4 +1,4 @@
-"""Names in the tests that documents carry about themselves."""
+"""Names in the tests of documents."""
 
 from collections.abc import Mapping
 from typing import Final
@@ -21,7 +21,7 @@ def link_test(
     settings: Mapping[str, Setting],
     findings: Findings,
 ) -> DocumentTest:
-    """Return the test with values of the signals' types and the poll it names by its index."""
+    """Return the test with values in the signals' types, and with the index of its poll."""
     if test.steps:
         _check_polls(part, driver, findings)
         steps = _link_steps(part, test.steps, driver, findings)
@@ -44,15 +44,15 @@ def link_test(
 def _check_purpose(part: Part, test: DocumentTest, driver: Driver, findings: Findings) -> None:
     text = ""
     if not test.feed and test.run is None and test.reply_to is None:
-        text = "'feed' or 'run' is missing: this test does nothing"
+        text = "'feed' or 'run' is missing, so this test does nothing"
     elif not (test.expect or test.sent or test.fails is not None or _reads(test, driver)):
-        text = "'expect', 'sent' or 'fails' is missing: this test cannot fail"
+        text = "'expect', 'sent' or 'fails' is missing, so this test cannot fail"
     if text:
         findings.error(part, "missing-key", text, key=True)
 
 
 def _reads(test: DocumentTest, driver: Driver) -> bool:
-    """Return whether something fed has to be read: as the answer to a command, or at all."""
+    """Return whether the fed frames must match: as a reply to a command, or as messages."""
     if test.feed and test.run is None and test.reply_to is None:
         return True
     asked = test.run if test.run is not None else test.reply_to
@@ -62,7 +62,7 @@ def _reads(test: DocumentTest, driver: Driver) -> bool:
 
 _COMES: Final = ("message", "response", "feedback")
 _GOES: Final = ("publish", "call", "goal", "cancel", "request")
-"""Kinds of messages that are fed, and of those that are sent."""
+"""Kinds of messages that a test feeds, and kinds that it expects to be sent."""
 
 
 def _check_transports(part: Part, driver: Driver, findings: Findings) -> None:
@@ -99,7 +99,7 @@ def _check_polls(part: Part, driver: Driver, findings: Findings) -> None:
     names = [poll.name for poll in driver.polls]
     for inner in part.listed("polls"):
         if inner.data not in names:
-            text = f"no poll is called {inner.data!r}"
+            text = f"there is no poll {inner.data!r}"
             hint = did_you_mean(str(inner.data), names, "polls")
             findings.error(inner, "unknown-request", text, hint=hint)
 
@@ -113,7 +113,7 @@ def _link_steps(
     parts = part.listed("steps")
     if not any(key in inner.data for inner in parts for key in _CHECKS):
         words = ", ".join(f"'{key}'" for key in _CHECKS[:-1])
-        text = f"{words} or '{_CHECKS[-1]}' is in no step: this test cannot fail"
+        text = f"{words} or '{_CHECKS[-1]}' is missing in all steps, so this test cannot fail"
         findings.error(part, "missing-key", text, at="steps", key=True)
     linked = []
     for place, (inner, step) in enumerate(zip(parts, steps, strict=True)):
@@ -125,8 +125,8 @@ def _link_steps(
                 _check_transport(str(named.data), named, driver, findings)
         spec = driver.transports.get(step.connects)
         if spec is not None and spec.connection == "per_request":
-            text = f"{spec.name!r} is connected for each request, and by it"
-            hint = "run a command that asks something there"
+            text = f"{spec.name!r} opens a connection for each request"
+            hint = "run a command with a request there"
             findings.error(inner, "wrong-transport", text, at="connects", hint=hint)
         may_fail = bool(step.fails or after.fails)
         _check_run(inner, step.run or None, step.arguments, driver, findings, may_fail=may_fail)
@@ -154,7 +154,7 @@ def _state(name: str, part: Part, driver: Driver, findings: Findings) -> Expecte
         text = f"signal {name!r} has no limits"
         findings.error(part, "misplaced-key", text, at="alarm", hint="give it limits")
     if "value" in part.data and part.text("age") == "never":
-        text = "what was never set has no value"
+        text = "a signal that was never set has no value"
         findings.error(part, "misplaced-key", text, at="value", key=True)
     inner = part.get("value")
     value = _expected(name, inner if inner else part, driver, findings, is_part=inner is None)
@@ -200,7 +200,7 @@ def _expected(
         return None
     if (signal.type == "array") != isinstance(part.data, list):
         wanted = f"a list of {signal.of}s" if signal.type == "array" else "no list"
-        text = f"signal {name!r} is of type {signal.type}: {wanted} is expected"
+        text = f"signal {name!r} is of type {signal.type}: expected {wanted}"
         findings.error(part, "wrong-type", text)
         return None
     if signal.type == "array":
@@ -213,7 +213,7 @@ def _fitting(part: Part, signal: Signal, kind: str, findings: Findings) -> Value
     if value is None or (isinstance(value, str) and value in dict(signal.states).values()):
         return value
     if kind in ("object", "image", "blob"):
-        text = f"signal {signal.name!r}: what is in {kind}s cannot be compared"
+        text = f"signal {signal.name!r}: a value of type {kind} cannot be compared"
         findings.error(part, "wrong-type", text, hint="compare a signal that is computed from it")
         return None
     try:
@@ -235,31 +235,31 @@ def _reply_to(
         names = {poll.name: place for place, poll in enumerate(driver.polls)}
         if waiting in driver.commands:
             if test.feed and driver.commands[waiting].reply is None:
-                findings.error(inner, "no-reply", f"the command {waiting!r} waits for no reply")
+                findings.error(inner, "no-reply", f"the command {waiting!r} expects no reply")
             return waiting
         if waiting not in names:
             findings.error(
                 inner,
                 "unknown-request",
-                f"no poll or command is called {waiting!r}",
+                f"there is no poll or command {waiting!r}",
                 hint=did_you_mean(waiting, (*names, *driver.commands), "names"),
             )
             return None
         waiting = names[waiting]
     if waiting >= len(driver.polls):
         most = len(driver.polls) - 1
-        text = f"the last one is {most}" if most >= 0 else "there are none"
+        text = f"the last poll is {most}" if most >= 0 else "the driver has no polls"
         findings.error(
             inner,
             "unknown-request",
             f"there is no poll {waiting}: {text}",
-            hint="polls are counted from 0",
+            hint="polls count from 0",
         )
         return None
     poll = driver.polls[waiting]
     if test.feed and poll.reply is None:
-        findings.error(inner, "no-reply", f"poll {waiting} waits for no reply")
-    # A line that the driver does not have has been told of where the poll stands.
+        findings.error(inner, "no-reply", f"poll {waiting} expects no reply")
+    # A transport that the driver does not have is reported at its poll.
     if test.feed and poll.transport in driver.transports and poll.transport not in test.feed:
         findings.error(
             inner,
@@ -313,7 +313,7 @@ def _check_argument(
 ) -> None:
     argument = known_argument(name, part, command, findings)
     if argument is None or may_fail:
-        return  # a test about a failure may give what is refused
+        return  # a test of a failure may give invalid values
     try:
         elements = fit_argument(part.data, argument.type, argument.of, argument.size)
     except ValueError as error:

@@ -17,20 +17,15 @@ __all__ = ["link_together"]
 
 _NOTHING_GIVEN: Final = Given()
 _LOCAL: Final = re.compile(r"/(?![/\\])")
-"""How an address on the same server begins."""
+"""Start of an address on the same server."""
 
 
 def link_together(
     part: Part, use: WidgetUse, widget: Widget, driver: Driver, findings: Findings
 ) -> None:
-    """Check bindings and options that are right alone, and may be wrong together.
+    """Check bindings and options that depend on each other.
 
-    Args:
-        part: the slot in the document; it may have only some keys of `use`.
-        use: the widget in the slot, with the keys of the driver.
-        widget: the manifest of that widget.
-        driver: owner of the bound signals and commands.
-        findings: collects the problems.
+    `part` is the slot in this document, with some keys of `use`, the complete slot.
     """
     bound = {**use.inputs, **use.lists, **use.outputs}
     _check_needs(part, use, widget, bound, findings)
@@ -45,7 +40,7 @@ def link_together(
 def _check_needs(
     part: Part, use: WidgetUse, widget: Widget, bound: Mapping[str, object], findings: Findings
 ) -> None:
-    tried = part.named("bind")  # what is wrong with those has been told
+    tried = part.named("bind")  # their problems are already reported
     given = {name for name, value in use.options.items() if value not in ("", None)}
     if widget.needs and not {*bound, *tried, *given} & {*widget.needs}:
         options = [name for name in widget.needs if name in widget.options]
@@ -55,7 +50,7 @@ def _check_needs(
         findings.error(
             part,
             "unbound-input",
-            f"nothing is given to widget {widget.name!r}: it has nothing to show or to do",
+            f"widget {widget.name!r} has no bindings, so it would be empty",
             key=True,
             hint=", or ".join(ways),
         )
@@ -77,18 +72,18 @@ def _check_groups(
             findings.error(
                 tried[mine[0]],
                 "half-bound",
-                f"{mine[0]!r} of widget {widget.name!r} means nothing without {listed(missing)}",
+                f"{mine[0]!r} of widget {widget.name!r} needs {listed(missing)}",
                 key=True,
-                hint=f"bind {listed(missing)} too, or leave {mine[0]} out",
+                hint=f"bind {listed(missing)} too, or remove {mine[0]}",
             )
 
 
 def _check_instead(
     part: Part, widget: Widget, bound: Mapping[str, object], findings: Findings
 ) -> None:
-    """Warn of what this document says in vain: another binding of the slot wins.
+    """Warn of a binding in this document that another binding of the slot overrides.
 
-    An interface may bind better than the driver; the driver's keys are not its mistake.
+    An interface may override a binding of the driver, which is no mistake of the driver.
     """
     said = (*part.named("bind").items(), *part.named("options").items())
     for port in widget.inputs.values():
@@ -97,9 +92,9 @@ def _check_instead(
             findings.warn(
                 inner,
                 "unused-binding",
-                f"{inner.name!r} of widget {widget.name!r} means nothing beside {port.name!r}",
+                f"{inner.name!r} of widget {widget.name!r} has no effect with {port.name!r}",
                 key=True,
-                hint=f"leave {inner.name} out, or do not bind {port.name}",
+                hint=f"remove {inner.name}, or do not bind {port.name}",
             )
 
 
@@ -109,7 +104,7 @@ def _check_instead(
 def _check_units(
     part: Part, use: WidgetUse, widget: Widget, driver: Driver, findings: Findings
 ) -> None:
-    """Report two bindings that are compared as they are, and have different units."""
+    """Report two bindings with different units where the widget compares them."""
     mine = part.named("bind")
     for port in (*widget.inputs.values(), *widget.outputs.values()):
         place = mine.get(port.name) or mine.get(port.unit_of)
@@ -124,14 +119,14 @@ def _check_units(
                     "wrong-unit",
                     f"{port.name!r} and {other.name!r} of widget {widget.name!r} need the same"
                     f" unit: {what} is in {unit!r}, {wanted[0]} in {wanted[1]!r}",
-                    hint="nothing is converted between them; bind others, or compute a signal in"
+                    hint="the widget does not convert; bind other ones, or compute a signal in"
                     " that unit",
                 )
                 break
 
 
 def _units(use: WidgetUse, port: Port, driver: Driver) -> Iterator[tuple[str, str]]:
-    """Yield what a port is bound to, and its unit."""
+    """Yield the signals or arguments of a port, as text, with their units."""
     single = use.inputs.get(port.name)
     for name in (single,) if single is not None else use.lists.get(port.name, ()):
         signal = driver.signals.get(name)
@@ -142,7 +137,7 @@ def _units(use: WidgetUse, port: Port, driver: Driver) -> Iterator[tuple[str, st
 
 
 def _arguments(use: WidgetUse, port: Port, driver: Driver) -> Iterator[Argument]:
-    """Yield the arguments that take what an output gives."""
+    """Yield the arguments that take the values of an output."""
     command = driver.commands.get(use.outputs.get(port.name, ""))
     if command is not None:
         taken = targets(command, port, use.given.get(port.name, _NOTHING_GIVEN))
@@ -153,7 +148,7 @@ def _arguments(use: WidgetUse, port: Port, driver: Driver) -> Iterator[Argument]
 
 
 def _check_order(part: Part, use: WidgetUse, widget: Widget, findings: Findings) -> None:
-    """Report an option that is not below the one that it must be below."""
+    """Report an option that is not below the option that limits it."""
     own = part.named("options")
     for name, schema in widget.options.items():
         above = schema.get("below") if isinstance(schema, Mapping) else None
@@ -164,8 +159,8 @@ def _check_order(part: Part, use: WidgetUse, widget: Widget, findings: Findings)
             findings.error(
                 own.get(name) or own[above],
                 "wrong-order",
-                f"option {name!r} is {low:g}, and must be below {above!r}, which is {high:g}",
-                hint="change one of them" if above in own else f"give the option {above} too",
+                f"option {name!r} is {low:g}, which must be below {above!r}, {high:g}",
+                hint="change one of the two" if above in own else f"give the option {above} too",
             )
 
 
@@ -179,14 +174,14 @@ def _check_local(part: Part, widget: Widget, findings: Findings) -> None:
                 "not-local",
                 f"option {name!r} must be an address on this dashboard's server,"
                 f" found {inner.data!r}",
-                hint="a page loads nothing from other servers; begin it with one slash",
+                hint="a page loads nothing from other servers; start it with one slash",
             )
 
 
 def _check_given(
     part: Part, use: WidgetUse, widget: Widget, driver: Driver, findings: Findings
 ) -> None:
-    """Report a text of the options that the argument it goes to cannot take."""
+    """Report a text of the options that does not fit its argument."""
     options = part.get("options")
     if options is None:
         return
@@ -208,7 +203,7 @@ def _check_text(
     elif argument.choices and value not in argument.choices:
         code, wrong = "unknown-word", "has other choices"
     elif not isinstance(value, str) and _is_outside(value, argument):
-        code, wrong = "out-of-range", f"goes from {_bound(argument.min)} to {_bound(argument.max)}"
+        code, wrong = "out-of-range", f"is from {_bound(argument.min)} to {_bound(argument.max)}"
     else:
         return
     choices = [str(one) for one in argument.choices]
@@ -221,7 +216,7 @@ def _check_text(
 
 
 def _read(text: str, argument: Argument) -> bool | float | str | None:
-    """Return what a page makes of a text for an argument; None when it cannot."""
+    """Return the value that a page reads from a text for an argument; None when it cannot."""
     if argument.type == "boolean":
         return {"true": True, "false": False}.get(text)
     if argument.type not in ("integer", "number"):

@@ -1,7 +1,4 @@
-"""The words of a signal's states in an expression: other texts are never its value.
-
-Floor 3.
-"""
+"""Comparisons of signals with texts that their states lack."""
 
 import ast
 from collections.abc import Iterable, Mapping
@@ -17,7 +14,7 @@ __all__ = ["check_words"]
 def check_words(
     findings: Findings, part: Part, template: Template, signals: Mapping[str, Signal]
 ) -> None:
-    """Warn of each text that a signal with ``states`` is compared with, and can never be."""
+    """Warn of each text in a comparison that is not a state of its signal."""
     worded = {
         name: dict(signals[name].states)
         for name in template.names
@@ -34,7 +31,7 @@ def check_words(
         findings.warn(
             part,
             "unknown-word",
-            f"{name!r} is never {text!r}: its values are the words of its states",
+            f"{name!r} is never {text!r}: its values are its states",
             offset=max(0, found),
             length=len(text) if found >= 0 else len(template.source),
             hint=hint or did_you_mean(text, states.values(), "words"),
@@ -42,7 +39,7 @@ def check_words(
 
 
 def _compared(python: str) -> Iterable[tuple[str, str]]:
-    """Return the name and the text of each comparison of a name with a text, or a list of some."""
+    """Return name and text of each comparison of a name with a text, or with a list of texts."""
     for node in ast.walk(ast.parse(python, mode="eval")):
         if not isinstance(node, ast.Compare):
             continue
@@ -58,7 +55,7 @@ def _compared(python: str) -> Iterable[tuple[str, str]]:
 
 
 def _name(node: ast.expr) -> str:
-    """Return the name that is read there; "" for anything else."""
+    """Return the name of a value read there; "" for anything else."""
     if isinstance(node, ast.Subscript) and isinstance(node.slice, ast.Constant):
         return str(node.slice.value) if isinstance(node.value, ast.Name) else ""
     return ""

@@ -1,4 +1,4 @@
-"""Names in the world of an emulated robot, and what its rules read of it."""
+"""Names in the world of an emulated robot, and in the readings of its rules."""
 
 import re
 from collections.abc import Iterable, Iterator, Mapping
@@ -15,28 +15,23 @@ from urc.model.world import READINGS, Failsafe, WorldSpec
 __all__ = ["check_readings", "link_world"]
 
 _READING: Final = re.compile(r"_item\(ns\['world'\], '(\w+)'\)(?:, '(\w+)'\))?")
-"""The targets of ``world.NAME`` and ``world.NAME.PART``."""
+"""Pattern of ``world.NAME`` and ``world.NAME.PART`` in a compiled template."""
 
 
 def link_world(
     linker: Linker, part: Part, spec: WorldSpec, state: Iterable[str], parts: Mapping[str, Part]
 ) -> WorldSpec:
-    """Check every name in a world; return it with the commands that keep it going.
+    """Check every name in a world; return it with the commands that reset its watchdog.
 
-    Args:
-        linker: of the driver.
-        part: the world.
-        spec: the parsed world.
-        state: names of the robot's own state.
-        parts: of the simulator.
+    `state` has the names of the robot's own state, and `parts` the parts of the simulator.
     """
     driver, findings, own = linker.driver, linker.findings, {*state}
     known = {"now", "world", *own, *driver.signals}
     for place, template in _templates(part, spec):
         linker.template(place, template, known)
     if "world" in driver.signals:
-        text = "a signal is called 'world' already, and expressions could not tell them apart"
-        findings.error(part, "duplicate-name", text, key=True, hint="call the signal otherwise")
+        text = "a signal has the name 'world', so expressions would be ambiguous"
+        findings.error(part, "duplicate-name", text, key=True, hint="rename the signal")
     _link_signals(part, driver, findings, parts)
     if spec.failsafe is None:
         return spec
@@ -44,13 +39,13 @@ def link_world(
 
 
 def check_readings(findings: Findings, part: Part, template: Template) -> None:
-    """Report what a template reads of the world and is not there."""
+    """Report unknown readings of the world in a template."""
     for name, inner in _READING.findall(template.python):
         if name not in READINGS:
             text, hint = f"the world has no {name!r}", did_you_mean(name, READINGS, "readings")
             findings.error(part, "unknown-name", text, hint=hint)
         elif READINGS[name] and inner not in READINGS[name]:
-            text = f"world.{name} has no {inner!r}" if inner else f"world.{name} has parts"
+            text = f"world.{name} has no {inner!r}" if inner else f"world.{name} has several parts"
             hint = did_you_mean(inner, READINGS[name], "parts")
             findings.error(part, "unknown-name", text, hint=hint)
 
@@ -78,8 +73,8 @@ def _link_signals(
     begun = parts["signals"].data if "signals" in parts else {}
     for name, inner in part.named("signals").items():
         if settable(name, inner, driver, findings) is not None and name in begun:
-            text = f"signal {name!r} is told by the world"
-            hint = "take it away here, or from the world"
+            text = f"the world sets the signal {name!r}"
+            hint = "remove it here, or from the world"
             findings.error(parts["signals"], "two-sources", text, at=name, key=True, hint=hint)
 
 
@@ -97,6 +92,6 @@ def _link_failsafe(part: Part, spec: Failsafe, linker: Linker, state: set[str]) 
     held = tuple(name for name, one in driver.commands.items() if one.hold is not None)
     without = spec.without or held
     if not without:
-        text = "no command is held, so nothing says which ones keep it going"
+        text = "the driver has no held command that could reset this watchdog"
         findings.error(part, "missing-key", text, key=True, hint="write without: [COMMAND]")
     return spec._replace(without=without)

@@ -1,4 +1,4 @@
-"""The keys next to a form of reading: fields, set, when, and the lines of a reply."""
+"""The keys next to a form of received frames: fields, set, when, and the lines of a reply."""
 
 from urc.config.parse.conversion import parse_conversion, parse_states
 from urc.config.part import Findings, Part
@@ -23,14 +23,14 @@ def beside_form(part: Part, spec: ReadSpec, findings: Findings) -> ReadSpec:
     }
     for name, inner in part.named("set").items():
         if name in spec.fields:
-            text = f"the frame gives {name!r} already"
-            hint = f"call the field _{name}, and write it so in the expression"
+            text = f"the frame already sets {name!r}"
+            hint = f"rename the field to _{name}, also in the expression"
             findings.error(inner, "duplicate-name", text, key=True, hint=hint)
     heads = part.named("head") if "head" in part.data else {}
     for name, inner in heads.items():
         if name in spec.fields:
-            text = f"the frame gives {name!r} already"
-            findings.error(inner, "duplicate-name", text, key=True, hint="call one of them _other")
+            text = f"the frame already sets {name!r}"
+            findings.error(inner, "duplicate-name", text, key=True, hint="rename one of them")
     when, subscribe = part.get("when"), part.get("subscribe")
     topic = findings.template(subscribe.must("topic")) if subscribe else None
     if topic is not None and ("+" in topic.source or "#" in topic.source):
@@ -48,17 +48,17 @@ def beside_form(part: Part, spec: ReadSpec, findings: Findings) -> ReadSpec:
 
 
 def with_collected(part: Part, spec: ReadSpec, findings: Findings) -> ReadSpec:
-    """Return `spec` with what the message at `part` puts together out of several frames."""
+    """Return `spec` with the values that the message at `part` collects from several frames."""
     found: dict[str, Collect] = {}
     for name, inner in part.named("collect").items():
         if name in spec.fields:
-            text = f"the frame gives {name!r} already"
-            hint = f"call the field _{name}, and collect that"
+            text = f"the frame already sets {name!r}"
+            hint = f"rename the field to _{name}, and collect that field"
             findings.error(inner, "duplicate-name", text, key=True, hint=hint)
         begin, end = inner.get("begin"), inner.get("end")
         if begin is None and end is None:
-            text = "nothing says where it begins or ends"
-            hint = "name what is true of its first frame (begin), or of its last one (end)"
+            text = "'begin' or 'end' is missing"
+            hint = "give a condition for its first frame (begin), or for its last frame (end)"
             findings.error(inner, "missing-key", text, key=True, hint=hint)
         value = findings.expression(inner.must("value"), allows_bytes=True)
         if value is not None:
@@ -91,7 +91,7 @@ def _conversion(part: Part, findings: Findings) -> Conversion:
 
 
 def parse_lines(part: Part | None, findings: Findings) -> int | Pattern | None:
-    """Return how many frames a reply is, or what the last of them matches."""
+    """Return the number of frames of a reply, or the pattern of its last frame."""
     if part is None:
         return None
     if isinstance(part.data, dict):

@@ -1,4 +1,4 @@
-"""Bytes as documents write them: names of control characters, numbers, lists of those, or text."""
+"""Bytes in documents: names of control characters, numbers, lists of both, or text."""
 
 import re
 from typing import Final
@@ -16,7 +16,7 @@ CONTROL_NAMES: Final = {name: bytes((place,)) for place, name in enumerate(_NAME
     "DEL": b"\x7f",
     "CRLF": b"\r\n",
 }
-"""Names of control characters that bytes may be written with."""
+"""Names of control characters that documents may use."""
 _HEX = re.compile(r"0x((?:[0-9A-Fa-f]{2})+)")
 _TEMPLATE = re.compile(r"\{\{.*?\}\}")
 _BACKSLASH = re.compile(r"\\(?:x[0-9A-Fa-f]{2}|[abefnrtv0])")
@@ -24,7 +24,7 @@ _SPELT = {r"\r": "CR", r"\n": "LF", r"\t": "TAB", r"\0": "NUL", r"\e": "ESC", r"
 
 
 def parse_bytes(part: Part | None, encoding: str, findings: Findings) -> bytes | None:
-    """Return the bytes that `part` stands for: none when there is no part, None when reported."""
+    """Return the bytes of `part`: none without a part, None when reported."""
     if part is None:
         return b""
     if isinstance(part.data, list):
@@ -47,10 +47,10 @@ def _literal(text: str, part: Part, encoding: str, findings: Findings) -> bytes 
         findings.error(
             part,
             "bad-template",
-            "these bytes are always the same: a template is not filled in here",
+            "these bytes are constant: templates are not possible here",
             offset=template.start(),
             length=len(template[0]),
-            hint="write the bytes themselves; what depends on settings belongs in what is sent",
+            hint="write the bytes themselves; use settings only in sent frames",
         )
         return None
     backslash = _BACKSLASH.search(text)
@@ -74,7 +74,7 @@ def _literal(text: str, part: Part, encoding: str, findings: Findings) -> bytes 
         findings.error(
             part,
             "bad-delimiter",
-            f"{text!r} is no name of a control character",
+            f"{text!r} is not the name of a control character",
             hint=f"write {spelt}",
         )
         return None

@@ -1,6 +1,6 @@
-"""The checksum of a framing: mapping → what it is and where, as far as it is written there.
+"""The checksum of a framing: mapping → algorithm, range and place, as declared.
 
-The framing settles places that depend on the rest of the frame (`at: end`, `over: payload`).
+The framing resolves places that depend on the rest of the frame (`at: end`, `over: payload`).
 """
 
 from typing import Any, Final, NamedTuple
@@ -24,13 +24,13 @@ __all__ = ["WrittenChecksum", "parse_checksum", "values_of"]
 
 _TRAIL_KEYS: Final = frozenset(("after", "each", "leading_zeros", "optional", "skip"))
 _NEEDED: Final = {
-    "after": "such as after: '*', where a mark stands before the checksum",
-    "each": "such as each: LF, where each line has a checksum",
+    "after": "such as after: '*', for a mark before the checksum",
+    "each": "such as each: LF, for a checksum of each line",
 }
 
 
 class WrittenTrail(NamedTuple):
-    """How a checksum stands behind a text or its lines, as its author wrote it."""
+    """The declared place of a checksum after a text or after each of its lines."""
 
     mark: bytes
     is_padded: bool
@@ -40,15 +40,15 @@ class WrittenTrail(NamedTuple):
 
 
 class WrittenChecksum(NamedTuple):
-    """A checksum as its author wrote it."""
+    """A checksum as declared, before its place is resolved."""
 
     part: Part
     algorithm: CrcSpec | FoldSpec | str
     bits: int
     over: Window | str
-    """``payload``, ``frame``, or what part of the frame."""
+    """``payload``, ``frame``, or a range of the frame."""
     at: int | None
-    """None: at the end."""
+    """Index of the first byte; None for the end of the frame."""
     is_big: bool
     spelling: Spelling
     salt: Salt
@@ -56,11 +56,11 @@ class WrittenChecksum(NamedTuple):
     closes: bool
     before: bytes
     trail: "WrittenTrail | None" = None
-    """Its place after a text; `at` is then None."""
+    """Place after a text; `at` is then None."""
 
     @property
     def size(self) -> int:
-        """Bytes that it takes in the frame."""
+        """Size in the frame, in bytes."""
         return spelt_size(self.bits, self.spelling)
 
 
@@ -98,7 +98,7 @@ def parse_checksum(part: Part, encoding: str, findings: Findings) -> WrittenChec
 
 
 def values_of(algorithm: CrcSpec | FoldSpec | str) -> frozenset[int]:
-    """Return which bytes a checksum may have in it when it is written raw."""
+    """Return the byte values that a binary checksum may contain."""
     every = range(256)
     if not isinstance(algorithm, FoldSpec) or algorithm.bits != 8:
         return frozenset(every)
@@ -107,25 +107,25 @@ def values_of(algorithm: CrcSpec | FoldSpec | str) -> frozenset[int]:
 
 
 def _trail(part: Part, encoding: str, findings: Findings) -> WrittenTrail | None:
-    """Return how the checksum at `part` stands behind a text; None when it does not."""
+    """Return the place of the checksum at `part` after a text; None for a fixed place."""
     mark = parse_bytes(part.get("after"), encoding, findings) or b""
     each = parse_bytes(part.get("each"), encoding, findings) or b""
     for key, bytes_found in (("after", mark), ("each", each)):
         if key in part.data and part.data[key] in ("", []):
-            findings.error(part, "empty-mark", f"an empty '{key}' marks nothing", at=key)
+            findings.error(part, "empty-mark", f"'{key}' is empty and marks nothing", at=key)
             return None
         if bytes_found and isinstance(part.data.get("at", "end"), int):
-            text = f"'at' means nothing beside '{key}', which says where the checksum stands"
+            text = f"'at' has no effect with '{key}', which gives the place of the checksum"
             findings.error(part, "misplaced-key", text, at="at", key=True)
     needs = {"optional": "after", "skip": "each", "leading_zeros": "after"}
     for key, needed in needs.items():
         if key in part.data and needed not in part.data:
-            text = f"'{key}' means nothing without '{needed}'"
+            text = f"'{key}' needs '{needed}'"
             hint = _NEEDED[needed]
             findings.error(part, "misplaced-key", text, at=key, key=True, hint=hint)
     is_padded = part.flag("leading_zeros", default=True)
     if not is_padded and part.text("as", "raw") == "raw":
-        text = "raw bytes have no leading zeros"
+        text = "a binary checksum has no leading zeros"
         hint = "add 'as: dec', or 'as: hex'"
         findings.error(part, "misplaced-key", text, at="leading_zeros", key=True, hint=hint)
     if not mark and not each:
@@ -155,7 +155,7 @@ def _named(part: Part, findings: Findings) -> CrcSpec | FoldSpec | str | None:
     hint = did_you_mean(name, algorithm_names())
     if not hint.startswith("did you mean"):
         hint = "for example crc16-modbus, crc32, sum8, xor8, lrc; or give 'width' and 'poly'"
-    findings.error(part, "unknown-checksum", f"there is no checksum {name!r}", hint=hint)
+    findings.error(part, "unknown-checksum", f"unknown checksum {name!r}", hint=hint)
     return None
 
 
@@ -172,7 +172,7 @@ def _crc(part: Part, findings: Findings) -> CrcSpec | None:
                 "too-wide",
                 f"0x{number:X} has more than {width} bits",
                 at=name,
-                hint="the highest bit of the polynomial is not written" if name == "poly" else "",
+                hint="leave out the highest bit of the polynomial" if name == "poly" else "",
             )
     if not is_good:
         return None
@@ -192,12 +192,12 @@ def _fold(part: Part, findings: Findings) -> FoldSpec | None:
             findings.error(part, "too-wide", text, at=name)
     if operation == "xor" and of > bits:
         is_good = False
-        text = f"numbers of {of} bits do not fit a result of {bits}"
+        text = f"numbers of {of} bits do not fit into a result of {bits} bits"
         findings.error(part, "too-wide", text, at="of")
     is_odd_xored = part.text("odd", "zeros") == "xor"
     if "odd" in part.data and of == 8:
         is_good = False
-        text = "'odd' means nothing where single bytes are put together"
+        text = "'odd' needs numbers of more than one byte"
         findings.error(part, "misplaced-key", text, at="odd", key=True, hint="add 'of: 16'")
     if not is_good:
         return None
@@ -219,8 +219,8 @@ def _window(part: Part, findings: Findings) -> Window | str:
         findings.error(
             part,
             "empty-window",
-            f"from {start} to {stop} there is nothing",
-            hint="places count from 0; negative ones count back from the end of the frame",
+            f"the range from {start} to {stop} is empty",
+            hint="places count from 0; negative places count back from the end of the frame",
         )
         return "payload"
     return Window(start, stop)

@@ -12,7 +12,7 @@ from urc.model.values import Conversion
 __all__ = ["CONVERSION_KEYS", "parse_conversion", "parse_states"]
 
 CONVERSION_KEYS: Final = ("base", "scale", "offset", "polynomial", "points", "not_available")
-"""Without ``states``."""
+"""All keys of a conversion but ``states``."""
 _A_NUMBER: Final = re.compile(r"[+-]?(0|[1-9][0-9]*)(\.[0-9]+)?([eE][+-]?[0-9]{1,3})?")
 _OF_NUMBERS: Final = ("base", "scale", "offset", "polynomial", "points")
 
@@ -20,10 +20,7 @@ _OF_NUMBERS: Final = ("base", "scale", "offset", "polynomial", "points")
 def parse_conversion(part: Part, findings: Findings, kind: str = "number") -> Conversion:
     """Return the conversion among the keys of `part`, without its states.
 
-    Args:
-        part: a signal, or a conversion.
-        findings: collects the problems.
-        kind: type of the converted value; strings and booleans have no arithmetic.
+    `kind` is the type of the converted value. Strings and booleans have no arithmetic.
     """
     if kind not in ("integer", "number"):
         for key in _OF_NUMBERS:
@@ -31,10 +28,10 @@ def parse_conversion(part: Part, findings: Findings, kind: str = "number") -> Co
                 findings.error(
                     part,
                     "misplaced-key",
-                    f"'{key}' means nothing for {kind}",
+                    f"'{key}' has no effect for {kind}",
                     at=key,
                     key=True,
-                    hint="only integer and number are computed with",
+                    hint="it needs the type integer or number",
                 )
     absent = tuple(inner.data for inner in part.listed("not_available"))
     if kind in ("integer", "number"):
@@ -48,9 +45,9 @@ def parse_conversion(part: Part, findings: Findings, kind: str = "number") -> Co
 
 
 def _numbers_in(absent: object) -> tuple[float, ...]:
-    """Return the number that quoted text stands for, if any: some forms read numbers, some text.
+    """Return the number in a quoted text, because some forms read numbers and some read text.
 
-    Leading zeros are a spelling that only text has: ``"000"`` does not mean 0.
+    Text with leading zeros is no number: ``"000"`` does not mean 0.
     """
     if not isinstance(absent, str) or _A_NUMBER.fullmatch(absent) is None:
         return ()
@@ -69,9 +66,9 @@ def parse_states(part: Part, kind: str, findings: Findings) -> tuple[tuple[str, 
                 findings.error(
                     inner,
                     "wrong-type",
-                    f"the signal is of type {kind}, and {raw!r} is no number",
+                    f"the signal has the type {kind}, and {raw!r} is not a number",
                     key=True,
-                    hint="make it 'type: string', or map numbers to words",
+                    hint="write 'type: string', or map numbers to words",
                 )
     return tuple((raw, str(inner.data)) for raw, inner in states.items())
 
@@ -88,10 +85,10 @@ def _polynomial(part: Part, findings: Findings) -> tuple[float, ...]:
                 findings.error(
                     part,
                     "two-conversions",
-                    f"'{key}' and 'polynomial' both compute the value",
+                    f"'{key}' and 'polynomial' both convert the value",
                     at=key,
                     key=True,
-                    hint="scale is the second coefficient, offset the first",
+                    hint="in a polynomial, offset is the first coefficient, and scale the second",
                 )
         return tuple(inner.data for inner in coefficients)
     if scale == 0:
@@ -99,7 +96,7 @@ def _polynomial(part: Part, findings: Findings) -> tuple[float, ...]:
             part.must("scale"),
             "zero-scale",
             "a scale of 0 makes every value the same",
-            hint="leave it out, or write what one step of the robot's number means",
+            hint="remove it, or give the size of one step of the raw number",
         )
     if scale is None and offset is None:
         return ()
@@ -115,7 +112,7 @@ def _points(part: Part | None, findings: Findings) -> tuple[tuple[float, float],
             findings.error(
                 after,
                 "wrong-order",
-                f"{after.data[0]:g} is not above {before.data[0]:g} of the point before",
-                hint="the first number of each pair is the robot's, and they rise",
+                f"{after.data[0]:g} is not above {before.data[0]:g} of the point before it",
+                hint="the first number of each pair is the raw number, and must rise",
             )
     return tuple((inner.data[0], inner.data[1]) for inner in pairs)

@@ -1,4 +1,4 @@
-"""A driver: mapping → `Driver`, patterns and templates compiled."""
+"""A driver: mapping → `Driver`, with compiled patterns and templates."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -28,12 +28,12 @@ __all__ = ["parse_driver", "spoken_name"]
 
 
 def parse_driver(part: Part, findings: Findings, catalog: Catalog) -> Driver:
-    """Return the driver in the mapping at `part`; a reported value gets its default."""
+    """Return the driver in the mapping at `part`; report mistakes and use defaults."""
     transports = {
         name: parse_transport(inner, findings, catalog)
         for name, inner in part.named("transports").items()
     }
-    # Where a message comes from and a command goes to may be left out when there is one line only.
+    # With only one transport, messages and commands need not name it.
     types, enums = _types(part, findings)
     lines = _Lines(transports, FormContext("", _set_by_frames(part), types, enums, catalog))
     transports = {
@@ -56,7 +56,7 @@ def parse_driver(part: Part, findings: Findings, catalog: Catalog) -> Driver:
     return Driver(
         transports=transports,
         signals=with_ages(aged_by_lines(signals, transports, messages, polls), polls),
-        # A sequence that is called like a command is reported with the names.
+        # A sequence with the name of a command is reported by the check of names.
         commands=with_moving_steps({**_sequences(part, lines, findings), **commands}),
         messages=messages,
         polls=polls,
@@ -84,7 +84,7 @@ def _sequences(part: Part, lines: "_Lines", findings: Findings) -> dict[str, Com
 
 
 def _types(part: Part, findings: Findings) -> tuple[Mapping[str, Any], Mapping[str, Any]]:
-    """Return the driver's ``types:`` and ``enums:``; most have none, and need none of the code."""
+    """Return the driver's ``types:`` and ``enums:``."""
     if "types" not in part.data and "enums" not in part.data:
         return NOTHING, NOTHING
     from urc.config.parse.struct.numbers import parse_enums
@@ -95,9 +95,9 @@ def _types(part: Part, findings: Findings) -> tuple[Mapping[str, Any], Mapping[s
 
 
 class _Lines:
-    """The transports, for those who name one, or may leave it out because there is only one.
+    """The transports of a driver, with the only one as the default.
 
-    A line that only carries others does not count.
+    A transport that only forwards others does not count.
     """
 
     def __init__(self, transports: Mapping[str, TransportSpec], context: FormContext) -> None:
@@ -108,18 +108,18 @@ class _Lines:
         self.only = own[0] if len(own) == 1 else ""
 
     def name(self, part: Part, key: str) -> str:
-        """Return the transport that `part` names under `key`."""
+        """Return the transport that `part` names under `key`, or the default."""
         return part.text(key, self.only)
 
     def context(self, name: str) -> FormContext:
-        """Return what forms must know of the transport `name`, which may not exist."""
+        """Return the context of forms on the transport `name`, which may not exist."""
         spec = self._transports.get(name)
         encoding = spec.encoding if spec else FormContext().encoding
         return self._context._replace(encoding=encoding, framing=spec.framing if spec else None)
 
 
 def spoken_name(name: str) -> str:
-    """Return ``joint_1`` as people read it: ``Joint 1``."""
+    """Return a name in the form for people: ``joint_1`` → ``Joint 1``."""
     words = name.replace("_", " ").replace("-", " ").strip()
     return words[:1].upper() + words[1:]
 
@@ -198,28 +198,28 @@ def _argument(part: Part, findings: Findings) -> Argument:
 
 
 def _check_argument(part: Part, kind: str, of: str, findings: Findings) -> None:
-    """Report a name that templates have already, and what means nothing for its type."""
+    """Report a reserved name, and keys without effect for the type."""
     if part.name in ("settings", "pi"):
         what = "the settings" if part.name == "settings" else "the number"
         findings.error(
             part,
             "bad-name",
-            f"an argument cannot be called {part.name!r}",
+            f"an argument cannot have the name {part.name!r}",
             key=True,
-            hint=f"templates find {what} under that name",
+            hint=f"in templates this name is {what}",
         )
     if of != "string" and "allow_control" in part.data:
         findings.error(
             part,
             "misplaced-key",
-            f"'allow_control' means nothing for {kind}",
+            f"'allow_control' has no effect for {kind}",
             at="allow_control",
             key=True,
         )
 
 
 def _default(inner: Part, argument: Part, kind: str, findings: Findings) -> Reading:
-    """Return the default; of an array, a list of as many elements as it has."""
+    """Return the default; for an array, a list of its size."""
     if kind != "array":
         return _fitting(inner, kind, findings)
     if not isinstance(inner.data, list):

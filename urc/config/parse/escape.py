@@ -1,4 +1,4 @@
-"""Byte stuffing of a framing: mapping → which bytes are hidden, and how."""
+"""Byte stuffing of a framing: mapping → escaped bytes and their replacements."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -21,7 +21,7 @@ def parse_escape(
     if len(given) != 1:
         text = "'xor', 'table', 'double' or 'after' is missing"
         if given:
-            text = f"'{given[0]}' and '{given[1]}' both say how bytes are hidden"
+            text = f"'{given[0]}' and '{given[1]}' both define the escape sequences"
         where = {"at": given[1]} if given else {}
         findings.error(inner, "two-forms" if given else "missing-key", text, key=True, **where)
         return None
@@ -48,7 +48,7 @@ def _one(part: Part, encoding: str, findings: Findings) -> int | None:
     found = parse_bytes(part, encoding, findings)
     if found is None or len(found) == 1:
         return None if found is None else found[0]
-    findings.error(part, "wrong-size", f"one byte is expected, found {len(found)}")
+    findings.error(part, "wrong-size", f"expected one byte, found {len(found)}")
     return None
 
 
@@ -56,15 +56,15 @@ def _inserted(part: Part, encoding: str, findings: Findings) -> EscapeSpec | Non
     after = parse_bytes(part.must("after"), encoding, findings)
     insert_part = part.get("insert")
     if after == b"":
-        findings.error(part, "empty-mark", "nothing cannot be looked for", at="after")
+        findings.error(part, "empty-mark", "'after' is empty and matches nothing", at="after")
     if insert_part is None:
-        text = "'insert' is missing: the byte that is put in behind the sequence"
+        text = "'insert' is missing: the byte to insert after the sequence"
         findings.error(part, "missing-key", text, at="after", key=True)
         return None
     insert = _one(insert_part, encoding, findings)
     for key in ("byte", "bytes"):
         if key in part.data:
-            text = f"'{key}' means nothing beside 'after'"
+            text = f"'{key}' has no effect with 'after'"
             findings.error(part, "misplaced-key", text, at=key, key=True)
     return None if after is None or insert is None else EscapeSpec(after=after, insert=insert)
 
@@ -74,12 +74,12 @@ def _escaped(
 ) -> EscapeSpec | None:
     byte_part = part.get("byte")
     if byte_part is None:
-        text = "'byte' is missing: the one that stands before a hidden byte"
+        text = "'byte' is missing: the escape byte"
         findings.error(part, "missing-key", text, at=way, key=True)
         return None
     byte = _one(byte_part, encoding, findings)
     if "insert" in part.data:
-        text = f"'insert' means nothing beside '{way}'"
+        text = f"'insert' has no effect with '{way}'"
         findings.error(part, "misplaced-key", text, at="insert", key=True)
     if byte is None:
         return None
@@ -108,11 +108,11 @@ def _table(
     needed = {byte, *(one for mark in marks for one in mark[:1])}
     missing = sorted(needed - table.keys())
     if missing:
-        text = f"{missing[0]:02X} is not in the table, and would not be hidden"
+        text = f"{missing[0]:02X} is not in the table, and would not be escaped"
         findings.error(part, "missing-key", text, at="table")
         return None
     if len(set(table.values())) < len(table):
-        text = "two bytes of the table are hidden by the same one"
+        text = "two bytes of the table have the same replacement"
         findings.error(part, "duplicate-name", text, at="table")
         return None
     _check_hidden(part, "table", table, findings)
@@ -123,7 +123,7 @@ def _check_hidden(part: Part, at: str, table: Mapping[int, int], findings: Findi
     """Report a replacement for an escaped byte that would need an escape itself."""
     wrong = next((one for one in table.values() if one in table), None)
     if wrong is not None:
-        text = f"{wrong:02X} stands for a hidden byte, and is hidden itself"
+        text = f"{wrong:02X} replaces an escaped byte, and needs an escape itself"
         findings.error(part, "overlap", text, at=at)
 
 
@@ -131,10 +131,10 @@ def _check_doubled(part: Part, byte: int, marks: tuple[bytes, ...], findings: Fi
     for mark in marks:
         if mark and mark[0] != byte:
             shown = mark.hex(" ")
-            text = f"the mark {shown} does not begin with {byte:02X}, and would not be hidden"
+            text = f"the mark {shown} does not start with {byte:02X}, and would not be escaped"
             findings.error(part, "does-not-fit", text, at="byte")
             return
         if len(mark) > 1 and mark[1] == byte:
-            text = f"the mark {mark.hex(' ')} looks like a byte that is doubled"
+            text = f"the mark {mark.hex(' ')} looks like a doubled byte"
             findings.error(part, "overlap", text, at="double")
             return

@@ -1,4 +1,4 @@
-"""The flow of commands: queues, rates, conditions, held commands and keep-alives."""
+"""The flow of commands: queues, rates, conditions, held commands and keepalives."""
 
 import math
 from collections.abc import Iterable, Mapping
@@ -40,28 +40,28 @@ __all__ = [
 
 _PER_S: Final = {"s": 1.0, "m": 60.0, "h": 3600.0}
 NOTHING_SENT: Final = WriteSpec("text", {"template": compile_template("")})
-"""The frame that a sequence itself sends."""
+"""The frame of a sequence itself: empty, because only its steps send."""
 
 
 def line_with_flow(
     spec: TransportSpec, part: Part, context: FormContext, findings: Findings
 ) -> TransportSpec:
-    """Return the transport with what it does by itself."""
+    """Return the transport with its queue, keepalive, timeouts and steps."""
     queue = part.get("queue")
     if spec.connection == "per_request":
-        refuse(part, ("keepalive",), "means nothing where each request connects anew", findings)
+        refuse(part, ("keepalive",), "has no effect: each request opens a connection", findings)
         if queue is not None:
-            refuse(queue, ("in_flight",), "is 1 where each request connects anew", findings)
+            refuse(queue, ("in_flight",), "is always 1: each request opens a connection", findings)
     if spec.is_half_duplex and queue is not None:
-        refuse(queue, ("in_flight",), "is 1 where one side talks at a time", findings)
+        refuse(queue, ("in_flight",), "is always 1: the transport is half-duplex", findings)
     timeouts = part.get("timeouts")
     if timeouts is not None and "on_connect" not in part.data:
-        refuse(timeouts, ("on_connect",), "limits nothing: there are no steps", findings)
+        refuse(timeouts, ("on_connect",), "has no effect without steps", findings)
     steps = StepContext(spec.name, is_named=False, forms=context)
     on_connect, on_close = part.get("on_connect"), part.get("on_close")
     errors, faults = parse_errors(part, findings, context)
     if queue is not None and spec.type in MESSAGING:
-        refuse(queue, ("bytes",), "counts bytes, and this line carries messages", findings)
+        refuse(queue, ("bytes",), "counts bytes, and this transport carries messages", findings)
     return spec._replace(
         errors=errors,
         faults=faults,
@@ -79,10 +79,9 @@ def aged_by_lines(
     messages: Mapping[str, Message],
     polls: Iterable[Poll],
 ) -> dict[str, Signal]:
-    """Return the signals, as old as the silence of the line that they come over.
+    """Return the signals with the `stale_after` of their transports.
 
-    Where a line says nothing of its silence, and for a signal with an age of its own, nothing is
-    changed.
+    A signal stays as it is if it has a `stale_after`, or if its transport has none.
     """
     ages: dict[str, list[float]] = {}
     frames = [(one.transport, one.read) for one in messages.values()]
@@ -101,7 +100,7 @@ def aged_by_lines(
 
 
 def command_with_flow(command: Command, part: Part, findings: Findings) -> Command:
-    """Return the command with when it may be sent, and how."""
+    """Return the command with its queueing, conditions, motion and retries."""
     hold, confirm, verify = part.get("hold"), part.get("confirm"), part.get("verify")
     retries, retry = _retries(part.get("retries"), findings)
     is_idempotent = part.flag("idempotent", default=False)
@@ -110,19 +109,19 @@ def command_with_flow(command: Command, part: Part, findings: Findings) -> Comma
         findings.error(
             part,
             "not-idempotent",
-            "it may be done twice when its answer is lost",
+            "the robot may perform it twice when its reply is lost",
             at="retries",
-            hint="write idempotent: true when twice is the same as once, or take 'retries' away",
+            hint="write idempotent: true if a repetition does no harm, or remove 'retries'",
         )
     if retries and command.reply is None:
         findings.error(
-            part, "misplaced-key", "'retries' without 'reply': nothing tells of a failure",
+            part, "misplaced-key", "'retries' needs 'reply': without it no failure shows",
             at="retries", key=True,
         )  # fmt: skip
     if part.text("priority") == "realtime":
-        refuse(part, ("coalesce", "rate_limit"), "means nothing for what never waits", findings)
+        refuse(part, ("coalesce", "rate_limit"), "has no effect with realtime priority", findings)
     if hold is not None:
-        refuse(part, ("moves", "stop"), "means nothing beside 'hold': a hand moves it", findings)
+        refuse(part, ("moves", "stop"), "has no effect with 'hold', which moves it", findings)
         _refuse_asides(part.get("reply"), findings)
     stops = part.flag("stop", default=False)
     if stops:
@@ -146,34 +145,34 @@ def command_with_flow(command: Command, part: Part, findings: Findings) -> Comma
 
 
 def _refuse_asides(reply: Part | None, findings: Findings) -> None:
-    """Report what a robot asks for about motion: the newest values go out all the time."""
+    """Report `resend` and `extend` of a held command, whose newest values are sent all the time."""
     for inner in [reply, *reply.listed("stages")] if reply is not None else ():
-        why = "means nothing beside 'hold': the next value goes out anyway"
+        why = "has no effect with 'hold': the next value follows anyway"
         refuse(inner, ("resend", "extend"), why, findings)
 
 
 def _check_stop(command: Command, part: Part, findings: Findings) -> None:
-    """Report what would keep back a command that STOP gives, or make it wait."""
-    moves = () if part.data.get("moves") is False else ("moves",)  # false only says so once more
+    """Report keys that would block or delay a command of STOP."""
+    moves = () if part.data.get("moves") is False else ("moves",)  # false is the default of a stop
     hindering = (*moves, "confirm", "requires", "coalesce", "rate_limit")
-    refuse(part, hindering, "means nothing beside 'stop': nothing may keep it back", findings)
+    refuse(part, hindering, "has no effect with 'stop': nothing may delay a stop", findings)
     for name, one in command.arguments.items():
         if one.confirm or (one.is_required and one.default is None):
             what = "asks people" if one.confirm else "has no default"
             findings.error(
                 part,
                 "missing-argument",
-                f"STOP gives it without arguments, and {name!r} {what}",
+                f"STOP sends it without arguments, and {name!r} {what}",
                 at="stop",
                 key=True,
-                hint="give a command that stops, and takes nothing",
+                hint="use a command for the stop that needs no arguments",
             )
 
 
 def poll_with_flow(
     poll: Poll, part: Part, commands: dict[str, Command], findings: Findings
 ) -> Poll:
-    """Return the poll with the command that it runs, and when it is asked."""
+    """Return the poll with its command and its period."""
     offline, when = part.get("offline"), part.get("when")
     poll = poll._replace(
         when=findings.expression(when) if when else None,
@@ -184,15 +183,15 @@ def poll_with_flow(
     if run is None:
         if "send" not in part.data:
             findings.error(
-                part, "missing-key", "'send' or 'run' is missing: it asks nothing", key=True
+                part, "missing-key", "'send' or 'run' is missing: the poll sends nothing", key=True
             )
         refuse(part, ("args",), "belongs to 'run'", findings)
         return poll
-    refuse(part, ("send", "reply", "to"), "means nothing beside 'run'", findings)
+    refuse(part, ("send", "reply", "to"), "has no effect with 'run'", findings)
     poll = poll._replace(run=str(run.data), arguments=_arguments(part))
     command = commands.get(poll.run)
     if command is None:
-        return poll  # reported with the names
+        return poll  # an unknown name is reported elsewhere
     defaults = {name: one.default for name, one in command.arguments.items()}
     return poll._replace(
         transport=command.transport,
@@ -205,14 +204,9 @@ def poll_with_flow(
 def parse_sequence(
     part: Part, title: str, only: str, context: FormContext, findings: Findings
 ) -> Command:
-    """Return the command that stands for a sequence.
+    """Return the command for a sequence.
 
-    Args:
-        part: the list of steps, or a mapping with it.
-        title: as people read its name.
-        only: the only transport there is, or "".
-        context: of forms.
-        findings: collects the problems.
+    `part` is the list of steps, or a mapping with it. `only` is the only transport, or "".
     """
     inner = part.must("steps") if isinstance(part.data, dict) else part
     steps = parse_steps(inner, StepContext(only, is_named=True, forms=context), findings)
@@ -245,7 +239,7 @@ def _arguments(part: Part) -> dict[str, Reading]:
 
 
 _NUMBERED_IN_FLIGHT: Final = 16
-"""Where answers say whose they are, nothing needs to wait for them."""
+"""Requests in flight where numbers match each reply to its request."""
 
 
 def _queue(part: Part | None, kind: str) -> Queue:
@@ -264,7 +258,7 @@ def _keepalive(part: Part | None, context: FormContext, findings: Findings) -> K
         return None
     given = [key for key in ("send", "run") if key in part.data]
     if len(given) != 1:
-        text = "'send' and 'run' both say it" if given else "'send' or 'run' is missing"
+        text = "both 'send' and 'run' are given" if given else "'send' or 'run' is missing"
         where = {"at": "run"} if given else {}
         findings.error(part, "two-forms" if given else "missing-key", text, key=True, **where)
         return None
@@ -295,16 +289,16 @@ def _hold(part: Part, findings: Findings) -> Hold:
     release, step = part.get("release"), part.get("step")
     step_s = findings.duration(part, "step", 0.0, least=0.001, most=10) if step else None
     if step is not None:
-        text = "means nothing beside 'step': the robot stops by itself after each"
+        text = "has no effect with 'step': the robot stops itself after each step"
         refuse(part, ("release", "watchdog"), text, findings)
     elif release is None:
         findings.error(
             part,
             "missing-release",
-            "nothing says how the motion stops when it is let go",
+            "a held command needs a stop for its release",
             key=True,
-            hint="write release: { … } with the arguments that mean standstill, or step: with the"
-            " time of a step after which the robot stops by itself",
+            hint="write release: { … } with the arguments for standstill, or step: with the"
+            " duration of a step after which the robot stops itself",
         )
         return Hold(repeat_s)
     entries = release.entries() if release is not None else {}
@@ -326,7 +320,7 @@ def _confirm(part: Part) -> Confirm:
 
 
 def parse_choice_questions(part: Part, argument: Argument, findings: Findings) -> Argument:
-    """Return the argument with the questions before some of its values."""
+    """Return the argument with the confirmations of some of its choices."""
     asked = part.named("confirm")
     if not asked:
         return argument
@@ -336,10 +330,10 @@ def parse_choice_questions(part: Part, argument: Argument, findings: Findings) -
         findings.error(
             part,
             "misplaced-key",
-            "'confirm' is about some of its choices, and there are none",
+            "'confirm' of an argument needs 'choices'",
             at="confirm",
             key=True,
-            hint="write choices: […], or 'confirm' beside 'send' to ask every time",
+            hint="write choices: […], or 'confirm' next to 'send' to ask every time",
         )
     for name, inner in asked.items():
         if words and name not in words:
@@ -354,12 +348,12 @@ def parse_choice_questions(part: Part, argument: Argument, findings: Findings) -
 
 
 def _written(value: Value) -> str:
-    """Return a choice as a document writes it as a key."""
+    """Return a choice as a key of a document."""
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 
 def _retries(part: Part | None, findings: Findings) -> tuple[int, Retry]:
-    """Return how often a request is sent again, and after which waits."""
+    """Return the number of retries and their waits."""
     if part is None:
         return 0, Retry()
     if not isinstance(part.data, dict):
@@ -370,7 +364,7 @@ def _retries(part: Part | None, findings: Findings) -> tuple[int, Retry]:
         findings.error(
             part,
             "wrong-order",
-            "the first wait is longer than the longest one",
+            "the first wait is longer than the longest wait",
             at="initial",
             hint="'initial' is the first wait, 'max' the longest",
         )

@@ -1,16 +1,7 @@
-"""Forms of frames: which there are, and which one a document uses at a place.
+"""Forms of frames: the table of forms, and the form of a given place.
 
-A form is a module of this package with two functions. For reading:
-
-    parse_read(part, findings, context) -> ReadSpec | None
-    place_of(part, field) -> (part, where), so that a finding about a field can point at it
-
-and for writing:
-
-    parse_write(part, findings, context) -> WriteSpec | None
-    templates(part, spec) -> iterable of (part, template), for the names used in them
-
-`part` is the value of the form's key; None means that a problem was reported.
+A form is a module of this package. A form of received frames has the functions of `ReadForm`, and
+a form of sent frames has the functions of `WriteForm`.
 """
 
 from collections.abc import Iterable, Mapping
@@ -45,40 +36,40 @@ _NO_WRITE = WriteSpec("text")
 
 
 class FormContext(NamedTuple):
-    """The surroundings of a form."""
+    """The context of a form."""
 
     encoding: str = "utf-8"
-    """Of the line that the frame comes from or goes to."""
+    """Encoding of the transport of the frame."""
     signals: frozenset[str] = frozenset()
     """Names of the driver's signals."""
     types: Mapping[str, tuple[Item, ...]] = NOTHING
     """The driver's reusable structs."""
     enums: Mapping[str, tuple[tuple[int, str], ...]] = NOTHING
-    """The driver's lists of words for numbers."""
+    """The driver's enums."""
     catalog: Catalog | None = None
-    """Which framings there are, for a frame that brings its own."""
+    """The known framings, for a frame with a framing of its own."""
     framing: FramingSpec | None = None
-    """Of that line; None where the frame brings its own."""
+    """Framing of the transport; None for a frame with a framing of its own."""
 
 
 class ReadForm(Protocol):
-    """A module that parses one way of reading a frame."""
+    """A module that parses one form of received frames."""
 
     def parse_read(self, part: Part, findings: Findings, context: FormContext) -> ReadSpec | None:
-        """Return what `part` declares, or None when a fault was reported."""
+        """Return the declaration at `part`, or None when a problem was reported."""
 
     def place_of(self, part: Part, field: str) -> tuple[Part, dict[str, Any]]:
-        """Return where `field` is named, as `Findings.error` takes it."""
+        """Return the place of `field`, as arguments of `Findings.error`."""
 
 
 class WriteForm(Protocol):
-    """A module that parses one way of writing a frame."""
+    """A module that parses one form of sent frames."""
 
     def parse_write(self, part: Part, findings: Findings, context: FormContext) -> WriteSpec | None:
-        """Return what `part` declares, or None when a fault was reported."""
+        """Return the declaration at `part`, or None when a problem was reported."""
 
     def templates(self, part: Part, spec: WriteSpec) -> Iterable[tuple[Part, Template]]:
-        """Return every template in it, with its place."""
+        """Return every template of the frame, with its place."""
 
 
 def read_form(part: Part) -> tuple[Part, ReadForm] | None:
@@ -109,17 +100,19 @@ def body_form(part: Part) -> tuple[Part, WriteForm] | None:
 
 
 def parse_read(part: Part, findings: Findings, context: FormContext) -> ReadSpec:
-    """Return how the frame of a reply or message is read."""
+    """Return the form of a received frame."""
     given = [key for key in READ_FORMS if key in part.data]
     if len(given) != 1:
         found = " and ".join(f"'{key}'" for key in given)
         findings.error(
             part,
             "two-forms" if given else "missing-form",
-            f"{found} both say how the frame is read" if given else "nothing says how it is read",
+            f"{found} are both forms of this frame"
+            if given
+            else "the form of the frame is missing",
             at=given[1] if given else "",
             key=True,
-            hint=f"use exactly one of: {', '.join(READ_FORMS)}",
+            hint=f"write exactly one of: {', '.join(READ_FORMS)}",
         )
         return _NO_READ
     found_form = read_form(part)
@@ -131,6 +124,6 @@ def parse_read(part: Part, findings: Findings, context: FormContext) -> ReadSpec
 
 
 def parse_write(part: Part, findings: Findings, context: FormContext) -> WriteSpec:
-    """Return how the frame under ``send:`` is written."""
+    """Return the form of the frame under ``send:``."""
     inner, form = write_form(part)
     return form.parse_write(inner, findings, context) or _NO_WRITE

@@ -1,6 +1,6 @@
-"""Where everything is in a frame: start, length field, payload, checksum and end fit together.
+"""The layout of a frame: places of start, length field, payload, checksum and end.
 
-A frame is seen whole here: with its start and end bytes, without a delimiter or byte stuffing.
+Places count from the first byte of the whole frame, without a delimiter or byte stuffing.
 """
 
 from typing import Any, Final, NamedTuple
@@ -20,9 +20,9 @@ from urc.model.framing import (
 __all__ = ["MARKED", "checksums_of", "parse_layout"]
 
 MARKED: Final = ("fixed", "length", "brackets")
-"""Framings whose frames carry bytes of their own."""
+"""Framings whose frames have start, length or end bytes."""
 _SPELT: Final = ("delimiter", "brackets", "idle", "datagram")
-"""Framings whose frames may be spelt in digits."""
+"""Framings that may encode their bytes as digits."""
 
 
 class _Frame(NamedTuple):
@@ -35,7 +35,7 @@ class _Frame(NamedTuple):
 
 
 def parse_layout(part: Part, encoding: str, findings: Findings, longest: int) -> FrameLayout:
-    """Return the layout of the framing at `part`; a reported value gets its default."""
+    """Return the layout of the framing at `part`; report a mistake and use its default."""
     kind = part.text("type")
     start = end = b""
     if kind in MARKED:
@@ -65,10 +65,10 @@ def parse_layout(part: Part, encoding: str, findings: Findings, longest: int) ->
 
 
 def _digits(part: Part, findings: Findings) -> Digits:
-    """Return how the framing at `part` spells its bytes."""
+    """Return the digits that encode the bytes of the framing at `part`."""
     digits: Any = part.text("decode") if part.text("type") in _SPELT else ""
     if digits and "escape" in part.data:
-        text = "'escape' means nothing beside 'decode': digits hide nothing"
+        text = "'escape' has no effect with 'decode': digits need no escape"
         findings.error(part, "misplaced-key", text, at="escape", key=True)
     return digits  # type: ignore[no-any-return]  # the schema has the words
 
@@ -80,20 +80,20 @@ def _check_trail(part: Part, written: WrittenChecksum, count: int, findings: Fin
         findings.error(
             written.part,
             "misplaced-key",
-            f"'{key}' is for frames of text; one of type {kind!r} has fixed places",
+            f"'{key}' needs text frames; frames of type {kind!r} have fixed places",
             at=key,
             key=True,
-            hint="say by 'at' where the checksum stands",
+            hint="give the place of the checksum with 'at'",
         )
     elif count > 1:
-        text = f"a checksum with '{key}' is the only one of its frame"
+        text = f"a checksum with '{key}' must be the only one of its frame"
         findings.error(written.part, "misplaced-key", text, at=key, key=True)
 
 
 def _trail_of(written: WrittenChecksum, start: bytes) -> TrailSpec:
     trail = written.trail
     if trail is None:
-        raise AssertionError("a checksum in a fixed place is no trail")
+        raise AssertionError("a checksum in a fixed place is not a trailer")
     over = written.over
     if not isinstance(over, Window):
         over = Window(len(start) if over == "payload" and not trail.each else 0)
@@ -104,7 +104,7 @@ def _trail_of(written: WrittenChecksum, start: bytes) -> TrailSpec:
 
 
 def checksums_of(part: Part) -> list[Part]:
-    """Return the checksums of the framing at `part`: there may be one, or a list of them."""
+    """Return the checksums of the framing at `part`, which has one or a list."""
     inner = part.get("checksum") if part.text("type") != "xml" else None
     if inner is None:
         return []
@@ -118,15 +118,15 @@ def _check_marks(part: Part, findings: Findings) -> None:
             findings.error(
                 inner,
                 "empty-mark",
-                f"an empty '{key}' marks no frame",
-                hint="name the bytes that stand there, such as '<' or STX",
+                f"'{key}' is empty and marks no frame",
+                hint="give the bytes of the mark, such as '<' or STX",
             )
 
 
 def _placed(
     part: Part, frame: _Frame, written: list[WrittenChecksum], findings: Findings
 ) -> FrameLayout:
-    """Return the layout with the places that follow from each other."""
+    """Return the layout with the places that depend on each other."""
     start, end, size, length = frame
     head, tail = len(start), len(end)
     if length is not None and length.is_loose:
@@ -136,7 +136,7 @@ def _placed(
     places: list[int] = []
     lasts: list[bool] = []
     for one in written:
-        # Those at the end stand in their order: what comes later lies further back.
+        # Checksums at the end keep their order, so a later one moves the earlier ones back.
         behind = [other.size for other in written[len(places) + 1 :] if other.at is None]
         last = -len(end) - one.size - sum(behind)
         at = last if one.at is None else one.at
@@ -165,7 +165,7 @@ def _placed(
 def _checksum(
     written: WrittenChecksum, at: int, is_last: bool, layout: FrameLayout
 ) -> ChecksumSpec:
-    # A window without an end goes up to a checksum that stands at the end, or to the end bytes.
+    # A window without an end stops at a checksum at the end, or at the end bytes.
     behind = len(layout.end)
     if is_last:
         behind = -at if at < 0 else behind + written.size
@@ -196,7 +196,7 @@ def _payload(
         findings.error(
             part,
             "overlap",
-            f"the payload ends {tail} bytes before the frame does, inside the end bytes",
+            f"the payload ends inside the end bytes, {tail} bytes before the end of the frame",
             at="to",
         )
     return head, tail
@@ -214,27 +214,27 @@ def _over(written: WrittenChecksum, behind: int, layout: FrameLayout) -> Window:
 def _check_checksum(
     part: Part, checksum: ChecksumSpec, layout: FrameLayout, findings: Findings
 ) -> None:
-    """Report a checksum or window outside the frame, or on top of something else."""
+    """Report a checksum or window outside the frame, or over another part of it."""
     at, size, frame_size = checksum.at, checksum.size, layout.size
     if at < 0 and at + size > 0:
-        text = f"a checksum of {size} bytes at {at} runs over the end of the frame"
-        findings.error(part, "outside-frame", text, at="at", hint=f"the last place is {-size}")
+        text = f"a checksum of {size} bytes at {at} exceeds the end of the frame"
+        findings.error(part, "outside-frame", text, at="at", hint=f"the last possible is {-size}")
         return
     if frame_size is not None and not -frame_size <= at <= frame_size - size:
         text = f"a checksum of {size} bytes at {at} is not inside a frame of {frame_size}"
         findings.error(part, "outside-frame", text, at="at" if "at" in part.data else "")
         return
     if at < 0 and at + size > -len(layout.end):
-        text = f"the checksum at {at} lies on the end bytes"
+        text = f"the checksum at {at} overlaps the end bytes"
         findings.error(
-            part, "overlap", text, at="at", hint=f"the last place is {-size - len(layout.end)}"
+            part, "overlap", text, at="at", hint=f"the last possible is {-size - len(layout.end)}"
         )
     if 0 <= at < len(layout.start):
-        text = f"the checksum at {at} lies on the start bytes"
+        text = f"the checksum at {at} overlaps the start bytes"
         findings.error(part, "overlap", text, at="at")
     length = layout.length
     if length and at >= 0 and at < length.offset + length.size and length.offset < at + size:
-        findings.error(part, "overlap", f"the checksum at {at} lies on the length field", at="at")
+        findings.error(part, "overlap", f"the checksum at {at} overlaps the length field", at="at")
     _check_window(part, checksum, layout, findings)
 
 
@@ -248,24 +248,22 @@ def _check_window(
         if layout.length is None or over.start >= 0 or "over" not in part.data:
             return
         if -over.start > least:
-            text = f"the window begins {-over.start} bytes before the end; a frame may have {least}"
+            text = f"the window starts {-over.start} before the end; a frame has {least} or more"
             findings.warn(part, "outside-frame", text, at=where)
         return
     if size < layout.head + layout.tail:
-        return  # which is reported
+        return  # reported elsewhere
     start = over.start if over.start >= 0 else size + over.start
     stop = size if over.stop is None else over.stop if over.stop >= 0 else size + over.stop
     if not 0 <= start <= size or not 0 <= stop <= size:
-        text = f"the window of the checksum is not inside a frame of {size} bytes"
+        text = f"the window of the checksum is outside a frame of {size} bytes"
         findings.error(part, "outside-frame", text, at=where)
     elif start >= stop:
-        findings.error(
-            part, "empty-window", "there is nothing that the checksum is taken over", at=where
-        )
+        findings.error(part, "empty-window", "the checksum covers no bytes", at=where)
 
 
 def _check_size(part: Part, layout: FrameLayout, longest: int, findings: Findings) -> None:
-    """Report frames that cannot hold their own parts, or are longer than any may be."""
+    """Report frames that cannot hold their own parts, or exceed the largest size."""
     least = layout.head + layout.tail
     if layout.size is not None and layout.size < least:
         findings.error(
@@ -278,7 +276,7 @@ def _check_size(part: Part, layout: FrameLayout, longest: int, findings: Finding
         findings.error(
             part,
             "frame-too-small",
-            f"a frame has at least {max(least, layout.size or 0)} bytes, and none may be longer"
+            f"a frame has at least {max(least, layout.size or 0)} bytes, which is more"
             f" than {longest}",
             at="max" if "max" in part.data else "",
         )
@@ -288,14 +286,14 @@ _MOST_BYTES = 8
 
 
 def _parse_length(part: Part, encoding: str, findings: Findings) -> LengthSpec:
-    """Return the length field at `part`; a reported value gets its default."""
+    """Return the length field at `part`; report a mistake and use its default."""
     size = part.integer("size") or 1
     spelling = part.text("as", "raw")
     flag, until = part.get("flag"), part.get("until")
     mark = None if until is None else parse_bytes(until, encoding, findings)
     if until is not None and mark == b"":
-        text = "nothing cannot end a number"
-        findings.error(until, "empty-mark", text, hint="name the bytes behind it, such as ':'")
+        text = "'until' is empty and ends no number"
+        findings.error(until, "empty-mark", text, hint="give the bytes after it, such as ':'")
     return LengthSpec(
         offset=part.integer("offset") or 0,
         size=size,
@@ -312,18 +310,18 @@ def _parse_length(part: Part, encoding: str, findings: Findings) -> LengthSpec:
 
 
 def _check_length(part: Part, start: bytes, length: LengthSpec, findings: Findings) -> None:
-    """Report a length field that overlaps the start bytes, or has meaningless keys."""
+    """Report a length field that overlaps the start bytes, or has keys without effect."""
     if length.offset < len(start):
         findings.error(
             part,
             "overlap",
-            f"the length field at {length.offset} lies in the start bytes",
+            f"the length field at {length.offset} overlaps the start bytes",
             at="offset",
             hint="places count from the first byte of the frame, start bytes included",
         )
     if length.spelling == "raw" and length.size > _MOST_BYTES:
-        text = f"a number of raw bytes has {_MOST_BYTES} at most, found {length.size}"
-        findings.error(part, "too-wide", text, at="size", hint="digits are said by 'as: dec'")
+        text = f"a binary number has {_MOST_BYTES} bytes at most, found {length.size}"
+        findings.error(part, "too-wide", text, at="size", hint="write 'as: dec' for decimal digits")
         return
     most = 8 * length.size if length.spelling == "raw" else 64
     if length.bits != 64 and length.bits > most:
@@ -332,25 +330,25 @@ def _check_length(part: Part, start: bytes, length: LengthSpec, findings: Findin
         return
     key = "until" if length.until else "counted"
     if length.spelling == "raw":
-        text = f"'{key}' is for a number that is spelt in digits"
+        text = f"'{key}' needs a number in digits"
         findings.error(part, "misplaced-key", text, at=key, key=True, hint="add 'as: dec'")
     for other in ("bits", "endian", "flag", *(("counted",) if length.until else ())):
         if other in part.data:
-            text = f"'{other}' means nothing beside '{key}'"
+            text = f"'{other}' has no effect with '{key}'"
             findings.error(part, "misplaced-key", text, at=other, key=True)
 
 
 def _check_loose(part: Part, findings: Findings) -> None:
-    """Report keys that need a fixed start of the payload, which this length field does not give."""
+    """Report keys that need a fixed start of the payload, where the length field has none."""
     for key in ("payload", "escape"):
         if key in part.data:
-            text = f"'{key}' means nothing where the length says its own size"
-            hint = "the payload is what stands between the length and the end of the frame"
+            text = f"'{key}' has no effect when 'until' ends the length"
+            hint = "the payload starts after the length and ends with the frame"
             findings.error(part, "misplaced-key", text, at=key, key=True, hint=hint)
     inner = part.get("checksum")
     if inner is not None:
         for one in inner.items() if isinstance(inner.data, list) else [inner]:
             if "over" not in one.data or one.must("over").data == "payload":
-                text = "where the payload begins is not known beforehand"
-                hint = "say what it is taken over: 'over: frame', or from one place to another"
+                text = "the start of the payload is not fixed"
+                hint = "write 'over: frame', or give two places"
                 findings.error(one, "misplaced-key", text, hint=hint)

@@ -1,7 +1,7 @@
 """The framing of a transport or of one reply: mapping → `FramingSpec`."""
 
 from collections.abc import Callable
-from re import _constants, _parser  # type: ignore[attr-defined]  # no public door to the syntax tree
+from re import _constants, _parser  # type: ignore[attr-defined]no public API for the syntax tree
 from typing import Any, Final
 
 from urc.config.parse.bytes import parse_bytes
@@ -19,11 +19,11 @@ __all__ = ["parse_framing"]
 _SWITCHABLE: Final = (
     "delimiter", "fixed", "length", "slip", "cobs", "regex", "brackets", "json", "xml",
 )  # fmt: skip
-"""Framings that find the end of a frame in its bytes, so that another may go on behind it."""
+"""Framings that find the end of a frame in its bytes, so that another framing may follow."""
 
 
 def parse_framing(part: Part, encoding: str, findings: Findings, catalog: Catalog) -> FramingSpec:
-    """Return the framing at `part`; a reported value gets its default."""
+    """Return the framing at `part`; report a mistake and use its default."""
     kind = part.must("type")
     if kind.data == "switch" and catalog.framings.get(kind.data) is not None:
         return _switch(part, encoding, findings, catalog)
@@ -55,7 +55,7 @@ def parse_framing(part: Part, encoding: str, findings: Findings, catalog: Catalo
 
 
 def _with_patience(part: Part, spec: FramingSpec, findings: Findings) -> FramingSpec:
-    """Return the framing with what any may have besides."""
+    """Return the framing with the options of every framing type."""
     if "timeout" not in part.data and "strip_ansi" not in part.data:
         return spec
     timeout_s = findings.duration(part, "timeout", 0.0, least=0.001, most=60) or None
@@ -71,8 +71,8 @@ def _delimiter(part: Part, encoding: str, findings: Findings) -> dict[str, Any]:
         findings.error(
             rx_part,
             "empty-delimiter",
-            "an empty delimiter cannot end a frame",
-            hint="name what the robot sends after each answer, such as LF or CRLF",
+            "the delimiter is empty and cannot end a frame",
+            hint="give the end of each reply, such as LF or CRLF",
         )
     return {"tx": tx or b"", "rx": rx or b"\n"}
 
@@ -80,7 +80,7 @@ def _delimiter(part: Part, encoding: str, findings: Findings) -> dict[str, Any]:
 def _check_raw(
     part: Part, layout: FrameLayout, options: dict[str, Any], findings: Findings
 ) -> None:
-    """Warn of a checksum of raw bytes among which a delimiter may be."""
+    """Warn of a binary checksum that may contain a delimiter."""
     specs = () if layout.digits else (*layout.checksums, layout.checksum)
     trailing = layout.trail.checksum if layout.trail else None
     ends = options["tx"] + options["rx"]
@@ -89,8 +89,8 @@ def _check_raw(
             findings.warn(
                 part.must("checksum"),
                 "raw-checksum",
-                "a checksum of raw bytes may contain the delimiter and cut its own frame",
-                hint="write 'as: hex', or use a framing that knows the size of its frames",
+                "a binary checksum may contain the delimiter and end its own frame",
+                hint="write 'as: hex', or use a framing with a known frame size",
             )
             return
 
@@ -139,7 +139,7 @@ def _switch(part: Part, encoding: str, findings: Findings, catalog: Catalog) -> 
             continue
         for key in ("timeout", "strip_ansi"):
             if key in inner.data:
-                text = f"'{key}' belongs to the 'switch' itself"
+                text = f"'{key}' must be a key of the 'switch' itself"
                 findings.error(inner, "misplaced-key", text, at=key, key=True)
         spec = parse_framing(inner, encoding, findings, catalog)._replace(
             timeout_s=None, strips_ansi=False
@@ -147,9 +147,7 @@ def _switch(part: Part, encoding: str, findings: Findings, catalog: Catalog) -> 
         if first is None:
             continue
         if not first:
-            findings.error(
-                first_part, "empty-mark", "no bytes cannot tell one framing from another"
-            )
+            findings.error(first_part, "empty-mark", "an empty case cannot select a framing")
             continue
         _check_case(first_part, first, spec, cases, findings)
         cases.append((first, spec))
@@ -168,8 +166,8 @@ def _is_switchable(kind: Part, findings: Findings) -> bool:
     findings.error(
         kind,
         "misplaced-framing",
-        f"a case of 'switch' cannot be of type {kind.data!r}",
-        hint=f"its framing must find the end of a frame by itself: {listed(_SWITCHABLE)}",
+        f"a case of 'switch' cannot have the type {kind.data!r}",
+        hint=f"use a framing that finds the end of a frame itself: {listed(_SWITCHABLE)}",
     )
     return False
 
@@ -187,9 +185,9 @@ def _check_case(
             findings.error(
                 part,
                 "unreachable-case",
-                f"frames that begin with {first.hex(' ')} are taken by the case of"
-                f" {other.hex(' ')} before it",
-                hint="put the longer one first",
+                f"frames that start with {first.hex(' ')} go to the earlier case of"
+                f" {other.hex(' ')}",
+                hint="put the longer case first",
             )
             return
     start = getattr(spec.options.get("layout"), "start", b"")
@@ -197,7 +195,7 @@ def _check_case(
         findings.error(
             part,
             "never-matches",
-            f"its frames begin with {start.hex(' ')}, not with {first.hex(' ')}",
+            f"its frames start with {start.hex(' ')}, not with {first.hex(' ')}",
         )
 
 
@@ -205,16 +203,16 @@ _REPEATS = (_constants.MAX_REPEAT, _constants.MIN_REPEAT)
 
 
 def _check_pattern(part: Part, findings: Findings) -> None:
-    """Report faults of a pattern that cuts a stream; it must show where a frame ends."""
+    """Report mistakes in a pattern for a stream, such as an unclear end of its frames."""
     text: str = part.data
     far = next((place for place, char in enumerate(text) if ord(char) > 127), None)
     if far is not None:
         findings.error(
             part,
             "bad-pattern",
-            f"{text[far]!r} is no byte: the pattern is over bytes, and sees no other characters",
+            f"{text[far]!r} is not a byte, and the pattern matches bytes",
             offset=far,
-            hint="write its bytes as \\xHH",
+            hint="write each byte as \\xHH",
         )
         return
     tree = _parser.parse(text.removeprefix("^"))
@@ -222,22 +220,22 @@ def _check_pattern(part: Part, findings: Findings) -> None:
         findings.error(
             part,
             "matches-nothing",
-            "the pattern also matches no bytes at all, which is no frame",
-            hint="let it ask for at least one byte",
+            "the pattern also matches an empty frame",
+            hint="make it match at least one byte",
         )
     elif _has_anchor(tree):
         findings.error(
             part,
             "misplaced-anchor",
-            "'^', '$' and '\\b' mean nothing inside a stream",
-            hint="a frame begins where the pattern begins to match; name the bytes that end it",
+            "'^', '$' and '\\b' have no effect inside a stream",
+            hint="a frame starts where the pattern matches; add the bytes that end it",
         )
     elif _is_open(tree):
         findings.error(
             part,
             "open-end",
-            "the pattern ends with something that may go on, so the end of a frame is never sure",
-            hint=f"name what ends a frame, such as '{text}\\r\\n'",
+            "the pattern has an open end, so the end of a frame is never certain",
+            hint=f"add the end of a frame, such as '{text}\\r\\n'",
         )
 
 

@@ -1,4 +1,4 @@
-"""Headers of web requests: those that a document may not set."""
+"""Headers of web requests that a document may not set."""
 
 from urc._headers import is_reserved
 from urc.config.part import Findings, Part
@@ -7,8 +7,8 @@ __all__ = ["check_headers"]
 
 
 def check_headers(part: Part, findings: Findings) -> None:
-    """Report each header under ``headers`` of `part` that says who asks, or frames the request."""
-    headers = part.entries().get("headers")  # most kinds of transports have none
+    """Report each header of `part` that identifies the client or controls the request."""
+    headers = part.entries().get("headers")  # most transport types have none
     for name, inner in headers.entries().items() if headers else ():
         if is_reserved(name):
             findings.error(
@@ -16,5 +16,5 @@ def check_headers(part: Part, findings: Findings) -> None:
                 "reserved-header",
                 f"a document may not set the header {name!r}",
                 key=True,
-                hint="URC sets it where it is needed; a login goes under 'auth'",
+                hint="URC sets it if needed; put a login under 'auth'",
             )

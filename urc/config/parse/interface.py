@@ -1,4 +1,4 @@
-"""A layout: the picture of a grid → slots, each checked to be a rectangle."""
+"""An interface: grid → slots, each of them a rectangle."""
 
 import re
 from typing import Final
@@ -10,15 +10,15 @@ from urc.model.interface import DEBUG, Grid, Interface, Slot, Tab
 __all__ = ["check_names", "parse_interface"]
 
 _MOST: Final = 48
-"""Rows or columns of one grid."""
+"""Maximum rows or columns of one grid."""
 _NAME = re.compile(r"[a-z][a-z0-9_-]{0,63}")
 _EMPTY = re.compile(r"\.+")
 _Cell = tuple[str, int]
-"""The content of a cell, and its character in the text."""
+"""The content of a cell, and its offset in the text."""
 
 
 def parse_interface(part: Part, name: str, findings: Findings) -> Interface:
-    """Return the layout at `part`, without what its slots are filled with."""
+    """Return the interface at `part`, without the widgets of its slots."""
     title = part.text("title", spoken_name(name))
     pages = part.named("tabs")
     tabs = {key: _tab(inner, findings, part) for key, inner in pages.items()}
@@ -43,23 +43,23 @@ def parse_interface(part: Part, name: str, findings: Findings) -> Interface:
         findings.error(
             part,
             "misplaced-key",
-            f"{background!r} is in the grid too",
+            f"{background!r} is also in the grid",
             at="background",
-            hint="a background lies behind the grid",
+            hint="a background slot is behind the grid, not in it",
         )
     return interface._replace(background=background)
 
 
 def check_names(root: Part, findings: Findings) -> None:
-    """Report an interface that has the name of the one that is made."""
+    """Report an interface with the name of the built-in interface."""
     if DEBUG in root.named("interfaces"):
         findings.error(
             root.must("interfaces"),
             "bad-name",
-            f"{DEBUG!r} is the interface that every robot has by itself",
+            f"{DEBUG!r} is the name of the built-in interface of every robot",
             at=DEBUG,
             key=True,
-            hint="give yours another name",
+            hint="give your interface another name",
         )
 
 
@@ -72,12 +72,12 @@ def _check_beside_tabs(part: Part, findings: Findings) -> None:
                 f"'{key}' and 'tabs' exclude each other",
                 at=key,
                 key=True,
-                hint="each of the tabs has its own pictures",
+                hint="give each tab its own grid",
             )
 
 
 def _tab(part: Part, findings: Findings, around: Part | None = None) -> Tab:
-    """Return one page; what `around` says of mirroring holds for each of its tabs."""
+    """Return one page; the mirroring keys of `around` are the defaults of its tabs."""
     is_mirrored = around.flag("mirror", default=True) if around is not None else True
     left = part.get("left")
     return Tab(
@@ -95,9 +95,9 @@ def _pictures(part: Part, findings: Findings, *, is_tab: bool) -> dict[str, Grid
         findings.error(
             part,
             "missing-key",
-            f"'grid' is missing from {'a tab' if is_tab else 'an interface'}",
+            f"{'a tab' if is_tab else 'an interface'} lacks 'grid'",
             key=True,
-            hint="draw it: a line for each row, a word for each cell, '.' for none",
+            hint="draw it: a line for each row, a name for each cell, '.' for an empty cell",
         )
     if one is not None and several is not None:
         findings.error(
@@ -105,7 +105,7 @@ def _pictures(part: Part, findings: Findings, *, is_tab: bool) -> dict[str, Grid
             "misplaced-key",
             "'grid' and 'grids' exclude each other",
             key=True,
-            hint="put the picture of 'grid' into 'grids' as 'wide'",
+            hint="move 'grid' into 'grids' as 'wide'",
         )
     found = {"wide": _grid(one, findings)} if one is not None else {}
     return found | (_by_screen(several, findings) if several is not None else {})
@@ -123,7 +123,7 @@ def _by_screen(several: Part, findings: Findings) -> dict[str, Grid]:
 def _grid(part: Part, findings: Findings) -> Grid:
     rows = _rows(part.data)
     if not rows:
-        findings.error(part, "empty-grid", "this grid has no row")
+        findings.error(part, "empty-grid", "the grid has no rows")
         return Grid(1, 1, ())
     if len(rows) > _MOST or len(rows[0]) > _MOST:
         findings.error(part, "wrong-size", f"a grid has at most {_MOST} rows and columns")
@@ -139,7 +139,7 @@ def _grid(part: Part, findings: Findings) -> Grid:
                 f"row {number} has {_cells(len(row))}, the first row has {width}",
                 offset=row[0][1],
                 length=row[-1][1] + len(row[-1][0]) - row[0][1],
-                hint="every row has the same number of cells; '.' is an empty one",
+                hint="every row needs the same number of cells; '.' is an empty cell",
             )
         for text, offset in row:
             if not _NAME.fullmatch(text) and not _EMPTY.fullmatch(text):
@@ -147,10 +147,10 @@ def _grid(part: Part, findings: Findings) -> Grid:
                 findings.error(
                     part,
                     "bad-name",
-                    f"{text!r} cannot be the name of a slot",
+                    f"{text!r} is not a valid slot name",
                     offset=offset,
                     length=len(text),
-                    hint="lower-case letters, digits, '-' and '_'; '.' is empty",
+                    hint="use lower-case letters, digits, '-' and '_'; '.' is an empty cell",
                 )
     if not is_sound:
         return Grid(1, 1, ())
@@ -210,9 +210,9 @@ def _check_rectangle(slot: Slot, part: Part, rows: list[list[_Cell]], findings: 
     findings.error(
         part,
         "not-a-rectangle",
-        f"slot {slot.name!r} is not a rectangle: it reaches from row {slot.row + 1} column"
+        f"slot {slot.name!r} is not a rectangle: it extends from row {slot.row + 1} column"
         f" {slot.column + 1} to row {bottom} column {right}, but {', '.join(told)}{more}",
         offset=offset,
         length=len(text),
-        hint="give another name to cells that stand apart, or fill the gap",
+        hint="rename the separate cells, or fill the gap",
     )

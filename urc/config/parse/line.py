@@ -56,10 +56,10 @@ def parse_transport(part: Part, findings: Findings, catalog: Catalog) -> Transpo
 
 
 def _framing(part: Part, encoding: str, findings: Findings, catalog: Catalog) -> FramingSpec:
-    """Return the framing of received frames, with that of sent frames if it differs."""
+    """Return the framing of received frames, with the framing of sent frames if it differs."""
     own = part.get("framing")
     if own is None:
-        return FramingSpec("datagram")  # the schema asks for it where the line is a stream
+        return FramingSpec("datagram")  # the schema requires 'framing' for streams
     framing = parse_framing(own, encoding, findings, catalog)
     sent = part.get("send_framing")
     if sent is None:
@@ -96,7 +96,7 @@ def _backoff(part: Part | None, findings: Findings) -> Backoff:
         findings.error(
             part,
             "wrong-order",
-            "the first wait is longer than the longest one",
+            "the first wait is longer than the longest wait",
             at="initial",
             hint="'initial' is the first wait, 'max' the longest",
         )

@@ -15,7 +15,7 @@ _VALUE_TYPES: Final = {
     "boolean": "boolean",
     "port": "integer",
 }
-"""Type of a setting → type of its value; text when it is not here."""
+"""Type of a setting → type of its value; a missing type means text."""
 
 
 def parse_setting(part: Part, findings: Findings) -> Setting:
@@ -32,19 +32,19 @@ def parse_setting(part: Part, findings: Findings) -> Setting:
         findings.error(
             default_part,
             "secret-in-document",
-            "a secret cannot stand in a document",
+            "a document must not contain a secret",
             key=True,
-            hint="leave 'default' out: the operator fills it in",
+            hint="remove 'default': the operator fills it in",
         )
     is_required = part.flag("required", default=True)
     if not is_required and default_part is not None:
         findings.error(
             part,
             "misplaced-key",
-            "'required' means nothing beside 'default': the setting is never empty",
+            "'required' has no effect with 'default': the setting is never empty",
             at="required",
             key=True,
-            hint="leave one of them out",
+            hint="remove one of the two",
         )
     setting = Setting(
         name=part.name,
@@ -66,16 +66,14 @@ def parse_setting(part: Part, findings: Findings) -> Setting:
 
 
 def _check_choices(part: Part, kind: str, choices: tuple[str, ...], findings: Findings) -> None:
-    """Report a setting of type choice without any, and choices of another type."""
+    """Report a setting of type choice without choices, and choices of another type."""
     if kind == "choice" and not choices:
-        findings.error(
-            part, "missing-key", "'choices' is missing from a setting of type choice", key=True
-        )
+        findings.error(part, "missing-key", "a setting of type choice needs 'choices'", key=True)
     if kind != "choice" and choices:
         findings.error(
             part,
             "misplaced-key",
-            f"'choices' means nothing for {kind}",
+            f"'choices' has no effect for {kind}",
             at="choices",
             key=True,
             hint="write 'type: choice'",
@@ -83,7 +81,7 @@ def _check_choices(part: Part, kind: str, choices: tuple[str, ...], findings: Fi
 
 
 def setting_value(part: Part, kind: str, choices: tuple[str, ...], findings: Findings) -> Value:
-    """Return the value of a setting that a document gives, or None when it was reported."""
+    """Return the value of a setting in a document, or None when it was reported."""
     wanted = _VALUE_TYPES.get(kind, "string")
     try:
         value = fit(part.data, wanted)
@@ -92,9 +90,9 @@ def setting_value(part: Part, kind: str, choices: tuple[str, ...], findings: Fin
         return None
     fault = ""
     if kind == "port" and not 1 <= int(value or 0) <= 65535:
-        fault = f"a port is 1 to 65535, found {value}"
+        fault = f"expected a port from 1 to 65535, found {value}"
     elif kind == "host" and not _is_host(str(value)):
-        fault = f"a host is a name or an address, found {shown(value)}"
+        fault = f"expected a host name or an address, found {shown(value)}"
     elif kind == "choice" and value not in choices:
         fault = f"{shown(value)} is not one of the choices"
     if fault:

@@ -20,12 +20,12 @@ __all__ = [
 ]
 
 _OF_THE_WHOLE = ("match", "stages", "framing")
-"""Keys that belong to the reply, not to one of its stages."""
+"""Keys of the whole reply, not of one of its stages."""
 _BESIDE_SILENCE = (
     "fields", "head", "set", "when", "lines", "match", "timeout", "framing", "resend", "extend",
 )  # fmt: skip
 _MOST_BUSY_S = 600.0
-"""How long a robot may be busy in all where ``within`` does not say it."""
+"""Default of ``within``: maximum time of a busy robot, in seconds."""
 
 
 def parse_reply(part: Part | None, findings: Findings, context: FormContext) -> Reply | None:
@@ -35,7 +35,7 @@ def parse_reply(part: Part | None, findings: Findings, context: FormContext) -> 
     own, context = parse_own_framing(part, findings, context)
     stages = part.listed("stages")
     for inner in stages:
-        refuse(inner, _OF_THE_WHOLE, "belongs to the whole reply", findings)
+        refuse(inner, _OF_THE_WHOLE, "must be a key of the whole reply", findings)
     if stages:
         beside = (
             *READ_FORMS,
@@ -48,7 +48,7 @@ def parse_reply(part: Part | None, findings: Findings, context: FormContext) -> 
             "resend",
             "extend",
         )
-        refuse(part, beside, "belongs to one of the stages", findings)
+        refuse(part, beside, "must be a key of one of the stages", findings)
     first, *others = [parse_stage(inner, findings, context) for inner in stages or [part]]
     errors, faults = parse_errors(part, findings, context) if stages else ((), ())
     match = part.get("match")
@@ -65,15 +65,15 @@ def parse_reply(part: Part | None, findings: Findings, context: FormContext) -> 
 
 
 def implied_reply(send: WriteSpec) -> Reply | None:
-    """Return the answer of a request that has one whether or not the driver looks at it.
+    """Return the reply of a request whose protocol always has one, even without `reply`.
 
-    So a request that the robot refuses fails, and is not taken for done once it is sent.
+    So a refused request fails, and does not count as done once it is sent.
     """
     return Reply(ReadSpec("any")) if send.options.get("verb") in NUMBERED else None
 
 
 def parse_stage(part: Part, findings: Findings, context: FormContext) -> Stage:
-    """Return one answer of any request."""
+    """Return one stage of the reply to any request."""
     errors, faults = parse_errors(part, findings, context)
     if "silence" in part.data:
         return _silence(part, errors, faults, findings)
@@ -92,15 +92,15 @@ def _silence(
     faults: tuple[ErrorReply, ...],
     findings: Findings,
 ) -> Stage:
-    """Return the answer of a robot that is silent on success."""
+    """Return the stage for a robot that is silent on success."""
     beside = (*READ_FORMS, *_BESIDE_SILENCE)
-    refuse(part, beside, "means nothing beside 'silence', which is the answer", findings)
+    refuse(part, beside, "has no effect with 'silence', which is the reply", findings)
     read, within_s = ReadSpec("silence"), findings.duration(part, "silence", 0.3, most=60)
     return Stage(read=read, errors=errors, faults=faults, timeout_s=within_s)
 
 
 def _asides(part: Part, findings: Findings, context: FormContext) -> Asides:
-    """Return what the robot may say under ``resend:`` and ``extend:``."""
+    """Return the provisional replies under ``resend:`` and ``extend:``."""
     extend, extend_s = part.get("extend"), _MOST_BUSY_S
     if extend is not None and isinstance(extend.data, dict):
         extend_s = findings.duration(extend, "within", _MOST_BUSY_S, most=3600)
@@ -108,9 +108,9 @@ def _asides(part: Part, findings: Findings, context: FormContext) -> Asides:
             findings.error(
                 extend,
                 "wrong-order",
-                "the robot may be busy for less time than its answer may take anyway",
+                "'within' is shorter than the timeout of the reply",
                 at="within",
-                hint="'timeout' is the longest wait for each of its words, 'within' for all",
+                hint="'timeout' limits the wait for each reply, 'within' for all of them",
             )
     resend = part.get("resend")
     if resend is not None and isinstance(resend.data, dict):
@@ -131,7 +131,7 @@ def _aside(part: Part | None, findings: Findings, context: FormContext) -> ReadS
 def parse_errors(
     part: Part, findings: Findings, context: FormContext
 ) -> tuple[tuple[Pattern, ...], tuple[ErrorReply, ...]]:
-    """Return the answers under ``errors:``: patterns, and those of any form."""
+    """Return the error replies under ``errors:``: patterns, and replies of any form."""
     patterns: list[Pattern] = []
     faults: list[ErrorReply] = []
     for inner in part.listed("errors"):
@@ -147,7 +147,7 @@ def parse_errors(
 
 
 def refuse(part: Part, keys: tuple[str, ...], why: str, findings: Findings) -> None:
-    """Report each of `keys` that stands in `part`."""
+    """Report each of `keys` in `part`."""
     for key in keys:
         if key in part.data:
             findings.error(part, "misplaced-key", f"'{key}' {why}", at=key, key=True)
@@ -156,15 +156,15 @@ def refuse(part: Part, keys: tuple[str, ...], why: str, findings: Findings) -> N
 def parse_own_framing(
     part: Part, findings: Findings, context: FormContext
 ) -> tuple[FramingSpec | None, FormContext]:
-    """Return the framing that an answer brings, and what its forms must know: it is not the line's.
+    """Return the reply's own framing and the context of its forms, which is then another one.
 
-    It is None where it brings none.
+    Without a framing of its own, the reply has None.
     """
     inner = part.get("framing")
     if inner is None:
         return None, context
     if context.catalog is None:
-        return None, context  # in a document that has no transports, which was reported
+        return None, context  # no transports in this document, which was reported
     spec = parse_framing(inner, context.encoding, findings, context.catalog)
     return spec, context._replace(framing=None)
 

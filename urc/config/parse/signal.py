@@ -20,18 +20,18 @@ _BYTES: Final = ("image", "blob")
 
 
 def parse_signal(part: Part, title: str, findings: Findings) -> Signal:
-    """Return the signal at `part`; `title` is what it is called when it says nothing itself."""
+    """Return the signal at `part`; `title` is the default of its title."""
     kind = part.text("type", "number")
     element = part.text("of", "number") if kind == "array" else kind
     _check_vector(part, kind, findings)
     low, high = check_range(part, element, findings)
     if part.name == "pi":
-        text, hint = "a signal cannot be called 'pi'", "expressions find the number under that name"
+        text, hint = "a signal cannot have the name 'pi'", "in expressions this name is the number"
         findings.error(part, "bad-name", text, key=True, hint=hint)
     precision = part.integer("precision")
     if precision is not None and element != "number":
         findings.error(
-            part, "misplaced-key", f"'precision' means nothing for {kind}", at="precision", key=True
+            part, "misplaced-key", f"'precision' has no effect for {kind}", at="precision", key=True
         )
     axes = _axes(part, kind, findings)
     return Signal(
@@ -57,9 +57,10 @@ def parse_signal(part: Part, title: str, findings: Findings) -> Signal:
 
 
 def with_ages(signals: Mapping[str, Signal], polls: tuple[Poll, ...]) -> dict[str, Signal]:
-    """Return the signals, each with the age at which it is old.
+    """Return the signals, each with the age in seconds at which it is stale.
 
-    Three periods of its fastest poll; of a computed one, the shortest age among its inputs.
+    The age is three periods of its fastest poll. A computed signal has the smallest age of its
+    inputs.
     """
     aged = {name: _with_age(one, polls) for name, one in signals.items()}
     for name, one in signals.items():
@@ -70,7 +71,7 @@ def with_ages(signals: Mapping[str, Signal], polls: tuple[Poll, ...]) -> dict[st
 
 
 def _bases(name: str, signals: Mapping[str, Signal]) -> set[str]:
-    """Return the signals out of frames that a computed one rests on; cycles end the walk."""
+    """Return the received signals that a computed signal depends on; a cycle ends the search."""
     found: set[str] = set()
     seen: set[str] = set()
     waiting = [name]
@@ -101,25 +102,25 @@ def _check_vector(part: Part, kind: str, findings: Findings) -> None:
             findings.error(
                 part,
                 "misplaced-key",
-                f"'{key}' means nothing for {kind}",
+                f"'{key}' has no effect for {kind}",
                 at=key,
                 key=True,
-                hint=f"it belongs to 'type: {kinds[0]}'",
+                hint=f"it needs 'type: {kinds[0]}'",
             )
 
 
 def _check_rotation(part: Part, kind: str, findings: Findings) -> None:
-    """Warn of a rotation that does not say which way it turns; a computed one is as its inputs."""
+    """Warn of a rotation without an axis convention, unless it is computed."""
     is_named = not {*part.name.split("_")}.isdisjoint(_ROTATIONS)
     is_angle = kind in _NUMBERS and part.text("unit") in ANGLE_UNITS
     if is_named and is_angle and "value" not in part.data:
         findings.warn(
             part,
             "no-axes",
-            f"nothing says which way {part.name!r} turns",
+            f"{part.name!r} has no axis convention",
             key=True,
-            hint="write axes: FLU (x forward, y left, z up) or axes: FRD (z down), as the robot's"
-            " document has it",
+            hint="write axes: FLU (x forward, y left, z up) or axes: FRD (z down), see the robot's"
+            " manual",
         )
 
 
@@ -135,7 +136,7 @@ def _axes(part: Part, kind: str, findings: Findings) -> str:
         wanted = f"a bearing is a number in one of the units {', '.join(ANGLE_UNITS)}"
     elif kind in _NUMBERS:
         fits = part.text("unit") != ""
-        wanted = "a number that has axes has a unit"
+        wanted = "a number with axes needs a unit"
     else:
         fits = kind == "object" or (kind == "array" and size in (2, 3, 4))
         wanted = "a vector is an array of size 2 or 3, a quaternion one of size 4, or an object"
@@ -152,13 +153,13 @@ def _deadband(
         return 0.0
     low, high = bounds
     if element not in _NUMBERS:
-        text = f"'deadband' means nothing for {element}"
+        text = f"'deadband' has no effect for {element}"
         findings.error(part, "misplaced-key", text, at="deadband", key=True)
     elif low is not None and high is not None and band > high - low:
         findings.error(
             part,
             "out-of-range",
-            f"no change between {low:g} and {high:g} is as large as {band:g}: none would be told",
+            f"a change of {band:g} is impossible between {low:g} and {high:g}, so none would show",
             at="deadband",
         )
     return band
@@ -166,7 +167,7 @@ def _deadband(
 
 def _debounce_s(part: Part, kind: str, findings: Findings) -> float:
     if kind not in (*_NUMBERS, "boolean", "string") and "debounce" in part.data:
-        text = f"'debounce' means nothing for {kind}"
+        text = f"'debounce' has no effect for {kind}"
         findings.error(part, "misplaced-key", text, at="debounce", key=True)
     return findings.duration(part, "debounce", 0.0, most=3600)
 
@@ -180,16 +181,16 @@ def _formula(part: Part, findings: Findings) -> Template | None:
             findings.error(
                 part,
                 "misplaced-key",
-                f"'{key}' means nothing for a signal that is computed",
+                f"'{key}' has no effect for a computed signal",
                 at=key,
                 key=True,
-                hint="write it into 'value'",
+                hint="put it into the formula under 'value'",
             )
     return findings.expression(inner)
 
 
 def _check_hysteresis(part: Part, values: Mapping[str, float | None], findings: Findings) -> None:
-    """Warn of an alarm that ends only where the next one has begun."""
+    """Warn of an alarm that ends only after the opposite alarm has begun."""
     width = part.number("hysteresis") or 0.0
     low = values["low"] if values["low"] is not None else values["lolo"]
     high = values["high"] if values["high"] is not None else values["hihi"]
@@ -197,10 +198,10 @@ def _check_hysteresis(part: Part, values: Mapping[str, float | None], findings: 
         findings.warn(
             part,
             "wide-hysteresis",
-            f"the alarm at {low:g} would end only at {low + width:g}, where the one at {high:g} has"
+            f"the alarm at {low:g} would end only at {low + width:g}, when that at {high:g} has"
             " begun",
             at="hysteresis",
-            hint=f"make it smaller than {high - low:g}, the way between the two",
+            hint=f"make it smaller than {high - low:g}, the distance between the two",
         )
 
 
@@ -211,7 +212,7 @@ def _limits(
     if inner is None:
         return Limits()
     if kind not in _NUMBERS:
-        findings.error(inner, "misplaced-key", f"'limits' mean nothing for {kind}", key=True)
+        findings.error(inner, "misplaced-key", f"'limits' have no effect for {kind}", key=True)
         return Limits()
     names = ("lolo", "low", "high", "hihi")
     values = {name: inner.number(name) for name in names}

@@ -1,4 +1,4 @@
-"""The emulated robot of a document: its first values, and the rules of each transport."""
+"""The emulated robot of a document: its initial values, and the rules of each transport."""
 
 import math
 from collections.abc import Mapping
@@ -41,7 +41,7 @@ _DEGREES: Final = {
     "laser": ("first", "last"),
     "camera": ("view", "tilt"),
 }
-"""Part → numbers that documents write in degrees."""
+"""Part → numbers that documents give in degrees."""
 _KEYS: Final = {"first": "from", "last": "to"}
 """Fields of a laser → its keys."""
 _LONGEST_S: Final = 3600.0
@@ -50,9 +50,9 @@ Spec = TypeVar("Spec", bound=Any)
 
 
 def parse_world(part: Part, findings: Findings) -> WorldSpec:
-    """Return the world that stands at `part`; its names are looked up later."""
+    """Return the world at `part`, before its names are resolved."""
     if "body" not in part.data:
-        text = "'body' is missing from this world"
+        text = "this world lacks 'body'"
         hint = "write body: { type: differential }, or another kind"
         findings.error(part, "missing-key", text, key=True, hint=hint)
         return WorldSpec()
@@ -62,7 +62,7 @@ def parse_world(part: Part, findings: Findings) -> WorldSpec:
     laser = _filled(LaserSpec(), part, "laser")
     battery = _filled(BatterySpec(), part, "battery")
     if laser.first >= laser.last:
-        text = "the field of view ends before it begins"
+        text = "the end of the field of view is before its start"
         findings.error(part.must("laser"), "wrong-order", text, key=True)
     if battery.empty >= battery.full:
         text = f"empty at {battery.empty:g} V is not below full at {battery.full:g} V"
@@ -104,7 +104,7 @@ def _pair(part: Part, key: str) -> tuple[float, float]:
 
 
 def _filled(spec: Spec, part: Part, key: str) -> Spec:
-    """Return `spec` with the plain values that the document gives; degrees become radians."""
+    """Return `spec` with the plain values of the document, and degrees as radians."""
     values: dict[str, object] = {}
     inner = part.get(key)
     for field in spec._fields:
@@ -133,7 +133,7 @@ def _check_body(part: Part, body: BodySpec, findings: Findings) -> None:
     for key in part.data:
         kinds = BODY_KEYS.get(key)
         if kinds is not None and body.type not in kinds:
-            text = f"'{key}' means nothing for {body.type}; it is for {' and '.join(kinds)}"
+            text = f"'{key}' has no effect for {body.type}; it is for {' and '.join(kinds)}"
             findings.error(part, "misplaced-key", text, at=key, key=True)
 
 
@@ -192,7 +192,7 @@ _TRIGGERS: Final = ("match", "command", "poll", "every")
 
 
 class Simulated(NamedTuple):
-    """The emulated robot of a document, before its names are looked up."""
+    """The emulated robot of a document, before its names are resolved."""
 
     rules: Mapping[str, list[SimulatorRule]] = NOTHING
     """By transport."""
@@ -202,14 +202,14 @@ class Simulated(NamedTuple):
 def parse_simulator(
     sources: Sources, driver: Driver, catalog: Catalog, findings: Findings
 ) -> Simulated:
-    """Return the rules of each transport, and the world; their names are looked up later."""
+    """Return the rules of each transport, and the world, before their names are resolved."""
     found: dict[str, list[SimulatorRule]] = {}
     context = FormContext(catalog=catalog)
     if any(_needs_types(part.data) for part in sources.rules.values()):
         from urc.config.parse.struct.numbers import parse_enums
         from urc.config.parse.types import parse_types
 
-        quiet = Findings()  # the driver has reported them
+        quiet = Findings()  # the driver already reported these problems
         enums = parse_enums(sources.driver, quiet)
         types = parse_types(sources.driver, enums, quiet)
         context = context._replace(types=types, enums=enums)
@@ -227,17 +227,17 @@ def parse_simulator(
 
 
 def _check_names(part: Part, rules: list[SimulatorRule], findings: Findings) -> None:
-    """Report two rules of one name: a document that builds on them could not choose one."""
+    """Report two rules of one name, which a derived document could not tell apart."""
     seen: set[str] = set()
     for inner, rule in zip(part.items(), rules, strict=True):
         if rule.name and rule.name in seen:
-            text = f"two rules of {rule.transport!r} are called {rule.name!r}"
+            text = f"two rules of {rule.transport!r} have the name {rule.name!r}"
             findings.error(inner, "duplicate-name", text, at="name", hint="rename one of them")
         seen.add(rule.name)
 
 
 def _needs_types(data: object) -> bool:
-    """Return whether there is a binary form anywhere."""
+    """Return whether the data has a binary form at any place."""
     if isinstance(data, dict):
         return "struct" in data or any(map(_needs_types, data.values()))
     return isinstance(data, list) and any(map(_needs_types, data))
@@ -250,13 +250,11 @@ def _rule(part: Part, transport: str, findings: Findings, context: FormContext) 
     request = part.text("command") or part.text("poll")
     does = any(key in part.data for key in ("set", "send", "message", "close", "then"))
     if "every" in part.data and not does:
-        findings.error(
-            part, "missing-key", "'send' is missing: what is said every so often?", key=True
-        )
+        findings.error(part, "missing-key", "a periodic rule needs 'send'", key=True)
     when, match = part.get("when"), part.get("match")
     first = _reaction(part, findings, context, answers=bool(request) and not _speaks(part))
     if "every" in part.data and first.after_s:
-        text = "what is done every so often needs no time before it"
+        text = "a periodic rule cannot have 'after'"
         findings.error(part, "misplaced-key", text, at="after", key=True)
     return SimulatorRule(
         transport=transport,
@@ -275,7 +273,7 @@ def _rule(part: Part, transport: str, findings: Findings, context: FormContext) 
 
 
 def _speaks(part: Part) -> bool:
-    """Return whether a rule has an answer of its own, now or later."""
+    """Return whether a rule has a reply of its own, immediate or delayed."""
     return any("send" in one.data or "answer" in one.data for one in (part, *part.listed("then")))
 
 
@@ -284,19 +282,19 @@ def _not_one_trigger(part: Part, triggers: list[str], findings: Findings) -> Non
         findings.error(
             part,
             "missing-key",
-            "'match' or 'every' is missing from this rule",
+            "this rule lacks 'match' or 'every'",
             key=True,
-            hint="a rule takes a frame (match, command, poll), or speaks every so often",
+            hint="a rule matches a frame (match, command, poll), or sends periodically (every)",
         )
         return
     both = f"'{triggers[0]}' and '{triggers[1]}'"
     findings.error(
         part,
         "misplaced-key",
-        f"{both} both say when this rule is used",
+        f"{both} are two triggers of one rule",
         at=triggers[1],
         key=True,
-        hint="make two rules of it",
+        hint="write two rules",
     )
 
 
@@ -312,7 +310,7 @@ def _reaction(
     answer = part.text("answer")
     send, framing = part.get("send"), part.get("framing")
     if framing is not None and send is None:
-        text = "'framing' is for what is sent, and there is no 'send'"
+        text = "'framing' has no effect without 'send'"
         findings.error(part, "misplaced-key", text, at="framing", key=True)
     if framing is not None:
         context = context._replace(framing=None)

@@ -24,7 +24,7 @@ _BESIDE: Final = {
     "if": ("then", "else"),
     "fail": (),
 }
-"""Verb → the keys that may accompany it."""
+"""Verb → additional keys of its step."""
 VERBS: Final = tuple(_BESIDE)
 _OF_REQUESTS: Final = ("match", "stages", "resend", "extend")
 _NEVER: Final = compile_template("")
@@ -32,32 +32,32 @@ _NO_PATTERN: Final = "^$"
 
 
 class StepContext(NamedTuple):
-    """The surroundings of steps."""
+    """The context of steps."""
 
     transport: str
-    """Whose steps these are, or the only one there is; "" when each must say it."""
+    """Transport of these steps, or the only transport; "" when each step must name one."""
     is_named: bool
-    """They are a sequence of their own, whose steps may name a transport."""
+    """The steps are a sequence of their own, so they may name a transport."""
     forms: FormContext
 
 
 def parse_steps(part: Part, context: StepContext, findings: Findings) -> tuple[sequence.Step, ...]:
-    """Return the steps in the list at `part`, branches included."""
+    """Return the steps in the list at `part`, with their branches."""
     steps = _steps(part, context, findings)
     count = sum(1 for _ in sequence.all_steps(steps))
     if count > sequence.MAX_STEPS:
         findings.error(
             part,
             "too-many-steps",
-            f"there are {count} steps, branches included; {sequence.MAX_STEPS} fit",
+            f"found {count} steps with branches; the limit is {sequence.MAX_STEPS}",
         )
     most = sequence.most_steps(steps)
     if most > sequence.MAX_STEPS_DONE:
         findings.error(
             part,
             "too-many-steps",
-            f"with all rounds of 'repeat' it would do {most} steps;"
-            f" {sequence.MAX_STEPS_DONE} are allowed",
+            f"with all rounds of 'repeat' it has {most} steps;"
+            f" the limit is {sequence.MAX_STEPS_DONE}",
             hint="make 'times' smaller",
         )
     return steps
@@ -78,19 +78,21 @@ def _step(part: Part, context: StepContext, findings: Findings) -> sequence.Step
         findings.error(
             part,
             "two-verbs" if verbs else "missing-verb",
-            f"'{verbs[0]}' and '{verbs[1]}' are two steps" if verbs else "nothing says what to do",
+            f"'{verbs[0]}' and '{verbs[1]}' are two actions"
+            if verbs
+            else "this step has no action",
             at=verbs[1] if verbs else "",
             key=True,
-            hint="write one step after the other" if verbs else f"use one of: {', '.join(VERBS)}",
+            hint="write two steps" if verbs else f"use one of: {', '.join(VERBS)}",
         )
         return None
     verb = verbs[0]
     for key in part.data:
         if key != verb and key not in _BESIDE[verb]:
-            text = f"'{key}' means nothing beside '{verb}'"
+            text = f"'{key}' has no effect with '{verb}'"
             findings.error(part, "misplaced-key", text, at=key, key=True)
     if not context.is_named:
-        refuse(part, ("to", "from"), "is for sequences: this is about one transport", findings)
+        refuse(part, ("to", "from"), "is for sequences: these steps have one transport", findings)
     return _one(verb, part, context, findings)
 
 
@@ -126,8 +128,8 @@ def _expect(
     transport = part.text("from", context.transport)
     framing = None
     if isinstance(inner.data, dict):
-        refuse(inner, _OF_REQUESTS, "means nothing for a step", findings)
-        refuse(inner, ("timeout",), "stands beside 'expect', not in it", findings)
+        refuse(inner, _OF_REQUESTS, "has no effect for a step", findings)
+        refuse(inner, ("timeout",), "must be next to 'expect', not inside", findings)
         framing, forms = parse_own_framing(inner, findings, context.forms)
         stage = parse_stage(inner, findings, forms)
     else:
@@ -163,7 +165,7 @@ def _wait(
     part: Part, inner: Part, context: StepContext, findings: Findings
 ) -> sequence.Step | None:
     if not isinstance(inner.data, dict):
-        refuse(part, ("else",), "means nothing for a plain wait", findings)
+        refuse(part, ("else",), "has no effect for a plain wait", findings)
         return sequence.WaitStep(findings.duration(part, "wait", 0.0, most=sequence.MAX_STEP_S))
     condition = findings.expression(inner.must("until"))
     otherwise, text = _else(part, context, findings)
@@ -179,13 +181,13 @@ def _repeat(
         findings.error(
             part,
             "missing-key",
-            "'times' is missing: nothing says how often at most",
+            "'times' is missing: the number of rounds has no limit",
             key=True,
             hint="write times: 10, and until: CONDITION to end earlier",
         )
     until = part.get("until")
     if until is None:
-        refuse(part, ("else",), "means nothing without 'until'", findings)
+        refuse(part, ("else",), "needs 'until'", findings)
     otherwise, text = _else(part, context, findings)
     return sequence.RepeatStep(
         _steps(inner, context, findings),
@@ -222,7 +224,7 @@ def _if(
         findings.error(
             part.must("else"),
             "wrong-type",
-            "'else' of an 'if' is a list of steps",
+            "'else' of an 'if' must be a list of steps",
             hint="write else: [{ fail: … }] to end here",
         )
     if "then" not in part.data and "else" not in part.data:
@@ -231,7 +233,7 @@ def _if(
 
 
 def _values(parts: dict[str, Part], findings: Findings) -> dict[str, Template | Value]:
-    """Return plain values, and templates where text has an expression in it."""
+    """Return plain values, and templates for texts with expressions."""
     values: dict[str, Template | Value] = {}
     for name, inner in parts.items():
         if isinstance(inner.data, str):

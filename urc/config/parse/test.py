@@ -1,4 +1,4 @@
-"""A test that a document carries about itself: mapping → `DocumentTest`."""
+"""A test of a document: mapping → `DocumentTest`."""
 
 from typing import Final
 
@@ -12,7 +12,7 @@ __all__ = ["parse_test"]
 _AT_ONCE: Final = ("feed", "reply_to", "run", "args", "expect", "sent", "fails")
 """Keys of a test in one instant."""
 _IN_STEPS: Final = ("polls", "ready")
-"""Keys that say how steps are done."""
+"""Keys about the execution of steps."""
 _VERBS: Final = (
     "message", "response", "feedback", "publish", "call", "goal", "cancel", "request",
 )  # fmt: skip
@@ -25,11 +25,11 @@ _ADDRESS: Final = (
 _BODIES: Final = ("json", "text", "hex")
 """Keys of a message that are its body."""
 _HAPPENS: Final = ("feed", "run", "wait", "connects", "closes", "leaves")
-"""Keys of a step of which one may happen at a time."""
+"""Keys of a step that exclude each other."""
 
 
 def parse_test(part: Part, findings: Findings) -> DocumentTest:
-    """Return one test; what it names is looked up when names are linked."""
+    """Return one test, before its names are resolved."""
     line, column, source = _place(part)
     reply_to = part.scalar("reply_to")
     if isinstance(reply_to, float):
@@ -59,7 +59,7 @@ def _check_keys(part: Part, findings: Findings) -> None:
     has_steps = "steps" in part.data
     for key in _AT_ONCE if has_steps else _IN_STEPS:
         if key in part.data:
-            why = "belongs into one of the steps" if has_steps else "is for tests with 'steps'"
+            why = "must be a key of one of the steps" if has_steps else "needs 'steps'"
             findings.error(part, "misplaced-key", f"'{key}' {why}", at=key, key=True)
 
 
@@ -69,13 +69,13 @@ def _step(part: Part, findings: Findings) -> DialogueStep:
         findings.error(
             part,
             "two-verbs",
-            f"'{happens[0]}' and '{happens[1]}' are two steps",
+            f"'{happens[0]}' and '{happens[1]}' are two actions",
             at=happens[1],
             key=True,
-            hint="write one step after the other",
+            hint="write two steps",
         )
     if "of" in part.data and not {"reply", "fails"} & part.data.keys():
-        text = "'of' says whose 'reply' or failure it is, and there is none"
+        text = "'of' needs a 'reply' or a failure"
         findings.error(part, "misplaced-key", text, at="of", key=True)
     line, column, source = _place(part)
     wait = part.get("wait")
@@ -152,7 +152,7 @@ def _message(part: Part, findings: Findings) -> Envelope:
     verb, inner = next((verb, one) for verb in _VERBS if (one := part.get(verb)) is not None)
     bodies = [key for key in _BODIES if key in inner.data]
     if len(bodies) > 1:
-        text = f"'{bodies[0]}' and '{bodies[1]}' are two bodies"
+        text = f"'{bodies[0]}' and '{bodies[1]}' are two bodies of one message"
         findings.error(inner, "two-forms", text, at=bodies[1], key=True)
     body: object = None
     for key in bodies:
@@ -170,7 +170,7 @@ def _hex(inner: Part, findings: Findings) -> bytes:
     try:
         return bytes.fromhex(inner.data)
     except ValueError:
-        text = "these are no pairs of hex digits"
-        hint = "write each byte as two digits: 02 FF 0D"
+        text = "expected pairs of hex digits"
+        hint = "write each byte as two digits, such as 02 FF 0D"
         findings.error(inner, "not-hex", text, hint=hint)
         return b""

@@ -1,4 +1,4 @@
-"""A driver's ``types:``: named structs, each read once, after those that it needs."""
+"""A driver's ``types:``: named structs, each parsed once, after the types that it needs."""
 
 from collections.abc import Iterator, Mapping
 from typing import Any
@@ -15,13 +15,13 @@ Items = tuple[Item, ...]
 def parse_types(
     part: Part, enums: Mapping[str, tuple[tuple[int, str], ...]], findings: Findings
 ) -> Mapping[str, Items]:
-    """Return every type of the driver at `part`; a reported one is empty."""
+    """Return every type of the driver at `part`; an invalid type is empty."""
     parts = part.named("types")
     types: dict[str, Items] = {}
     needed = {name: set(_names(inner.data)) & parts.keys() for name, inner in parts.items()}
     for name, inner in parts.items():
         if number_of(name) is not None or name in ("bytes", "text", "rest"):
-            findings.error(inner, "bad-name", f"{name!r} is a type already", key=True)
+            findings.error(inner, "bad-name", f"{name!r} is a built-in type", key=True)
             needed[name] = set()
     for name in parts:
         _parse(name, parts, needed, (), types, enums, findings)
@@ -37,7 +37,7 @@ def _parse(
     enums: Mapping[str, tuple[tuple[int, str], ...]],
     findings: Findings,
 ) -> None:
-    """Read the types that `name` needs, then itself."""
+    """Parse the types that `name` needs, then `name` itself."""
     if name in types:
         return
     types_above = (*above, name)

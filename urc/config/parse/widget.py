@@ -1,4 +1,4 @@
-"""A widget's manifest → `Widget`, and the shelf that reads manifests by name."""
+"""A widget's manifest → `Widget`, and the folder that reads manifests by name."""
 
 import re
 from collections.abc import Iterable
@@ -18,7 +18,7 @@ _NAME = re.compile(r"[a-z][a-z0-9-]{0,63}")
 
 
 def parse_widget(document: Document, findings: Findings) -> Widget:
-    """Return the widget that a manifest declares."""
+    """Return the widget of a manifest."""
     part = Part(document, (), document.data)
     folder = FilePath(document.file).parent
     name = part.text("name")
@@ -26,9 +26,9 @@ def parse_widget(document: Document, findings: Findings) -> Widget:
         findings.error(
             part,
             "wrong-name",
-            f"the folder is called {folder.absolute().name!r}, the widget {name!r}",
+            f"the folder has the name {folder.absolute().name!r}, the widget {name!r}",
             at="name",
-            hint="they must be the same",
+            hint="give both the same name",
         )
     size = part.get("size")
     smallest = [int(inner.data) for inner in size.listed("min")] if size else []
@@ -55,7 +55,7 @@ def parse_widget(document: Document, findings: Findings) -> Widget:
 
 
 def _check_names(part: Part, widget: Widget, findings: Findings) -> None:
-    """Report each name of a port or an option that the manifest does not have."""
+    """Report each name of an input, output or option that the manifest does not have."""
     ports, options = {**widget.inputs, **widget.outputs}, widget.options
     told: list[tuple[Part, Iterable[str]]] = []
     told += [(inner, (*ports, *options)) for inner in part.listed("needs")]
@@ -117,7 +117,7 @@ def _output(part: Part) -> Port:
 
 
 def _check_defaults(options: Part, findings: Findings) -> None:
-    """Report each default that its own schema would refuse."""
+    """Report each default that does not fit its own schema."""
     for name, inner in options.entries().items():
         default = inner.get("default")
         if default is None:
@@ -129,7 +129,7 @@ def _check_defaults(options: Part, findings: Findings) -> None:
 
 
 def _nearby(file: FilePath) -> str:
-    """Return a path as a person in the current folder would write it."""
+    """Return a path relative to the current folder, if possible."""
     try:
         return str(file.relative_to(FilePath.cwd()))
     except (OSError, ValueError):
@@ -137,7 +137,7 @@ def _nearby(file: FilePath) -> str:
 
 
 class Shelf:
-    """The widgets of one folder; each manifest is read once, when it is first asked for."""
+    """The widgets of one folder; each manifest is read once, at its first use."""
 
     def __init__(self, folder: FilePath) -> None:
         self.folder = folder
@@ -147,11 +147,11 @@ class Shelf:
 
     @property
     def files(self) -> tuple[str, ...]:
-        """Every manifest that was asked for, whether there is one or not."""
+        """Return the path of every requested manifest, existing or not."""
         return tuple(str(self.folder / name / "widget.yaml") for name in self._widgets)
 
     def names(self) -> list[str]:
-        """Return the names of all widgets there are."""
+        """Return the names of all widgets of the folder."""
         try:
             return sorted(entry.parent.name for entry in self.folder.glob("*/widget.yaml"))
         except OSError:
@@ -164,11 +164,11 @@ class Shelf:
         return self._widgets[name]
 
     def has(self, name: str) -> bool:
-        """Return whether there is a widget of that name, broken or not."""
+        """Return whether the folder has a widget of this name, broken or not."""
         return bool(_NAME.fullmatch(name)) and (self.folder / name / "widget.yaml").is_file()
 
     def place(self, name: str) -> FilePath:
-        """Return the folder of the widget of that name."""
+        """Return the folder of the widget with this name."""
         return self.folder / name
 
     def hint(self, name: str) -> str:
@@ -187,7 +187,7 @@ class Shelf:
                 document.problem(
                     ("kind",),
                     "wrong-kind",
-                    "a widget's manifest is expected here",
+                    "expected the manifest of a widget",
                     hint="write 'kind: widget'",
                 )
             ]

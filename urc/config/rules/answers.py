@@ -1,4 +1,4 @@
-"""Rules about silent robots: on a line by design, or on success."""
+"""Rules about silent robots: silent by design, or silent on success."""
 
 from typing import Final
 
@@ -9,17 +9,11 @@ from urc.model.sequence import ExpectStep, PromptStep, Step, all_steps
 
 __all__ = ["check_answers"]
 
-_HINT: Final = "leave out 'answers: never', or leave out whatever waits for the robot there"
+_HINT: Final = "remove 'answers: never', or remove the waits for this transport"
 
 
 def check_answers(part: Part, driver: Driver, findings: Findings) -> None:
-    """Report waits on a line that never answers, and silence that no answer can end.
-
-    Args:
-        part: the driver's mapping.
-        driver: as loaded, without errors.
-        findings: collects the problems.
-    """
+    """Report waits on a transport without replies, and silence that no error reply can end."""
     for name, inner in part.named("commands").items():
         one = driver.commands[name]
         _check_silence(inner, one.reply, driver.transports.get(one.transport), findings)
@@ -43,7 +37,7 @@ def check_answers(part: Part, driver: Driver, findings: Findings) -> None:
             findings.error(
                 inner,
                 "never-answers",
-                f"nothing ever comes from {driver.messages[name].transport!r}, which never answers",
+                f"{driver.messages[name].transport!r} receives nothing: it has 'answers: never'",
                 key=True,
                 hint=_HINT,
             )
@@ -54,7 +48,7 @@ def check_answers(part: Part, driver: Driver, findings: Findings) -> None:
 def _check_silence(
     part: Part, reply: Reply | None, spec: TransportSpec | None, findings: Findings
 ) -> None:
-    """Report an answer that is silence where nothing could break it."""
+    """Report a stage of silence that no error reply can end."""
     place = part.get("reply")
     if reply is None or place is None or (spec is not None and (spec.errors or spec.faults)):
         return
@@ -66,15 +60,15 @@ def _check_silence(
             findings.error(
                 inner,
                 "nothing-refuses",
-                "silence is the answer, and nothing says how the robot refuses",
+                "silence means success, and no error reply is declared",
                 at="silence",
                 key=True,
-                hint="write errors: with what it says then, or leave 'reply' out",
+                hint="write errors: with the error replies, or remove 'reply'",
             )
 
 
 def _refuse(part: Part, key: str, name: str, findings: Findings) -> None:
-    text = f"{name!r} waits for an answer, and its line never answers"
+    text = f"{name!r} waits for a reply on a transport with 'answers: never'"
     findings.error(part, "never-answers", text, at=key, key=True, hint=_HINT)
 
 
@@ -82,7 +76,7 @@ def _check_line(part: Part, spec: TransportSpec, findings: Findings) -> None:
     timeouts = part.get("timeouts")
     for place, key in ((part, "stale_after"), (timeouts, "idle")):
         if place is not None and key in place.data:
-            text = f"{key!r} waits for the robot, and the line never answers"
+            text = f"{key!r} waits for the robot on a transport with 'answers: never'"
             findings.error(place, "never-answers", text, at=key, key=True, hint=_HINT)
     for key, steps in (("on_connect", spec.on_connect), ("on_close", spec.on_close)):
         if steps:
@@ -92,6 +86,6 @@ def _check_line(part: Part, spec: TransportSpec, findings: Findings) -> None:
 def _check_steps(part: Part, steps: tuple[Step, ...], mute: set[str], findings: Findings) -> None:
     for step in all_steps(steps):
         if isinstance(step, (ExpectStep, PromptStep)) and step.transport in mute:
-            text = f"a step waits for {step.transport!r}, which never answers"
+            text = f"a step waits for {step.transport!r}, which has 'answers: never'"
             findings.error(part, "never-answers", text, key=True, hint=_HINT)
             return

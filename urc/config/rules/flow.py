@@ -1,6 +1,6 @@
-"""Rules about traffic and safety: rates that are too high, unsafe motion. All are warnings.
+"""Rules about traffic and safety: excessive rates and unsafe motion.
 
-A rule reports written values only, never a default.
+All are warnings about declared values, never about defaults.
 """
 
 from collections.abc import Iterator
@@ -21,19 +21,15 @@ from urc.model.sequence import SendStep, Step, UntilStep, WaitStep, all_steps
 __all__ = ["check_flow"]
 
 _GOOD_BYE_S = 2.0
-"""The time for ``on_close``, see `urc.protocol.engine`."""
+"""Time limit of ``on_close`` in seconds, see `urc.protocol.engine`."""
 _BITS_OF_A_BYTE = 10
-"""On a serial line: start and stop bit included."""
+"""Bits of a byte on a serial line, with start and stop bit."""
 
 
 def check_flow(part: Part, driver: Driver, secrets: frozenset[str], findings: Findings) -> None:
     """Add the warnings about the driver at `part`.
 
-    Args:
-        part: the driver's mapping.
-        driver: as loaded, without errors.
-        secrets: names of secret settings.
-        findings: collects the problems.
+    `secrets` has the names of secret settings.
     """
     for name, inner in part.named("transports").items():
         _check_line(inner, driver.transports[name], findings)
@@ -62,15 +58,15 @@ def _check_line(part: Part, spec: TransportSpec, findings: Findings) -> None:
         findings.warn(
             part.must("keepalive").must("every"),
             "slow-keepalive",
-            f"the robot gives up after {shown_duration(watchdog_s)}, before it hears of this",
-            hint="half of that leaves room for one that is lost",
+            f"the watchdog of the robot runs out first, after {shown_duration(watchdog_s)}",
+            hint="half of that time allows for one lost frame",
         )
     waits_s = sum(_wait_s(step) for step in all_steps(spec.on_close))
     if waits_s > _GOOD_BYE_S:
         findings.warn(
             part.must("on_close"),
             "long-good-bye",
-            f"its waits take {shown_duration(waits_s)}, and it has"
+            f"its waits take {shown_duration(waits_s)}, and the limit is"
             f" {shown_duration(_GOOD_BYE_S)} in all",
             key=True,
         )
@@ -83,7 +79,7 @@ def _wait_s(step: Step) -> float:
 
 
 def _check_baud(part: Part, driver: Driver, spec: TransportSpec, findings: Findings) -> None:
-    """Warn of polls that need more bytes than a serial line carries, at the very least."""
+    """Warn of polls whose smallest frames already exceed the baud rate of a serial line."""
     baud = spec.options.get("baud")
     if isinstance(baud, bool) or not isinstance(baud, (int, float)) or baud <= 0:
         return
@@ -93,14 +89,14 @@ def _check_baud(part: Part, driver: Driver, spec: TransportSpec, findings: Findi
         findings.warn(
             part,
             "too-many-polls",
-            f"the polls need {bytes_per_s * _BITS_OF_A_BYTE:.0f} bit/s at the least, and the line"
+            f"the polls need {bytes_per_s * _BITS_OF_A_BYTE:.0f} bit/s or more, and the line"
             f" carries {baud:g}",
             at="baud",
         )
 
 
 def _least_bytes(poll: Poll) -> int:
-    """Return the bytes of a request and its answer, as far as they are written out."""
+    """Return the number of bytes of a request and its reply, as far as they are fixed."""
     template = poll.send.options.get("template")
     source = getattr(template, "source", "")
     literal = sum(len(text) for _, text, _ in split_template(source))
@@ -110,7 +106,7 @@ def _least_bytes(poll: Poll) -> int:
 def _check_stages(
     part: Part, reply: Reply, transport: str, driver: Driver, findings: Findings
 ) -> None:
-    """Warn of a long second answer that holds up the polls of a line with one request in flight."""
+    """Warn of a long second stage that delays the polls of a line with one request in flight."""
     if not reply.stages or driver.transports[transport].queue.in_flight > 1:
         return
     periods = [poll.every_s for poll in driver.polls if poll.transport == transport]
@@ -119,10 +115,10 @@ def _check_stages(
         findings.warn(
             part.must("stages"),
             "stages-block-line",
-            f"while it waits up to {shown_duration(longest_s)} to be done, the poll of every"
+            f"while it waits up to {shown_duration(longest_s)} for its last stage, the poll every"
             f" {shown_duration(min(periods))} waits, too",
             key=True,
-            hint="write queue: { in_flight: 2 } when the robot can answer in between",
+            hint="write queue: { in_flight: 2 } if the robot can reply in between",
         )
 
 
@@ -138,8 +134,8 @@ def _check_haste(part: Part, driver: Driver, name: str, findings: Findings) -> N
             findings.warn(
                 part.must("within"),
                 "hasty-verify",
-                f"{signal!r} is read every {shown_duration(min(periods))} only",
-                hint="give it longer than a period, or ask more often",
+                f"{signal!r} is read only every {shown_duration(min(periods))}",
+                hint="give it more than one period, or poll more often",
             )
 
 
@@ -152,14 +148,14 @@ def _check_poll(part: Part, poll: Poll, findings: Findings) -> None:
         findings.warn(
             part.must("offline").must("retry"),
             "eager-retry",
-            f"a part that does not answer is asked more often than one that does"
+            f"an offline part is asked more often than an online part"
             f" (every {shown_duration(poll.every_s)})",
             hint="make it longer than 'every'",
         )
 
 
 def _digested(part: Part, send: WriteSpec) -> set[str]:
-    """Return the settings that show in no frame, but as part of a hash that is new each time."""
+    """Return the settings that are sent only inside a hash that changes every time."""
     inner, form = write_form(part)
     found = [template for _, template in form.templates(inner, send)]
     digested = {name for one in found for name in digested_settings(one)}
@@ -183,7 +179,7 @@ def _check_secrets(part: Part, driver: Driver, secrets: frozenset[str], findings
             findings.warn(
                 place,
                 "secret-not-redacted",
-                f"the secret {used[0]!r} shows in the traffic of every request",
+                f"the secret {used[0]!r} is visible in the traffic of every request",
                 hint="send it once, in a step of 'on_connect' or of a sequence, with redact: true",
             )
     for inner, step in _sends(part, driver):
@@ -192,8 +188,8 @@ def _check_secrets(part: Part, driver: Driver, secrets: frozenset[str], findings
             findings.warn(
                 inner.must("send"),
                 "secret-not-redacted",
-                f"the secret {used[0]!r} may show up in messages and logs",
-                hint="write redact: true beside it",
+                f"the secret {used[0]!r} may appear in messages and logs",
+                hint="add redact: true",
             )
 
 

@@ -1,6 +1,6 @@
-"""Rules about frames: patterns that match too much, and names without a use.
+"""Rules about frames: patterns that match too much, and unused names.
 
-All are warnings. Two declarations that match one frame are reported only with an example of it.
+All are warnings. Two declarations that match one frame are reported only with an example frame.
 """
 
 import re
@@ -21,14 +21,14 @@ from urc.patterns import Pattern, can_be_empty, example
 __all__ = ["check_frames_apart"]
 
 _FILLINGS: Final = ("0", "7", "-1.5", "q", "Zq", "a b", "~", "A5", "F", "+12", "x_1", "")
-"""Sample values of a field; those that its pattern rejects are skipped."""
+"""Sample values of a field; a pattern may reject some of them."""
 _VARIANTS: Final = 6
 _SHOWN: Final = 40
 _WORD: Final = re.compile(r"\w+")
 _LETTERS: Final = re.compile(r"\^([A-Za-z0-9 :,=/_-]*)")
 _GROUP: Final = re.compile(r"\(\?(?:P<\w+>|:)")
 _MAY_BE_LESS: Final = re.compile(r"[*?|{]|\(\)")
-"""Marks inside a group that may be empty."""
+"""Characters of a group that may be empty."""
 
 
 def check_frames_apart(part: Part, driver: Driver, findings: Findings) -> None:
@@ -47,8 +47,8 @@ def check_frames_apart(part: Part, driver: Driver, findings: Findings) -> None:
             findings.warn(
                 inner,
                 "matches-empty",
-                "this fits an empty text, and so the first byte of anything is the prompt",
-                hint="say what the prompt ends with: 'login: $'",
+                "the pattern matches empty text, so any first byte counts as the prompt",
+                hint="match the end of the prompt, such as 'login: $'",
             )
     _check_words(part, findings)
 
@@ -91,24 +91,24 @@ def _stages(part: Part, reply: Reply) -> Iterator[tuple[Part, ReadSpec]]:
     yield from zip(part.listed("stages") or [part], reads, strict=True)
 
 
-# -- frames that two declarations take
+# -- frames that match two declarations
 
 
 class _Text:
-    """A declaration of text frames: how to tell whether it takes one, and some that it takes."""
+    """A declaration of text frames, with a test for a match and some sample frames."""
 
     def __init__(self, pattern: Pattern | None, text: str = "") -> None:
         self._pattern = pattern
         self._text = text
         self.head = text if pattern is None else _head(pattern.source)
-        """The first characters of its frames, where they are evident."""
+        """The certain first characters of its frames; "" when none is certain."""
 
     def takes(self, text: str) -> bool:
         return text == self._text if self._pattern is None else bool(_finds(self._pattern, text))
 
     @cached_property
     def samples(self) -> tuple[str, ...]:
-        """Some frames that it takes."""
+        """Some frames that match."""
         if self._pattern is None:
             return (self._text,)
         groups = self._pattern.groups
@@ -117,7 +117,7 @@ class _Text:
         return tuple(dict.fromkeys(one for one in made if _finds(self._pattern, one)))
 
     def takes_all_of(self, other: "_Text") -> bool:
-        """Return whether it takes every frame of `other` that comes to mind."""
+        """Return whether every sample of `other` matches this declaration, too."""
         if not (self.head.startswith(other.head) or other.head.startswith(self.head)):
             return False
         return bool(other.samples) and all(map(self.takes, other.samples))
@@ -128,7 +128,7 @@ def _finds(pattern: Pattern, text: str) -> bool:
 
 
 def _head(source: str) -> str:
-    """Return the letters that a pattern begins with; "" where that takes more than a look."""
+    """Return the fixed characters at the start of a pattern; "" when they are not obvious."""
     found = _LETTERS.match(source)
     if found is None or "|" in source:
         return ""
@@ -136,7 +136,7 @@ def _head(source: str) -> str:
 
 
 def _check_messages(part: Part, driver: Driver, findings: Findings) -> None:
-    """Warn of a message whose frames an earlier one takes: the first one has them."""
+    """Warn of a message whose frames match an earlier message, which takes them."""
     seen: list[tuple[str, str, ReadSpec, _Text | None]] = []
     for name, inner in part.named("messages").items():
         message = driver.messages[name]
@@ -149,10 +149,10 @@ def _check_messages(part: Part, driver: Driver, findings: Findings) -> None:
                 findings.warn(
                     inner,
                     "ambiguous-frame",
-                    f"{other!r}, above, takes the same frames{shown}, so that this one gets none"
+                    f"{other!r}, above, takes the same frames{shown}, so this one gets none"
                     " of them",
                     key=True,
-                    hint="put the more special one first, or tell them apart by 'when'",
+                    hint="put the more specific one first, or distinguish them by 'when'",
                 )
                 break
         seen.append((name, message.transport, message.read, text))
@@ -161,7 +161,7 @@ def _check_messages(part: Part, driver: Driver, findings: Findings) -> None:
 def _shared(
     first: ReadSpec, earlier: _Text | None, second: ReadSpec, later: _Text | None
 ) -> str | None:
-    """Return how to show a frame of `second` that `first` takes; None when none is known."""
+    """Return the example of a frame that both match, as text; None when none is known."""
     if first.topic != second.topic:
         return None
     if first.when is not None or first.lines is not None or second.lines is not None:
@@ -189,7 +189,7 @@ def _items(read: ReadSpec) -> tuple[Item, ...]:
 
 
 def _covers(first: tuple[Item, ...], second: tuple[Item, ...]) -> bool:
-    """Return whether every frame of `second` is one of `first`, as far as that can be proven."""
+    """Return whether every frame of `second` provably matches `first`."""
     size = fixed_size(first)
     if size is None or size != fixed_size(second):
         return False
@@ -214,10 +214,10 @@ def _asked(items: tuple[Item, ...]) -> dict[tuple[int, int], object] | None:
 
 
 def _check_refusals(part: Part, reply: Reply, findings: Findings) -> None:
-    """Warn of a refusal that takes the good answer: refusals are looked at first."""
+    """Warn of an error pattern that matches a reply: errors are tried first."""
     good = _text_of(reply.read) if reply.read.when is None and reply.read.lines is None else None
-    errors = [(inner, "a refusal", "refusals") for inner in part.listed("errors")]
-    asides = [("resend", "a request for the frame"), ("extend", "being busy")]
+    errors = [(inner, "an error", "errors") for inner in part.listed("errors")]
+    asides = [("resend", "a resend request"), ("extend", "a busy reply")]
     errors += [(part.must(key), what, f"{key!r}") for key, what in asides if key in part.data]
     patterns = (*reply.errors, *_patterns_of(reply.asides))
     for inner, what, whose in errors:
@@ -228,26 +228,26 @@ def _check_refusals(part: Part, reply: Reply, findings: Findings) -> None:
             findings.warn(
                 inner,
                 "matches-empty",
-                f"this fits an empty text, and so every answer counts as {what}"
+                f"the pattern matches empty text, so every reply counts as {what}"
                 if _finds(pattern, "~ no such answer ~")
-                else "this fits an empty answer, too",
-                hint=f"say what {what} begins with: '^ERR'"
-                if what == "a refusal"
-                else "say what such a frame begins with",
+                else "the pattern matches an empty reply",
+                hint=f"match the start of {what}: '^ERR'"
+                if what == "an error"
+                else "match the start of such a frame",
             )
         elif good is not None and _Text(pattern).takes_all_of(good):
             findings.warn(
                 inner,
                 "ambiguous-frame",
-                f"the good answer fits this, too, such as {good.samples[0][:_SHOWN]!r}: it would"
+                f"the reply on success matches it, such as {good.samples[0][:_SHOWN]!r}: it would"
                 f" count as {what}",
-                hint=f"make it fit {whose} only; they are looked at first",
+                hint=f"make it match {whose} only; they are tried first",
             )
     _check_struct_refusals(part, reply, findings)
 
 
 def _check_shared_refusals(part: Part, driver: Driver, findings: Findings) -> None:
-    """Warn of a refusal of a whole line that takes the good answer of some request."""
+    """Warn of an error pattern of a transport that matches the reply to some request."""
     for name, inner in part.named("transports").items():
         spec = driver.transports[name]
         requests = [(one.transport, one.reply) for one in driver.commands.values()]
@@ -259,7 +259,7 @@ def _check_shared_refusals(part: Part, driver: Driver, findings: Findings) -> No
             told = len(findings.problems)
             _check_refusals(inner, alone, findings)
             if len(findings.problems) > told:
-                break  # one is enough to mend it
+                break  # one warning is enough
 
 
 def _patterns_of(asides: Asides) -> Iterator[Pattern]:
@@ -270,7 +270,7 @@ def _patterns_of(asides: Asides) -> Iterator[Pattern]:
 
 
 def _check_struct_refusals(part: Part, reply: Reply, findings: Findings) -> None:
-    """Warn of a refusal in bytes that differs from the good answer by nothing but a field."""
+    """Warn of a binary error reply that differs from the reply in only a field."""
     given = [inner for inner in part.listed("errors") if isinstance(inner.data, dict)]
     if len(given) != len(reply.faults) or reply.read.form != "struct":
         return
@@ -280,18 +280,18 @@ def _check_struct_refusals(part: Part, reply: Reply, findings: Findings) -> None
             findings.warn(
                 inner,
                 "ambiguous-frame",
-                "the good answer fits this, too: it would count as a refusal",
-                hint="say by 'when' what is true of refusals only; they are looked at first",
+                "the reply on success matches it, and would count as an error",
+                hint="give 'when' a condition that holds for errors only; they are tried first",
             )
 
 
-# -- numbers out of nothing
+# -- numbers from empty text
 
 
 def _check_empty(
     part: Part, read: ReadSpec, signals: Mapping[str, Signal], findings: Findings
 ) -> None:
-    """Warn of a number that is read from a group which may hold no character at all."""
+    """Warn of a number from a group that may be empty."""
     pattern = read.options.get("pattern")
     if read.form != "regex" or not isinstance(pattern, Pattern):
         return
@@ -307,8 +307,8 @@ def _check_empty(
             findings.warn(
                 place,
                 "matches-empty",
-                f"{name!r} may be empty here, and nothing is no number",
-                hint="write + in place of *, or not_available: [''] where it means 'not known'",
+                f"{name!r} may be empty here, and empty text is not a number",
+                hint="write + instead of *, or not_available: [''] if empty means 'not known'",
                 **where,
             )
 
@@ -327,7 +327,7 @@ def _is_plain_number(signal: Signal) -> bool:
 
 
 def _check_words(part: Part, findings: Findings) -> None:
-    """Warn of types and enums whose name stands nowhere else."""
+    """Warn of types and enums that are never used."""
     if "types" not in part.data and "enums" not in part.data:
         return
     everywhere = _words(part.data)
@@ -339,12 +339,12 @@ def _check_words(part: Part, findings: Findings) -> None:
                     code,
                     f"nothing uses the {noun} {name!r}",
                     key=True,
-                    hint="name it in a struct, or take it away",
+                    hint="name it in a struct, or remove it",
                 )
 
 
 def _words(data: Any) -> Counter[str]:
-    """Return how often each word stands in the texts of a part."""
+    """Return the number of times that each word occurs in the texts of a part."""
     return Counter(word for text in _texts(data) for word in _WORD.findall(text))
 
 

@@ -1,8 +1,8 @@
-"""Rules about motion: what a held command must know of the robot, and what its line must carry.
+"""Rules about motion: facts of the robot for held commands, and the load of their transport.
 
-The robot's own watchdog is the last one left when this machine loses its power, so that a driver
-has to say what it is. A value that contradicts it is an error: the motion would stutter, or go on
-for longer than the lease says. The others are warnings.
+If this machine loses its power, only the robot's own watchdog can stop it, so a driver must declare
+it. A contradiction with the watchdog is an error: the motion would stutter, or outlast the lease.
+The other problems are warnings.
 """
 
 import math
@@ -20,10 +20,10 @@ from urc.model.framing import FrameLayout
 __all__ = ["check_motion", "least_frame_bytes"]
 
 _ASKED: Final = frozenset(("websocket", "rosbridge"))
-"""Kinds of line whose other end is asked for signs of life while something is held."""
+"""Transport types that check liveness while a command is held."""
 LONG_LEASE_S: Final = 0.5
 _BITS_OF_A_BYTE: Final = 10
-"""On a serial line: start and stop bit included."""
+"""Bits of a byte on a serial line, with start and stop bit."""
 _ROUNDING: Final = 1.000001
 
 
@@ -52,11 +52,11 @@ def check_motion(part: Part, driver: Driver, findings: Findings) -> None:
         findings.warn(
             held[0][0],
             "unnoticed-loss",
-            "nothing tells when the robot has gone: no line says how long it may be silent,"
-            " and nothing is asked",
+            "the loss of the robot would go unnoticed: no transport has 'stale_after',"
+            " and no poll has a reply",
             key=True,
-            hint="write stale_after: beside its transport, or poll something that it answers, or"
-            " write answers: never where it says nothing by design",
+            hint="give its transport stale_after: or add a poll with a reply, or"
+            " write answers: never if it never sends anything",
         )
     elif held:
         for name, spec in driver.transports.items():
@@ -66,7 +66,7 @@ def check_motion(part: Part, driver: Driver, findings: Findings) -> None:
 
 
 def _check_freeze(one: tuple[Part, Command, Hold], spec: TransportSpec, findings: Findings) -> None:
-    """Warn of motion on a line that has no way to know that its other end stands still."""
+    """Warn of motion over a transport that cannot detect a frozen robot program."""
     part, command, _ = one
     is_asked = spec.type in _ASKED or spec.never_answers
     if is_asked or spec.stale_after_s is not None or spec.connection == "per_request":
@@ -74,11 +74,11 @@ def _check_freeze(one: tuple[Part, Command, Hold], spec: TransportSpec, findings
     findings.warn(
         part,
         "unnoticed-freeze",
-        f"while {command.name!r} is held, nothing tells that the robot's program stands still:"
-        f" {spec.name!r} cannot ask it",
+        f"while {command.name!r} is held, a frozen robot program would go unnoticed:"
+        f" {spec.name!r} has no liveness check",
         key=True,
-        hint=f"write stale_after: beside {spec.name!r}, as short as what the robot says allows, or"
-        " answers: never where it says nothing by design",
+        hint=f"give {spec.name!r} a stale_after: as short as the robot's traffic allows, or"
+        " answers: never if it never sends anything",
     )
 
 
@@ -87,10 +87,10 @@ def _check_line(part: Part, spec: TransportSpec | None, findings: Findings) -> N
         findings.error(
             part,
             "motion-unconnected",
-            f"what is held needs a line that stays open, and {spec.name!r} connects anew for each"
+            f"a held command needs an open connection, and {spec.name!r} opens one for each"
             " request",
             key=True,
-            hint="leave out 'connection: per_request', or send it by another transport",
+            hint="leave out 'connection: per_request', or send it over another transport",
         )
 
 
@@ -100,27 +100,27 @@ def _check_watchdog(part: Part, command: Command, hold: Hold, findings: Findings
         findings.warn(
             part,
             "unknown-watchdog",
-            f"nobody says how long the robot itself goes on after the last {command.name!r}",
+            f"the robot's own watchdog after the last {command.name!r} is unknown",
             key=True,
-            hint="write watchdog: with the time in its manual, or watchdog: none when it never"
-            " stops by itself",
+            hint="write watchdog: with the time in its manual, or watchdog: none if it never"
+            " stops itself",
         )
         return
     if hold.lease_s >= watchdog_s:
         findings.error(
             part.get("lease") or part.must("watchdog"),
             "lease-too-long",
-            f"the lease is {shown_duration(hold.lease_s)}, and the robot stops by itself after"
+            f"the lease is {shown_duration(hold.lease_s)}, and the robot stops itself after"
             f" {shown_duration(watchdog_s)}",
-            hint="make 'lease' shorter than 'watchdog': the lease is to stop it first",
+            hint="make 'lease' shorter than 'watchdog', so that the lease ends first",
         )
     if hold.repeat_s >= watchdog_s:
         findings.error(
             part.must("repeat"),
             "repeat-too-slow",
-            f"it is repeated every {shown_duration(hold.repeat_s)}, and the robot stops by itself"
+            f"it is repeated every {shown_duration(hold.repeat_s)}, and the robot stops itself"
             f" after {shown_duration(watchdog_s)}: it would stutter",
-            hint="repeat it three times within the watchdog, so that one may be lost",
+            hint="repeat it three times within the watchdog, so that one value may be lost",
         )
 
 
@@ -130,16 +130,16 @@ def _check_step(part: Part, hold: Hold, step_s: float, findings: Findings) -> No
             part.must("repeat"),
             "steps-pile-up",
             f"it is repeated every {shown_duration(hold.repeat_s)}, and a step takes"
-            f" {shown_duration(step_s)}: steps would wait in the robot, and move it when it was let"
-            " go",
-            hint="repeat it as often as steps are done, or make the steps smaller",
+            f" {shown_duration(step_s)}: steps would pile up in the robot, and move it after the"
+            " release",
+            hint="repeat it at the rate of the steps, or make the steps smaller",
         )
     if step_s > LONG_LEASE_S:
         findings.warn(
             part.must("step"),
             "long-step",
-            f"the robot moves on for {shown_duration(step_s)} when it was let go",
-            hint="make the steps smaller, or faster: nothing ends one that has begun",
+            f"the robot moves on for {shown_duration(step_s)} after the release",
+            hint="make the steps smaller or faster: a step cannot be interrupted",
         )
 
 
@@ -148,15 +148,15 @@ def _check_lease(part: Part, hold: Hold, findings: Findings) -> None:
         findings.warn(
             part.must("lease"),
             "long-lease",
-            f"the robot moves on for {shown_duration(hold.lease_s)} when its driver is gone",
-            hint=f"{shown_duration(0.25)} is usual, and {shown_duration(LONG_LEASE_S)} is much",
+            f"the robot moves on for {shown_duration(hold.lease_s)} after its operator is lost",
+            hint=f"{shown_duration(0.25)} is usual, and {shown_duration(LONG_LEASE_S)} is long",
         )
 
 
 def _check_baud(
     held: list[tuple[Part, Command, Hold]], spec: TransportSpec, findings: Findings
 ) -> None:
-    """Report motion that needs more bytes than a serial line carries, at the very least."""
+    """Report motion whose smallest frames already exceed the baud rate of a serial line."""
     baud = spec.options.get("baud")
     if isinstance(baud, bool) or not isinstance(baud, (int, float)) or baud <= 0:
         return
@@ -171,7 +171,7 @@ def _check_baud(
     findings.error(
         part.must("repeat"),
         "line-too-slow",
-        f"{what} {bits_per_s:.0f} bit/s at the least, and the line carries {baud:g}",
+        f"{what} {bits_per_s:.0f} bit/s or more, and the line carries {baud:g}",
         hint=f"repeat less often: every {_bearable_ms(bits_per_s / baud, held)}ms and slower",
     )
 
@@ -179,27 +179,27 @@ def _check_baud(
 def _check_will(
     held: list[tuple[Part, Command, Hold]], spec: TransportSpec, findings: Findings
 ) -> None:
-    """Warn of motion through a broker that has no last will to stop the robot."""
+    """Warn of motion through a broker without a last will that stops the robot."""
     if spec.type != "mqtt" or spec.options.get("will") is not None:
         return
     part, command, _ = held[0]
     findings.warn(
         part,
         "motion-without-will",
-        f"when the way to the broker is cut, nobody stops what {command.name!r} moves",
+        f"if the connection to the broker is lost, nothing ends {command.name!r}",
         key=True,
-        hint=f"write will: with the topic and the payload of its stop beside {spec.name!r}: the"
+        hint=f"give {spec.name!r} a will: with the topic and payload of its stop: the"
         " broker publishes it then",
     )
 
 
 def _bearable_ms(excess: float, held: list[tuple[Part, Command, Hold]]) -> int:
-    """Return the repeat at which the line would be full, were all slowed down alike."""
+    """Return the shortest repeat that the line can carry, if all commands slow down alike."""
     return math.ceil(min(hold.repeat_s for _, _, hold in held) * excess * 1000 - 1e-6)
 
 
 def _notices(spec: TransportSpec, driver: Driver) -> bool:
-    """Return whether a robot that says nothing any more is noticed on a line."""
+    """Return whether silence of the robot is noticed on a transport."""
     if spec.stale_after_s is not None or spec.timeouts.idle_s is not None:
         return True
     asked = [poll for poll in driver.polls if poll.transport == spec.name]
@@ -211,9 +211,9 @@ def _notices(spec: TransportSpec, driver: Driver) -> bool:
 
 
 def least_frame_bytes(send: WriteSpec, spec: TransportSpec) -> int:
-    """Return the bytes of a frame at the least, what its framing adds included.
+    """Return the smallest number of bytes of a frame, with those of its framing.
 
-    A part that depends on values counts as one byte; stuffed bytes count as none.
+    A part that depends on values counts as one byte. Byte stuffing counts as none.
     """
     frames = each_of(send)
     return sum(max(1, sum(_payload_bytes(one))) for one in frames) + len(frames) * _around(spec)

@@ -1,4 +1,4 @@
-"""The last pass: rules over a whole profile. None of them is an error; all are worth a look."""
+"""The last pass: rules over a whole profile, all of them warnings."""
 
 import re
 from pathlib import PurePath
@@ -15,7 +15,7 @@ from urc.model.interface import Interface
 __all__ = ["check_profile"]
 
 _ENDINGS: Final = (".yaml", ".yml")
-"""Of files; text that comes by another way has no name of its own."""
+"""Suffixes of document files; a text from another source has no file name."""
 
 
 def check_profile(
@@ -25,7 +25,7 @@ def check_profile(
     uses: Uses,
     findings: Findings,
 ) -> None:
-    """Add a warning for each thing that is declared to no purpose, or cannot keep up."""
+    """Add a warning for each unused declaration, and for polls that are too fast."""
     _check_name(sources, findings)
     _check_unused(sources, driver, uses, findings)
     _check_slots(sources, interfaces, findings)
@@ -38,19 +38,19 @@ def check_profile(
 
 
 def _check_name(sources: Sources, findings: Findings) -> None:
-    """Warn of a robot that is started by one name and shown by another."""
+    """Warn of a robot whose file has another name than the robot."""
     file = PurePath(sources.root.document.file)
     name = sources.root.text("name")
-    # In a package the folder has the robot's name, and the file is always called the same.
+    # In a package, the folder has the robot's name, and the file is always `robot.yaml`.
     is_of_package = file.name == "robot.yaml" and file.parent.name == name
     is_other = file.suffix in _ENDINGS and name != file.stem and not is_of_package
     if sources.kind == "robot" and is_other:
         findings.warn(
             sources.root,
             "other-name",
-            f"the robot is called {name!r}, its file {file.name!r}",
+            f"the robot has the name {name!r}, and its file {file.name!r}",
             at="name",
-            hint=f"write name: {file.stem}, or call the file {name}{file.suffix}",
+            hint=f"write name: {file.stem}, or rename the file to {name}{file.suffix}",
         )
 
 
@@ -60,10 +60,10 @@ def _check_unused(sources: Sources, driver: Driver, uses: Uses, findings: Findin
             findings.warn(
                 part,
                 "never-set",
-                f"nothing ever sets the signal {name!r}",
+                f"nothing sets the signal {name!r}",
                 key=True,
-                hint=f"give that name to a field of a reply or message, such as (?P<{name}>…) in a"
-                f" 'regex', {{{name}}} in a 'pattern', or 'u16be {name}' in a 'struct'; or compute"
+                hint=f"capture it in a reply or message, such as (?P<{name}>…) in a"
+                f" 'regex', {{{name}}} in a 'pattern', or 'u16be {name}' in a 'struct', or compute"
                 " it with 'value'",
             )
     for name, part in sources.driver.named("transports").items():
@@ -78,14 +78,14 @@ def _check_unused(sources: Sources, driver: Driver, uses: Uses, findings: Findin
                 "unused-setting",
                 f"nothing uses the setting {name!r}",
                 key=True,
-                hint=f"write {{{{ settings.{name} }}}} where it belongs",
+                hint=f"write {{{{ settings.{name} }}}} at the place for it",
             )
 
 
 def _check_slots(sources: Sources, interfaces: dict[str, Interface], findings: Findings) -> None:
     """Warn of a slot that this document fills and no interface shows.
 
-    A driver's own document fills slots for every interface, so that only the robot's are looked at.
+    A driver's document fills slots for every interface, so only the slots of the robot are checked.
     """
     if not sources.interfaces:
         return
@@ -103,9 +103,9 @@ def _check_slots(sources: Sources, interfaces: dict[str, Interface], findings: F
 
 
 def _check_unfilled(sources: Sources, interfaces: dict[str, Interface], findings: Findings) -> None:
-    """Warn of a slot in a robot's own picture that nothing fills.
+    """Warn of an empty slot in a robot's own grid.
 
-    An interface in a document of its own serves several drivers, and leaves out what one lacks.
+    An interface in its own document serves several drivers, and may have slots that a driver lacks.
     """
     for name, interface in interfaces.items():
         part = sources.interfaces[name]
@@ -124,12 +124,12 @@ def _check_unfilled(sources: Sources, interfaces: dict[str, Interface], findings
                     length=len(slot),
                     hint=did_you_mean(slot, free, "slots that are not shown")
                     if free
-                    else f"write widgets: {{ {slot}: {{ use: … }} }}, or a '.' in its place",
+                    else f"write widgets: {{ {slot}: {{ use: … }} }}, or '.' instead of its name",
                 )
 
 
 def _drawn(part: Part, slot: str) -> tuple[Part, int] | None:
-    """Return the first picture of an interface that shows a slot, and where in its text."""
+    """Return the first grid of an interface that shows a slot, and the offset in its text."""
     for page in (part, *part.named("tabs").values()):
         one = page.get("grid")
         several = [*page.named("grids").values(), *page.named("left").values()]
@@ -141,9 +141,9 @@ def _drawn(part: Part, slot: str) -> tuple[Part, int] | None:
 
 
 def _check_pace(part: Part, poll: Poll, driver: Part, findings: Findings) -> None:
-    """Warn of a request whose lost answer is waited for while the next ones are due.
+    """Warn of a poll whose reply timeout is longer than its period.
 
-    A written timeout up to the default is no worse than the default, which gets no warning.
+    An explicit timeout up to the default gives no warning, because the default gives none either.
     """
     if poll.reply is None:
         return
@@ -155,20 +155,20 @@ def _check_pace(part: Part, poll: Poll, driver: Part, findings: Findings) -> Non
         timeouts = driver.must("transports").must(poll.transport).get("timeouts")
         where = timeouts.get("reply") if timeouts else None
         if where is None:
-            return  # the default is nobody's decision
+            return  # a default is not a decision of the author
         seconds = Findings().duration(timeouts, "reply", 2.0) if timeouts else None
     if seconds is not None and seconds > max(poll.every_s, Timeouts().reply_s):
         findings.warn(
             part.must("every"),
             "impatient-poll",
-            f"the next request is due after {shown_duration(poll.every_s)}, but an answer may take"
+            f"the next request is due after {shown_duration(poll.every_s)}, but a reply may take"
             f" {shown_duration(seconds)}",
             hint=f"shorten the timeout in {_place(where, part)}, or poll more slowly",
         )
 
 
 def _place(part: Part, near: Part) -> str:
-    """Return where `part` stands, seen from `near`."""
+    """Return the place of `part`, as seen from `near`."""
     mark = part.document.at(part.path)
     file = part.document.source_of(part.path).file
     line = f"line {mark.span.line if mark else 1}"
@@ -176,7 +176,7 @@ def _place(part: Part, near: Part) -> str:
 
 
 def _check_rate(part: Part, driver: Driver, findings: Findings) -> None:
-    """Warn of polls that together want more requests than the line's shortest gap lets through."""
+    """Warn of polls that together exceed the request rate of their transport."""
     for name, transport in driver.transports.items():
         if not transport.min_gap_s:
             continue
@@ -185,7 +185,7 @@ def _check_rate(part: Part, driver: Driver, findings: Findings) -> None:
             findings.warn(
                 part.must("transports").must(name),
                 "too-many-polls",
-                f"the polls want {rate:g} requests a second, but a gap of"
-                f" {shown_duration(transport.min_gap_s)} lets {1 / transport.min_gap_s:g} through",
+                f"the polls need {rate:g} requests a second, but a min_gap of"
+                f" {shown_duration(transport.min_gap_s)} allows {1 / transport.min_gap_s:g}",
                 at="min_gap",
             )

@@ -1,6 +1,6 @@
-"""Rules about what a line carries: motion that comes late, and talk that is too fast or too slow.
+"""Rules about the traffic of a transport: late motion, and polls that are too fast or too slow.
 
-All are warnings about written values, never about a default.
+All are warnings about declared values, never about defaults.
 """
 
 from collections.abc import Mapping
@@ -13,7 +13,7 @@ __all__ = ["check_traffic"]
 
 
 def check_traffic(part: Part, driver: Driver, findings: Findings) -> None:
-    """Add the warnings about the lines and the motion of the driver at `part`."""
+    """Add the warnings about the traffic and the motion of the driver at `part`."""
     for name, inner in part.named("commands").items():
         command = driver.commands[name]
         spec = driver.transports.get(command.transport)
@@ -26,7 +26,7 @@ def check_traffic(part: Part, driver: Driver, findings: Findings) -> None:
             findings.warn(
                 inner.must("every"),
                 "too-many-polls",
-                f"it is asked {1 / poll.every_s:g} times a second, and {poll.run!r} may be sent"
+                f"it is polled {1 / poll.every_s:g} times a second, and {poll.run!r} may be sent"
                 f" {rate:g} times",
                 hint="poll more slowly, or raise its 'rate_limit'",
             )
@@ -37,7 +37,7 @@ def check_traffic(part: Part, driver: Driver, findings: Findings) -> None:
 
 
 def _check_counted(part: Part, driver: Driver, findings: Findings) -> None:
-    """Warn of what fills the robot's buffer, and of which nothing tells when it has left it."""
+    """Warn of commands that fill the robot's buffer without a reply that shows their end."""
     requests = [
         (inner, one.transport, one.reply, one.priority)
         for name, inner in part.named("commands").items()
@@ -55,15 +55,15 @@ def _check_counted(part: Part, driver: Driver, findings: Findings) -> None:
             findings.warn(
                 inner.must("send"),
                 "uncounted",
-                f"{transport!r} counts the bytes that the robot has not read, and nothing tells"
-                " when it has read these",
-                hint="give it the 'reply' that the robot gives, or priority: realtime where the"
-                " robot takes it past its buffer",
+                f"{transport!r} counts the unread bytes of the robot, and no reply shows"
+                " when it has read these bytes",
+                hint="give it the 'reply' of the robot, or priority: realtime if the"
+                " robot does not buffer it",
             )
 
 
 def _check_ports(part: Part, driver: Driver, findings: Findings) -> None:
-    """Warn of two lines that listen on one port of this machine."""
+    """Warn of two transports that listen on one port of this machine."""
     seen: dict[tuple[str, str, str], str] = {}
     for name, inner in part.named("transports").items():
         options = driver.transports[name].options
@@ -77,8 +77,8 @@ def _check_ports(part: Part, driver: Driver, findings: Findings) -> None:
             findings.warn(
                 inner.must(key),
                 "same-port",
-                f"{seen[place]!r} listens on {place[1]}, too, and only one of them can",
-                hint="give each its own, or send both over one line and tell the messages apart",
+                f"{seen[place]!r} listens on {place[1]}, too, and only one transport can",
+                hint="give each its own port, or use one transport and distinguish the messages",
             )
         seen.setdefault(place, name)
 
@@ -88,12 +88,12 @@ def _written(value: object) -> str:
 
 
 def _check_kept(part: Part, command: Command, findings: Findings) -> None:
-    """Report motion that a broker would keep, or say again."""
+    """Report motion that a broker would keep or repeat."""
     attributes = command.send.options.get("attributes")
     if not isinstance(attributes, Mapping):
         return
-    kept = [("retain", "is kept for whoever comes later")] if attributes.get("retain") else []
-    kept += [("qos", "is said again until it is acknowledged")] if attributes.get("qos") else []
+    kept = [("retain", "is kept for later subscribers")] if attributes.get("retain") else []
+    kept += [("qos", "is repeated until its acknowledgement")] if attributes.get("qos") else []
     for key, what in kept:
         findings.error(
             part.must("publish"),
@@ -101,12 +101,12 @@ def _check_kept(part: Part, command: Command, findings: Findings) -> None:
             f"{command.name!r} moves the robot, and with this {key} it {what}",
             at=key,
             key=True,
-            hint=f"take '{key}' away: motion that comes late moves a robot that nobody drives",
+            hint=f"remove '{key}': late motion moves a robot without an operator",
         )
 
 
 def _check_pace(part: Part, command: Command, spec: TransportSpec, findings: Findings) -> None:
-    """Warn of a hold whose values come faster than they may be sent."""
+    """Warn of a held command whose period is shorter than its rate limit allows."""
     if command.hold is None:
         return
     repeat_s = command.hold.repeat_s
@@ -114,20 +114,20 @@ def _check_pace(part: Part, command: Command, spec: TransportSpec, findings: Fin
         (spec.min_gap_s if command.priority != "realtime" else 0.0, "the line's 'min_gap'"),
         (1 / command.rate_per_s if command.rate_per_s else 0.0, "its 'rate_limit'"),
     ):
-        if limit_s > repeat_s * 1.001:  # 1/20 s and 50 ms are the same
+        if limit_s > repeat_s * 1.001:  # Tolerance, because 1/20 s and 50 ms are the same.
             findings.warn(
                 part.must("repeat"),
                 "held-back",
-                f"it is repeated every {shown_duration(repeat_s)}, and {what} lets it go every"
+                f"it is repeated every {shown_duration(repeat_s)}, and {what} allows it every"
                 f" {shown_duration(limit_s)}",
-                hint="make 'repeat' as long as that, or longer",
+                hint="make 'repeat' at least as long",
             )
 
 
 def _check_silence(part: Part, spec: TransportSpec, driver: Driver, findings: Findings) -> None:
-    """Warn of a line that counts as silent, or is closed, between two questions."""
+    """Warn of a transport that counts as silent, or closes, between two polls."""
     if any(one.transport == spec.name for one in driver.messages.values()):
-        return  # the robot talks by itself, nobody knows how often
+        return  # unsolicited messages come at an unknown rate
     periods = [poll.every_s for poll in driver.polls if poll.transport == spec.name and poll.reply]
     keepalive = spec.keepalive
     if keepalive is not None:
@@ -145,7 +145,7 @@ def _check_silence(part: Part, spec: TransportSpec, driver: Driver, findings: Fi
             findings.warn(
                 place.must(key),
                 "slow-keepalive",
-                f"the line {what} after {shown_duration(limit_s)}, and the robot is asked every"
+                f"the line {what} after {shown_duration(limit_s)}, and the robot is polled every"
                 f" {shown_duration(min(periods))} only",
-                hint="make it two of those periods or more, so that one answer may be lost",
+                hint="make it at least two periods, so that one reply may be lost",
             )

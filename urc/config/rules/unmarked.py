@@ -1,7 +1,7 @@
-"""Commands that move a robot: is each marked as such, and does anything end what goes on by itself?
+"""Checks that commands that seem to move the robot are marked, and that autonomous motion can end.
 
 Signs of motion are the name of a command, the units and names of its arguments, and the type of its
-message. All words are compared whole: ``moves_left`` is not ``move``.
+message. Only whole words match: ``moves_left`` is not ``move``.
 """
 
 import re
@@ -23,20 +23,20 @@ _MOTION: Final = _words(
     "advance climb crawl dive dock drive fly follow goto hover jog jump launch move navigate orbit"
     " reverse roll rotate spin steer swim takeoff turn undock walk"
 )
-"""Words that mean motion wherever they stand in a name."""
+"""Words that mean motion at any place of a name."""
 _FIRST: Final = _words("back backward flip forward go home lift lower raise return")
-"""Words that mean motion where a name begins with them."""
+"""Words that mean motion at the start of a name."""
 _PAIRS: Final = frozenset(("go to", "set speed", "set velocity", "take off"))
-"""Two words that mean motion where a name begins with them."""
+"""Pairs of words that mean motion at the start of a name."""
 _QUIET: Final = _words(
     "abort accept alarm arm brake calibrate cancel clear config configure disable disarm enable end"
     " error feedback finish get gain halt info init lamp led level light limit list load lock log"
     " max min mode name off offset on param pause ping query read reset save select show signal"
     " state status stop store subscribe test timeout trim tune unlock version volume zero"
 )
-"""Words of a name that is about something else than starting a motion: ``drive_mode``."""
+"""Words that make a name harmless, such as ``drive_mode``."""
 _BOUND: Final = _words("limit max maximum min minimum top")
-"""Words of an argument that bounds a motion and starts none."""
+"""Words of arguments that limit a motion."""
 _MOVING_ARGUMENTS: Final = _words("omega rudder steering throttle thrust velocity vx vy vz")
 _MOVING_TYPES: Final = _words(
     "AckermannDrive AckermannDriveStamped JointJog JointTrajectory Twist TwistStamped"
@@ -44,23 +44,16 @@ _MOVING_TYPES: Final = _words(
 _QUANTITIES: Final = {"speed": "a speed", "rotation": "a rotation"}
 _WORD: Final = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+")
 _HINT: Final = (
-    "write hold: { … } for motion by hand, moves: true when it goes on by itself, stop: true when"
-    " it ends motion, or moves: false when nothing moves"
+    "write hold: { … } for motion by hand, moves: true if it goes on, stop: true if"
+    " it ends motion, or moves: false if nothing moves"
 )
 _HINT_OF_STEPS: Final = (
-    "write steps: [ … ] with moves: true when it goes on by itself, or moves: false when nothing"
-    " moves"
+    "write steps: [ … ] with moves: true if the motion goes on, or moves: false if nothing moves"
 )
 
 
 def check_unmarked(part: Part, driver: Driver, findings: Findings) -> None:
-    """Warn of each command and sequence that seems to move the robot and does not say so.
-
-    Args:
-        part: the driver's mapping.
-        driver: as loaded, without errors.
-        findings: collects the problems.
-    """
+    """Warn of each command and sequence that seems to move the robot and is not marked."""
     for key in ("commands", "sequences"):
         for name, inner in part.named(key).items():
             command = driver.commands[name]
@@ -71,22 +64,17 @@ def check_unmarked(part: Part, driver: Driver, findings: Findings) -> None:
                 findings.warn(
                     inner,
                     "unmarked-motion",
-                    f"{name!r} seems to move the robot ({why}) and does not say so: STOP does not"
-                    " hold it back",
+                    f"{name!r} seems to move the robot ({why}) and is not marked: STOP does not"
+                    " block it",
                     key=True,
                     hint=_HINT if key == "commands" else _HINT_OF_STEPS,
                 )
 
 
 def check_unguarded(part: Part, driver: Driver, findings: Findings) -> None:
-    """Warn of motion that goes on by itself, which STOP cannot end and people are not asked about.
+    """Warn of autonomous motion that STOP cannot end and that needs no confirmation.
 
-    A held command needs no such guard: the hand is its guard, and its release ends it.
-
-    Args:
-        part: the driver's mapping.
-        driver: as loaded, without errors.
-        findings: collects the problems.
+    A held command needs neither: its release ends it.
     """
     if any(one.stops or one.hold is not None for one in driver.commands.values()):
         return
@@ -98,11 +86,11 @@ def check_unguarded(part: Part, driver: Driver, findings: Findings) -> None:
                 findings.warn(
                     inner.must("moves"),
                     "unguarded-motion",
-                    f"{name!r} moves the robot by itself: STOP has nothing to send to end it,"
-                    " and people are not asked before",
+                    f"{name!r} starts autonomous motion: STOP has no command to end it,"
+                    " and it needs no confirmation",
                     key=True,
-                    hint="mark the command that ends it with stop: true, or let people 'confirm'"
-                    " this one when the robot has none",
+                    hint="mark the command that ends it with stop: true, or add 'confirm' to"
+                    " this one if the robot has no such command",
                 )
 
 
@@ -115,14 +103,14 @@ def _says_no(part: Part) -> bool:
 
 
 def why_it_moves(name: str, command: Command) -> str:
-    """Return what makes a command look like motion, in words for people; "" when nothing does."""
+    """Return why a command looks like motion, in words for people; "" when it does not."""
     if command.send.options.get("verb") == "cancel":
-        return ""  # whatever its name, it gives up what was begun
+        return ""  # a cancel ends motion, whatever its name
     words = words_of(name)
     pair = " ".join(words[:2])
     is_quiet = pair not in _PAIRS and not _QUIET.isdisjoint(words)
     if not is_quiet and (found := pair if pair in _PAIRS else _motion_word(words)):
-        return f"its name says {found!r}"
+        return f"its name has {found!r}"
     for argument in command.arguments.values():
         own = words_of(argument.name)
         if not _BOUND.isdisjoint((*own, *words)):
@@ -135,7 +123,7 @@ def why_it_moves(name: str, command: Command) -> str:
 
 
 def words_of(name: str) -> tuple[str, ...]:
-    """Return the words of ``go_to``, ``GoTo`` or ``GO2``, in small letters."""
+    """Return the words of ``go_to``, ``GoTo`` or ``GO2``, in lower case."""
     return tuple(found[0].lower() for found in _WORD.finditer(name))
 
 

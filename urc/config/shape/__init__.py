@@ -1,1 +1,1 @@
-"""The shape of a document: its schema, and the problems where it differs."""
+"""The shape of a document: its schema, and the differences as problems."""

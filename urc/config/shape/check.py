@@ -1,7 +1,7 @@
 """The shape pass: does a document fit the schema of its kind?
 
-The fast verdict of `urc.config.schemas` comes first. Other documents go to `jsonschema`, and
-`urc.config.shape.report` writes its errors in our own words.
+The fast check of `urc.config.schemas` comes first. Other documents go to `jsonschema`, and
+`urc.config.shape.report` rewords its errors.
 """
 
 import math
@@ -27,7 +27,7 @@ def check_shape(document: Document) -> list[Problem]:
             path,
             "not-finite",
             f"expected a number, found {number}",
-            hint="no number of the language is infinite or undefined",
+            hint="numbers must be finite",
         )
         for path, number in _not_finite(document.data, ())
     ]
@@ -40,10 +40,11 @@ def check_shape(document: Document) -> list[Problem]:
 
 
 def check_source(document: Document) -> list[Problem]:
-    """Return the faults of one source of a merged document, apart from the others.
+    """Return the problems of one source of a merged document.
 
-    These are unknown keys, and keys of the source alone. The merge may lose both, and with them
-    the problem. A missing key may come from another source, so the merged document is checked too.
+    These are unknown keys, and keys that only the source has. The merge may lose both, and with
+    them the problem. A missing key may come from another source, so the merged document is checked
+    too.
     """
     if not kind_of(document):
         return [_without_kind(document)]
@@ -64,7 +65,7 @@ def check_source(document: Document) -> list[Problem]:
 
 
 _OWN_KEYS: Final = ("urc", "extends", "include", "partial")
-"""Keys that no other document takes over."""
+"""Keys that are never merged into another document."""
 
 
 @cache
@@ -79,7 +80,7 @@ def _source_schema(name: str) -> Mapping[str, Any]:
 
 
 def _optional(schema: Any) -> Any:
-    """Return a schema that requires nothing; what chooses between kinds is left as it is."""
+    """Return a schema without required keys, except those that choose between kinds."""
     if isinstance(schema, list):
         return [_optional(item) for item in schema]
     if not isinstance(schema, dict):
@@ -92,7 +93,7 @@ def _optional(schema: Any) -> Any:
 
 
 def _without_nothing(value: object) -> object:
-    """Return data without the keys whose value is null: they take something away."""
+    """Return data without null values, which remove something."""
     if isinstance(value, dict):
         return {key: _without_nothing(item) for key, item in value.items() if item is not None}
     if isinstance(value, list):
@@ -103,13 +104,9 @@ def _without_nothing(value: object) -> object:
 def check_options(
     document: Document, path: Path, value: object, options: Mapping[str, object]
 ) -> list[Problem]:
-    """Return every difference between a slot's options and what the widget's manifest declares.
+    """Return every difference between a slot's options and the widget's manifest.
 
-    Args:
-        document: where the options stand.
-        path: where in it.
-        value: the options as written.
-        options: JSON Schema of each option.
+    `options` has the JSON Schema of each option.
     """
     schema = {
         "title": "the options of this widget",
@@ -137,7 +134,7 @@ def _without_kind(document: Document) -> Problem:
         return document.problem(
             (),
             "wrong-type",
-            "a document is a mapping of keys to values",
+            "a document must be a mapping of keys to values",
             hint="it starts with 'urc: 1' and 'kind: robot'",
         )
     if "kind" not in data:
@@ -146,7 +143,7 @@ def _without_kind(document: Document) -> Problem:
         return document.problem(
             (),
             "missing-key",
-            "'kind' is missing: what is this document?",
+            "'kind' is missing",
             hint=f"{instead}write one of: " + ", ".join(f"'kind: {kind}'" for kind in KINDS),
         )
     kind = data["kind"]

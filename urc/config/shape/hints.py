@@ -51,18 +51,18 @@ _SAME_TYPES: Final = {
 _URL: Final = re.compile(r"[a-z]+://(?P<host>[^/:?#]+)(?::(?P<port>[0-9]+))?(?P<path>/[^?#]+)?")
 _FRAMING: Final = "framing: { type: delimiter, tx: LF, rx: LF }"
 _ELSEWHERE: Final = {
-    ("reply_to", "leaves"): "polls are asked at their times here, and 'feed' answers them",
-    ("signal", "command"): "an input is bound to the name of a signal alone, as level: battery;"
+    ("reply_to", "leaves"): "polls run at their times here, and 'feed' gives their replies",
+    ("signal", "command"): "bind an input to the name of a signal, such as level: battery;"
     " only an output takes 'command'",
 }
-"""A key that has no place here, and one that tells where here is → what to write instead."""
+"""A misplaced key, and a key that identifies the place → the hint for it."""
 
 
 def key_hint(key: str, known: Mapping[str, Any], value: object = None) -> str:
-    """Return what a key that is unknown may have been meant to be, with its value."""
+    """Return the known key that an unknown key probably means, with its value."""
     name, colon, _ = key.partition(":")
     if colon and name in known:
-        return f"put a space behind the colon: '{name}: '"
+        return f"put a space after the colon: '{name}: '"
     for (other, beside), hint in _ELSEWHERE.items():
         if key == other and beside in known:
             return hint
@@ -70,36 +70,36 @@ def key_hint(key: str, known: Mapping[str, Any], value: object = None) -> str:
         return _place_hint(value, known)
     others = [word for word in _OTHER_WORDS.get(key, ()) if word in known]
     if others:
-        return f"it is called '{others[0]}' here"
+        return f"the key is '{others[0]}' here"
     return did_you_mean(key, known, "keys")
 
 
 def _place_hint(value: object, known: Mapping[str, Any]) -> str:
-    """Return how a URL is written by the keys of a transport."""
+    """Return a URL in the keys of a transport."""
     found = _URL.match(value) if isinstance(value, str) else None
     if found is None:
-        return "it takes 'host' and 'port', such as host: robot.local, port: 9090"
+        return "write 'host' and 'port', such as host: robot.local, port: 9090"
     written = [f"host: {found['host']}"]
     written += [f"port: {found['port']}"] if found["port"] else []
     written += [f"path: {found['path']}"] if found["path"] and "path" in known else []
-    return f"it takes 'host' and 'port': write {', '.join(written)}"
+    return f"write {', '.join(written)}"
 
 
 def word_hint(word: str, words: Sequence[str]) -> str:
-    """Return which of `words` is meant by one that is not among them; "" when none comes near."""
+    """Return the word of `words` that an unknown word probably means; "" when none is similar."""
     other = _SAME_TYPES.get(word.lower(), "")
     if other in words:
-        return f"it is called '{other}' here"
+        return f"the word is '{other}' here"
     near = did_you_mean(word, words)
     return near if near.startswith("did you") else ""
 
 
 def example_of(schema: Mapping[str, Any], key: str) -> str:
-    """Return how a key that is missing could be written; "" where the schema shows nothing."""
+    """Return an example of a missing key; "" where the schema has none."""
     inner = schema.get("properties", {}).get(key, {})
     examples = inner.get("examples") or ()
     if key == "framing":
-        return f"most text protocols: {_FRAMING}"
+        return f"for most text protocols: {_FRAMING}"
     if not examples or isinstance(examples[0], (dict, list)):
         return ""
     text = str(examples[0])
@@ -107,7 +107,7 @@ def example_of(schema: Mapping[str, Any], key: str) -> str:
 
 
 def mapping_hint(document: Document, path: Path, value: object, schema: Mapping[str, Any]) -> str:
-    """Return the first example of a mapping, with `value` in it where it is a delimiter."""
+    """Return the first example of a mapping, with `value` in it if it is a delimiter."""
     if _is_filled_in(document, path):
         return ""
     example = next((one for one in schema.get("examples", ()) if isinstance(one, dict)), None)
@@ -138,16 +138,16 @@ def type_hint(
 ) -> str:
     """Return how a value of a wrong type could become one of `types`, or ""."""
     if value is None:
-        return "give it a value, or leave the key out"
+        return "give it a value, or remove the key"
     if is_duration and isinstance(value, (int, float)) and not isinstance(value, bool):
         return f"write the unit: {value}s, or {value}ms"
     if "string" in types and isinstance(value, (bool, int, float)):
         return f'quote it: "{_written(document, path) or value}"'
     if isinstance(value, str):
         if _is_filled_in(document, path):
-            return 'a text with names in braces becomes a value only when it is one name: "{i}"'
+            return 'only a text with nothing but a name in braces becomes a value: "{i}"'
         if {"integer", "number"} & set(types) and _looks_like_number(value):
-            return f"take the quotes away: {value}"
+            return f"remove the quotes: {value}"
         if "boolean" in types:
             return "yes, no, on and off are text in YAML 1.2; write true or false"
         if "object" in types:
@@ -158,7 +158,7 @@ def type_hint(
 
 
 def _written(document: Document, path: Path) -> str:
-    """Return a scalar as it stands in the text."""
+    """Return a scalar as written in the text."""
     mark = document.at(path)
     if mark is None or mark.span.line != mark.span.end_line:
         return ""

@@ -1,6 +1,6 @@
-"""`jsonschema`'s errors as problems in our own words, exact at the key or value.
+"""`jsonschema`'s errors as problems in plain words, exact at the key or value.
 
-Imported only for a document that is broken: `jsonschema` costs 80 ms.
+Imported only for an invalid document: `jsonschema` costs 80 ms.
 """
 
 from collections.abc import Callable, Iterator, Mapping
@@ -37,7 +37,7 @@ class _Error(NamedTuple):
     """The value in the document."""
     schema: Mapping[str, Any]
     is_name: bool
-    """Whether it is about the name of a key."""
+    """Whether the error is about the name of a key."""
 
 
 _Read = Callable[[str], Mapping[str, Any]]
@@ -59,20 +59,15 @@ def report(
 ) -> list[Problem]:
     """Return the problems, deepest first.
 
-    Args:
-        document: the document.
-        schema: its schema, or that of the part at `path`.
-        read: returns another schema by its file name.
-        path: the part to check; empty for the whole document.
-        value: the data of that part.
+    The schema describes the part at `path`. `read` returns another schema by its file name.
     """
-    registry: Registry[Any] = Registry(  # type: ignore[call-arg]  # attrs' alias, unseen by mypy
+    registry: Registry[Any] = Registry(  # type: ignore[call-arg]  # alias of attrs, unknown to mypy
         retrieve=lambda uri: Resource.from_contents(read(uri), DRAFT202012)
     )
     validator = _Validator(schema, registry=registry)
     data = value if path else document.data
     problems: dict[Problem, int] = {}
-    said: set[tuple[str, int, str]] = set()  # a branch repeats what its schema says, with its hint
+    said: set[tuple[str, int, str]] = set()  # a branch may repeat an error of its schema
     for found in validator.iter_errors(data):
         where = (*path, *found.absolute_path)
         error = _error(found)
@@ -98,7 +93,7 @@ def _branches(
         yield error
 
 
-_Validator: Any = extend(Draft202012Validator, {"if": _branches})  # type: ignore[no-untyped-call]  # it has no types
+_Validator: Any = extend(Draft202012Validator, {"if": _branches})  # type: ignore[no-untyped-call]  # untyped
 
 
 def _error(found: ValidationError) -> _Error:
@@ -128,7 +123,7 @@ def _unknown_keys(document: Document, path: Path, error: _Error) -> list[Problem
 
 def _missing_keys(document: Document, path: Path, error: _Error) -> list[Problem]:
     known = error.schema.get("properties", {})
-    # Where any key may stand, none of them is told as unknown.
+    # Where any key is allowed, none is unknown.
     is_closed = bool(known) and error.schema.get("additionalProperties") is False
     misspelt = [
         key_hint(key, known, error.value[key])
@@ -141,7 +136,7 @@ def _missing_keys(document: Document, path: Path, error: _Error) -> list[Problem
         if name not in error.value and not any(f"'{name}'" in hint for hint in misspelt)
     ]
     if not missing:
-        return []  # the unknown key that stands for it is told already
+        return []  # its misspelt form is already reported
     verb = "is" if len(missing) == 1 else "are"
     names = " and ".join((", ".join(missing[:-1]), missing[-1])) if missing[1:] else missing[0]
     return [
@@ -156,10 +151,10 @@ def _missing_keys(document: Document, path: Path, error: _Error) -> list[Problem
 
 
 def _wrong_name(document: Document, path: Path, error: _Error) -> list[Problem]:
-    """A key that may not be a name; the path of the error is the mapping's."""
+    """Return a problem of an invalid name; the path of the error is the path of the mapping."""
     if not isinstance(error.value, str):
         return [_other_one(document, path, error)]
-    message = f"{_cut(error.value)} cannot be a name here"
+    message = f"{_cut(error.value)} is not a valid name here"
     if error.keyword == "maxLength":
         message += f": it has more than {error.limit} characters"
     return [
@@ -201,7 +196,7 @@ def _wrong_constant(document: Document, path: Path, error: _Error) -> list[Probl
             document.problem(
                 path,
                 "wrong-version",
-                f"this URC reads version 1 of the language, found {_found(error.value)}",
+                f"expected version 1 of the language, found {_found(error.value)}",
                 hint="write 'urc: 1'",
             )
         ]
@@ -230,7 +225,7 @@ def _wrong_size(document: Document, path: Path, error: _Error) -> list[Problem]:
     limit = error.limit
     if keyword.startswith("min") and limit == 1:
         empty = {"characters": "text", "items": "a list", "keys": "a mapping"}[unit]
-        message = f"{empty} with something in it is expected, found nothing"
+        message = f"expected {empty} that is not empty"
     else:
         word = "at least" if keyword.startswith("min") else "at most"
         message = f"expected {word} {limit} {unit}, found {len(error.value)}"

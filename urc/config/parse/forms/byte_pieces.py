@@ -1,4 +1,4 @@
-"""Pieces of bytes with expressions between them: what the forms ``hex`` and ``bytes`` share."""
+"""Pieces of bytes with expressions between them, for the forms ``hex`` and ``bytes``."""
 
 from collections.abc import Sequence
 from typing import NamedTuple, cast
@@ -13,12 +13,12 @@ Piece = bytes | Template
 
 
 class Placed(NamedTuple):
-    """One piece, and where it stands under the form's key."""
+    """One piece, and its place under the form's key."""
 
     piece: Piece
     path: tuple[int, ...] = ()
     offset: int = 0
-    """Of the expression in its text."""
+    """Offset of the expression in its text."""
 
 
 def spec_of(form: str, pieces: Sequence[Placed]) -> WriteSpec:
@@ -33,7 +33,7 @@ def spec_of(form: str, pieces: Sequence[Placed]) -> WriteSpec:
 
 
 def _moved(template: Template, offset: int) -> Template:
-    """Return the expression with blanks before it, so that its names stand where they are."""
+    """Return the expression with leading blanks, so that its names keep their columns."""
     source = " " * offset + template.source
     return Template(source, template.python, template.names, template.settings)
 

@@ -28,7 +28,7 @@ def parse_write(part: Part, findings: Findings, context: FormContext) -> WriteSp
 
 
 def templates(part: Part, spec: WriteSpec) -> Iterable[tuple[Part, Template]]:
-    """Return every expression in it."""
+    """Return every expression in the list."""
     return templates_at(part, spec)
 
 
@@ -39,7 +39,7 @@ def _expression(part: Part, findings: Findings) -> Template | None:
             findings.error(
                 part,
                 "bad-template",
-                "an expression stands alone in its item of the list",
+                "an expression must be alone in its list item",
                 hint='write the text and the expression as two items: ["SET ", "{{ x }}"]',
             )
             return None

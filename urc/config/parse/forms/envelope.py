@@ -1,7 +1,7 @@
-"""The forms of transports that carry messages: publish, call, goal, request.
+"""The forms of message transports: publish, call, goal, request.
 
 An envelope has an address, whose values may be templates, and a body in one of the other forms.
-``stamped`` makes a message of ROS into its stamped kind here, so the engine knows nothing of it.
+``stamped`` turns a ROS message into its stamped type here, so the engine needs no rule for it.
 """
 
 from collections.abc import Iterable
@@ -31,7 +31,7 @@ _STAMPED: Final = {
     "Vector3": "vector",
     "Wrench": "wrench",
 }
-"""Type of geometry_msgs → field that has it in its stamped kind (common_interfaces)."""
+"""Type of geometry_msgs → its field in the stamped type (common_interfaces)."""
 
 
 def parse_write(part: Part, findings: Findings, context: FormContext) -> WriteSpec | None:
@@ -49,14 +49,14 @@ def parse_write(part: Part, findings: Findings, context: FormContext) -> WriteSp
         return None
     if part.name == "request" and ("url" in part.data) == ("path" in part.data):
         both = "url" in part.data
-        text = "'path' and 'url' both say where" if both else "'path' is missing"
-        hint = "write 'path', or 'url' for what the robot itself has named"
+        text = "'path' and 'url' are both given" if both else "'path' is missing"
+        hint = "write 'path', or 'url' for an address from the robot itself"
         findings.error(part, "two-forms" if both else "missing-key", text, key=True, hint=hint)
         return None
     url = attributes.get("url")
     if isinstance(url, Template) and any(not name.startswith("_") for name in url.names):
-        text = "'url' is what the robot has named, a field such as _next, and nothing else"
-        hint = "put arguments and settings into 'path' or 'query', which keep to this server's part"
+        text = "'url' must be one field from the robot, such as _next, and nothing else"
+        hint = "put arguments and settings into 'path' or 'query', which stay on this server"
         findings.error(part.must("url"), "wrong-form", text, hint=hint)
         return None
     stamped = part.get("stamped") if part.name == "publish" else None
@@ -79,29 +79,29 @@ def parse_write(part: Part, findings: Findings, context: FormContext) -> WriteSp
 
 
 def _stamped_type(part: Part, kind: object, findings: Findings) -> str | None:
-    """Return the type at `part` if it has a stamped kind; else report it."""
+    """Return the type at `part` if it has a stamped type; else report it."""
     package, _, name = str(kind).replace("/msg/", "/").partition("/")
     if package == "geometry_msgs" and name in _STAMPED and "json" in part.data:
         return str(kind)
     findings.error(
         part,
         "bad-value",
-        f"{kind!r} has no stamped kind that is known, or no json",
+        f"{kind!r} has no known stamped type, or no json",
         at="stamped",
-        hint=f"types of geometry_msgs with json: {', '.join(_STAMPED)}; others are written out",
+        hint=f"types of geometry_msgs with json: {', '.join(_STAMPED)}; write others in full",
     )
     return None
 
 
 def _stamped(kind: str, spec: WriteSpec) -> WriteSpec:
-    """Return the body in its stamped kind; rosbridge writes its own time in place of ``now``."""
+    """Return the body in its stamped type; rosbridge replaces ``now`` with its own time."""
     header = {"stamp": "now", "frame_id": ""}
     tree = {"header": header, _STAMPED[kind.rpartition("/")[2]]: spec.options["tree"]}
     return spec._replace(options={"tree": tree})
 
 
 def _unstamped(part: Part, spec: WriteSpec) -> WriteSpec:
-    """Return the body as it is written in the document."""
+    """Return the body as written in the document."""
     tree = spec.options.get("tree")
     if not part.data.get("stamped") or not isinstance(tree, dict):
         return spec
@@ -109,7 +109,7 @@ def _unstamped(part: Part, spec: WriteSpec) -> WriteSpec:
 
 
 def templates(part: Part, spec: WriteSpec) -> Iterable[tuple[Part, Template]]:
-    """Return every template in it, with its place."""
+    """Return every template of the envelope, with its place."""
     attributes = spec.options.get("attributes")
     if isinstance(attributes, dict):
         for name, tree in attributes.items():

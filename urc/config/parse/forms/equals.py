@@ -22,5 +22,5 @@ def parse_read(part: Part, findings: Findings, context: FormContext) -> ReadSpec
 
 
 def place_of(part: Part, field: str) -> tuple[Part, dict[str, Any]]:
-    """Return the text: there is no field in it."""
+    """Return the place of the text, which has no fields."""
     return part, {}

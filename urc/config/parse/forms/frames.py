@@ -1,4 +1,4 @@
-"""Several frames of one command: a list under ``send:``, each item in a form of its own."""
+"""Several frames of one command: a list under ``send:``, each item in its own form."""
 
 from collections.abc import Iterable
 
@@ -16,7 +16,7 @@ def parse_write(part: Part, findings: Findings, context: FormContext) -> WriteSp
         findings.error(
             part,
             "many-frames",
-            "several frames of one command go out together, and on this line each is a message of"
+            "several frames of one command are sent together, and here each is a message of"
             " its own",
             hint="write a command for each, or a 'framing' where the line is a stream",
         )
@@ -28,10 +28,10 @@ def parse_write(part: Part, findings: Findings, context: FormContext) -> WriteSp
         if found is None:
             return None
         if found.form == "envelope":
-            text = "it is a message of its own, and cannot go out together with others"
+            text = "this frame is a message of its own, and cannot be sent together with others"
             findings.error(item, "many-frames", text, hint="write a command for each")
         elif COUNTERS in found.names:
-            text = "a counter counts frames that are sent, and these are sent as one"
+            text = "a frame with a counter cannot be sent together with others"
             findings.error(item, "many-frames", text, hint="write a command for each")
         frames.append(found)
     return WriteSpec(

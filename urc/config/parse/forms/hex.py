@@ -1,4 +1,4 @@
-"""The form ``hex``: bytes as pairs of hex digits, with expressions that say their width."""
+"""The form ``hex``: bytes as pairs of hex digits, with expressions of a given width."""
 
 import re
 from collections.abc import Iterable
@@ -42,20 +42,20 @@ def parse_write(part: Part, findings: Findings, context: FormContext) -> WriteSp
 
 
 def templates(part: Part, spec: WriteSpec) -> Iterable[tuple[Part, Template]]:
-    """Return every expression in it."""
+    """Return every expression in the text."""
     return templates_at(part, spec)
 
 
 def _digits(part: Part, literal: str, offset: int, findings: Findings) -> bytes | None:
     wrong = _NOT_HEX.search(literal)
     if wrong is not None:
-        text = f"{wrong[0]!r} is no hex digit"
+        text = f"{wrong[0]!r} is not a hex digit"
         hint = "write bytes as 02 FF 0D, and values as {{ x | u8 }}"
         findings.error(part, "not-hex", text, offset=offset + wrong.start(), hint=hint)
         return None
     odd = _ODD.search(literal)
     if odd is not None:
-        text = f"{odd[0]!r} is half a byte too much or too little"
+        text = f"{odd[0]!r} has an odd number of hex digits"
         at = offset + odd.start()
         hint = "two digits make a byte"
         findings.error(part, "not-hex", text, offset=at, length=len(odd[0]), hint=hint)
@@ -76,10 +76,10 @@ def _expression(part: Part, text: str, offset: int, findings: Findings) -> Templ
         findings.error(
             part,
             "no-width",
-            f"{shown!r} does not say which bytes it becomes",
+            f"{shown!r} does not give its size in bytes",
             offset=offset + len(text) - len(text.lstrip()),
             length=len(shown),
-            hint=f"end it in a filter: {{{{ {plain} | u8 }}}}, u16be, f32le, hexbytes, utf8 …",
+            hint=f"end it with a filter: {{{{ {plain} | u8 }}}}, u16be, f32le, hexbytes, utf8 …",
         )
         return None
     return template

@@ -1,6 +1,6 @@
-"""The form ``json``: fields out of a JSON document, by JMESPath.
+"""The form ``json``: fields from a JSON document, by JMESPath.
 
-Plain paths (``a.b[0].c``) become tuples, which the engine compiles; only others need the library.
+Plain paths (``a.b[0].c``) become tuples for the engine; only other paths need the library.
 """
 
 import re
@@ -19,7 +19,7 @@ _STEP = re.compile(r'([A-Za-z_][A-Za-z0-9_]*)|"([^"\\]+)"|\[([0-9]+)\]')
 
 
 def parse_read(part: Part, findings: Findings, context: FormContext) -> ReadSpec | None:
-    """Return where each field is: a plain path, or a compiled expression."""
+    """Return the path of each field: plain, or a compiled expression."""
     paths: dict[str, object] = {}
     is_good = True
     for name, inner in part.entries().items():
@@ -30,7 +30,7 @@ def parse_read(part: Part, findings: Findings, context: FormContext) -> ReadSpec
 
 
 def place_of(part: Part, field: str) -> tuple[Part, dict[str, Any]]:
-    """Return where the field is named."""
+    """Return the place of the field."""
     return part.must(field), {"key": True}
 
 
@@ -47,7 +47,7 @@ def _path(part: Part, findings: Findings) -> object:
         offset = getattr(error, "lex_position", None) or 0
         hint = "it starts at the top, without '$': battery.level" if text.startswith("$") else ""
         findings.error(
-            part, "bad-path", f"{text!r} is no JMESPath expression", offset=offset, hint=hint
+            part, "bad-path", f"{text!r} is not a JMESPath expression", offset=offset, hint=hint
         )
     except RecursionError:
         findings.error(part, "bad-path", "the expression is nested too deeply")

@@ -12,7 +12,7 @@ __all__ = ["compiled_tree", "parse_write", "placed_templates", "templates", "tem
 
 
 def parse_write(part: Part, findings: Findings, context: FormContext) -> WriteSpec | None:
-    """Return the value at `part`, its templates compiled."""
+    """Return the value at `part`, with compiled templates."""
     before = len(findings.problems)
     tree = compiled_tree(part, findings)
     if len(findings.problems) > before:
@@ -24,16 +24,16 @@ def parse_write(part: Part, findings: Findings, context: FormContext) -> WriteSp
 
 
 def templates(part: Part, spec: WriteSpec) -> Iterable[tuple[Part, Template]]:
-    """Return every template in it, with its place."""
+    """Return every template of the value, with its place."""
     return placed_templates(part, spec.options.get("tree"))
 
 
 def compiled_tree(part: Part, findings: Findings) -> Any:
-    """Return the value at `part`, each text with braces as a template."""
+    """Return the value at `part`, with each text in braces as a template."""
     if isinstance(part.data, dict):
         for name, inner in part.entries().items():
             if "{{" in name:
-                text = "templates stand in values, not in names"
+                text = "a template is only possible in a value, not in a name"
                 findings.error(inner, "bad-template", text, key=True)
         return {name: compiled_tree(inner, findings) for name, inner in part.entries().items()}
     if isinstance(part.data, list):

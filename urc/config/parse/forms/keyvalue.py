@@ -14,7 +14,7 @@ def parse_read(part: Part, findings: Findings, context: FormContext) -> ReadSpec
     pairs, separator = part.must("pairs"), part.must("separator")
     if pairs.data == separator.data:
         findings.error(
-            separator, "same-separator", "what separates pairs also separates a key from its value"
+            separator, "same-separator", "the separator of pairs also separates key and value"
         )
         return None
     named = part.named("fields")
@@ -32,7 +32,7 @@ def parse_read(part: Part, findings: Findings, context: FormContext) -> ReadSpec
     bare = tuple(inner.data or "" for inner in part.listed("first"))
     for place, inner in enumerate(part.listed("first")):
         if inner.data and (inner.data in bare[:place] or inner.data in keys.values()):
-            text = f"the field {inner.data!r} stands here twice"
+            text = f"the field {inner.data!r} is named twice"
             findings.error(inner, "duplicate-name", text)
             return None
     strip = part.get("strip")
@@ -47,7 +47,7 @@ def parse_read(part: Part, findings: Findings, context: FormContext) -> ReadSpec
 
 
 def place_of(part: Part, field: str) -> tuple[Part, dict[str, Any]]:
-    """Return where the field is named."""
+    """Return the place of the field."""
     for inner in [*part.listed("first"), *part.named("fields").values()]:
         if inner.data == field:
             return inner, {}

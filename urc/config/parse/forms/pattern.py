@@ -1,4 +1,4 @@
-"""The form ``pattern``: the frame as it is written, with {name:kind} in the places of fields."""
+"""The form ``pattern``: the frame as received, with {name:kind} at the places of fields."""
 
 import re
 from typing import Any, Final, cast, get_args
@@ -15,11 +15,11 @@ _KINDS: Final = get_args(FieldKind)
 _PIECE = re.compile(r"\{\{|\}\}|\{([^{}]*)\}|[{}]")
 _FIELD = re.compile(r"(_?[A-Za-z][A-Za-z0-9_]*)?:([a-z]+)(?::([1-9][0-9]{0,3}))?")
 _EATS: Final = {"integer": "0123456789", "number": "0123456789.eE", "hex": "0123456789abcdefABCDEF"}
-"""Last characters of a field; the text after it cannot begin with one."""
+"""Possible last characters of a field; the text after it cannot start with one of them."""
 
 
 class _Fault(Exception):
-    """A fault of a pattern, and its place."""
+    """A mistake in a pattern, and its place."""
 
     def __init__(self, message: str, offset: int, length: int = 1, hint: str = "") -> None:
         super().__init__(message)
@@ -38,7 +38,7 @@ def parse_read(part: Part, findings: Findings, context: FormContext) -> ReadSpec
 
 
 def place_of(part: Part, field: str) -> tuple[Part, dict[str, Any]]:
-    """Return where the field stands in the pattern."""
+    """Return the place of the field in the pattern."""
     return part, {"offset": str(part.data).find("{" + field + ":") + 1, "length": len(field)}
 
 
@@ -54,9 +54,9 @@ def _parse(text: str) -> tuple[tuple[Hole, ...], str]:
             literal += piece[0][0]
         elif piece[1] is None:
             hint = "write {{ or }} for a brace of the frame"
-            raise _Fault(f"{piece[0]!r} has no partner", piece.start(), hint=hint)
+            raise _Fault(f"{piece[0]!r} is not closed or not opened", piece.start(), hint=hint)
         else:
-            # Before a field of fixed width, every blank is a place of its own.
+            # Before a field of fixed width, blanks are counted.
             is_fixed = piece[1].rpartition(":")[2].isdecimal()
             before = literal if is_fixed else _blanks(literal)
             _check_after(holes, before, last)
@@ -75,7 +75,7 @@ def _blanks(literal: str) -> str:
 def _hole(inside: str, before: str, offset: int, holes: list[Hole]) -> Hole:
     found = _FIELD.fullmatch(inside)
     if found is None:
-        text = f"'{{{inside}}}' is no field"
+        text = f"'{{{inside}}}' is not a field"
         hint = f"write {{name:kind}}; kinds are {', '.join(_KINDS)}"
         raise _Fault(text, offset - 1, len(inside) + 2, hint)
     name, kind = found[1] or "", found[2]
@@ -84,24 +84,24 @@ def _hole(inside: str, before: str, offset: int, holes: list[Hole]) -> Hole:
         text = f"there is no kind of field {kind!r}"
         raise _Fault(text, offset + found.start(2), len(kind), hint)
     if name and any(hole.name == name for hole in holes):
-        raise _Fault(f"the field {name!r} stands here twice", offset, len(name))
+        raise _Fault(f"the field {name!r} occurs twice", offset, len(name))
     if found[3] and kind == "rest":
-        text = "the rest has no width: it is everything to the end"
+        text = "a field of kind 'rest' has no width: it takes everything to the end"
         raise _Fault(text, offset + found.start(3), len(found[3]))
     return Hole(before, name, cast("FieldKind", kind), int(found[3] or 0))
 
 
 def _check_after(holes: list[Hole], literal: str, last: tuple[int, int]) -> None:
-    """Complain when it cannot be told where the last field ends."""
+    """Raise `_Fault` when the end of the last field is ambiguous."""
     if not holes or holes[-1].width:
         return
     kind, (start, end) = holes[-1].kind, last
     if kind == "rest":
         raise _Fault("nothing can follow a field of kind 'rest'", start, end - start)
     if not literal:
-        hint = "put what stands between them, or say a width: {name:number:6}"
-        text = "there is nothing between this field and the next one"
+        hint = "write the text between them, or give a width: {name:number:6}"
+        text = "there is no text between this field and the next"
         raise _Fault(text, start, end - start, hint)
     if literal[0] in _EATS.get(kind, ""):
-        text = f"{literal[0]!r} after it could belong to the {kind}"
+        text = f"{literal[0]!r} after it could be part of the {kind}"
         raise _Fault(text, start, end - start, "use a regex")

@@ -15,5 +15,5 @@ def parse_read(part: Part, findings: Findings, context: FormContext) -> ReadSpec
 
 
 def place_of(part: Part, field: str) -> tuple[Part, dict[str, Any]]:
-    """Return where the field is named."""
+    """Return the place of the field."""
     return part, {}

@@ -18,5 +18,5 @@ def parse_read(part: Part, findings: Findings, context: FormContext) -> ReadSpec
 
 
 def place_of(part: Part, field: str) -> tuple[Part, dict[str, Any]]:
-    """Return where the group `field` stands in the pattern."""
+    """Return the place of the group `field` in the pattern."""
     return part, {"offset": str(part.data).find(f"<{field}>") + 1, "length": len(field)}

@@ -23,11 +23,11 @@ def parse_read(part: Part, findings: Findings, context: FormContext) -> ReadSpec
         if name.endswith(_MORE) and name != _MORE and inner is items[-1]:
             name, tail = name.removesuffix(_MORE), name.removesuffix(_MORE)
         if name.endswith(_MORE):
-            text = "'...' can only stand at the end"
+            text = "'...' is only possible at the end"
             findings.error(inner, "bad-name", text)
             is_good = False
         elif name in names and name:
-            findings.error(inner, "duplicate-name", f"the field {name!r} stands here twice")
+            findings.error(inner, "duplicate-name", f"the field {name!r} occurs twice")
             is_good = False
         names.append(name)
     strip = part.get("strip")
@@ -42,7 +42,7 @@ def parse_read(part: Part, findings: Findings, context: FormContext) -> ReadSpec
 
 
 def place_of(part: Part, field: str) -> tuple[Part, dict[str, Any]]:
-    """Return where the field is named."""
+    """Return the place of the field."""
     for inner in part.listed("fields"):
         if inner.data in (field, field + _MORE):
             return inner, {}

@@ -1,4 +1,4 @@
-"""The form ``struct``: binary items, both when reading and when sending."""
+"""The form ``struct``: binary items, for received and sent frames."""
 
 from collections.abc import Iterable, Iterator
 from typing import Any, cast
@@ -26,7 +26,7 @@ Uses = tuple[tuple[tuple[str | int, ...], Template], ...]
 
 
 def parse_read(part: Part, findings: Findings, context: FormContext) -> ReadSpec | None:
-    """Return the items at `part`, and their ids as fields."""
+    """Return the items at `part`, with their ids as fields."""
     before = len(findings.problems)
     parser = ItemParser(findings, context.types, context.enums, "read", context.encoding)
     items = parser.items(part)
@@ -37,7 +37,7 @@ def parse_read(part: Part, findings: Findings, context: FormContext) -> ReadSpec
 
 
 def parse_write(part: Part, findings: Findings, context: FormContext) -> WriteSpec | None:
-    """Return the items at `part`, whose ids are arguments unless they are computed."""
+    """Return the items at `part`, with the ids as arguments unless they are computed."""
     before = len(findings.problems)
     parser = ItemParser(findings, context.types, context.enums, "send", context.encoding)
     items = parser.items(part)
@@ -63,7 +63,7 @@ def parse_write(part: Part, findings: Findings, context: FormContext) -> WriteSp
 def _check_size(
     part: Part, items: tuple[Item, ...], framing: FramingSpec | None, findings: Findings
 ) -> None:
-    """Report items that no frame of the line can hold."""
+    """Report items that do not fit the frames of the transport."""
     if framing is None:
         return
     layout = framing.options.get("layout")
@@ -72,12 +72,12 @@ def _check_size(
     if isinstance(layout, FrameLayout) and layout.size is not None:
         room = layout.size - around
         if least > room or (size is not None and size < room):
-            over = f"write {{ size: {room - least} }} for what means nothing"
+            over = f"write {{ size: {room - least} }} for unused bytes"
             hint = over if least < room else ""
-            text = f"the items take {least} bytes, and a frame of this line holds {room}"
+            text = f"the items take {least} bytes, and a frame of this transport holds {room}"
             findings.error(part, "does-not-fit", text, hint=hint)
     elif least + around > framing.max_bytes:
-        text = f"the items take {least} bytes, and a frame of this line has {framing.max_bytes}"
+        text = f"the items take {least} bytes, and a frame on this line has {framing.max_bytes}"
         findings.error(part, "does-not-fit", text + " at most", hint="raise 'max' of the framing")
 
 
@@ -93,7 +93,7 @@ def templates(part: Part, spec: WriteSpec) -> Iterable[tuple[Part, Template]]:
 
 
 def place_of(part: Part, field: str) -> tuple[Part, dict[str, Any]]:
-    """Return where the item that gives `field` is named."""
+    """Return the place of the item that sets `field`."""
     nearest = part
     for place, name in _named(part, ""):
         if name == field:
@@ -110,7 +110,7 @@ def _inside(place: Part, name: str) -> dict[str, Any]:
 
 
 def _named(part: Part, outer: str) -> Iterator[tuple[Part, str]]:
-    """Yield the place and the name of every item that has one, and nameless types with ""."""
+    """Yield place and name of every named item, and of nameless types with ""."""
     for item in part.items():
         if isinstance(item.data, str):
             _, _, name = item.data.strip().partition(" ")

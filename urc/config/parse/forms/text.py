@@ -1,4 +1,4 @@
-"""The form ``text``: a template, as it stands under ``send:``."""
+"""The form ``text``: a template, as written under ``send:``."""
 
 from collections.abc import Iterable
 from typing import cast

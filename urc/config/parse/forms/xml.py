@@ -1,4 +1,4 @@
-"""The form ``xml``: fields out of an XML document, by the elements that lead to them."""
+"""The form ``xml``: fields from an XML document, by the path of their elements."""
 
 import re
 from typing import Any
@@ -17,11 +17,11 @@ _STEP = re.compile(
 _TEST = re.compile(rf"""\[@({_NAME})=(?:'([^']*)'|"([^"]*)")\]""")
 _ATTRIBUTE = re.compile(r"@([A-Za-z_][\w.:-]*)")
 _PIECE = re.compile(r"(?:\[[^\]]*\]|[^/\[])*")
-"""Up to the next stroke that is not in brackets."""
+"""Text up to the next slash outside of brackets."""
 
 
 def parse_read(part: Part, findings: Findings, context: FormContext) -> ReadSpec | None:
-    """Return where each field is."""
+    """Return the path of each field."""
     paths: dict[str, XmlPath | None] = {}
     root: XmlStep | None = None
     for name, inner in part.entries().items():
@@ -30,8 +30,8 @@ def parse_read(part: Part, findings: Findings, context: FormContext) -> ReadSpec
             root = root or path.steps[0]
             if path.steps[0] != root:
                 start, other = _spelt(path.steps[0]), _spelt(root)
-                text = f"this path starts at {start!r}, another one at {other!r}"
-                hint = "a document has one root element: give each its own message"
+                text = f"this path starts at {start!r}, and another at {other!r}"
+                hint = "a document has one root element: write one message for each root"
                 findings.error(inner, "bad-path", text, hint=hint)
                 paths[name] = None
     if None in paths.values():
@@ -40,7 +40,7 @@ def parse_read(part: Part, findings: Findings, context: FormContext) -> ReadSpec
 
 
 def place_of(part: Part, field: str) -> tuple[Part, dict[str, Any]]:
-    """Return where the field is named."""
+    """Return the place of the field."""
     return part.must(field), {"key": True}
 
 
@@ -58,7 +58,7 @@ def _path(part: Part, findings: Findings) -> XmlPath | None:
             findings.error(
                 part,
                 "bad-path",
-                f"{piece!r} is no step of a path",
+                f"{piece!r} is not a step of a path",
                 offset=offset,
                 length=max(1, len(piece)),
                 hint="write root/element/@attribute, root/element[2] or root/element[@name='x']",
@@ -72,10 +72,10 @@ def _path(part: Part, findings: Findings) -> XmlPath | None:
 
 
 def _piece(path: str, offset: int) -> str:
-    """Return the step that begins at `offset`, brackets and all."""
+    """Return the step at `offset`, with its brackets."""
     found = _PIECE.match(path, offset)
     end = found.end() if found else offset
-    # An open bracket ends nothing: the rest is the step, and is reported.
+    # An unclosed bracket takes the rest as one step, which is then reported.
     return path[offset:end] if path[end : end + 1] in ("", "/") else path[offset:]
 
 

@@ -1,7 +1,7 @@
 """The items of a ``struct:``, or of an entry of ``types:``: list → `Item`s.
 
-One `ItemParser` reads one scope: the ids that its expressions can name. `_KEYS` has the keys of
-each kind of item; `numbers` checks numbers, constants and enums.
+An `ItemParser` reads one scope: the ids that its expressions can name. `_KEYS` has the keys of each
+kind of item; `numbers` checks numbers, constants and enums.
 """
 
 from collections.abc import Mapping
@@ -29,9 +29,9 @@ Purpose = Literal["read", "send", "type"]
 Items = tuple[Item, ...]
 
 MOST_ITEMS: Final = 2000
-"""Items of one frame, those of its types included."""
+"""Maximum items of one frame, including those of its types."""
 DEEPEST: Final = 16
-"""Types and switches in each other."""
+"""Maximum nesting of types and switches."""
 _NUMBER: Final = ("id", "type", "count", "if", "enum", "const", "valid", "scale", "offset", "value")
 _KEYS: Final[Mapping[str, tuple[str, ...]]] = {
     "number": _NUMBER,
@@ -47,7 +47,7 @@ _KEYS: Final[Mapping[str, tuple[str, ...]]] = {
 
 
 class ItemParser:
-    """Reads the items of one scope."""
+    """A parser for the items of one scope."""
 
     def __init__(
         self,
@@ -66,7 +66,7 @@ class ItemParser:
         self.leaves = LeafParser(findings, enums, self.scope)
 
     def items(self, part: Part) -> Items:
-        """Return the items of the list at `part`, without the reported ones."""
+        """Return the items of the list at `part`, without the invalid items."""
         found: list[Item | None] = []
         total = 0
         for inner in part.items():
@@ -74,22 +74,22 @@ class ItemParser:
             found.append(item)
             total += weight_of(item)
             if total > MOST_ITEMS:
-                text = f"with its types it has more than {MOST_ITEMS} items"
+                text = f"it has more than {MOST_ITEMS} items, including those of its types"
                 self.findings.error(inner, "wrong-size", text)
                 return ()
         self._check_rest(part, found)
         return tuple(item for item in found if item is not None)
 
     def _check_rest(self, part: Part, found: list[Item | None]) -> None:
-        """Report an item behind one that takes all the rest."""
+        """Report an item after another item that takes the rest of the frame."""
         for place, item in enumerate(found[:-1]):
             extents = (item.size, item.times) if item is not None else ()
             if any(extent is not None and extent.kind == "rest" for extent in extents):
                 self.findings.error(
                     part.items()[place + 1],
                     "after-rest",
-                    "the item before takes all the rest of the frame",
-                    hint="say its size, or put it last",
+                    "the item before it takes the rest of the frame",
+                    hint="give that item a size, or put it last",
                 )
 
     def _item(self, part: Part) -> Item | None:
@@ -97,7 +97,7 @@ class ItemParser:
         if item is None:
             return None
         if depth_of(item) > DEEPEST:
-            text = f"types and switches are nested more than {DEEPEST} deep"
+            text = f"types and switches are nested more than {DEEPEST} levels deep"
             self.findings.error(part, "too-deep", text)
             return None
         self._check_sent(part, item)
@@ -120,7 +120,7 @@ class ItemParser:
             self.findings.error(
                 part,
                 "bad-item",
-                f"a name or a constant is expected behind {word!r}",
+                f"expected a name or a constant after {word!r}",
                 hint=f"write '{word} speed', '{word} 8', or {{ size: {number.size} }} to skip it",
             )
             return None
@@ -132,14 +132,14 @@ class ItemParser:
         return Item(kind_of(number), "", number, const=constant)
 
     def _long(self, part: Part) -> Item | None:
-        """Return an item that is a mapping."""
+        """Return an item from a mapping."""
         kind = self._kind(part)
         if kind is None:
             return None
         for key in part.data:
             if key not in _KEYS[kind]:
                 self.findings.error(
-                    part, "misplaced-key", f"'{key}' means nothing for {_NOUNS[kind]}",
+                    part, "misplaced-key", f"'{key}' has no effect for {_NOUNS[kind]}",
                     at=key, key=True,
                 )  # fmt: skip
                 return None
@@ -158,7 +158,7 @@ class ItemParser:
         if named is None:
             if "size" in part.data and "id" not in part.data and "bits" not in part.data:
                 return "padding"
-            text = "'type' is missing from an item"
+            text = "an item lacks 'type'"
             self.findings.error(part, "missing-key", text, key=True, hint="for example 'type: u8'")
             return None
         if "bits" in part.data:
@@ -190,7 +190,7 @@ class ItemParser:
         times = self._extent(part.get("count"))
         if kind == "padding":
             if size is not None and size.kind == "prefix":
-                text = "what is skipped has no size in front of it"
+                text = "the size of skipped bytes cannot be a type"
                 self.findings.error(part.must("size"), "bad-item", text)
                 return None
             return Item("padding", size=size, pad=part.integer("pad") or 0)
@@ -207,12 +207,12 @@ class ItemParser:
             size_is_free = item.size is not None and item.size.kind != "fixed"
             if not size_is_free or fixed_size(_without_rest(items)) is None:
                 self.findings.error(
-                    part, "misplaced-key", "'trim' is for a fixed type in a window of another size",
-                    at="trim", key=True, hint="say 'size: rest', or an item that is the size",
+                    part, "misplaced-key", "'trim' needs a fixed type in a window of another size",
+                    at="trim", key=True, hint="write 'size: rest', or name the item with the size",
                 )  # fmt: skip
                 return None
         if item.value is not None and item.times is None:
-            text = "'value' means nothing for a struct that is no array"
+            text = "'value' of a struct needs an array"
             self.findings.error(part, "misplaced-key", text, at="value", key=True)
         return item._replace(items=items, trim=trim)
 
@@ -222,19 +222,19 @@ class ItemParser:
             self.findings.error(part, "missing-key", text, key=True, hint="{ size: … } skips bytes")
             return None
         if item.const is not None:
-            text = "'const' means nothing for an array"
+            text = "'const' has no effect for an array"
             self.findings.error(part, "misplaced-key", text, at="const", key=True)
             return None
         if item.kind == "packed":
             return item
         if least_size((item._replace(times=None, condition=None),)) == 0:
-            text = "each of its items has to take a byte at least"
+            text = "each of its items must take at least one byte"
             self.findings.error(part, "bad-item", text, at="count")
             return None
         return item
 
     def _extent(self, part: Part | None) -> Extent | None:
-        """Return a size or count: a number, ``rest``, a type in front of it, or an expression."""
+        """Return a size or count: a number, ``rest``, a type before the item, or an expression."""
         if part is None:
             return None
         if not isinstance(part.data, str):
@@ -245,7 +245,7 @@ class ItemParser:
         if prefix is not None:
             if prefix.kind in ("integer", "varint") and not prefix.is_signed:
                 return Extent("prefix", prefix=prefix)
-            text = f"a size has no sign and no fraction, {part.data!r} has"
+            text = f"a size must be a whole number without a sign, found {part.data!r}"
             self.findings.error(part, "bad-item", text)
             return None
         expression = self.scope.expression(part)
@@ -283,30 +283,30 @@ class ItemParser:
         return items
 
     def _check_case(self, part: Part, subject: Item | None) -> None:
-        """Report a case that the item can never choose."""
+        """Report a case for a value that the item can never have."""
         key = case_key(part.name)
         if subject is None or subject.kind not in ("number", "coded"):
             return
         words = [word for _, word in subject.enum]
         if isinstance(key, str) and subject.number.kind == "integer" and key not in words:
             text = f"{key!r} is no value of {subject.id!r}"
-            hint = f"its words: {', '.join(words)}" if words else "it has numbers only"
+            hint = f"its words: {', '.join(words)}" if words else "it has only numbers"
             self.findings.error(part, "unknown-word", text, key=True, hint=hint)
         elif isinstance(key, int) and key in dict(subject.enum):
             word = dict(subject.enum)[key]
-            text = f"{subject.id!r} is read as the word {word!r}, never as {key}"
+            text = f"{subject.id!r} has the word {word!r} for this value, never {key}"
             self.findings.error(part, "unknown-word", text, key=True, hint=f"write {word}:")
         elif isinstance(key, int) and subject.number.kind == "integer":
             check_fits(part, subject.number, key, self.findings, key=True)
 
     def _check_sent(self, part: Part, item: Item) -> None:
-        """Report what would be sent and has no value."""
+        """Report an item of a sent struct that has no value."""
         if self.purpose == "send" and asks_for_the_end(item):
             self.findings.error(
                 part,
                 "nothing-to-send",
-                "what is sent has no end yet: '_left' and '_size' cannot say how it goes on",
-                hint="write 'rest' for all that is left, or let an item before say the size",
+                "'_left' and '_size' are unknown while a frame is built",
+                hint="write 'rest' for the remaining bytes, or give the size in an earlier item",
             )
         if self.purpose != "send" or item.kind not in (
             "number",
@@ -318,13 +318,13 @@ class ItemParser:
             return
         if not item.id and item.const is None and item.value is None:
             self.findings.error(
-                part, "nothing-to-send", "it has neither 'id' nor 'const' nor 'value'",
-                hint="name the argument, or write { size: … } for bytes that mean nothing",
+                part, "nothing-to-send", "'id', 'const' or 'value' is missing",
+                hint="name the argument, or write { size: … } for unused bytes",
             )  # fmt: skip
 
 
 def _without_rest(items: Items) -> Items:
-    """Return the items without a last one that takes the rest of a longer window."""
+    """Return the items without padding at the end that takes the rest of a longer window."""
     is_rest = bool(items) and items[-1].size is not None and items[-1].size.kind == "rest"
     return items[:-1] if is_rest and items[-1].kind == "padding" else items
 
@@ -336,21 +336,21 @@ _NOUNS: Final = {
     "bits": "bits",
     "bytes": "bytes",
     "text": "text",
-    "padding": "bytes that are skipped",
+    "padding": "skipped bytes",
     "struct": "a struct",
     "switch": "a switch",
 }
 
 
 def _inner(item: Item) -> list[Items]:
-    """Return the lists of items inside of an item."""
+    """Return the lists of items inside an item."""
     if item.switch is None:
         return [item.items]
     return [*(case for _, case in item.switch.cases), item.switch.default or ()]
 
 
 def asks_for_the_end(item: Item) -> bool:
-    """Return whether the size of the whole frame says how large an item is, or which it is."""
+    """Return whether the size or choice of an item depends on the size of the whole frame."""
     by = None if item.switch is None else item.switch.by
     extents = [extent.expression for extent in (item.size, item.times) if extent is not None]
     if any(one is not None and one.names & FRAME_NAMES for one in (by, *extents)):
@@ -359,13 +359,13 @@ def asks_for_the_end(item: Item) -> bool:
 
 
 def weight_of(item: Item | None) -> int:
-    """Return how many items an item is; each type in it was found small enough before."""
+    """Return the number of items that an item expands to; its types were checked before."""
     if item is None:
         return 0
     return 1 + sum(weight_of(one) for items in _inner(item) for one in items)
 
 
 def depth_of(item: Item) -> int:
-    """Return how many types and switches are nested in an item."""
+    """Return the nesting depth of types and switches in an item."""
     depths = [depth_of(one) for items in _inner(item) for one in items]
     return max(depths, default=0) + (item.kind in ("struct", "switch"))

@@ -13,12 +13,12 @@ __all__ = ["LeafParser", "kind_of", "parse_content"]
 
 
 def kind_of(number: Number) -> Literal["number", "coded"]:
-    """Return the kind of item that such a number is."""
+    """Return the item kind of a number."""
     return "coded" if number.is_coded else "number"
 
 
 class LeafParser:
-    """Reads numbers, for the parser of all items."""
+    """A parser for items without inner items."""
 
     def __init__(
         self, findings: Findings, enums: Mapping[str, tuple[tuple[int, str], ...]], scope: Scope
@@ -28,10 +28,10 @@ class LeafParser:
         self.scope = scope
 
     def number(self, part: Part, name: str, times: Extent | None) -> Item:
-        """Return a number, or an array of them."""
+        """Return a number, or an array of numbers."""
         parser = NumberParser(part, self.findings)
         number = number_of(part.text("type"))
-        assert number is not None  # noqa: S101  # `_kind` has looked
+        assert number is not None  # noqa: S101  # checked by `_kind`
         return Item(
             kind_of(number),
             name,
@@ -46,15 +46,15 @@ class LeafParser:
         )
 
     def packed(self, part: Part, name: str, times: Extent | None) -> Item | None:
-        """Return an array of numbers that are no whole bytes, such as ``u11``."""
+        """Return an array of numbers that take no whole bytes, such as ``u11``."""
         parser, number, count = (
             NumberParser(part, self.findings),
             width_of(part.text("type")),
             part.must("count"),
         )
-        assert number is not None  # noqa: S101  # `_kind` has looked
+        assert number is not None  # noqa: S101  # checked by `_kind`
         if times is None or times.kind != "fixed" or number.bits * times.number % 8:
-            text = f"numbers of {number.bits} bits need a count with which they fill whole bytes"
+            text = f"numbers of {number.bits} bits need a count that fills whole bytes"
             self.findings.error(count, "wrong-size", text, hint="such as 8, 16 or 24")
             return None
         return Item(
@@ -70,11 +70,11 @@ class LeafParser:
         )
 
     def bits(self, part: Part, name: str) -> Item | None:
-        """Return the parts of a whole number."""
+        """Return the bit fields of a whole number."""
         named = part.must("type")
         number = number_of(named.data)
         if number is None or number.kind != "integer" or number.is_signed or number.is_coded:
-            text = f"bits lie in a whole number without a sign, not in {named.data!r}"
+            text = f"bits need an unsigned whole number, found {named.data!r}"
             self.findings.error(named, "bad-item", text, hint="such as u8 or u16be")
             return None
         parts = [self._bit(inner) for inner in part.listed("bits")]
@@ -83,8 +83,8 @@ class LeafParser:
             self.findings.error(
                 part.must("bits"),
                 "wrong-size",
-                f"they take {widths} bits, and {named.data} has {number.bits}",
-                hint="give what is reserved its own { width: … }" if widths < number.bits else "",
+                f"the bits take {widths} in all, and {named.data} has {number.bits}",
+                hint="declare reserved bits with { width: … }" if widths < number.bits else "",
             )
             return None
         is_lsb_first = part.text("order", "msb") == "lsb"
@@ -119,26 +119,26 @@ def parse_content(part: Part, item: Item, encoding: str, findings: Findings) -> 
     if const is not None:
         for key in ("size", "until", "pad", "value", "count"):
             if key in part.data:
-                text = f"'{key}' means nothing for a constant"
+                text = f"'{key}' has no effect for a constant"
                 findings.error(part, "misplaced-key", text, at=key, key=True)
                 return None
         return item._replace(const=const, size=Extent("fixed", len(const)), encoding=own)
     if (item.size is None) == (until is None):
         if item.size is None and ("size" in part.data or "until" in part.data):
-            return None  # it was reported
+            return None  # already reported
         key = "until" if until is not None else ""
         findings.error(
             part,
             "misplaced-key" if key else "missing-key",
-            "both 'size' and 'until' say where it ends" if key else "nothing says where it ends",
+            "'size' and 'until' both define its end" if key else "'size' or 'until' is missing",
             at=key,
             key=True,
-            hint="'size: 8', 'size: u8' with its length in front, 'size: rest', or 'until: NUL'",
+            hint="'size: 8', 'size: u8' for a length before it, 'size: rest', or 'until: NUL'",
         )
         return None
     is_fixed = item.size is not None and item.size.kind == "fixed"
     if "pad" in part.data and not is_fixed:
-        text = "'pad' means nothing where the size is not fixed"
+        text = "'pad' needs a fixed size"
         findings.error(part, "misplaced-key", text, at="pad", key=True)
         return None
     return item._replace(until=until or b"", pad=part.integer("pad") or 0, encoding=own)
@@ -147,6 +147,6 @@ def parse_content(part: Part, item: Item, encoding: str, findings: Findings) -> 
 def _bytes(part: Part | None, encoding: str, findings: Findings) -> bytes | None:
     found = parse_bytes(part, encoding, findings) if part is not None else None
     if part is not None and found == b"":
-        findings.error(part, "wrong-size", "at least one byte is expected")
+        findings.error(part, "wrong-size", "expected at least one byte")
         return None
     return found

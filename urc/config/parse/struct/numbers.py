@@ -43,13 +43,13 @@ def written_constant(text: str) -> int | float | bool | None:
 def unknown_type(
     part: Part, word: str, types: Iterable[str], findings: Findings, *, only_types: bool = False
 ) -> None:
-    """Report a word that is no type."""
+    """Report a word that is not a type."""
     if width_of(word) is not None and number_of(f"{word}be") is None:
-        hint = f"only arrays have numbers of {word[1:]} bits: {{ type: {word}, count: 16 }}"
+        hint = f"only arrays may have numbers of {word[1:]} bits: {{ type: {word}, count: 16 }}"
     elif number_of(f"{word}be") is not None:
-        hint = f"say the order of its bytes: {word}be or {word}le"
+        hint = f"add the byte order: {word}be or {word}le"
     elif word[:-2] in ("u8", "i8"):
-        hint = f"one byte has no order: {word[:-2]}"
+        hint = f"one byte has no byte order: {word[:-2]}"
     else:
         known = [*types, *(() if only_types else (*_COMMON_TYPES, *WORDS_OF_TYPES))]
         hint = did_you_mean(word, known, "types")
@@ -77,14 +77,14 @@ def check_fits(
 
 
 class NumberParser:
-    """Reads the keys of one number."""
+    """A parser for the keys of one number."""
 
     def __init__(self, part: Part, findings: Findings) -> None:
         self._part = part
         self._findings = findings
 
     def width(self) -> Number:
-        """Return the number that one of ``bits`` is."""
+        """Return the number of one field of ``bits``."""
         return Number(
             "integer",
             self._part.integer("width") or 1,
@@ -98,19 +98,19 @@ class NumberParser:
             return None
         for key in ("value", "enum", "scale", "offset", "valid"):
             if key in self._part.data:
-                text = f"'{key}' means nothing for a constant, which is raw"
+                text = f"'{key}' has no effect for a constant"
                 self._findings.error(self._part, "misplaced-key", text, at=key, key=True)
         check_fits(inner, number, inner.data, self._findings)
         is_number = isinstance(inner.data, (bool, int, float))
         return inner.data if is_number else 0
 
     def scale(self) -> float:
-        """Return ``scale``; 0 would make every number the same."""
+        """Return ``scale``; report 0, which would make every number the same."""
         inner = self._part.get("scale")
         if inner is not None and isinstance(inner.data, str):
             return fraction_of(inner.data)
         if inner is not None and inner.data == 0:
-            self._findings.error(inner, "zero-scale", "a scale of 0 cannot be undone")
+            self._findings.error(inner, "zero-scale", "expected a scale other than 0")
             return 1
         return 1 if inner is None else inner.data
 
@@ -134,17 +134,17 @@ def parse_enums(part: Part, findings: Findings) -> dict[str, Enum]:
 
 
 def parse_enum(part: Part, number: Number, enums: Mapping[str, Enum], findings: Findings) -> Enum:
-    """Return ``enum`` of an item: one of the driver's, or its own."""
+    """Return ``enum`` of an item: an enum of the driver, or its own."""
     inner = part.get("enum")
     if inner is None:
         return ()
     if number.kind == "boolean":
-        text = "'enum' means nothing for true and false"
+        text = "'enum' has no effect for booleans"
         findings.error(part, "misplaced-key", text, at="enum", key=True)
         return ()
     for key in ("scale", "offset"):
         if key in part.data:
-            text = f"'{key}' means nothing beside 'enum'"
+            text = f"'{key}' has no effect with 'enum'"
             findings.error(part, "misplaced-key", text, at=key, key=True)
     is_named = isinstance(inner.data, str)
     enum = enums.get(inner.data) if is_named else _enum(inner, findings)
@@ -172,11 +172,11 @@ def _enum(part: Part, findings: Findings) -> Enum:
     for key, inner in part.entries().items():
         raw, word = int(key, 0), str(inner.data)
         if raw in found:
-            text = f"{key} is {raw}, which is here already"
+            text = f"{key} is {raw}, which already has a word"
             findings.error(inner, "duplicate-name", text, key=True)
         elif word in words:
-            text = f"another number is called {word!r} too"
-            hint = "give each its own word: it is also how the word becomes a number again"
+            text = f"another number has the word {word!r}"
+            hint = "give each number its own word, so that a word stands for one number"
             findings.error(inner, "duplicate-name", text, hint=hint)
         found[raw] = word
         words.add(word)

@@ -1,4 +1,4 @@
-"""The names that the expressions of one struct can use, and each of them only once."""
+"""The names for the expressions of one struct, each declared only once."""
 
 from collections.abc import Iterator
 from typing import Literal
@@ -12,18 +12,18 @@ __all__ = ["Scope"]
 
 
 class Scope:
-    """The names known at one point of a struct: the items before it."""
+    """The names known at one point of a struct, from the items before it."""
 
     def __init__(self, findings: Findings, purpose: Literal["read", "send", "type"]) -> None:
         self.known: dict[str, Item | None] = {}
-        """Name → its item, where it is one of this struct."""
+        """Name → item; None for a name that is not an item of this struct."""
         self.uses: list[tuple[Part, Template]] = []
-        """Expressions that can name arguments and settings, with their places."""
+        """Expressions over arguments and settings, with their places."""
         self._findings = findings
         self._purpose = purpose
 
     def get(self, name: str) -> Item | None:
-        """Return the item called `name`."""
+        """Return the item with this name."""
         return self.known.get(name.strip())
 
     @staticmethod
@@ -32,10 +32,10 @@ class Scope:
         yield from names_of((item,))
 
     def add(self, part: Part, item: Item) -> None:
-        """Add an item; report a second one of the same name at `part`."""
+        """Add an item; report a second item of the same name at `part`."""
         own = {one.id: one for one in scope_of((item,)) if one.id}
         if item.switch is not None:
-            return  # its cases were noted one by one
+            return  # its cases were added one by one
         for name in self.names(item):
             self.know(part, name, own.get(name))
             if self._purpose == "send" and own.get(name, item).value is None:
@@ -44,20 +44,20 @@ class Scope:
             self.uses += [(part, one) for one in _outer_values(item.items)]
 
     def know(self, part: Part, name: str, item: Item | None) -> None:
-        """Take note of one name."""
+        """Add one name."""
         if name in self.known:
             at = "id" if isinstance(part.data, dict) and "id" in part.data else ""
-            text = f"another item is called {name!r} too"
+            text = f"another item has the name {name!r}"
             self._findings.error(part, "duplicate-name", text, at=at, hint="give each its own name")
         self.known[name] = item
 
     def check_name(self, part: Part, name: str) -> None:
-        """Report an id that means something else already."""
+        """Report an id that already has another meaning."""
         if name in FRAME_NAMES or number_of(name) is not None or name == "settings":
-            self._findings.error(part, "bad-name", f"{name!r} means something else here")
+            self._findings.error(part, "bad-name", f"{name!r} has another meaning here")
         elif name and not (name.isidentifier() and name.isascii() and name == name.lower()):
-            text = f"{name!r} cannot be the name of an item"
-            hint = "lower-case letters, digits and underscores"
+            text = f"{name!r} is not a valid item name"
+            hint = "use lower-case letters, digits and underscores"
             self._findings.error(part, "bad-name", text, hint=hint)
 
     def expression(self, part: Part) -> Template | None:
@@ -73,7 +73,7 @@ class Scope:
         if part is None:
             return None
         if isinstance(part.data, str):
-            # What a type sends may come from outside of it; reading never looks at a 'value'.
+            # A sent type may use names from outside; a received struct ignores 'value'.
             return self._expression(part, OUTER_NAMES if self._purpose == "type" else frozenset())
         from urc.expressions import compile_expression
 
@@ -88,7 +88,7 @@ class Scope:
             self._findings.error(
                 part,
                 "unknown-name",
-                f"{name!r} is no item before this one",
+                f"no earlier item has the name {name!r}",
                 offset=max(found, 0),
                 length=len(name),
                 hint=self._hint(name),
@@ -98,16 +98,16 @@ class Scope:
     def _hint(self, name: str) -> str:
         if name in ("settings", COUNTERS) and self._purpose == "type":
             return (
-                "only the 'value' of a type's item knows settings and seq():"
-                " what frames are read by cannot depend on them"
+                "only the 'value' of an item in a type may use settings and seq():"
+                " frames are decoded without them"
             )
         if name == "settings":
-            return "what a frame must hold by a setting is said in 'when', beside the struct"
+            return "compare a frame with a setting in 'when', next to the struct"
         return did_you_mean(name, [*self.known, *FRAME_NAMES], "names")
 
 
 def _outer_values(items: tuple[Item, ...]) -> Iterator[Template]:
-    """Yield what the values of a type's items take from outside of it."""
+    """Yield the outer names in the values of a type's items."""
     for item in items:
         if item.value is not None and item.value.names & OUTER_NAMES:
             one = item.value
@@ -120,6 +120,6 @@ def _outer_values(items: tuple[Item, ...]) -> Iterator[Template]:
 
 
 def _argument(part: Part, name: str) -> Template:
-    """Return the use of an argument, whose source is the text that names it in the document."""
+    """Return the use of an argument; its source is its text in the document."""
     source = part.data if isinstance(part.data, str) else name
     return Template(source, f"ns[{name!r}]", frozenset((name,)), frozenset())
