@@ -77,8 +77,12 @@ def test_a_grid_of_another_document_gives_way_to_tabs(folder: Folder) -> None:
             "missing-key",
             "a tab lacks 'grid'",
         ),
-        ("x: { tabs: { one: { grid: a } }, background: a }", "misplaced-key", "is also in the grid"),
-        ("debug: { grid: a b }", "bad-name", "the name of the built-in interface of every robot"),
+        (
+            "x: { tabs: { one: { grid: a } }, background: a }",
+            "misplaced-key",
+            "is also in the grid",
+        ),
+        ("debug: { grid: a b }", "bad-name", "the built-in interface of every robot"),
     ],
 )
 def test_wrong_tabs_are_told_where_they_stand(

@@ -1,7 +1,7 @@
 """The framing of a transport or of one reply: mapping → `FramingSpec`."""
 
 from collections.abc import Callable
-from re import _constants, _parser  # type: ignore[attr-defined]no public API for the syntax tree
+from re import _constants, _parser  # type: ignore[attr-defined]  # no public API for the syntax tree
 from typing import Any, Final
 
 from urc.config.parse.bytes import parse_bytes
