@@ -30,8 +30,8 @@ def test_a_sound_widget_has_no_findings(folder: Path, capsys: Output) -> None:
     [
         ("template.html.j2", "{% endif %}", "", ": error bad-template: "),
         ("template.html.j2", "options.label", "optons.label", ": error unknown-name: there is no"),
-        ("template.html.j2", "options.label", "options.lable", "none of the options in the mani"),
-        ("template.html.j2", "options.label", "options['lable']", "none of the options in the"),
+        ("template.html.j2", "options.label", "options.lable", "not among the options in the man"),
+        ("template.html.j2", "options.label", "options['lable']", "not among the options in the"),
         ("template.html.j2", "options.label", "options.label | upercase", "No filter named"),
         ("template.html.j2", "options.label", "inputs.value.titel", "in the state 'normal'"),
         ("demo.yaml", "{ value: 12.5 }, shows", "{ valu: 12.5 }, shows", "states.normal.values"),
